@@ -1,0 +1,20 @@
+/* Numbers as text, the same under every locale: the decimal separator is always the point. */
+#ifndef FEEDSIM_NUMBERS_H
+#define FEEDSIM_NUMBERS_H
+
+#include <stdbool.h>
+
+#include "prefix.h"
+
+/* Read the decimal number that `text` starts with: [+-] digits [. digits] [e [+-] digits], at least one digit in the
+ * mantissa; correctly rounded. No leading space, no hexadecimal, no "inf" or "nan"; a number too large for a double is
+ * refused. On success *value is the number and *end (where end is not NULL) the first character behind it; false leaves
+ * both untouched. */
+bool number_parse(const char *text, const char **end, double *value);
+
+#define NUMBER_TEXT_SIZE 32
+
+/* Shortest of %.15g, %.16g and %.17g that reads back as `value`, written to text[NUMBER_TEXT_SIZE]; returns text. */
+char *number_text(char *text, double value);
+
+#endif

@@ -1,0 +1,214 @@
+"""Variables -> modelDescription.xml (FMI 2.0, co-simulation)."""
+
+import math
+from collections.abc import Iterable, Sequence
+from xml.etree import ElementTree as ET
+
+from packager import units
+from packager.errors import InputError
+from packager.table import INITIAL, Row, Table
+from packager.variables import Variable
+
+GENERATION_TOOL = "feedsim packager"
+DEFAULT_EXPERIMENT = {"startTime": 0.0, "stopTime": 1.0, "stepSize": 125e-6}  # s; stepSize is the drives' control cycle
+
+# What the shell in src/fmi2 can do, for every unit alike.
+CAPABILITIES: dict[str, bool | int] = {
+    "needsExecutionTool": False,
+    "canHandleVariableCommunicationStepSize": True,
+    "canInterpolateInputs": True,
+    "maxOutputDerivativeOrder": 1,
+    "canRunAsynchronuously": False,  # spelled so in the standard
+    "canBeInstantiatedOnlyOncePerProcess": False,
+    "canNotUseMemoryManagementFunctions": False,
+    "canGetAndSetFMUstate": True,
+    "canSerializeFMUstate": True,
+    "providesDirectionalDerivative": True,
+}
+
+LOG_CATEGORIES = {
+    "logStatusError": "Calls that were refused or failed, with the reason",
+    "logStatusWarning": "Calls that were carried out although something is doubtful",
+    "logEvents": "Instantiation, initialisation, reset and termination",
+    "logFmi2Call": "Every call of an FMI function, with its arguments",
+    "logAll": "All messages",
+}
+
+# unit -> (type name, quantity). A unit that is missing here gets no type, which is no loss but of a nice name.
+TYPES = {
+    "1": ("Ratio", "Ratio"),
+    "m": ("Position", "Length"),
+    "rad": ("Angle", "Angle"),
+    "rad/s": ("AngularVelocity", "AngularVelocity"),
+    "s": ("Duration", "Time"),
+    "Hz": ("Frequency", "Frequency"),
+    "1/s": ("PositionGain", "VelocityGain"),
+    "m/rad": ("Lead", "LengthPerAngle"),
+    "N": ("Force", "Force"),
+    "N.m": ("Torque", "Torque"),
+    "N.m/rad": ("RotationalStiffness", "RotationalSpringConstant"),
+    "N.m.s/rad": ("RotationalDamping", "RotationalDampingConstant"),
+    "N.m/A": ("TorqueConstant", "ElectricalTorqueConstant"),
+    "A": ("Current", "ElectricCurrent"),
+    "V": ("Voltage", "ElectricPotential"),
+    "V/A": ("CurrentGain", "Resistance"),
+    "Ohm": ("Resistance", "Resistance"),
+    "H": ("Inductance", "Inductance"),
+}
+
+
+def describe(table: Table, variables: Sequence[Variable], *, guid: str, version: str, sources: Iterable[str]) -> bytes:
+    """The file's content. `sources` are the C files to compile, by name. Deterministic: no date, no machine."""
+    root = ET.Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": "2.0",
+            "modelName": table.unit,
+            "guid": guid,
+            **({"description": table.summary} if table.summary else {}),
+            "version": version,
+            "license": "MIT",
+            "generationTool": f"{GENERATION_TOOL} {version}",
+            "variableNamingConvention": "structured",
+        },
+    )
+    capabilities = {name: _text(value) for name, value in CAPABILITIES.items()}
+    simulation = ET.SubElement(root, "CoSimulation", {"modelIdentifier": table.unit, **capabilities})
+    files = ET.SubElement(simulation, "SourceFiles")
+    for name in sorted(sources):
+        ET.SubElement(files, "File", name=name)
+    reals = [variable.row for variable in variables if variable.row.kind == "REAL"]
+    _add_units(root, reals)
+    _add_types(root, reals, {variable.name for variable in variables})
+    categories = ET.SubElement(root, "LogCategories")
+    for name, text in LOG_CATEGORIES.items():
+        ET.SubElement(categories, "Category", name=name, description=text)
+    ET.SubElement(root, "DefaultExperiment", {name: _text(value) for name, value in DEFAULT_EXPERIMENT.items()})
+    _add_variables(root, variables)
+    _add_structure(root, variables)
+    ET.indent(root)
+    content: str = ET.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{content}\n'.encode()
+
+
+def _text(value: bool | int | float) -> str:
+    """A value as XML Schema spells it; floats in the shortest form that reads back the same."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value).removesuffix(".0")
+
+
+def _display_units(rows: Iterable[Row]) -> dict[str, list[str]]:
+    """unit -> its display units, both in order of their first use; a unit is not its own display unit."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        names = found.setdefault(row.unit, [])
+        if row.display_unit not in (row.unit, *names):
+            names.append(row.display_unit)
+    return found
+
+
+def _add_units(root: ET.Element, rows: Sequence[Row]) -> None:
+    if not rows:
+        return
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for name, display_names in _display_units(rows).items():
+        unit = units.parse(name)
+        element = ET.SubElement(definitions, "Unit", name=name)
+        base = ET.SubElement(element, "BaseUnit")
+        for symbol, exponent in zip(units.BASE, unit.exponents, strict=True):
+            if exponent:
+                base.set(symbol, str(exponent))
+        if unit.factor != 1:
+            base.set("factor", _text(unit.factor))
+        for display in display_names:
+            ET.SubElement(element, "DisplayUnit", name=display, factor=_text(units.conversion(name, display)))
+
+
+def _add_types(root: ET.Element, rows: Sequence[Row], variable_names: set[str]) -> None:
+    typed = {unit: names for unit, names in _display_units(rows).items() if unit in TYPES}
+    if not typed:
+        return
+    definitions = ET.SubElement(root, "TypeDefinitions")
+    for unit, display_names in typed.items():
+        name, quantity = TYPES[unit]
+        if name in variable_names:
+            raise InputError(f"variable {name}: the name is taken by the type of unit {unit}; FMI wants both unique")
+        real = ET.SubElement(ET.SubElement(definitions, "SimpleType", name=name), "Real", quantity=quantity, unit=unit)
+        if display_names:
+            real.set("displayUnit", display_names[0])
+
+
+def _add_variables(root: ET.Element, variables: Iterable[Variable]) -> None:
+    parent = ET.SubElement(root, "ModelVariables")
+    for variable in variables:
+        row = variable.row
+        element = ET.SubElement(
+            parent,
+            "ScalarVariable",
+            name=variable.name,
+            valueReference=str(variable.reference),
+            description=row.description,
+            causality=row.causality,
+            variability=row.variability,
+        )
+        if initial := INITIAL[row.causality]:
+            element.set("initial", initial)
+        ET.SubElement(element, row.kind.capitalize(), _type_attributes(variable))
+
+
+def _type_attributes(variable: Variable) -> dict[str, str]:
+    row = variable.row
+    attributes: dict[str, str] = {}
+    if row.kind == "REAL":
+        # The unit is repeated beside the type: many importers do not look it up there.
+        if row.unit in TYPES:
+            attributes["declaredType"] = TYPES[row.unit][0]
+        attributes["unit"] = row.unit
+        if row.display_unit != row.unit:
+            attributes["displayUnit"] = row.display_unit
+    if row.kind in ("REAL", "INTEGER"):
+        number = float if row.kind == "REAL" else int
+        for name, value in (("min", row.minimum), ("max", row.maximum)):
+            if math.isfinite(value):
+                attributes[name] = _text(number(value))
+    if variable.start is not None:
+        attributes["start"] = _start(row.kind, variable.start)
+    return attributes
+
+
+def _start(kind: str, start: str) -> str:
+    match kind:
+        case "REAL":
+            return _text(float(start))
+        case "INTEGER":
+            return _text(int(start))
+        case "BOOLEAN":
+            return _text(bool(int(start)))
+    return start
+
+
+def _add_structure(root: ET.Element, variables: Sequence[Variable]) -> None:
+    structure = ET.SubElement(root, "ModelStructure")
+    outputs = [variable for variable in variables if variable.row.causality == "output"]
+    if not outputs:
+        return
+    element = ET.SubElement(structure, "Outputs")
+    for variable in outputs:
+        _add_unknown(element, variable, variable.depends)
+    # Inputs by declaration, so that importers see no loop of initial values where there is none; parameters without
+    # distinction, as no importer solves for them.
+    parameters = [variable.reference for variable in variables if variable.row.causality == "parameter"]
+    element = ET.SubElement(structure, "InitialUnknowns")
+    for variable in outputs:
+        _add_unknown(element, variable, sorted((*variable.depends_initially, *parameters)))
+
+
+def _add_unknown(parent: ET.Element, variable: Variable, references: Sequence[int]) -> None:
+    ET.SubElement(
+        parent,
+        "Unknown",
+        index=str(variable.reference + 1),  # counts from 1; value references are the positions from 0
+        dependencies=" ".join(str(reference + 1) for reference in references),
+        dependenciesKind=" ".join("dependent" for _ in references),
+    )

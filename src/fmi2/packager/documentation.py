@@ -1,0 +1,137 @@
+"""documentation/ of an archive: index.html from the unit's README.md, its variables and the licence."""
+
+import html
+import re
+from collections.abc import Sequence
+
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+from packager.table import Table
+from packager.variables import Variable
+
+_STYLE = """\
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #1c2126; }
+h1, h2, h3 { line-height: 1.2; }
+pre, code { font-family: ui-monospace, Consolas, monospace; font-size: 0.9em; background: #f3f5f7; }
+pre { padding: 0.8rem; overflow-x: auto; }
+table { border-collapse: collapse; display: block; overflow-x: auto; }
+th, td { border: 1px solid #ccd3da; padding: 0.25rem 0.6rem; text-align: left; vertical-align: top; }
+th { background: #eef1f4; }
+td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+"""
+
+_BUILD = """\
+cc -std=c99 -O2 -ffp-contract=off -fPIC -shared -fvisibility=hidden *.c -lm -o {unit}.so
+"""
+
+
+_SYNTHETIC = "<p>Start values are those of a synthetic default machine; no existing machine has them.</p>\n"
+
+_HEADERS = """
+The files fmi2Functions.h, fmi2FunctionTypes.h and fmi2TypesPlatform.h in sources/ are part of the FMI standard and
+under a licence of their own: fmi-headers.txt.
+"""
+
+
+def pages(
+    table: Table,
+    variables: Sequence[Variable],
+    *,
+    readme: str | None,
+    licence: str | None,
+    standard_header: str,
+    version: str,
+    default_machine: bool,
+) -> dict[str, bytes]:
+    """Archive path -> content. Without `readme` or `licence` that part is left out (the caller warns).
+
+    `default_machine`: the numbers are those of the synthetic default machine, and the page says so. `standard_header`
+    is a header of the FMI standard, whose opening comment holds the standard's licence.
+    """
+    found = {"documentation/index.html": _index(table, variables, readme, licence, version, default_machine).encode()}
+    if licence is not None:
+        found["documentation/licenses/license.txt"] = (licence + _HEADERS).encode()
+    found["documentation/licenses/fmi-headers.txt"] = _licence_of(standard_header).encode()
+    return found
+
+
+def _licence_of(header: str) -> str:
+    """From the copyright line to the end of the comment it stands in, without the indentation."""
+    match = re.search(r"^ *Copyright .*?(?=\*/)", header, re.DOTALL | re.MULTILINE)
+    if match is None:
+        raise ValueError("the header of the FMI standard has no copyright notice")
+    return "\n".join(line.removeprefix("   ").rstrip() for line in match[0].rstrip().splitlines()) + "\n"
+
+
+def _index(
+    table: Table,
+    variables: Sequence[Variable],
+    readme: str | None,
+    licence: str | None,
+    version: str,
+    default_machine: bool,
+) -> str:
+    body = _rendered(readme) if readme else f"<h1>{table.unit}</h1>\n<p>{html.escape(table.summary)}.</p>\n"
+    parts = [
+        "<!DOCTYPE html>\n",
+        f'<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{table.unit} {html.escape(version)}</title>\n',
+        f"<style>\n{_STYLE}</style>\n</head>\n<body>\n",
+        body,
+        "<h2>Variables</h2>\n",
+        _SYNTHETIC if default_machine else "",
+        _variable_table(variables),
+        "<h2>Building from the sources</h2>\n",
+        "<p>The folder <code>sources</code> is complete; the C files to compile are listed in modelDescription.xml, ",
+        "nothing needs to be defined, and nothing but the C library and libm is needed:</p>\n",
+        f"<pre><code>{html.escape(_BUILD.format(unit=table.unit))}</code></pre>\n",
+        "<p>To link several units into one program, compile each with ",
+        f"<code>-DFMI2_FUNCTION_PREFIX={table.unit}_</code> (the unit's own name and an underscore).</p>\n",
+    ]
+    if licence is not None:
+        parts.append(f"<h2>Licence</h2>\n<pre>{html.escape(licence)}</pre>\n")
+    return "".join((*parts, "</body>\n</html>\n"))
+
+
+def _rendered(text: str) -> str:
+    """Markdown -> HTML. Links to files of the repository become plain text: the archive has no such files."""
+    markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
+    tokens = markdown.parse(text)
+    for token in tokens:
+        if token.children:
+            token.children = _without_relative_links(token.children)
+    rendered: str = markdown.renderer.render(tokens, markdown.options, {})
+    return rendered
+
+
+def _without_relative_links(tokens: Sequence[Token]) -> list[Token]:
+    kept: list[Token] = []
+    relative = False  # links do not nest
+    for token in tokens:
+        if token.type == "link_open":
+            relative = not re.match(r"https?:|mailto:|#", str(token.attrGet("href")))
+        if not (relative and token.type in ("link_open", "link_close")):
+            kept.append(token)
+        if token.type == "link_close":
+            relative = False
+    return kept
+
+
+def _variable_table(variables: Sequence[Variable]) -> str:
+    heads = ("Name", "Unit", "Shown in", "Causality", "Variability", "Start", "Min", "Max", "Description")
+    lines = [f"<table>\n<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>\n"]
+    for variable in variables:
+        row = variable.row
+        start = "" if variable.start is None else variable.start
+        if row.kind == "BOOLEAN" and start:
+            start = "true" if int(start) else "false"
+        shown = (row.unit or row.kind.capitalize(), row.display_unit)
+        texts = (f"<code>{variable.name}</code>", *map(html.escape, shown))
+        numbers = (start, row.min.removeprefix("NO_MIN"), row.max.removeprefix("NO_MAX"))
+        cells = (
+            *(f"<td>{text}</td>" for text in (*texts, row.causality, row.variability)),
+            *(f'<td class="number">{html.escape(number)}</td>' for number in numbers),
+            f"<td>{html.escape(row.description)}</td>",
+        )
+        lines.append(f"<tr>{''.join(cells)}</tr>\n")
+    return "".join((*lines, "</table>\n"))

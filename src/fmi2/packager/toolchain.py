@@ -1,0 +1,63 @@
+"""The C compiler: which one, and how to run it."""
+
+import importlib.util
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from packager.errors import CompilerError
+
+CANDIDATES = ("cc", "gcc", "clang", "zig")
+
+
+def find_compiler(wanted: str | None = None) -> tuple[str, ...]:
+    """Return the compiler as a command, e.g. ("cc",) or ("python", "-m", "ziglang", "cc").
+
+    In this order: `wanted`, the environment variable CC, cc, gcc, clang, zig, the Python package ziglang.
+    """
+    text = wanted or os.environ.get("CC", "").strip()
+    if text:
+        command = tuple(shlex.split(text, posix=os.name != "nt"))
+        if shutil.which(command[0]) is None:
+            raise CompilerError(f"the C compiler '{text}' cannot be run: no program '{command[0]}' on the search path")
+        return command
+    for name in CANDIDATES:
+        if shutil.which(name):
+            return (name, "cc") if name == "zig" else (name,)
+    if importlib.util.find_spec("ziglang"):
+        return (sys.executable, "-m", "ziglang", "cc")
+    raise CompilerError(f"no C compiler found (looked for {', '.join(CANDIDATES)} and the Python package ziglang)")
+
+
+def is_zig(command: Sequence[str]) -> bool:
+    """Whether the compiler is zig, which can compile for any platform and any glibc."""
+    return any(Path(part).stem in ("zig", "ziglang") for part in command)
+
+
+def run(command: Sequence[str], directory: Path) -> str:
+    """Run a compiler command in `directory` and return its standard output; raises CompilerError with its messages."""
+    environment = {**os.environ, "LC_ALL": "C"}
+    try:
+        done = subprocess.run(
+            command, cwd=directory, env=environment, capture_output=True, encoding="utf-8", errors="replace"
+        )
+    except OSError as error:
+        raise CompilerError(f"cannot run {shlex.join(command[:2])}: {error.strerror}") from error
+    if done.returncode:
+        messages = _messages(done.stderr)
+        raise CompilerError(f"{shlex.join(command)}\nfailed with exit code {done.returncode}:\n{messages}")
+    return done.stdout
+
+
+def _messages(text: str, limit: int = 40) -> str:
+    """The compiler's lines once each (the table is included many times), errors only where there are any."""
+    lines = list(dict.fromkeys(line for line in text.splitlines() if line.strip()))
+    errors = [line for line in lines if re.search(r"\berror\b|undefined reference|multiple definition", line)]
+    shown = errors or lines
+    more = [f"... and {len(shown) - limit} more lines"] if len(shown) > limit else []
+    return "\n".join(shown[:limit] + more)

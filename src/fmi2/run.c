@@ -1,0 +1,128 @@
+/* When the model is asked for what: coefficients, initial values, steps. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "derivatives.h"
+#include "log.h"
+#include "numbers.h"
+#include "shell.h"
+#include "values.h"
+
+/* --- coefficients */
+
+static size_t field_size(Kind kind) {
+    return kind == KIND_REAL ? sizeof(double) : kind == KIND_STRING ? STRING_SIZE : sizeof(int);
+}
+
+static bool parameters_differ(const Unit *unit) {
+    for (size_t i = 0; i < unit->variable_count; i++) {
+        const Variable *variable = &unit->variables[i];
+        if (variable->info->causality == CAUSALITY_parameter &&
+            memcmp(unit_address(unit, variable), unit->derived_for + (variable->offset - SCALARS_AT),
+                   field_size(variable->info->kind)) != 0)
+            return true;
+    }
+    return false;
+}
+
+bool run_derive(Unit *unit, bool may_resize) {
+    if (unit->derived_valid && !(unit->parameters_touched && parameters_differ(unit))) {
+        unit->parameters_touched = false;
+        return true;
+    }
+    unit->derived_valid = false;
+    if (!MODEL.derive(unit))
+        return false;
+    size_t state_size = MODEL.state_size(unit), old_size = unit->block_size - unit->state_at;
+    if (state_size != old_size && !may_resize)
+        return unit_fail(unit, "a tunable parameter changed the size of the model's state from %.0f to %.0f bytes",
+                         (double)old_size, (double)state_size);
+    if (state_size != old_size && !unit_resize_state(unit, state_size))
+        return false;
+    memcpy(unit->derived_for, unit->block + SCALARS_AT, unit->slopes_at - SCALARS_AT);
+    unit->derived_valid = true;
+    unit->parameters_touched = false;
+    log_write(unit, LOG_EVENTS, "coefficients derived from the parameters");
+    return true;
+}
+
+/* --- results */
+
+static bool results_finite(Unit *unit) {
+    for (size_t i = 0; i < unit->result_count; i++) {
+        const Variable *variable = &unit->variables[unit->results[i]];
+        double value = *(const double *)unit_address(unit, variable);
+        if (!isfinite(value)) {
+            char name[VARIABLE_NAME_SIZE], text[NUMBER_TEXT_SIZE];
+            return unit_fail(unit, "%s '%s' is not finite: %s", table_causality(variable->info->causality),
+                             values_name(unit, variable, name), number_text(text, value));
+        }
+    }
+    return true;
+}
+
+bool run_refresh(Unit *unit) {
+    if (!unit_header(unit)->stale)
+        return true;
+    if (!run_derive(unit, true))
+        return false;
+    memset(unit_state(unit), 0, unit->block_size - unit->state_at);
+    MODEL.start(unit);
+    if (!results_finite(unit))
+        return false;
+    unit_header(unit)->stale = 0;
+    return true;
+}
+
+void run_reset(Unit *unit) {
+    memset(unit->block, 0, unit->block_size);
+    memcpy(unit->block + SCALARS_AT, unit->start, unit->slopes_at - SCALARS_AT);
+    unit_header(unit)->stop_time = INFINITY;
+    unit_header(unit)->stale = 1;
+    unit->parameters_touched = true;
+}
+
+/* --- steps */
+
+/* Importers compute time as k h, as a sum of h, from integer nanoseconds, ...: what differs by less than this is the
+ * same instant. A part in 10^9, but never a noticeable part of a step, and never less than a few units in the last
+ * place. */
+static double tolerance(double t, double h) {
+    double scale = fabs(t) + h;
+    return fmax(16 * DBL_EPSILON * scale, fmin(1e-9 * scale, 0.1 * h));
+}
+
+static bool step_allowed(Unit *unit, double t, double h) {
+    const Header *header = unit_header(unit);
+    char text[3][NUMBER_TEXT_SIZE];
+    if (!isfinite(t))
+        return unit_fail(unit, "the communication point is not finite");
+    if (!(isfinite(h) && h > 0))
+        return unit_fail(unit, "the step size must be finite and greater than 0");
+    if (fabs(t - header->time) > tolerance(header->time, h))
+        return unit_fail(unit, "the communication point is %s s, but the unit stands at %s s", number_text(text[0], t),
+                         number_text(text[1], header->time));
+    if (!isfinite(t + h) || t + h > header->stop_time + tolerance(header->stop_time, h))
+        return unit_fail(unit, "the step would end at %s s, past the stop time of %s s", number_text(text[0], t + h),
+                         number_text(text[1], header->stop_time));
+    return derivatives_inputs_finite(unit, h);
+}
+
+/* A step that is refused leaves everything as it was; one that fails leaves an instance that only a reset or a restored
+ * state brings back. */
+bool run_step(Unit *unit, double t, double h) {
+    if (!step_allowed(unit, t, h) || !run_derive(unit, false))
+        return false;
+    bool good = MODEL.step(unit, t, h) && results_finite(unit);
+    Header *header = unit_header(unit);
+    derivatives_clear_inputs(unit);
+    header->last_step = good ? fmi2OK : fmi2Error;
+    if (good) {
+        header->time = t + h;
+        header->steps++;
+    } else {
+        header->phase = PHASE_FAILED;
+    }
+    return good;
+}

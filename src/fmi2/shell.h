@@ -1,0 +1,102 @@
+/* One instance of a unit, as the rooms of the shell share it. Models never see this file. */
+#ifndef FEEDSIM_SHELL_H
+#define FEEDSIM_SHELL_H
+
+#include <stdint.h>
+
+#include "calls.h"
+#include "fmi2Functions.h"
+#include "hash.h"
+#include "log.h"
+#include "unit.h"
+
+#define GUID_SIZE (2 * HASH_TEXT_SIZE) /* <hash of the table>-<hash of the resources> */
+
+/* First part of the block: where the instance is in its life. */
+typedef struct Header {
+    double start_time;
+    double stop_time; /* INFINITY where none is defined */
+    double time;      /* last communication point reached */
+    uint64_t steps;
+    uint32_t phase;     /* a Phase */
+    uint32_t stale;     /* initialisation: parameters or inputs changed since start() */
+    uint32_t sloped;    /* an input slope is set for the next step */
+    uint32_t last_step; /* fmi2Status of the last step */
+} Header;
+
+/* The block: Header, Scalars, AxisBlock[axes], slopes [one double per value reference], model state. */
+#define BLOCK_ALIGNED(size) (((size) + 15) / 16 * 16)
+#define SCALARS_AT BLOCK_ALIGNED(sizeof(Header))
+#define AXES_AT (SCALARS_AT + BLOCK_ALIGNED(sizeof(Scalars)))
+
+typedef struct Variable {
+    const VariableInfo *info;
+    size_t offset; /* in the block */
+} Variable;
+
+struct Unit {
+    fmi2CallbackFunctions callbacks; /* memory functions always set, logger may be NULL */
+    char *name;
+    char guid[GUID_SIZE];
+    char *resources;
+    unsigned log_categories;
+    Call call; /* the function being executed, and its step: where a message belongs */
+    double step_time, step_size;
+
+    size_t axes;
+    char **axis_names;
+    Variable *variables; /* by value reference */
+    size_t variable_count;
+    unsigned *inputs, *results; /* value references of the Real inputs; of the Real outputs and locals */
+    size_t input_count, result_count;
+
+    unsigned char *block;
+    size_t slopes_at, state_at, block_size;
+    unsigned char *start;       /* variables as load() left them, for reset */
+    unsigned char *derived_for; /* variables that the derived data was made from */
+    bool derived_valid;
+    bool parameters_touched; /* they may differ from derived_for */
+    void *derived;
+};
+
+static inline Header *unit_header(const Unit *unit) {
+    return (Header *)(void *)unit->block;
+}
+
+static inline double *unit_slopes(const Unit *unit) {
+    return (double *)(void *)(unit->block + unit->slopes_at);
+}
+
+static inline void *unit_address(const Unit *unit, const Variable *variable) {
+    return unit->block + variable->offset;
+}
+
+/* --- table.c */
+extern const VariableInfo table_scalars[SCALAR_ROWS + 1];
+extern const VariableInfo table_axis[AXIS_ROWS + 1];
+char *table_hash(char *text); /* text[HASH_TEXT_SIZE], which is returned */
+const char *table_causality(Causality causality);
+
+/* --- unit.c */
+Unit *unit_create(const fmi2CallbackFunctions *callbacks, const char *name);
+void unit_destroy(Unit *unit);
+char *unit_copy_text(Unit *unit, const char *text);
+bool unit_keep_start(Unit *unit);                      /* the variables of now are those that reset brings back */
+bool unit_resize_state(Unit *unit, size_t state_size); /* keeps all but the model state, which is zeroed */
+
+/* --- run.c: false with the reason logged */
+bool run_derive(Unit *unit, bool may_resize); /* where parameters changed since the last time */
+bool run_refresh(Unit *unit);                 /* initial values that belong to the parameters and inputs of now */
+bool run_step(Unit *unit, double t, double h);
+void run_reset(Unit *unit);
+
+/* --- entry points: how each of them opens, with its arguments as the log of calls shows them, and what it returns */
+#define BEGIN(call, ...)                                                                                               \
+    Unit *unit = c;                                                                                                    \
+    if (unit != NULL && (unit->log_categories & LOG_CALLS))                                                            \
+        call_tell(unit, CALL_##call, __VA_ARGS__);                                                                     \
+    if (!call_begin(unit, CALL_##call))                                                                                \
+    return fmi2Error
+#define STATUS(good) ((good) ? fmi2OK : fmi2Error)
+
+#endif

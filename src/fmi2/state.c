@@ -1,0 +1,137 @@
+#include "state.h"
+
+#include <ctype.h>
+#include <string.h>
+
+#include "log.h"
+
+#define MAGIC "FEEDSIM"
+#define FORMAT 1u
+#define BYTE_ORDER_PROBE 0x01020304u
+
+static unsigned char *content(const Snapshot *snapshot) {
+    return (unsigned char *)(uintptr_t)(snapshot + 1);
+}
+
+static uint64_t checksum(const Snapshot *snapshot) {
+    return hash_bytes(HASH_OF_NOTHING, content(snapshot), (size_t)(snapshot->fixed_size + snapshot->state_size));
+}
+
+/* Make room for `size` bytes in *snapshot. */
+static bool allot(Unit *unit, Snapshot **snapshot, size_t size) {
+    if (*snapshot != NULL && (*snapshot)->size == size)
+        return true;
+    Snapshot *fresh = unit_alloc(unit, size, 1);
+    if (fresh == NULL)
+        return false;
+    unit_free(unit, *snapshot);
+    *snapshot = fresh;
+    return true;
+}
+
+bool state_save(Unit *unit, Snapshot **snapshot) {
+    if (*snapshot != NULL && !state_known(unit, *snapshot))
+        return false;
+    /* Before initial values exist, or while they are out of date, the model state means nothing. */
+    const Header *header = unit_header(unit);
+    size_t state_size = header->stale ? 0 : unit->block_size - unit->state_at;
+    size_t size = sizeof(Snapshot) + unit->state_at + state_size;
+    if (!allot(unit, snapshot, size))
+        return false;
+    Snapshot *saved = *snapshot;
+    memset(saved, 0, sizeof *saved);
+    memcpy(saved->magic, MAGIC, sizeof MAGIC);
+    saved->format = FORMAT;
+    saved->byte_order = BYTE_ORDER_PROBE;
+    memcpy(saved->guid, unit->guid, sizeof unit->guid);
+    saved->size = size;
+    saved->fixed_size = unit->state_at;
+    saved->state_size = state_size;
+    memcpy(content(saved), unit->block, unit->state_at + state_size);
+    return true;
+}
+
+bool state_known(Unit *unit, const Snapshot *snapshot) {
+    if (memcmp(snapshot->magic, MAGIC, sizeof MAGIC) != 0) {
+        char shown[sizeof snapshot->magic + 1] = "";
+        for (size_t i = 0; i < sizeof snapshot->magic; i++)
+            shown[i] = isprint((unsigned char)snapshot->magic[i]) ? snapshot->magic[i] : '.';
+        return unit_fail(unit, "not a saved state: it begins with '%s', expected is '%s'", shown, MAGIC);
+    }
+    if (snapshot->byte_order != BYTE_ORDER_PROBE)
+        return unit_fail(unit,
+                         "the state was saved on a machine with another byte order: mark %08lx, expected is %08lx",
+                         (unsigned long)snapshot->byte_order, (unsigned long)BYTE_ORDER_PROBE);
+    if (snapshot->format != FORMAT)
+        return unit_fail(unit, "the state has format version %lu, expected is %lu", (unsigned long)snapshot->format,
+                         (unsigned long)FORMAT);
+    if (memcmp(snapshot->guid, unit->guid, sizeof unit->guid) != 0)
+        return unit_fail(unit, "the state belongs to GUID '%.*s', this instance has '%s'", (int)sizeof snapshot->guid,
+                         snapshot->guid, unit->guid);
+    if (snapshot->fixed_size != unit->state_at)
+        return unit_fail(unit, "the state holds %.0f bytes of variables, this instance has %.0f",
+                         (double)snapshot->fixed_size, (double)unit->state_at);
+    return true;
+}
+
+bool state_restore(Unit *unit, const Snapshot *snapshot) {
+    if (!state_known(unit, snapshot))
+        return false;
+    memcpy(unit->block, content(snapshot), unit->state_at);
+    unit->parameters_touched = true;
+    if (unit_header(unit)->stale)
+        return true;
+    bool good = run_derive(unit, true);
+    size_t state_size = unit->block_size - unit->state_at;
+    if (good && snapshot->state_size != state_size)
+        good = unit_fail(unit, "the state holds %.0f bytes of model state, its parameters need %.0f",
+                         (double)snapshot->state_size, (double)state_size);
+    if (good)
+        memcpy(unit_state(unit), content(snapshot) + unit->state_at, state_size);
+    else
+        unit_header(unit)->phase = PHASE_FAILED;
+    return good;
+}
+
+bool state_serialize(Unit *unit, const Snapshot *snapshot, fmi2Byte bytes[], size_t size) {
+    if (!state_known(unit, snapshot))
+        return false;
+    if (size < snapshot->size)
+        return unit_fail(unit, "the array has %.0f bytes, the state needs %.0f", (double)size, (double)snapshot->size);
+    Snapshot heading = *snapshot;
+    heading.checksum = checksum(snapshot);
+    memcpy(bytes, &heading, sizeof heading);
+    memcpy(bytes + sizeof heading, content(snapshot), (size_t)snapshot->size - sizeof heading);
+    return true;
+}
+
+bool state_deserialize(Unit *unit, const fmi2Byte bytes[], size_t size, Snapshot **snapshot) {
+    if (*snapshot != NULL && !state_known(unit, *snapshot))
+        return false;
+    Snapshot heading;
+    if (size < sizeof heading)
+        return unit_fail(unit, "the serialized state has %.0f bytes, its heading alone has %.0f", (double)size,
+                         (double)sizeof heading);
+    memcpy(&heading, bytes, sizeof heading);
+    if (!state_known(unit, &heading))
+        return false;
+    if (heading.size > size || heading.size < sizeof heading + unit->state_at ||
+        heading.size - sizeof heading - unit->state_at != heading.state_size)
+        return unit_fail(unit, "the serialized state has %.0f bytes, its heading speaks of %.0f", (double)size,
+                         (double)heading.size);
+    uint64_t found = hash_bytes(HASH_OF_NOTHING, bytes + sizeof heading, (size_t)heading.size - sizeof heading);
+    if (found != heading.checksum) {
+        char text[2][HASH_TEXT_SIZE];
+        return unit_fail(unit, "the serialized state is damaged: checksum %s, its heading says %s",
+                         hash_text(text[0], found), hash_text(text[1], heading.checksum));
+    }
+    Header header;
+    memcpy(&header, bytes + sizeof heading, sizeof header);
+    if (header.phase >= PHASE_COUNT)
+        return unit_fail(unit, "the serialized state is damaged: it is in phase %lu of %d", (unsigned long)header.phase,
+                         PHASE_COUNT);
+    if (!allot(unit, snapshot, (size_t)heading.size))
+        return false;
+    memcpy(*snapshot, bytes, (size_t)heading.size);
+    return true;
+}

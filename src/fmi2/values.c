@@ -1,0 +1,210 @@
+#include "values.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "numbers.h"
+
+static const char *const kind_names[] = {"Real", "Integer", "Boolean", "String"};
+
+char *values_name(const Unit *unit, const Variable *variable, char *name) {
+    if (variable->offset < AXES_AT)
+        snprintf(name, VARIABLE_NAME_SIZE, "%s", variable->info->name);
+    else
+        snprintf(name, VARIABLE_NAME_SIZE, "%s.%s", unit->axis_names[(variable->offset - AXES_AT) / sizeof(AxisBlock)],
+                 variable->info->name);
+    return name;
+}
+
+static const Variable *not_found(Unit *unit, fmi2ValueReference reference, Kind kind) {
+    if (reference >= unit->variable_count) {
+        unit_fail(unit, "value reference %u does not exist; those of this unit run from 0 to %u", reference,
+                  (unsigned)unit->variable_count - 1);
+        return NULL;
+    }
+    const Variable *variable = &unit->variables[reference];
+    char name[VARIABLE_NAME_SIZE];
+    unit_fail(unit, "value reference %u is the %s %s '%s'; a %s is expected here", reference,
+              kind_names[variable->info->kind], table_causality(variable->info->causality),
+              values_name(unit, variable, name), kind_names[kind]);
+    return NULL;
+}
+
+const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind) {
+    if (reference < unit->variable_count && unit->variables[reference].info->kind == kind)
+        return &unit->variables[reference];
+    return not_found(unit, reference, kind);
+}
+
+bool values_arrays(Unit *unit, size_t count, const void *references, const void *values) {
+    if (count > 0 && (references == NULL || values == NULL))
+        return unit_fail(unit, "an array of %.0f elements is expected, not NULL", (double)count);
+    return true;
+}
+
+/* --- get */
+
+/* In initialisation mode calculated variables follow what was set; afterwards they belong to the end of the last step.
+ */
+static bool ready(Unit *unit, size_t count, const fmi2ValueReference references[]) {
+    const Header *header = unit_header(unit);
+    if (header->phase != PHASE_INITIALIZATION || !header->stale)
+        return true;
+    for (size_t i = 0; i < count; i++) {
+        if (references[i] < unit->variable_count) {
+            Causality causality = unit->variables[references[i]].info->causality;
+            if (causality == CAUSALITY_output || causality == CAUSALITY_local)
+                return run_refresh(unit);
+        }
+    }
+    return true;
+}
+
+static bool all_found(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[]) {
+    for (size_t i = 0; i < count; i++)
+        if (values_find(unit, references[i], kind) == NULL)
+            return false;
+    return true;
+}
+
+static bool readable(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[], const void *values) {
+    return values_arrays(unit, count, references, values) && all_found(unit, kind, count, references) &&
+           ready(unit, count, references);
+}
+
+bool values_get_real(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2Real values[]) {
+    if (!readable(unit, KIND_REAL, count, references, values))
+        return false;
+    for (size_t i = 0; i < count; i++)
+        values[i] = *(const double *)unit_address(unit, &unit->variables[references[i]]);
+    return true;
+}
+
+bool values_get_whole(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[], int values[]) {
+    if (!readable(unit, kind, count, references, values))
+        return false;
+    for (size_t i = 0; i < count; i++)
+        values[i] = *(const int *)unit_address(unit, &unit->variables[references[i]]);
+    return true;
+}
+
+bool values_get_string(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2String values[]) {
+    if (!readable(unit, KIND_STRING, count, references, values))
+        return false;
+    for (size_t i = 0; i < count; i++)
+        values[i] = unit_address(unit, &unit->variables[references[i]]);
+    return true;
+}
+
+/* --- set: check the whole call first, then write */
+
+static bool settable(Unit *unit, const Variable *variable) {
+    const VariableInfo *info = variable->info;
+    if (info->causality == CAUSALITY_input)
+        return true;
+    char name[VARIABLE_NAME_SIZE];
+    if (info->causality != CAUSALITY_parameter)
+        return unit_fail(unit, "the %s '%s' is calculated and cannot be set", table_causality(info->causality),
+                         values_name(unit, variable, name));
+    if (unit_header(unit)->phase == PHASE_STEPPING && info->variability != VARIABILITY_tunable)
+        return unit_fail(unit, "the fixed parameter '%s' cannot be set once initialisation is complete",
+                         values_name(unit, variable, name));
+    return true;
+}
+
+static bool out_of_range(Unit *unit, const Variable *variable, double value) {
+    const VariableInfo *info = variable->info;
+    char name[VARIABLE_NAME_SIZE], text[3][NUMBER_TEXT_SIZE];
+    const char *gap = *info->unit ? " " : "";
+    values_name(unit, variable, name);
+    number_text(text[0], value);
+    number_text(text[1], info->min);
+    number_text(text[2], info->max);
+    if (!isfinite(value))
+        return unit_fail(unit, "the value of %s '%s' is not finite: %s", table_causality(info->causality), name,
+                         text[0]);
+    if (isinf(info->max))
+        return unit_fail(unit, "the value of %s '%s' is out of range: %s%s%s, allowed is at least %s",
+                         table_causality(info->causality), name, text[0], gap, info->unit, text[1]);
+    if (isinf(info->min))
+        return unit_fail(unit, "the value of %s '%s' is out of range: %s%s%s, allowed is at most %s",
+                         table_causality(info->causality), name, text[0], gap, info->unit, text[2]);
+    return unit_fail(unit, "the value of %s '%s' is out of range: %s%s%s, allowed is %s to %s",
+                     table_causality(info->causality), name, text[0], gap, info->unit, text[1], text[2]);
+}
+
+static bool in_range(Unit *unit, const Variable *variable, double value) {
+    const VariableInfo *info = variable->info;
+    return (isfinite(value) && value >= info->min && value <= info->max) || out_of_range(unit, variable, value);
+}
+
+/* What follows from variables having been set. */
+static void note_set(Unit *unit, const Variable *variable) {
+    if (variable->info->causality == CAUSALITY_parameter)
+        unit->parameters_touched = true;
+    if (unit_header(unit)->phase != PHASE_STEPPING)
+        unit_header(unit)->stale = 1;
+}
+
+bool values_set_real(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2Real values[]) {
+    if (!values_arrays(unit, count, references, values))
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        const Variable *variable = values_find(unit, references[i], KIND_REAL);
+        if (variable == NULL || !settable(unit, variable) || !in_range(unit, variable, values[i]))
+            return false;
+    }
+    for (size_t i = 0; i < count; i++) {
+        const Variable *variable = &unit->variables[references[i]];
+        *(double *)unit_address(unit, variable) = values[i];
+        note_set(unit, variable);
+    }
+    return true;
+}
+
+bool values_set_whole(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[], const int values[]) {
+    if (!values_arrays(unit, count, references, values))
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        const Variable *variable = values_find(unit, references[i], kind);
+        if (variable == NULL || !settable(unit, variable) || !in_range(unit, variable, values[i]))
+            return false;
+    }
+    for (size_t i = 0; i < count; i++) {
+        const Variable *variable = &unit->variables[references[i]];
+        *(int *)unit_address(unit, variable) = kind == KIND_BOOLEAN ? values[i] != 0 : values[i];
+        note_set(unit, variable);
+    }
+    return true;
+}
+
+static bool fits(Unit *unit, const Variable *variable, const char *text) {
+    char name[VARIABLE_NAME_SIZE];
+    if (text == NULL)
+        return unit_fail(unit, "the value of '%s' is NULL", values_name(unit, variable, name));
+    size_t length = strlen(text);
+    if (length >= STRING_SIZE)
+        return unit_fail(unit, "the value of '%s' is too long: %.0f bytes, allowed are at most %d",
+                         values_name(unit, variable, name), (double)length, STRING_SIZE - 1);
+    return true;
+}
+
+bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2String values[]) {
+    if (!values_arrays(unit, count, references, values))
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        const Variable *variable = values_find(unit, references[i], KIND_STRING);
+        if (variable == NULL || !settable(unit, variable) || !fits(unit, variable, values[i]))
+            return false;
+    }
+    for (size_t i = 0; i < count; i++) {
+        const Variable *variable = &unit->variables[references[i]];
+        char *text = unit_address(unit, variable);
+        size_t length = strlen(values[i]);
+        memmove(text, values[i], length); /* importers may hand back what fmi2GetString gave them */
+        memset(text + length, 0, STRING_SIZE - length);
+        note_set(unit, variable);
+    }
+    return true;
+}

@@ -1,0 +1,27 @@
+/* Generic access to the variables by value reference. Every function either succeeds or changes nothing and returns
+ * false with the reason logged. */
+#ifndef FEEDSIM_VALUES_H
+#define FEEDSIM_VALUES_H
+
+#include "fmi2Functions.h"
+#include "shell.h"
+
+/* The variable of that reference, or NULL (with the reason logged) where there is none of that kind. */
+const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind);
+
+#define VARIABLE_NAME_SIZE 256
+/* "F_S", or "X.M_a" for a row of axis X, written to name[VARIABLE_NAME_SIZE]; returns name. */
+char *values_name(const Unit *unit, const Variable *variable, char *name);
+
+/* An importer may pass NULL for an array of no elements only. */
+bool values_arrays(Unit *unit, size_t count, const void *references, const void *values);
+
+bool values_get_real(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2Real values[]);
+bool values_set_real(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2Real values[]);
+/* kind: KIND_INTEGER or KIND_BOOLEAN */
+bool values_get_whole(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[], int values[]);
+bool values_set_whole(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[], const int values[]);
+bool values_get_string(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2String values[]);
+bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2String values[]);
+
+#endif

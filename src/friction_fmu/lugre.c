@@ -1,0 +1,52 @@
+#include "lugre.h"
+
+#include <math.h>
+
+static double sign(double n) {
+    return (double)((n > 0) - (n < 0));
+}
+
+double lugre_level(const Lugre *p, double n) {
+    const double speed = fabs(n);
+    double torque = p->F_C + (p->F_S - p->F_C) * exp(-pow(speed / p->v_s, p->beta));
+    if (p->F_log > 0) { /* 0 times an overflowing logarithm's argument would be no number */
+        torque += p->F_log * log1p(speed / p->v_log);
+    }
+    return (1 + p->asymmetry * sign(n)) * torque / p->sigma_0;
+}
+
+double lugre_level_slope(const Lugre *p, double n) {
+    const double speed = fabs(n);
+    const double x = pow(speed / p->v_s, p->beta);
+    double torque = 0;
+    if (x < 700) { /* beyond, exp(-x) has vanished while x may be infinite */
+        torque -= (p->F_S - p->F_C) * p->beta * x * exp(-x);
+    }
+    torque += p->F_log * (speed / (speed + p->v_log));
+    return (1 + p->asymmetry * sign(n)) * torque / p->sigma_0;
+}
+
+double lugre_advance(const Lugre *p, double z, double n, double h) {
+    const double g = lugre_level(p, n);
+    const double z_end = sign(n) * g;
+    /* expm1: the small steps of a slow speed must not be lost in 1 - exp(). */
+    return z - (z_end - z) * expm1(-fabs(n) / g * h);
+}
+
+double lugre_rate(const Lugre *p, double z, double n) {
+    const double g = lugre_level(p, n);
+    /* Eq. 6 factored: exactly 0 at constant speed, where n - |n|/g z leaves a rounding error that sigma_1 would pass
+     * on. */
+    return fabs(n) / g * (sign(n) * g - z);
+}
+
+double lugre_torque(const Lugre *p, double k, double z, double n) {
+    return k * p->sigma_0 * z + p->sigma_1 * lugre_rate(p, z, n) + p->sigma_2 * n;
+}
+
+double lugre_torque_by_speed(const Lugre *p, double z, double n) {
+    const double g = lugre_level(p, n);
+    /* d(|n|/g)/dn = sgn(n) (g - n dg/dn) / g^2 */
+    const double rate_by_speed = 1 - sign(n) * z * (g - lugre_level_slope(p, n)) / (g * g);
+    return p->sigma_1 * rate_by_speed + p->sigma_2;
+}

@@ -1,0 +1,150 @@
+/* friction: the friction torque of one feed axis, seen from the motor shaft.
+ *
+ *   M_fr   = k sigma_0 z + sigma_1 dz/dt + sigma_2 n                                   (1)   lugre.h
+ *   dz/dt  = n - |n| / g(n) z                                                          (6)
+ *   g(n)   = (1 + a sgn n) (F_C + (F_S - F_C) exp(-(|n|/v_s)^beta) + F_log ln(|n|/v_log + 1)) / sigma_0   (7)
+ *   k      = gamma + lambda (1 - gamma)                                                (2)   tem.h
+ *   lambda = (W/2 + c)/W for z >= 0,  (W/2 - c)/W for z < 0                            (3)
+ *   c      = clip(c + travelled angle, -W/2, +W/2)                                     (4)
+ *
+ *   n = n_fr  speed at the contact [rad/s]         M_fr   friction torque, sign of n [N.m]
+ *   z         mean bristle deflection [rad]        c      position in the engaging zone [rad]
+ *   k         engaged share of stiffness [1]       lambda engagement [1]
+ *   parameters: variables.def
+ *
+ * Source: M. Wiesauer, F. Bleicher, "Parameterization method for non-linear friction models of machine tool feed
+ * drives", 18th CIRP Conference on Modeling of Machining Operations (2021). What its print has wrong: README.md.
+ *
+ * A step takes n as linear in time and is split where n crosses zero; each part advances z by the exact solution at the
+ * part's mean speed (second order, stable for any step) and c exactly. */
+#include <math.h>
+
+#include "lugre.h"
+#include "numbers.h"
+#include "tem.h"
+#include "unit.h"
+
+typedef struct State {
+    double z;          /* [rad] */
+    double c;          /* [rad] */
+    double n;          /* speed that M_fr belongs to: at the end of the last step [rad/s] */
+    double M_fr_slope; /* change of M_fr over the last step, per second [N.m/s] */
+} State;
+
+static Lugre friction_lugre(const Scalars *v) {
+    return (Lugre){.sigma_0 = v->sigma_0,
+                   .sigma_1 = v->sigma_1,
+                   .sigma_2 = v->sigma_2,
+                   .F_C = v->F_C,
+                   .F_S = v->F_S,
+                   .v_s = v->v_s,
+                   .beta = v->beta,
+                   .F_log = v->F_log,
+                   .v_log = v->v_log,
+                   .asymmetry = v->asymmetry};
+}
+
+static bool friction_derive(Unit *unit) {
+    const Scalars *v = unit_scalars(unit);
+    char text[2][NUMBER_TEXT_SIZE];
+    if (v->F_S < v->F_C) {
+        return unit_fail(
+            unit,
+            "parameter 'F_S' is %s N.m and 'F_C' is %s N.m; the static friction torque F_S must not be below "
+            "the Coulomb friction torque F_C",
+            number_text(text[0], v->F_S), number_text(text[1], v->F_C));
+    }
+    const double turnover = 2 * (1 + fabs(v->asymmetry)) * v->F_S / v->sigma_0;
+    if (v->W > 0 && v->W <= turnover) {
+        unit_warn(unit,
+                  "parameter 'W' is %s rad; keep it well above 2 (1 + |asymmetry|) F_S / sigma_0 = %s rad, the angle "
+                  "within which the bristles turn over, or at 0 (engaging model off)",
+                  number_text(text[0], v->W), number_text(text[1], turnover));
+    }
+    return true;
+}
+
+static size_t friction_state_size(const Unit *unit) {
+    (void)unit;
+    return sizeof(State);
+}
+
+/* Outputs and locals that go with z, c and n. */
+static void friction_show(Scalars *v, const Lugre *p, const State *state) {
+    v->z = state->z;
+    v->c = state->c;
+    v->lambda = tem_engagement(state->z, state->c, v->W);
+    v->k = tem_share(v->lambda, v->gamma);
+    v->M_fr = lugre_torque(p, v->k, state->z, state->n);
+}
+
+static void friction_start(Unit *unit) {
+    Scalars *v = unit_scalars(unit);
+    State *state = unit_state(unit);
+    const Lugre p = friction_lugre(v);
+    state->n = v->n_fr;
+    friction_show(v, &p, state);
+}
+
+/* One part of a step: mean speed n, which does not change its sign, over h. */
+static void friction_part(const Lugre *p, double W, State *state, double n, double h) {
+    state->z = lugre_advance(p, state->z, n, h);
+    state->c = tem_advance(state->c, n * h, W);
+}
+
+static bool friction_step(Unit *unit, double t, double h) {
+    (void)t; /* the law does not change with time */
+    Scalars *v = unit_scalars(unit);
+    State *state = unit_state(unit);
+    const Lugre p = friction_lugre(v);
+    const double n_start = v->n_fr, n_end = n_start + unit_slope(unit, VR_n_fr) * h;
+    State next = *state;
+    if ((n_start < 0 && n_end > 0) || (n_start > 0 && n_end < 0)) {
+        const double crossing = h * (n_start / (n_start - n_end));
+        friction_part(&p, v->W, &next, n_start / 2, crossing);
+        friction_part(&p, v->W, &next, n_end / 2, h - crossing);
+    } else {
+        friction_part(&p, v->W, &next, n_start + (n_end - n_start) / 2, h);
+    }
+    next.n = n_end;
+    Scalars shown = *v;
+    friction_show(&shown, &p, &next);
+    if (!isfinite(shown.M_fr)) {
+        char text[2][NUMBER_TEXT_SIZE];
+        return unit_fail(
+            unit,
+            "M_fr would be no finite number at the end of the step, in which n_fr goes from %s to %s rad/s; the "
+            "state was kept",
+            number_text(text[0], n_start), number_text(text[1], n_end));
+    }
+    next.M_fr_slope = (shown.M_fr - v->M_fr) / h;
+    *state = next;
+    *v = shown;
+    return true;
+}
+
+static double friction_output_derivative(Unit *unit, unsigned vr) {
+    const State *state = unit_state(unit);
+    return vr == VR_M_fr ? state->M_fr_slope : 0;
+}
+
+static double friction_partial(Unit *unit, unsigned output, unsigned input) {
+    if (output != VR_M_fr || input != VR_n_fr) {
+        return 0;
+    }
+    const State *state = unit_state(unit);
+    const Lugre p = friction_lugre(unit_scalars(unit));
+    return lugre_torque_by_speed(&p, state->z, state->n);
+}
+
+const Model MODEL = {
+    .identifier = "friction",
+    .load = NULL,
+    .derive = friction_derive,
+    .state_size = friction_state_size,
+    .start = friction_start,
+    .step = friction_step,
+    .output_derivative = friction_output_derivative,
+    .partial = friction_partial,
+    .release = NULL,
+};

@@ -1,0 +1,198 @@
+#include "modal.h"
+
+#include <math.h>
+
+/* Everything about a mode's step follows from its impulse response g (g(0) = 0, g'(0) = 1) and its integrals, here made
+ * dimensionless with x = omega h:
+ *   rate = g'(h),  once = g(h)/h,  twice = integral of g / h^2,  thrice = double integral of g / h^3
+ * and hold, the response to a unit initial displacement. All tend to 1, 1, 1/2, 1/6 and 1 as x -> 0. */
+typedef struct Response {
+    double rate, once, twice, thrice, hold;
+} Response;
+
+/* Taylor series; p is the j-th derivative of g at 0 times h^(j-1). Used for x times the larger pole <= 2, where the
+ * terms fall below the rounding error after 30 and cancel no more than a digit. Rigid modes are its first term. */
+static Response response_series(double x, double zeta) {
+    Response r = {0, 0, 0, 0, 0};
+    double previous = 0, p = 1, factorial = 1;
+    for (int j = 0; j < 30; j++) {
+        r.rate += p / factorial;
+        r.once += p / (factorial * (j + 1));
+        r.twice += p / (factorial * (j + 1) * (j + 2));
+        r.thrice += p / (factorial * (j + 1) * (j + 2) * (j + 3));
+        factorial *= j + 1;
+        const double next = -2 * zeta * x * p - x * x * previous;
+        previous = p;
+        p = next;
+    }
+    r.hold = 1 - x * x * r.twice;
+    return r;
+}
+
+/* Integrals from the differential equation itself; loses accuracy for small x. */
+static void response_integrals(Response *r, double x, double zeta) {
+    r->twice = (1 - r->hold) / (x * x);
+    r->thrice = (1 - r->once - 2 * zeta * x * r->twice) / (x * x);
+}
+
+static Response response_underdamped(double x, double zeta) {
+    Response r;
+    const double y = x * sqrt((1 - zeta) * (1 + zeta)), decay = exp(-zeta * x);
+    r.once = decay * sin(y) / y;
+    r.rate = decay * cos(y) - zeta * x * r.once;
+    r.hold = decay * cos(y) + zeta * x * r.once;
+    response_integrals(&r, x, zeta);
+    return r;
+}
+
+/* (1 - exp(-a))/a and (exp(-a) - 1 + a)/a^2 for a >= 0 */
+static double decay_mean(double a) {
+    return a > 0 ? -expm1(-a) / a : 1;
+}
+
+static double decay_mean_2(double a) {
+    if (a > 1) {
+        return (1 - decay_mean(a)) / a;
+    }
+    double sum = 0, term = 0.5;
+    for (int j = 3; j < 22; j++) {
+        sum += term;
+        term *= -a / j;
+    }
+    return sum;
+}
+
+/* zeta >= 1: poles -omega slow, -omega fast with slow fast = 1; equal poles included. */
+static Response response_overdamped(double x, double fast_rate) {
+    Response r;
+    const double fast = fast_rate * x, slow = x / fast_rate, gap = fast - slow;
+    r.once = exp(-slow) * decay_mean(gap);
+    r.rate = exp(-fast) - slow * r.once;
+    r.hold = exp(-fast) + fast * r.once;
+    if (slow >= 1) {
+        response_integrals(&r, x, (fast + slow) / (2 * x));
+    } else { /* here fast > 2, so that the gap is wide and the differences do not cancel */
+        r.twice = (decay_mean(slow) - decay_mean(fast)) / gap;
+        r.thrice = (decay_mean_2(slow) - decay_mean_2(fast)) / gap;
+    }
+    return r;
+}
+
+ModeUpdate mode_update(double omega, double zeta, double h) {
+    const double x = omega * h;
+    const double fast_rate = zeta < 1 ? 1 : zeta + sqrt(zeta - 1) * sqrt(zeta + 1);
+    Response r;
+    if (fast_rate * x <= 2) {
+        r = response_series(x, zeta);
+    } else if (zeta < 1) {
+        r = response_underdamped(x, zeta);
+    } else {
+        r = response_overdamped(x, fast_rate);
+    }
+    return (ModeUpdate){.q_q = r.hold,
+                        .q_v = h * r.once,
+                        .q_f = h * h * r.twice,
+                        .q_df = h * h * r.thrice,
+                        .v_q = -omega * x * r.once,
+                        .v_v = r.rate,
+                        .v_f = h * r.once,
+                        .v_df = h * r.twice};
+}
+
+size_t modal_padded(size_t modes) {
+    return (modes + MODAL_LANES - 1) / MODAL_LANES * MODAL_LANES;
+}
+
+size_t modal_memory(size_t modes, size_t ports) {
+    return (10 + ports) * modal_padded(modes);
+}
+
+void modal_place(Modal *modal, double *memory, size_t modes, size_t ports) {
+    const size_t size = modal_padded(modes);
+    double **const arrays[] = {&modal->q_q, &modal->q_v,  &modal->q_f,   &modal->q_df, &modal->v_q,  &modal->v_v,
+                               &modal->v_f, &modal->v_df, &modal->omega, &modal->zeta, &modal->shape};
+    modal->size = size;
+    modal->ports = ports;
+    modal->h = 0;
+    for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) {
+        *arrays[i] = memory + i * size;
+    }
+}
+
+void modal_set_mode(Modal *modal, size_t mode, double omega, double zeta, const double *shape) {
+    modal->omega[mode] = omega;
+    modal->zeta[mode] = zeta;
+    for (size_t i = 0; i < modal->ports; i++) {
+        modal->shape[i * modal->size + mode] = shape[i];
+    }
+}
+
+void modal_prepare(Modal *modal, double h) {
+    if (h == modal->h) {
+        return;
+    }
+    for (size_t k = 0; k < modal->size; k++) {
+        const ModeUpdate update = mode_update(modal->omega[k], modal->zeta[k], h);
+        modal->q_q[k] = update.q_q;
+        modal->q_v[k] = update.q_v;
+        modal->q_f[k] = update.q_f;
+        modal->q_df[k] = update.q_df;
+        modal->v_q[k] = update.v_q;
+        modal->v_v[k] = update.v_v;
+        modal->v_f[k] = update.v_f;
+        modal->v_df[k] = update.v_df;
+    }
+    modal->h = h;
+}
+
+void modal_advance(const Modal *modal, size_t inputs, const double *restrict u, const double *restrict du,
+                   const double *restrict q, const double *restrict v, double *restrict q_end, double *restrict v_end) {
+    const Modal m = *modal;
+    for (size_t k = 0; k < m.size; k += MODAL_LANES) {
+        double f[MODAL_LANES] = {0}, df[MODAL_LANES] = {0};
+        const double *b = m.shape + k;
+        for (size_t i = 0; i < inputs; i++, b += m.size) {
+            /* lanes written out: a loop over them is left in memory by compilers that vectorise cautiously */
+            f[0] += b[0] * u[i];
+            f[1] += b[1] * u[i];
+            f[2] += b[2] * u[i];
+            f[3] += b[3] * u[i];
+            df[0] += b[0] * du[i];
+            df[1] += b[1] * du[i];
+            df[2] += b[2] * du[i];
+            df[3] += b[3] * du[i];
+        }
+        for (size_t j = 0; j < MODAL_LANES; j++) {
+            const size_t i = k + j;
+            q_end[i] = (m.q_q[i] * q[i] + m.q_v[i] * v[i]) + (m.q_f[i] * f[j] + m.q_df[i] * df[j]);
+            v_end[i] = (m.v_q[i] * q[i] + m.v_v[i] * v[i]) + (m.v_f[i] * f[j] + m.v_df[i] * df[j]);
+        }
+    }
+}
+
+double modal_sum(const Modal *modal, size_t port, const double *restrict q) {
+    const size_t size = modal->size;
+    const double *restrict b = modal->shape + port * size;
+    double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
+    for (size_t k = 0; k < size; k += MODAL_LANES) {
+        s0 += b[k] * q[k];
+        s1 += b[k + 1] * q[k + 1];
+        s2 += b[k + 2] * q[k + 2];
+        s3 += b[k + 3] * q[k + 3];
+    }
+    return (s0 + s1) + (s2 + s3);
+}
+
+double modal_acceleration(const Modal *modal, size_t port, size_t inputs, const double *u, const double *q,
+                          const double *v) {
+    double sum = 0;
+    for (size_t k = 0; k < modal->size; k++) {
+        const double omega = modal->omega[k];
+        double f = -omega * (omega * q[k] + 2 * modal->zeta[k] * v[k]);
+        for (size_t i = 0; i < inputs; i++) {
+            f += modal->shape[i * modal->size + k] * u[i];
+        }
+        sum += modal->shape[port * modal->size + k] * f;
+    }
+    return sum;
+}

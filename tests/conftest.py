@@ -1,0 +1,51 @@
+"""What tests of several areas share."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+UNITS = ("plant", "controller", "friction")
+
+
+def _inputs() -> list[Path]:
+    """Everything the archives are made from."""
+    modes = ROOT / "scenarios" / "machines" / "test_centre" / "modes.csv"
+    folders = [ROOT / "src" / "fmi2", *(ROOT / "src" / f"{unit}_fmu" for unit in UNITS)]
+    kept = (".c", ".h", ".def", ".py", ".md", ".csv")
+    sources = [path for folder in folders for path in folder.rglob("*") if path.suffix in kept]
+    return [modes, ROOT / "pyproject.toml", ROOT / "LICENSE", *sources]
+
+
+def _up_to_date(archives: list[Path]) -> bool:
+    if not all(path.is_file() for path in archives):
+        return False
+    built = min(path.stat().st_mtime for path in archives)
+    return all(path.stat().st_mtime <= built for path in _inputs() if path.is_file())
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with plant.fmu, controller.fmu and friction.fmu.
+
+    The one that the environment variable FEEDSIM_FMUS names, else fmus/ where it is newer than its sources, else built
+    for this session.
+    """
+    if given := os.environ.get("FEEDSIM_FMUS"):
+        folder = Path(given).resolve()
+        missing = [unit for unit in UNITS if not (folder / f"{unit}.fmu").is_file()]
+        if missing:
+            pytest.fail(f"FEEDSIM_FMUS={given} has no archive of {', '.join(missing)}")
+        return folder
+    folder = ROOT / "fmus"
+    if _up_to_date([folder / f"{unit}.fmu" for unit in UNITS]):
+        return folder
+
+    from packager import build, toolchain
+
+    folder = tmp_path_factory.mktemp("fmus")
+    compiler = toolchain.find_compiler()
+    for unit in UNITS:
+        build.build(build.load(build.unit_directory(unit), compiler), folder / f"{unit}.fmu", compiler)
+    return folder

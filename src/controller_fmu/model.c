@@ -1,0 +1,234 @@
+/* controller: position, speed and current control of one feed axis, with its synchronous motor.
+ *
+ *   inputs   x_s n_ffw (taken over every T_pos), x_a n_a n_add M_add (every T_c)
+ *   output   M_a, linear over a control cycle; the rest are observables
+ *
+ * Equations, symbols and units stand in the headers of the blocks: position.h (delay.h, lag.h), setpoint_ramp.h,
+ * reference_model.h, speed.h, biquad.h, current.h, pmsm.h; drive.h puts them in order; README.md shows the whole.
+ * Source: Wiesauer, Bleicher, 18th CIRP CMMO (2021), section 2.2. This file holds what is about time and about the
+ * unit's interface.
+ *
+ * Instant k lies at t_k = start + k T_c; k is counted, so that nothing drifts. A step [t, t + H) works the instants in
+ * that interval and reads the inputs at each, value + slope (t_k - t). H may be anything. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "drive.h"
+#include "unit.h"
+
+/* An importer's sum of steps runs off the grid: adding 125 us ten million times ends 1.6e-3 cycles late. An instant
+ * that lies so little ahead of the end of a step belongs to the next one, as it was meant; reading the inputs a
+ * hundredth of a cycle late instead (extrapolated by the slope) is far below a cycle's own effect. */
+#define DRIFT 1e-2
+
+/* An end of a step so close to the end of a cycle [T_c] is the end of the cycle. */
+#define ROUNDING 1e-6
+
+typedef struct State {
+    DriveState drive;
+    double lines[]; /* delay lines */
+} State;
+
+/* --- parameters to coefficients ----------------------------------------------------------------------------------- */
+
+static bool derive_cycles(Unit *unit, const Scalars *v, Drive *p) {
+    double ratio = v->T_pos / v->T_c;
+    double ticks = round(ratio);
+    /* Times of four significant digits that do not fit are off by far more, quotients of doubles by far less. */
+    if (ticks < 1.0 || fabs(ratio - ticks) > 1e-9 * ticks) {
+        return unit_fail(unit, "T_pos = %.12g s is not a whole multiple of T_c = %.12g s (ratio %.12g)", v->T_pos,
+                         v->T_c, ratio);
+    }
+    p->T_c = v->T_c;
+    p->ticks = (int32_t)ticks;
+    return true;
+}
+
+static bool derive_filters(Unit *unit, const Scalars *v, Drive *p) {
+    const struct {
+        const char *name;
+        int type;
+        double f, D_num, D_den;
+    } filters[FILTERS] = {
+        {"filter_1", v->filter_1_type, v->filter_1_f, v->filter_1_D_num, v->filter_1_D_den},
+        {"filter_2", v->filter_2_type, v->filter_2_f, v->filter_2_D_num, v->filter_2_D_den},
+        {"filter_3", v->filter_3_type, v->filter_3_f, v->filter_3_D_num, v->filter_3_D_den},
+        {"filter_4", v->filter_4_type, v->filter_4_f, v->filter_4_D_num, v->filter_4_D_den},
+    };
+    const double pi = acos(-1.0);
+    bool good = true;
+    p->filters = 0;
+    for (int i = 0; i < FILTERS; ++i) {
+        if (filters[i].type == 0) {
+            continue;
+        }
+        if (filters[i].f >= 0.5 / v->T_c) {
+            good = unit_fail(unit, "%s.f = %.12g Hz is not below half the sampling rate, 1/(2 T_c) = %.12g Hz",
+                             filters[i].name, filters[i].f, 0.5 / v->T_c);
+            continue;
+        }
+        double K = tan(pi * filters[i].f * v->T_c);
+        p->filter[p->filters++] = filters[i].type == 1 ? biquad_band_stop(K, filters[i].D_num, filters[i].D_den)
+                                                       : biquad_low_pass(K, filters[i].D_den);
+    }
+    return good;
+}
+
+static void derive_blocks(const Scalars *v, Drive *p) {
+    const PositionParameters position = {.T_pos = v->T_pos,
+                                         .I_P = v->I_P,
+                                         .K_v = v->K_v,
+                                         .k_ffw = v->k_ffw,
+                                         .T_dyn = v->T_dyn,
+                                         .T_sym = v->T_sym,
+                                         .symmetry_lag = v->symmetry_lag != 0};
+    p->position = position_of(&position);
+    p->ramp.ticks = p->ticks;
+    p->ramp.ramped = v->ramp_speed_setpoint != 0;
+    p->reference_model = reference_model_of(v->reference_model != 0, v->omega_0, v->D, v->T_ref, v->T_c);
+    p->speed = speed_of(v->K_p, v->T_n, v->speed_integrator != 0, v->M_max, v->T_c);
+    p->ideal_current_loop = v->ideal_current_loop != 0;
+    p->K_t = v->K_t;
+    p->current = current_of(v->current_K_p, v->current_T_n, v->u_max, v->T_c);
+    p->motor.R = v->R;
+    p->motor.L_d = v->L_d;
+    p->motor.L_q = v->L_q;
+    p->motor.p = v->p;
+    p->motor.psi = pmsm_flux_linkage(v->K_t, v->p);
+}
+
+static bool derive(Unit *unit) {
+    Drive *p = unit_derived(unit);
+    if (p == NULL) {
+        p = calloc(1, sizeof *p);
+        if (p == NULL) {
+            return unit_fail(unit, "no memory for the coefficients (%u bytes)", (unsigned)sizeof *p);
+        }
+        unit_set_derived(unit, p);
+    }
+    const Scalars *v = unit_scalars(unit);
+    bool cycles = derive_cycles(unit, v, p);
+    bool filters = derive_filters(unit, v, p);
+    if (!cycles || !filters) {
+        return false;
+    }
+    derive_blocks(v, p);
+    drive_layout(p);
+    return true;
+}
+
+static size_t state_size(const Unit *unit) {
+    const Drive *p = unit_derived(unit);
+    return sizeof(State) + p->samples * sizeof(double);
+}
+
+static void release(Unit *unit) {
+    free(unit_derived(unit));
+    unit_set_derived(unit, NULL);
+}
+
+/* --- time --------------------------------------------------------------------------------------------------------- */
+
+/* What the outputs show that belong to the last instant. */
+static void show_instant(Scalars *v, const DriveState *x) {
+    v->x_e = x->position.x_e;
+    v->n_s = x->n_s;
+    v->n_ref = x->n_ref;
+    v->M_s = x->M_s;
+    v->u_d = x->u_d;
+    v->u_q = x->u_q;
+    v->torque_limited = x->speed.limited;
+    v->voltage_limited = x->current.limited;
+}
+
+/* What runs linearly over the cycle, at `share` [1] of it. */
+static void show_cycle(Scalars *v, const DriveState *x, double share) {
+    if (share == 1.0) { /* exactly the cycle's end */
+        v->M_a = x->right.M_a;
+        v->i_d = x->right.i.i_d;
+        v->i_q = x->right.i.i_q;
+        return;
+    }
+    v->M_a = x->left.M_a + share * (x->right.M_a - x->left.M_a);
+    v->i_d = x->left.i.i_d + share * (x->right.i.i_d - x->left.i.i_d);
+    v->i_q = x->left.i.i_q + share * (x->right.i.i_q - x->left.i.i_q);
+}
+
+static void start(Unit *unit) {
+    const State *state = unit_state(unit);
+    Scalars *v = unit_scalars(unit);
+    show_instant(v, &state->drive);
+    show_cycle(v, &state->drive, 1.0);
+    v->x_e = v->x_s - v->x_a;
+}
+
+static bool step(Unit *unit, double t, double h) {
+    const Drive *p = unit_derived(unit);
+    State *state = unit_state(unit);
+    DriveState *x = &state->drive;
+    Scalars *v = unit_scalars(unit);
+    const double start_time = unit_start_time(unit);
+    const double end = t + h;
+    const DriveInputs slope = {.x_s = unit_slope(unit, VR_x_s),
+                               .n_ffw = unit_slope(unit, VR_n_ffw),
+                               .x_a = unit_slope(unit, VR_x_a),
+                               .n_a = unit_slope(unit, VR_n_a),
+                               .n_add = unit_slope(unit, VR_n_add),
+                               .M_add = unit_slope(unit, VR_M_add)};
+
+    double t_k = start_time + (double)x->instant * p->T_c;
+    while (t_k < end - DRIFT * p->T_c) {
+        const double since = t_k - t;
+        const DriveInputs in = {.x_s = v->x_s + slope.x_s * since,
+                                .n_ffw = v->n_ffw + slope.n_ffw * since,
+                                .x_a = v->x_a + slope.x_a * since,
+                                .n_a = v->n_a + slope.n_a * since,
+                                .n_add = v->n_add + slope.n_add * since,
+                                .M_add = v->M_add + slope.M_add * since};
+        drive_instant(p, x, state->lines, &in);
+        t_k = start_time + (double)x->instant * p->T_c;
+    }
+
+    if (x->instant > 0) {
+        double share = 1.0 - (t_k - end) / p->T_c;
+        show_instant(v, x);
+        show_cycle(v, x, share > 1.0 - ROUNDING ? 1.0 : fmax(share, 0.0));
+    }
+    return true;
+}
+
+/* Slope over the cycle that the communication point ends or lies in; 0 at the start, where there is none yet. */
+static double output_derivative(Unit *unit, unsigned vr) {
+    const Drive *p = unit_derived(unit);
+    const State *state = unit_state(unit);
+    const DriveEnd *left = &state->drive.left;
+    const DriveEnd *right = &state->drive.right;
+    switch (vr) {
+    case VR_M_a:
+        return (right->M_a - left->M_a) / p->T_c;
+    case VR_i_d:
+        return (right->i.i_d - left->i.i_d) / p->T_c;
+    case VR_i_q:
+        return (right->i.i_q - left->i.i_q) / p->T_c;
+    default: /* sampled: steps */
+        return 0.0;
+    }
+}
+
+/* Every output is sampled or computed from samples: no input acts on one at once. */
+static double partial(Unit *unit, unsigned output, unsigned input) {
+    (void)unit;
+    (void)output;
+    (void)input;
+    return 0.0;
+}
+
+const Model MODEL = {.identifier = "controller",
+                     .load = NULL,
+                     .derive = derive,
+                     .state_size = state_size,
+                     .start = start,
+                     .step = step,
+                     .output_derivative = output_derivative,
+                     .partial = partial,
+                     .release = release};

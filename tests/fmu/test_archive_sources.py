@@ -1,0 +1,130 @@
+"""Archives from their sources: byte-identical rebuilds, builds by others, all units in one program, another machine."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from fmu.unpacked import PLATFORM, UNITS, Archive, initialize, instantiate, unpack
+from packager import build, resources, toolchain, variables
+
+
+def test_rebuilding_gives_the_same_bytes(unit: str, tmp_path: Path) -> None:
+    compiler = toolchain.find_compiler()
+    for name in ("first", "a longer name"):  # other folders, other paths
+        loaded = build.load(build.unit_directory(unit), compiler)
+        build.build(loaded, tmp_path / name / f"{unit}.fmu", compiler, tmp_path / name / "staged")
+    first, second = ((tmp_path / name / f"{unit}.fmu").read_bytes() for name in ("first", "a longer name"))
+    assert first == second
+
+
+# --- sources
+
+
+def _compiler() -> list[str]:
+    return list(toolchain.find_compiler())
+
+
+def test_sources_build_by_themselves(archive: Archive, tmp_path: Path) -> None:
+    """As an importer of source-code FMUs does it: the files that the description lists, no definition, no option."""
+    sources = archive.folder / "sources"
+    assert set(archive.source_files) == {path.name for path in sources.glob("*.c")}
+    rebuilt = tmp_path / "unpacked"
+    shutil.copytree(archive.folder, rebuilt)
+    library = rebuilt / "binaries" / PLATFORM.folder / archive.library.name
+    library.unlink()
+    command = [*_compiler(), "-shared", "-fPIC", *archive.source_files, "-lm", "-o", str(library)]
+    subprocess.run(command, cwd=sources, check=True)
+    slave = instantiate(archive, rebuilt)
+    try:
+        initialize(slave)
+        slave.exitInitializationMode()
+        slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=125e-6)
+    finally:
+        slave.freeInstance()
+
+
+PROGRAM = """\
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "fmi2FunctionTypes.h"
+
+fmi2InstantiateTYPE plant_fmi2Instantiate, controller_fmi2Instantiate, friction_fmi2Instantiate;
+fmi2FreeInstanceTYPE plant_fmi2FreeInstance, controller_fmi2FreeInstance, friction_fmi2FreeInstance;
+
+static int try(fmi2InstantiateTYPE *instantiate, fmi2FreeInstanceTYPE *release, const char *guid) {
+    const fmi2CallbackFunctions callbacks = {NULL, calloc, free, NULL, NULL};
+    fmi2Component component = instantiate("static", fmi2CoSimulation, guid, NULL, &callbacks, 0, 0);
+    if (component == NULL)
+        return 1;
+    release(component);
+    return 0;
+}
+
+int main(int count, char **guids) {
+    if (count != 4)
+        return 2;
+    return try(plant_fmi2Instantiate, plant_fmi2FreeInstance, guids[1]) +
+           try(controller_fmi2Instantiate, controller_fmi2FreeInstance, guids[2]) +
+           try(friction_fmi2Instantiate, friction_fmi2FreeInstance, guids[3]);
+}
+"""
+
+
+def test_all_units_link_into_one_program(fmus: Path, tmp_path: Path) -> None:
+    """Statically, each with its FMI2_FUNCTION_PREFIX; without resource files, hence with the embedded machine."""
+    objects: list[Path] = []
+    guids: list[str] = []
+    for unit in UNITS:
+        archive = unpack(unit, fmus, tmp_path / unit)
+        guids.append(archive.guid)
+        folder = tmp_path / unit / "sources"
+        found = [(folder / name).with_suffix(".o") for name in archive.source_files]
+        for source, compiled in zip(archive.source_files, found, strict=True):
+            command = [*_compiler(), "-c", f"-DFMI2_FUNCTION_PREFIX={unit}_", source, "-o", str(compiled)]
+            subprocess.run(command, cwd=folder, check=True)
+        if shutil.which("nm"):
+            listed = subprocess.run(
+                ["nm", "-g", "--defined-only", "-P", *map(str, found)], capture_output=True, text=True, check=True
+            ).stdout
+            symbols = [line.split()[0] for line in listed.splitlines() if len(line.split()) > 1]
+            assert symbols
+            assert [symbol for symbol in symbols if not symbol.lstrip("_").startswith(f"{unit}_")] == []
+        objects += found
+    (tmp_path / "main.c").write_text(PROGRAM, encoding="utf-8")
+    program = tmp_path / "program"
+    include = f"-I{tmp_path / 'plant' / 'sources'}"
+    subprocess.run(
+        [*_compiler(), include, "main.c", *map(str, objects), "-lm", "-o", str(program)], cwd=tmp_path, check=True
+    )
+    assert subprocess.run([str(program), *guids]).returncode == 0
+
+
+# --- another machine in the same binary
+
+
+def test_another_machine_needs_no_compiler(plant: Archive, tmp_path: Path) -> None:
+    """The plant's binary as it is, with the resources and the GUID of a machine of one axis."""
+    (tmp_path / "axes.csv").write_text("axis,x_0 [m]\nW,0.25\n", encoding="utf-8")
+    header = ",".join(resources.modes_header(["W"]))
+    (tmp_path / "modes.csv").write_text(
+        f"{header}\n0,0,0,2,0.01,0.01,0,0\n1,50,0.02,1,0.005,0.004,0,0\n", encoding="utf-8"
+    )
+    given = resources.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
+    loaded = build.load(build.unit_directory("plant"), toolchain.find_compiler())
+    repacked = tmp_path / "unpacked"
+    shutil.copytree(plant.folder, repacked)
+    for path, content in given.files().items():
+        (repacked / path).write_bytes(content)
+    described = variables.expand(loaded.table, given)
+    slave = instantiate(plant, repacked, guid=variables.guid(loaded.table, given))
+    try:
+        initialize(slave)
+        (reference,) = (each.reference for each in described if each.name == "W.x_0")
+        assert slave.getReal([reference]) == [0.25]
+        with pytest.raises(Exception, match="fmi2GetReal"):
+            slave.getReal([len(described)])  # there is no second axis
+    finally:
+        slave.freeInstance()

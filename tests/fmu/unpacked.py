@@ -1,0 +1,115 @@
+"""Built archives as the tests of this folder see them, and variables.def by a parser that is not the packager's."""
+
+import csv
+import re
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import fmpy
+from fmpy.fmi2 import FMU2Slave
+
+from packager import compile
+
+ROOT = Path(__file__).resolve().parents[2]
+UNITS = ("plant", "controller", "friction")
+PLATFORM = compile.host_target()
+
+
+@dataclass(frozen=True)
+class Archive:
+    """An unpacked archive."""
+
+    unit: str
+    path: Path
+    folder: Path
+
+    @property
+    def description(self) -> ET.Element:
+        return ET.parse(self.folder / "modelDescription.xml").getroot()
+
+    @property
+    def guid(self) -> str:
+        return self.description.attrib["guid"]
+
+    @property
+    def library(self) -> Path:
+        return self.folder / "binaries" / PLATFORM.folder / f"{self.unit}{PLATFORM.suffix}"
+
+    @property
+    def source_files(self) -> list[str]:
+        return [file.attrib["name"] for file in self.description.iterfind("CoSimulation/SourceFiles/File")]
+
+    def variables(self) -> dict[str, ET.Element]:
+        return {each.attrib["name"]: each for each in self.description.iterfind("ModelVariables/ScalarVariable")}
+
+
+def unpack(unit: str, fmus: Path, folder: Path) -> Archive:
+    with zipfile.ZipFile(fmus / f"{unit}.fmu") as opened:
+        opened.extractall(folder)
+    return Archive(unit, fmus / f"{unit}.fmu", folder)
+
+
+def instantiate(archive: Archive, folder: Path | None = None, guid: str | None = None) -> FMU2Slave:
+    description = fmpy.read_model_description(str(archive.folder))
+    slave = FMU2Slave(
+        guid=guid or archive.guid,
+        unzipDirectory=str(folder or archive.folder),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="tried",
+    )
+    slave.instantiate(loggingOn=False)
+    return slave
+
+
+def initialize(slave: FMU2Slave) -> None:
+    """Into initialisation mode: the standard lets values be read from there on."""
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+
+
+MACROS = {  # columns of each row macro in table.h
+    "REAL": "name causality variability start unit display min max depends description",
+    "INTEGER": "name causality variability start min max depends description",
+    "BOOLEAN": "name causality variability start depends description",
+    "STRING": "name causality variability start description",
+}
+
+
+def declared(unit: str) -> Iterator[dict[str, str]]:
+    """Rows of variables.def by a parser of our own: one row a line, comma-separated, quotes as in CSV."""
+    for line in (ROOT / "src" / f"{unit}_fmu" / "variables.def").read_text(encoding="utf-8").splitlines():
+        match = re.fullmatch(r"(AXIS_)?(REAL|INTEGER|BOOLEAN|STRING)(_OF)?\((.*)\)", line)
+        if match is None:
+            assert re.match(r"\s*(/?\*.*)?$", line), f"line not understood: {line}"
+            continue
+        fields = next(csv.reader([match[4]], skipinitialspace=True))
+        if match[3]:
+            fields[:2] = [".".join(fields[:2])]
+        row = dict(zip(MACROS[match[2]].split(), fields, strict=True))
+        yield (
+            {"unit": "", "min": "NO_MIN", "max": "NO_MAX", "depends": ""}
+            | row
+            | {
+                "kind": match[2],
+                "axis": match[1] or "",
+            }
+        )
+
+
+def axes() -> list[tuple[str, str]]:
+    lines = (ROOT / "src/plant_fmu/resources/axes.csv").read_text(encoding="utf-8").splitlines()
+    return [(name, x_0) for name, x_0 in (line.split(",") for line in lines[1:])]
+
+
+def expected_variables(unit: str) -> list[dict[str, str]]:
+    """All variables in the order of their value references."""
+    rows = list(declared(unit))
+    found = [row for row in rows if not row["axis"]]
+    for axis, x_0 in axes():
+        for row in (row for row in rows if row["axis"]):
+            start = x_0 if row["name"] == "x_0" else row["start"]
+            found.append(row | {"name": f"{axis}.{row['name']}", "start": start})
+    return found

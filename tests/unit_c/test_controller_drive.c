@@ -1,0 +1,87 @@
+/* The cascade of the controller: order of the blocks, instants, computing delay. */
+#include "check.h"
+#include "drive.h"
+
+#define LINES 64
+
+static const double T_C = 125e-6;
+
+/* Z axis of the synthetic default machine, without filter. */
+static Drive z_drive(bool ideal_current_loop) {
+    const PositionParameters position = {
+        .T_pos = 1e-3, .I_P = 0.003, .K_v = 60.0, .k_ffw = 1.0, .T_dyn = 1.326e-3, .T_sym = 3.528e-3};
+    Drive p = {.T_c = T_C, .ticks = 8, .K_t = 2.0, .ideal_current_loop = ideal_current_loop};
+    p.position = position_of(&position);
+    p.ramp = (SetpointRamp){.ticks = 8, .ramped = true};
+    p.reference_model = reference_model_of(true, 915.3, 1.214, 2.5 * T_C, T_C);
+    p.speed = speed_of(6.18, 0.012, false, 80.0, T_C);
+    p.current = current_of(17.28, 0.011, 350.0, T_C);
+    p.motor = (Pmsm){.R = 0.45, .L_d = 5e-3, .L_q = 5e-3, .psi = pmsm_flux_linkage(2.0, 5.0), .p = 5.0};
+    drive_layout(&p);
+    CHECK(p.samples <= LINES);
+    return p;
+}
+
+static void delay_lines_do_not_overlap(void) {
+    Drive p = z_drive(true);
+    CHECK(p.x_ring == 0);
+    CHECK(p.n_ring == 7);          /* 4.854 samples: ages 3 to 6 */
+    CHECK(p.reference_ring == 11); /* 1.326 samples: ages 0 to 3 */
+    CHECK(p.samples == 15);        /* 2.5 samples: ages 2 and 3 */
+}
+
+static void voltage_acts_a_cycle_later(void) {
+    Drive p = z_drive(false);
+    DriveState x = {.instant = 0};
+    double lines[LINES];
+    const DriveInputs in = {.x_s = 0.1, .x_a = 0.1, .M_add = 5.0};
+    drive_instant(&p, &x, lines, &in); /* t_0: current setpoint 2.5 A, first voltage computed */
+    double u_q = 17.28 * (1.0 + T_C / 0.011) * 2.5;
+    CHECK_NEAR(x.M_s, 5.0, 1e-11); /* x_s through the weights of the delay: an ulp of 0.1, times K_p K_v/I_P */
+    CHECK(x.u_q == 0.0 && x.right.M_a == 0.0);
+    drive_instant(&p, &x, lines, &in); /* t_1: it acts until t_2 */
+    double i_q = u_q / 0.45 * -expm1(-0.45 / 5e-3 * T_C);
+    CHECK_NEAR(x.u_q, u_q, 1e-10);
+    CHECK(x.left.M_a == 0.0);
+    CHECK_NEAR(x.right.M_a, 2.0 * i_q, 1e-11);
+    double before = x.right.M_a;
+    drive_instant(&p, &x, lines, &in);
+    CHECK(x.left.M_a == before && x.right.M_a > before);
+}
+
+static void ideal_current_loop_acts_at_once(void) {
+    Drive p = z_drive(true);
+    DriveState x = {.instant = 0};
+    double lines[LINES];
+    for (int k = 0; k < 20; ++k) {
+        const DriveInputs in = {.n_add = k, .n_a = 0.5 * k, .M_add = 1.0};
+        drive_instant(&p, &x, lines, &in);
+        CHECK_NEAR(x.right.M_a, 6.18 * 0.5 * k + 1.0, 1e-13); /* P controller on this very instant's speeds */
+        CHECK(x.left.M_a == x.right.M_a); /* held over the cycle */
+        CHECK(x.right.i.i_q == x.right.M_a / 2.0 && x.right.i.i_d == 0.0 && x.u_q == 0.0);
+    }
+}
+
+static void position_works_every_eighth_instant(void) {
+    Drive p = z_drive(true);
+    DriveState x = {.instant = 0};
+    double lines[LINES];
+    for (int k = 0; k < 24; ++k) {
+        const DriveInputs in = {.x_a = -1e-6 * k};
+        drive_instant(&p, &x, lines, &in);
+        CHECK_NEAR(x.position.x_e, 1e-6 * (k / 8) * 8, 1e-21);
+        /* from the value of the cycle before to this one's, reached in the last tick */
+        double step = 60.0 * 8e-6 / 0.003;
+        double n_s = k < 8 ? 0.0 : step * (k / 8 - 1) + step * (k % 8 + 1) / 8.0;
+        CHECK_NEAR(x.n_s, n_s, 1e-15);
+    }
+    CHECK(x.instant == 24 && x.tick == 0);
+}
+
+int main(void) {
+    delay_lines_do_not_overlap();
+    voltage_acts_a_cycle_later();
+    ideal_current_loop_acts_at_once();
+    position_works_every_eighth_instant();
+    return CHECK_RESULT;
+}

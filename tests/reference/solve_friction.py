@@ -1,0 +1,80 @@
+"""Friction unit's reference: Eqs. 1-7 by scipy's DOP853, interval by interval between the knots of the speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from reference_files import Case, Table
+from scipy.integrate import solve_ivp
+
+# Z axis of the synthetic default machine: the unit's start values
+DEFAULTS = {
+    "sigma_0": 300.0,
+    "sigma_1": 0.8,
+    "sigma_2": 0.006,
+    "F_C": 1.6,
+    "F_S": 2.1,
+    "v_s": 0.6,
+    "beta": 1.0,
+    "F_log": 0.4,
+    "v_log": 3.0,
+    "asymmetry": 0.0,
+    "W": 0.04,
+    "gamma": 0.35,
+}
+
+
+def steady_deflection(p: Mapping[str, float], n: float, side: float) -> float:
+    """g(n) of Eq. 7 [rad] at the speed n [rad/s]; `side`: sign of the direction of travel."""
+    speed = abs(n)
+    stribeck = math.exp(-((speed / p["v_s"]) ** p["beta"]))
+    level = p["F_C"] + (p["F_S"] - p["F_C"]) * stribeck + p["F_log"] * math.log(speed / p["v_log"] + 1)
+    return level * (1 + p["asymmetry"] * side) / p["sigma_0"]
+
+
+def engagement(p: Mapping[str, float], z: float, c: float) -> tuple[float, float]:
+    """lambda (Eq. 3) and k (Eq. 2); pure LuGre is fully engaged."""
+    if p["W"] == 0:
+        return 1.0, 1.0
+    engaged = (p["W"] / 2 + (c if z >= 0 else -c)) / p["W"]
+    return engaged, p["gamma"] + engaged * (1 - p["gamma"])
+
+
+def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
+    """The named outputs every `every` seconds; every sampling instant must be a knot of the input."""
+    p = DEFAULTS | dict(case.parameters)
+    time, speed = case.inputs["time"], case.inputs["n_fr"]
+    z = c = 0.0
+    rows: list[tuple[float, ...]] = []
+    for i, (t, n) in enumerate(zip(time, speed, strict=True)):
+        if abs(t / every - round(t / every)) < 1e-6:
+            g = steady_deflection(p, n, math.copysign(1, n))
+            rate = n - abs(n) / g * z
+            engaged, k = engagement(p, z, c)
+            torque = k * p["sigma_0"] * z + p["sigma_1"] * rate + p["sigma_2"] * n
+            rows.append((t, torque, z, c, k, engaged))
+        if i + 1 < len(time):
+            z, c = _interval(p, z, c, n, speed[i + 1], time[i + 1] - t)
+    table = dict(zip(("time", "M_fr", "z", "c", "k", "lambda"), np.array(rows).T, strict=True))
+    return {name: table[name] for name in ("time", *outputs)}
+
+
+def _interval(p: Mapping[str, float], z: float, c: float, n0: float, n1: float, h: float) -> tuple[float, float]:
+    """z and c after an interval of linear speed; split where the speed changes sign, a kink of the equation."""
+    if n0 * n1 < 0:
+        part = n0 / (n0 - n1)
+        z, c = _interval(p, z, c, n0, 0.0, part * h)
+        return _interval(p, z, c, 0.0, n1, (1 - part) * h)
+    if n0 == 0 and n1 == 0:
+        return z, c
+    side = math.copysign(1, n0 + n1)
+
+    def rate(t: float, y: list[float]) -> list[float]:
+        n = n0 + (n1 - n0) * t / h
+        return [n - abs(n) / steady_deflection(p, n, side) * y[0]]
+
+    z = float(solve_ivp(rate, (0, h), [z], method="DOP853", rtol=1e-12, atol=1e-17).y[0, -1])
+    half = p["W"] / 2
+    return z, min(max(c + (n0 + n1) / 2 * h, -half), half)

@@ -1,0 +1,151 @@
+"""Figures of a circular test, named as in ISO 230-4. Definitions: docs/figures.md.
+
+The radius deviation is hypot of the two positions about the programmed centre, less the programmed radius; it is
+evaluated over one full turn. Angles run from the plane's first axis towards its second. Where the circle crosses the
+half axis of one axis, that axis reverses: at 0 and 180 deg the first, at 90 and 270 deg the second.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from feedsim.analysis.figures import Array, Figure, column, window
+from feedsim.errors import InputError
+from feedsim.trace import Trace
+
+QUARTER = math.pi / 2
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One programmed full turn: axes of the plane (first, second), centre (2,) [m], radius [m], sense of the motion
+    (+1 from the first axis towards the second: counterclockwise, -1 clockwise), begin and end [s]."""
+
+    axes: tuple[str, str]
+    centre: tuple[float, float]
+    radius: float
+    sense: int
+    begin: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Glitch:
+    """Quadrant glitch: name of the crossed half axis ("X+"), the axis that reverses there, and the contour's largest
+    radius deviation within +-45 deg of it: angle [rad], deviation [m], and height [m] above the turn's median."""
+
+    name: str
+    axis: str
+    angle: float
+    deviation: float
+    height: float
+
+
+@dataclass(frozen=True, eq=False)
+class Contour:
+    """Measured turn: angle (N,) [rad] in [-pi, pi), deviation of the radius (N,) [m], and its four glitches."""
+
+    angle: Array
+    deviation: Array
+    median: float
+    glitches: tuple[Glitch, Glitch, Glitch, Glitch]
+
+
+def contour(trace: Trace, turn: Turn, columns: tuple[str, str] | None = None) -> Contour:
+    """Radius deviation over ``turn``, by the linear scales or by the two position ``columns`` [m].
+
+    Raises InputError where the columns are not recorded, or where the turn is not recorded whole.
+    """
+    first, second = turn.axes
+    names = columns or (f"{first}.x_a", f"{second}.x_a")
+    purpose = f"circularity in the plane {first}{second}"
+    rows = window(trace, turn.begin, turn.end, purpose, least=16)
+    if trace.time[rows][-1] >= turn.end:  # the same point of the circle as the first one
+        rows = slice(rows.start, rows.stop - 1)
+    x, y = (column(trace, name, purpose)[rows] - c for name, c in zip(names, turn.centre, strict=True))
+    angle = np.arctan2(y, x)
+    deviation = np.hypot(x, y) - turn.radius
+    if np.unique(np.floor(angle / (math.pi / 4))).size < 8:
+        covered = np.rad2deg(np.ptp(np.unwrap(angle)))
+        raise InputError(
+            f"{purpose}: the path from {turn.begin:.6g} to {turn.end:.6g} s covers {covered:.0f} deg, no full turn"
+        )
+    median = float(np.median(deviation))
+    glitches = [_glitch(turn, k, angle, deviation, median) for k in range(4)]
+    return Contour(angle, deviation, median, (glitches[0], glitches[1], glitches[2], glitches[3]))
+
+
+def circularity(trace: Trace, turn: Turn) -> dict[str, Figure]:
+    """Figures of ``turn`` by the linear scales and, with prefix ``tool.``, by the tool point where it is recorded."""
+    figures = _figures(turn, trace, (f"{turn.axes[0]}.x_a", f"{turn.axes[1]}.x_a"), "by the linear scales")
+    at_tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
+    if all(name in trace.columns for name in at_tool):
+        by_tool = _figures(turn, trace, at_tool, "by the tool point")
+        figures |= {f"tool.{name}": figure for name, figure in by_tool.items()}
+    return figures
+
+
+def least_squares_deviation(angle: Array, deviation: Array, radius: float) -> float:
+    """Circular deviation G about the least-squares circle [m]: range of the distance from its centre."""
+    x, y = (radius + deviation) * np.cos(angle), (radius + deviation) * np.sin(angle)
+    centre = np.zeros(2)
+    for _ in range(4):  # Gauss-Newton; an offset of d leaves d^2/R after one pass, nothing after three
+        distance = np.hypot(x - centre[0], y - centre[1])
+        normal = np.column_stack([(x - centre[0]) / distance, (y - centre[1]) / distance, np.ones(len(x))])
+        centre += np.linalg.lstsq(normal, distance - radius, rcond=None)[0][:2]
+    return float(np.ptp(np.hypot(x - centre[0], y - centre[1])))
+
+
+def _glitch(turn: Turn, quarter: int, angle: Array, deviation: Array, median: float) -> Glitch:
+    near = np.abs((angle - quarter * QUARTER + math.pi) % (2 * math.pi) - math.pi) <= QUARTER / 2
+    peak = int(np.flatnonzero(near)[np.argmax(deviation[near])])
+    axis = turn.axes[quarter % 2]
+    return Glitch(
+        name=f"{axis}{'+' if quarter < 2 else '-'}",
+        axis=axis,
+        angle=float(angle[peak]),
+        deviation=float(deviation[peak]),
+        height=float(deviation[peak]) - median,
+    )
+
+
+def _figures(turn: Turn, trace: Trace, columns: tuple[str, str], how: str) -> dict[str, Figure]:
+    measured = contour(trace, turn, columns)
+    e = measured.deviation
+    # ISO 230-4 orders the axis letters by the sense of contouring: XZ from X+ to Z+, ZX from Z+ to X+.
+    letters = axis_letters(turn.axes if turn.sense > 0 else turn.axes[::-1])
+
+    def um(value: float, meaning: str) -> Figure:
+        return Figure(value * 1e6, "um", f"{meaning}, {how}")
+
+    figures = {
+        "G": um(
+            float(np.ptp(e)),
+            f"ISO 230-4 circular deviation G_{letters}, range of the deviation about the programmed centre",
+        ),
+        "G_ls": um(
+            least_squares_deviation(measured.angle, e, turn.radius),
+            f"ISO 230-4 circular deviation G_{letters} about the centre of the least-squares circle",
+        ),
+        "F_max": um(float(e.max()), f"ISO 230-4 radial deviation F_{letters},max about the programmed circle"),
+        "F_min": um(float(e.min()), f"ISO 230-4 radial deviation F_{letters},min about the programmed circle"),
+        "mean": um(float(e.mean()), "mean radius deviation over the turn"),
+        "median": um(measured.median, "median radius deviation over the turn"),
+    }
+    for axis in turn.axes:
+        height = max(glitch.height for glitch in measured.glitches if glitch.axis == axis)
+        figures[f"glitch_{axis}"] = um(height, f"quadrant glitch where {axis} reverses, the larger of the two")
+    for glitch in measured.glitches:
+        figures[f"glitch_{glitch.name}"] = um(
+            glitch.height, f"quadrant glitch at {glitch.name}, largest within +-45 deg less the median of the turn"
+        )
+    return figures
+
+
+def axis_letters(axes: Sequence[str]) -> str:
+    """Name of a plane or of several axes: letters in a row, longer names joined by a hyphen."""
+    return ("" if all(len(axis) == 1 for axis in axes) else "-").join(axes)

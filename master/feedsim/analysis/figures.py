@@ -1,0 +1,84 @@
+"""A derived figure, and small tools on time series that the analyses share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.errors import InputError
+from feedsim.trace import Trace
+
+Array = NDArray[np.float64]
+
+# Instants within this share of a sampling interval count as the same: recorded times carry rounding errors.
+SAME_INSTANT = 1e-6
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One derived number. ``value`` is NaN where the trace does not contain what the definition asks for."""
+
+    value: float
+    unit: str
+    meaning: str
+
+    def __str__(self) -> str:
+        return f"{self.value:.4g} {self.unit}" if math.isfinite(self.value) else "not determined"
+
+
+Figures = Mapping[str, Figure]
+
+
+def column(trace: Trace, name: str, purpose: str) -> Array:
+    """Column ``name`` of the trace; raises InputError that names the purpose and what was recorded instead."""
+    if name not in trace.columns:
+        recorded = ", ".join(trace.columns) or "nothing"
+        raise InputError(f"{purpose} needs {name}, which is not recorded; recorded: {recorded}")
+    return np.asarray(trace[name], dtype=np.float64)
+
+
+def window(trace: Trace, begin: float, end: float, purpose: str, *, least: int = 2) -> slice:
+    """Rows with begin <= time <= end [s]; raises InputError where the trace does not reach that far.
+
+    The window may stick out of the recording by one sampling interval.
+    """
+    time = trace.time
+    interval = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    slack = SAME_INSTANT * interval
+    first = int(np.searchsorted(time, begin - slack, side="left"))
+    last = int(np.searchsorted(time, end + slack, side="right"))
+    short = len(time) == 0 or begin < time[0] - interval - slack or end > time[-1] + interval + slack
+    if short or last - first < least:
+        have = f"{time[0]:.6g} to {time[-1]:.6g} s" if len(time) else "nothing"
+        raise InputError(
+            f"{purpose} needs the trace from {begin:.6g} to {end:.6g} s with {least} samples or more; "
+            f"recorded: {have}, {max(last - first, 0)} samples in that span"
+        )
+    return slice(first, last)
+
+
+def up_crossings(time: Array, signal: Array) -> Array:
+    """Instants [s], linearly interpolated, at which ``signal`` (N,) rises through zero."""
+    rise = np.flatnonzero((signal[:-1] < 0) & (signal[1:] >= 0))
+    share = signal[rise] / (signal[rise] - signal[rise + 1])
+    return np.asarray(time[rise] + share * (time[rise + 1] - time[rise]), dtype=np.float64)
+
+
+def last_outside(time: Array, deviation: Array, band: float) -> float:
+    """Last instant [s] with |deviation| > band, interpolated to the crossing of the band's edge.
+
+    -inf where the deviation never leaves the band, NaN where it is still outside at the last sample.
+    """
+    outside = np.flatnonzero(np.abs(deviation) > band)
+    if len(outside) == 0:
+        return -math.inf
+    k = int(outside[-1])
+    if k == len(time) - 1:
+        return math.nan
+    edge = math.copysign(band, deviation[k])
+    share = (deviation[k] - edge) / (deviation[k] - deviation[k + 1])
+    return float(time[k] + share * (time[k + 1] - time[k]))

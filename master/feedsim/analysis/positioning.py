@@ -1,0 +1,152 @@
+"""Figures of a positioning move: how an axis comes to rest on its target, and the torque that it took.
+
+Definitions: docs/figures.md. Everything refers to the programmed target and to the end of the NC motion.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from feedsim.analysis.figures import Array, Figure, column, last_outside, up_crossings, window
+from feedsim.errors import InputError
+from feedsim.trace import Trace
+
+RINGING_WINDOW = (0.030, 0.400)  # s after the end of the NC motion: the first swing is left out, it is a forced one
+REST_DELAY = 1.0  # s after the end of the NC motion
+PLATEAU = (0.4, 0.9)  # share of the constant-speed phase: its begin still rings from the acceleration
+
+
+@dataclass(frozen=True)
+class Approach:
+    """One axis of one programmed motion.
+
+    axis: name; start, end: of the NC motion [s]; until: last instant that belongs to it [s] (the next motion's start
+    or the end of the program); origin, target: programmed positions [m]; steady: constant-speed phase [s] or None.
+    """
+
+    axis: str
+    start: float
+    end: float
+    until: float
+    origin: float
+    target: float
+    steady: tuple[float, float] | None
+
+    def __post_init__(self) -> None:
+        if self.origin == self.target:
+            raise InputError(f"positioning: axis {self.axis} does not move; its target is its start, {self.target:g} m")
+
+    @property
+    def sense(self) -> float:
+        """+1 towards larger positions, -1 towards smaller ones."""
+        return math.copysign(1.0, self.target - self.origin)
+
+
+def positioning(trace: Trace, approach: Approach, *, band: float = 1e-6) -> dict[str, Figure]:
+    """Figures of ``approach``: overshoot, settling time to ``band`` [m], ringing, torques; by scale and by tool point.
+
+    Torque and tool-point figures are present where M_a, M_fr and tcp.x_<axis> are recorded. Raises InputError where
+    the axis' position is not recorded, or not up to the end of the motion.
+    """
+    axis = approach.axis
+    figures = {
+        "duration": Figure(approach.end - approach.start, "s", "duration of the NC motion, from rest to rest"),
+        **_stop(trace, approach, f"{axis}.x_a", band, f"axis {axis} by the linear scale"),
+    }
+    if f"{axis}.n_a" in trace.columns:
+        figures["ringing_frequency"] = _ringing(
+            trace.time, approach.sense * trace[f"{axis}.n_a"], approach, f"motor speed of axis {axis}"
+        )
+    if f"{axis}.M_a" in trace.columns:
+        figures |= _torques(trace, approach)
+    if f"{axis}.M_fr" in trace.columns:
+        figures["rest_torque"] = _rest_torque(trace, approach)
+    if f"tcp.x_{axis}" in trace.columns:
+        by_tool = _stop(trace, approach, f"tcp.x_{axis}", band, f"axis {axis} by the tool point")
+        figures |= {f"tool.{name}": figure for name, figure in by_tool.items()}
+    return figures
+
+
+def deviation(trace: Trace, approach: Approach, name: str) -> tuple[Array, Array]:
+    """Time [s] and distance beyond the target [m], positive past it, from the motion's start to its last instant."""
+    rows = _rows(trace, approach)
+    return trace.time[rows], approach.sense * (column(trace, name, "positioning")[rows] - approach.target)
+
+
+def ringing_frequency(time: Array, speed: Array) -> float:
+    """Mean frequency [Hz] between the first and the last up-crossing of zero; NaN with fewer than two of them.
+
+    Speed, not position: at rest the axis creeps to its target, and crossings of a drifting signal come late.
+    """
+    crossings = up_crossings(time, speed)
+    return (len(crossings) - 1) / float(crossings[-1] - crossings[0]) if len(crossings) > 1 else math.nan
+
+
+def _rows(trace: Trace, approach: Approach) -> slice:
+    """The motion and what follows it, as far as it is recorded."""
+    until = max(approach.end, min(approach.until, float(trace.time[-1]))) if len(trace) else approach.until
+    return window(trace, approach.start, until, f"positioning of axis {approach.axis}")
+
+
+def _stop(trace: Trace, approach: Approach, name: str, band: float, what: str) -> dict[str, Figure]:
+    time, beyond = deviation(trace, approach, name)
+    after = time >= approach.end
+    if not after.any():
+        raise InputError(
+            f"positioning of axis {approach.axis}: nothing is recorded after the end of the motion at "
+            f"{approach.end:.6g} s"
+        )
+    settled = last_outside(time[after], beyond[after], band) - approach.end
+    width = f"{band * 1e6:g} um"
+    return {
+        "overshoot": Figure(max(float(beyond.max()), 0.0) * 1e6, "um", f"largest distance beyond the target, {what}"),
+        "settling_time": Figure(
+            max(settled, 0.0) * 1e3 if not math.isnan(settled) else math.nan,
+            "ms",
+            f"last instant outside +-{width} about the target, counted from the end of the NC motion, {what}",
+        ),
+        "ringing_frequency": _ringing(
+            time, np.gradient(beyond, time), approach, f"rate of change of the position, {what}"
+        ),
+    }
+
+
+def _ringing(time: Array, speed: Array, approach: Approach, what: str) -> Figure:
+    begin, end = (approach.end + delay for delay in RINGING_WINDOW)
+    inside = (time >= begin) & (time <= min(end, approach.until))
+    return Figure(
+        ringing_frequency(time[inside], speed[inside]),
+        "Hz",
+        f"{what}: mean frequency of its up-crossings of zero, 30 to 400 ms after the end of the NC motion",
+    )
+
+
+def _torques(trace: Trace, approach: Approach) -> dict[str, Figure]:
+    torque = column(trace, f"{approach.axis}.M_a", "positioning")
+    rows = _rows(trace, approach)
+    figures = {
+        "peak_torque": Figure(float(np.abs(torque[rows]).max()), "N.m", "largest magnitude of the motor torque"),
+    }
+    if approach.steady is not None:
+        begin, end = (approach.steady[0] + share * (approach.steady[1] - approach.steady[0]) for share in PLATEAU)
+        inside = (trace.time >= begin) & (trace.time <= end)
+        figures["plateau_torque"] = Figure(
+            float(torque[inside].mean()) if inside.any() else math.nan,
+            "N.m",
+            f"mean motor torque at constant speed, {begin:.3f} to {end:.3f} s",
+        )
+    return figures
+
+
+def _rest_torque(trace: Trace, approach: Approach) -> Figure:
+    instant = approach.end + REST_DELAY
+    reached = instant <= min(approach.until, float(trace.time[-1]))
+    torque = column(trace, f"{approach.axis}.M_fr", "positioning")
+    return Figure(
+        float(np.interp(instant, trace.time, torque)) if reached else math.nan,
+        "N.m",
+        f"friction torque at rest, {REST_DELAY:g} s after the end of the NC motion",
+    )

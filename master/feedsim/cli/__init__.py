@@ -1,0 +1,107 @@
+"""Command line: ``feedsim COMMAND``. Commands, messages, progress, exit codes; all else is in the rooms below.
+
+Exit codes: 0 done; 1 an error of feedsim itself (please report it); 2 bad input or usage; 3 a unit failed during the
+simulation; 4 the results could not be written; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+EPILOG = """exit codes:
+  0 done    1 internal error    2 bad input or usage    3 a unit failed    4 results cannot be written
+  130 interrupted
+
+examples:
+  feedsim run scenarios/z_positioning.yaml --out results/z
+  feedsim run scenarios/xz_circle.yaml --set "machine.axes.*.friction.W=0 rad"
+  feedsim validate scenarios/xz_circle.yaml
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line's grammar."""
+    top = argparse.ArgumentParser(
+        prog="feedsim",
+        description="Simulate machine-tool feed drives with non-linear friction.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("--version", action="version", version=f"feedsim {version('feedsim')}")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+
+    run = commands.add_parser("run", help="run a scenario; write result.csv, summary.json, report.html and figures")
+    _add_scenario(run)
+    run.add_argument(
+        "--out", type=Path, metavar="DIR", help="where the results go (default: results/<name of the scenario file>)"
+    )
+    run.add_argument(
+        "--fmus", type=Path, metavar="DIR", help="folder of the archives (default: $FEEDSIM_FMUS or fmus/)"
+    )
+    run.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+
+    validate = commands.add_parser("validate", help="check a scenario, its machine and its motion without running it")
+    _add_scenario(validate)
+
+    schema = commands.add_parser("schema", help="print the JSON Schema of scenario or machine files, for editors")
+    schema.add_argument("kind", nargs="?", choices=("scenario", "machine"), default="scenario")
+
+    convert = commands.add_parser(
+        "convert",
+        help="turn variables of a MAT file into a CSV trace",
+        description="Turn variables of a MAT file into a CSV trace with units in its header, e.g. the recorded "
+        "position reference of an axis: feedsim convert record.mat --column t=time:s "
+        "--column qg=Z.x_s:m --out reference.csv",
+    )
+    convert.add_argument("file", type=Path, metavar="FILE.mat")
+    convert.add_argument(
+        "--column",
+        action="append",
+        required=True,
+        metavar="VARIABLE=NAME:UNIT",
+        help="one column; the first must be time",
+    )
+    convert.add_argument("--out", type=Path, required=True, metavar="FILE.csv")
+    return top
+
+
+def _add_scenario(command: argparse.ArgumentParser) -> None:
+    command.add_argument("scenario", type=Path, metavar="SCENARIO.yaml")
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="overrides",
+        metavar="KEY=VALUE",
+        help="override one entry, e.g. machine.axes.Z.friction.F_C='1.8 N.m'; may be given several times",
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    options = parser().parse_args(arguments)
+
+    from feedsim.cli import commands
+    from feedsim.errors import FeedsimError, InputError, OutputError, SimulationError
+
+    codes: dict[type[FeedsimError], int] = {InputError: 2, SimulationError: 3, OutputError: 4}
+    try:
+        getattr(commands, options.command)(options)
+    except FeedsimError as error:
+        print(f"feedsim: {error}", file=sys.stderr)
+        return next((code for kind, code in codes.items() if isinstance(error, kind)), 1)
+    except KeyboardInterrupt:
+        print("feedsim: interrupted; nothing was written", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        return 0
+    return 0
+
+
+def entry() -> None:
+    """Entry point of the console script."""
+    sys.exit(main())

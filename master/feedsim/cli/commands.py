@@ -1,0 +1,65 @@
+"""What each command does. One function per command, named like it, taking the parsed options."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+from feedsim.errors import InputError
+
+
+def run(options: Namespace) -> None:
+    from tqdm import tqdm
+
+    from feedsim import analysis, cosim, report, scenario
+
+    plan = scenario.load(options.scenario, options.overrides)
+    directory: Path = options.out or Path("results") / options.scenario.stem
+    report.check_writable(directory)
+    with tqdm(
+        desc=plan.name, unit=" cycles", unit_scale=True, leave=False, disable=options.quiet or not sys.stderr.isatty()
+    ) as bar:
+
+        def progress(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        result = cosim.run(plan, fmus=options.fmus, progress=progress)
+    figures = analysis.evaluate(result)
+    report.write(result, figures, directory)
+    for warning in result.warnings:
+        print(f"feedsim: warning: {warning}", file=sys.stderr)
+    if not options.quiet:
+        print(f"{plan.name}: {report.summary_line(result, figures)} -> {directory}")
+
+
+def validate(options: Namespace) -> None:
+    from feedsim import nc, scenario
+
+    checked = scenario.load(options.scenario, options.overrides)
+    program = nc.plan(checked)
+    motions = f"{len(checked.motions)} motion{'s'[: len(checked.motions) != 1]}"
+    print(f"{options.scenario}: valid; {motions}, {program.time[-1]:.4g} s on {checked.machine.name}")
+
+
+def schema(options: Namespace) -> None:
+    from feedsim import scenario
+
+    json.dump(scenario.json_schema(options.kind), sys.stdout, indent=2)
+    print()
+
+
+def convert(options: Namespace) -> None:
+    from feedsim.trace import convert_mat
+
+    columns = []
+    for text in options.column:
+        variable, equals, rest = text.partition("=")
+        name, colon, unit = rest.rpartition(":")
+        if not (equals and colon and variable and name and unit):
+            raise InputError(f"--column {text}: VARIABLE=NAME:UNIT is needed, e.g. qg=Z.x_s:m")
+        columns.append((variable, name, unit))
+    convert_mat(options.file, columns, options.out)
+    print(f"{options.out}: {len(columns)} columns from {options.file}")

@@ -1,0 +1,165 @@
+"""Run a scenario on the units: plan the motion, build the system, exchange at the control cycle, record."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
+
+from feedsim.cosim import wiring
+from feedsim.cosim.schedule import SCHEMES, Cycle
+from feedsim.cosim.system import System
+from feedsim.cosim.unit import Floats, Log
+from feedsim.errors import InputError
+from feedsim.nc import Program, plan
+from feedsim.scenario import Scenario
+from feedsim.trace import Trace
+
+Progress = Callable[[int, int], None]
+
+CONTROLLER_SIGNALS = (
+    "M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q", "torque_limited", "voltage_limited",
+)  # fmt: skip
+FRICTION_SIGNALS = ("M_fr", "z", "c", "k", "lambda")
+PLANT_SIGNALS = ("x_a", "n_a")
+TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run leaves behind.
+
+    Attributes:
+        trace: recorded signals, columns "X.x_a" ... in SI units.
+        coupling: per axis, interface energy residual [J], its peak, and the friction work [J] to hold it against.
+        wall_time: duration of the cycle loop [s].
+        units: per instance, GUID and version of its archive.
+        warnings: what the units warned of.
+    """
+
+    scenario: Scenario
+    program: Program
+    trace: Trace
+    coupling: Mapping[str, float]
+    wall_time: float
+    units: Mapping[str, Mapping[str, str]]
+    warnings: tuple[str, ...]
+
+
+def fmus_directory() -> Path:
+    """Folder of the built archives: FEEDSIM_FMUS, else `fmus/` of the checkout this package runs from."""
+    named = os.environ.get("FEEDSIM_FMUS")
+    return Path(named) if named else Path(__file__).resolve().parents[3] / "fmus"
+
+
+def run(scenario: Scenario, *, fmus: Path | None = None, progress: Progress | None = None) -> Run:
+    """Run `scenario` and return its trace.
+
+    Args:
+        fmus: folder with plant.fmu, controller.fmu, friction.fmu; default :func:`fmus_directory`.
+        progress: called now and then with (cycles done, cycles in all).
+
+    Raises:
+        InputError: the motion violates a limit, the archives do not fit the machine.
+        SimulationError: a unit failed; the message names the unit, the time and the unit's reason.
+    """
+    program = plan(scenario)
+    cycles = scenario.machine.cycles
+    ratio = round(cycles.T_pos / cycles.T_c)
+    every = round(scenario.recording.interval / cycles.T_c)
+    total = (len(program.time) - 1) * ratio
+    with System(scenario.machine, fmus or fmus_directory()) as system:
+        cycle = Cycle(system, SCHEMES[scenario.coupling.scheme], cycles.T_c, scenario.coupling.substeps)
+        logs = _logs(system, total // every + 1)
+        begun = time.perf_counter()
+        system.initialise(program, stop=total * cycles.T_c)
+        for k in range(total):
+            if k % ratio == 0:
+                system.set_setpoints(program, k // ratio)
+            if k % every == 0:
+                for log in logs.values():
+                    log.record(k // every)
+            cycle.run(k)
+            if progress is not None and (k + 1) % 512 == 0:
+                progress(k + 1, total)
+        if total % every == 0:
+            for log in logs.values():
+                log.record(total // every)
+        if progress is not None:
+            progress(total, total)
+        wall_time = time.perf_counter() - begun
+        return Run(
+            scenario=scenario,
+            program=program,
+            trace=_trace(scenario, system, program, logs, every, ratio),
+            coupling=_coupling(system, cycle),
+            wall_time=wall_time,
+            units={
+                name: {"guid": unit.archive.guid, "version": unit.archive.version}
+                for name, unit in system.units.items()
+            },
+            warnings=tuple(system.warnings),
+        )
+
+
+def _logs(system: System, rows: int) -> dict[str, Log]:
+    plant = [f"{axis}.{signal}" for axis in system.axes for signal in PLANT_SIGNALS] + list(TOOL_SIGNALS)
+    logs = {wiring.PLANT: Log(system.plant, plant, rows)}
+    for axis in system.axes:
+        for name, signals in ((wiring.controller(axis), CONTROLLER_SIGNALS), (wiring.friction(axis), FRICTION_SIGNALS)):
+            logs[name] = Log(system.units[name], signals, rows)
+    return logs
+
+
+def _trace(
+    scenario: Scenario, system: System, program: Program, logs: Mapping[str, Log], every: int, ratio: int
+) -> Trace:
+    plant = logs[wiring.PLANT]
+    cycle = np.arange(len(plant.reals)) * every
+    position_cycle = cycle // ratio
+    columns: dict[str, Floats] = {}
+    units: dict[str, str] = {}
+    for axis in system.axes:
+        for setpoint, values in (("x_s", program.x_s), ("n_ffw", program.n_ffw)):
+            columns[f"{axis}.{setpoint}"] = values[axis][position_cycle]
+            units[f"{axis}.{setpoint}"] = wiring.SETPOINT_UNITS[setpoint]
+        for signal in PLANT_SIGNALS:
+            columns[f"{axis}.{signal}"] = plant.columns()[f"{axis}.{signal}"]
+            units[f"{axis}.{signal}"] = plant.unit.archive.unit_of(f"{axis}.{signal}")
+        for name in (wiring.controller(axis), wiring.friction(axis)):
+            for signal, column in logs[name].columns().items():
+                columns[f"{axis}.{signal}"] = column
+                units[f"{axis}.{signal}"] = logs[name].unit.archive.unit_of(signal)
+    for signal in TOOL_SIGNALS:
+        columns[signal] = plant.columns()[signal]
+        units[signal] = plant.unit.archive.unit_of(signal)
+    wanted = _selected(scenario, list(columns))
+    return Trace(
+        time=np.asarray(cycle * scenario.machine.cycles.T_c, dtype=np.float64),
+        columns={name: columns[name] for name in wanted},
+        units={name: units[name] for name in wanted},
+    )
+
+
+def _selected(scenario: Scenario, names: list[str]) -> list[str]:
+    patterns = scenario.recording.variables
+    if patterns is None:
+        return names
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise InputError(f"{scenario.file}: recording.variables: '{pattern}' matches none of: {', '.join(names)}")
+    return [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
+
+
+def _coupling(system: System, cycle: Cycle) -> dict[str, float]:
+    coupling: dict[str, float] = {}
+    for i, axis in enumerate(system.axes):
+        coupling[f"{axis}.residual"] = float(cycle.residual[i])
+        coupling[f"{axis}.residual_peak"] = float(cycle.residual_peak[i])
+        coupling[f"{axis}.friction_work"] = float(cycle.dissipated[i])
+    return coupling

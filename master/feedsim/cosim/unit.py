@@ -1,0 +1,270 @@
+"""One FMU instance, through fmpy: the only room that knows fmpy and ctypes.
+
+An :class:`Archive` is an unpacked ``.fmu``; a :class:`Unit` is an instance of it; a :class:`Port` is a group of Real
+variables of one unit that travel together. A port's buffers are numpy arrays, possibly views of a larger one, whose
+addresses go straight into the FMI calls: wiring two units is sharing memory, and a cycle makes no copies.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from numpy.typing import NDArray
+
+from feedsim.errors import InputError, SimulationError
+
+Floats = NDArray[np.float64]
+
+WARNING = 1  # fmi2Status: 0 OK, 1 warning, 2 discard, 3 error, 4 fatal
+
+_EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
+_DERIVATIVE = ctypes.CFUNCTYPE(
+    ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_void_p
+)
+_STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
+
+
+class Archive:
+    """An ``.fmu`` file, unpacked into a temporary folder for as long as this object is open (a context manager)."""
+
+    def __init__(self, path: Path) -> None:
+        if not path.is_file():
+            raise InputError(f"{path}: no such file; `make fmus` builds the archives, FEEDSIM_FMUS names their folder")
+        self.path = path
+        self.directory = Path(tempfile.mkdtemp(prefix="feedsim-"))
+        try:
+            extract(str(path), unzipdir=str(self.directory))
+            self.description = read_model_description(str(self.directory))
+        except Exception as error:
+            self.close()
+            raise InputError(f"{path}: not a usable FMI 2.0 archive: {error}") from error
+        if self.description.coSimulation is None:
+            self.close()
+            raise InputError(f"{path}: has no co-simulation interface")
+        self.variables = {variable.name: variable for variable in self.description.modelVariables}
+
+    @property
+    def guid(self) -> str:
+        return str(self.description.guid)
+
+    @property
+    def version(self) -> str:
+        return str(self.description.version)
+
+    def close(self) -> None:
+        shutil.rmtree(self.directory, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def unit_of(self, name: str) -> str:
+        """Unit of variable `name` as the archive declares it; "1" where it declares none."""
+        variable = self.variables[name]
+        declared = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+        return str(declared or "1")
+
+
+class Unit:
+    """An instance of an archive. Every failed call raises :class:`SimulationError` with the unit's own message."""
+
+    def __init__(self, archive: Archive, name: str) -> None:
+        self.archive = archive
+        self.name = name
+        self.warnings: list[str] = []
+        self._messages: list[str] = []
+        self._time = 0.0
+        self._fmu = FMU2Slave(
+            guid=archive.guid,
+            unzipDirectory=str(archive.directory),
+            modelIdentifier=archive.description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        callbacks = fmi2CallbackFunctions()
+        callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
+        callbacks.allocateMemory = defaultCallbacks.allocateMemory
+        callbacks.freeMemory = defaultCallbacks.freeMemory
+        try:
+            self._fmu.instantiate(callbacks=callbacks)
+        except Exception as error:
+            raise SimulationError(f"unit {name}: cannot be instantiated: {self._said() or error}") from error
+        self._component = self._fmu.component
+        library = self._fmu.dll
+        self._set_real = _EXCHANGE(("fmi2SetReal", library))
+        self._get_real = _EXCHANGE(("fmi2GetReal", library))
+        self._get_boolean = _EXCHANGE(("fmi2GetBoolean", library))
+        self._set_slope = _DERIVATIVE(("fmi2SetRealInputDerivatives", library))
+        self._get_slope = _DERIVATIVE(("fmi2GetRealOutputDerivatives", library))
+        self._do_step = _STEP(("fmi2DoStep", library))
+
+    def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
+        text = message.decode("utf-8", errors="replace").replace("%%", "%")
+        if status == WARNING:
+            self.warnings.append(f"{self.name}: {text}")
+        elif status > WARNING:
+            self._messages.append(text)
+
+    def _said(self) -> str:
+        said = "; ".join(self._messages)
+        self._messages.clear()
+        return said
+
+    def fail(self, action: str) -> None:
+        """Raise for a call that returned an error."""
+        said = self._said() or "no message"
+        raise SimulationError(f"unit {self.name}, t = {self._time:.9g} s: {action} failed: {said}")
+
+    def _checked(self, action: str, call: Any, *arguments: Any) -> None:
+        """A call of fmpy's own wrapper: it raises without the unit's words, which belong into the message."""
+        try:
+            call(*arguments)
+        except Exception:
+            self.fail(action)
+
+    def set_parameters(self, parameters: Mapping[str, float | int | bool | str]) -> None:
+        """Set start values by name, before initialisation.
+
+        Raises:
+            InputError: the unit has no such variable.
+            SimulationError: the unit refuses the value.
+        """
+        for name, value in parameters.items():
+            variable = self.archive.variables.get(name)
+            if variable is None:
+                raise InputError(f"{self.archive.path.name}: no variable '{name}'")
+            reference = [variable.valueReference]
+            action = f"{name} = {value!r}"
+            if variable.type == "Real":
+                self._checked(action, self._fmu.setReal, reference, [float(value)])
+            elif variable.type == "Integer":
+                self._checked(action, self._fmu.setInteger, reference, [int(value)])
+            elif variable.type == "Boolean":
+                self._checked(action, self._fmu.setBoolean, reference, [bool(value)])
+            else:
+                self._checked(action, self._fmu.setString, reference, [str(value)])
+
+    def enter_initialisation(self, start: float, stop: float) -> None:
+        self._time = start
+        self._checked("fmi2SetupExperiment", self._fmu.setupExperiment, None, start, stop)
+        self._checked("fmi2EnterInitializationMode", self._fmu.enterInitializationMode)
+
+    def exit_initialisation(self) -> None:
+        self._checked("fmi2ExitInitializationMode", self._fmu.exitInitializationMode)
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from t to t + h [s]."""
+        if self._do_step(self._component, t, h, 1) > WARNING:
+            self._time = t
+            self.fail(f"step of {h:.6g} s")
+
+    def close(self) -> None:
+        """Free the instance; never raises, so that it can stand in a `finally`."""
+        if self._component is not None:
+            self._fmu.fmi2FreeInstance(self._component)
+            self._component = None
+
+    def references(self, names: Iterable[str]) -> NDArray[np.uint32]:
+        """Value references of the named variables.
+
+        Raises:
+            InputError: the unit has no such variable.
+        """
+        known = self.archive.variables
+        names = list(names)
+        for name in names:
+            if name not in known:
+                raise InputError(f"{self.archive.path.name}: no variable '{name}'")
+        return np.array([known[name].valueReference for name in names], dtype=np.uint32)
+
+
+class Port:
+    """Real variables of one unit that are exchanged in one call.
+
+    Attributes:
+        values: (n,) in the unit's own units; what `set` sends and `get` fills.
+        slopes: (n,) first time derivatives; what `set_slopes` sends and `get_slopes` fills.
+    """
+
+    def __init__(
+        self, unit: Unit, names: Sequence[str], values: Floats | None = None, slopes: Floats | None = None
+    ) -> None:
+        self.unit = unit
+        self.names = tuple(names)
+        count = len(self.names)
+        self.values = np.zeros(count) if values is None else values
+        self.slopes = np.zeros(count) if slopes is None else slopes
+        for buffer in (self.values, self.slopes):
+            if buffer.shape != (count,) or buffer.dtype != np.float64 or not buffer.flags.c_contiguous:
+                raise ValueError(f"port {self.names}: a buffer of {count} contiguous float64 is needed")
+        self._references = unit.references(self.names)
+        self._orders = np.ones(count, dtype=np.int32)
+        component = unit._component
+        at = self._references.ctypes.data
+        self._exchange = (component, at, count, self.values.ctypes.data)
+        self._derivative = (component, at, count, self._orders.ctypes.data, self.slopes.ctypes.data)
+
+    def set(self) -> None:
+        if self.unit._set_real(*self._exchange) > WARNING:
+            self.unit.fail(f"setting {', '.join(self.names)}")
+
+    def get(self) -> None:
+        if self.unit._get_real(*self._exchange) > WARNING:
+            self.unit.fail(f"reading {', '.join(self.names)}")
+
+    def set_slopes(self) -> None:
+        if self.unit._set_slope(*self._derivative) > WARNING:
+            self.unit.fail(f"setting slopes of {', '.join(self.names)}")
+
+    def get_slopes(self) -> None:
+        if self.unit._get_slope(*self._derivative) > WARNING:
+            self.unit.fail(f"reading slopes of {', '.join(self.names)}")
+
+
+class Log:
+    """Rows of a unit's variables, written by the unit itself into preallocated memory.
+
+    Attributes:
+        reals: (rows, n) of the Real variables `real_names`.
+        flags: (rows, m) of the Boolean variables `flag_names`, 0 or 1.
+    """
+
+    def __init__(self, unit: Unit, names: Sequence[str], rows: int) -> None:
+        self.unit = unit
+        unit.references(names)  # names must exist before their types are asked
+        kinds = {name: unit.archive.variables[name].type for name in names}
+        self.real_names = tuple(name for name in names if kinds[name] == "Real")
+        self.flag_names = tuple(name for name in names if kinds[name] == "Boolean")
+        if len(self.real_names) + len(self.flag_names) != len(names):
+            raise InputError(f"{unit.archive.path.name}: only Real and Boolean variables can be recorded, not {names}")
+        self.reals = np.zeros((rows, len(self.real_names)))
+        self.flags = np.zeros((rows, len(self.flag_names)), dtype=np.int32)
+        self._real_references = unit.references(self.real_names)
+        self._flag_references = unit.references(self.flag_names)
+
+    def record(self, row: int) -> None:
+        unit = self.unit
+        for call, references, table in (
+            (unit._get_real, self._real_references, self.reals),
+            (unit._get_boolean, self._flag_references, self.flags),
+        ):
+            if not references.size:
+                continue
+            address = table.ctypes.data + row * table.strides[0]
+            if call(unit._component, references.ctypes.data, references.size, address) > WARNING:
+                unit.fail("recording")
+
+    def columns(self) -> dict[str, Floats]:
+        """Recorded columns by variable name, each (rows,)."""
+        columns = {name: self.reals[:, i] for i, name in enumerate(self.real_names)}
+        columns.update({name: self.flags[:, i].astype(np.float64) for i, name in enumerate(self.flag_names)})
+        return columns

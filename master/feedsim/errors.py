@@ -1,0 +1,39 @@
+"""Exception types. Messages say what is wrong, where (file:line if there is one), the actual value, what is allowed."""
+
+from collections.abc import Iterable
+
+
+class FeedsimError(Exception):
+    """Base of everything that the package raises on purpose. `exit_code` is what the command line ends with."""
+
+    exit_code = 1
+
+
+class InputError(FeedsimError):
+    """A file, an option or an argument is wrong. `problems` holds one line per fault; the message lists them all."""
+
+    exit_code = 2
+
+    def __init__(self, message: str, problems: Iterable[str] = ()) -> None:
+        self.problems = tuple(problems) or (message,)
+        super().__init__(message)
+
+    @classmethod
+    def of(cls, what: str, problems: Iterable[str]) -> "InputError":
+        """One error from several faults: the fault itself if it is alone, else a headline and a line per fault."""
+        found = tuple(problems)
+        if len(found) == 1:
+            return cls(found[0])
+        return cls("\n  ".join((f"{what}: {len(found)} problems", *found)), found)
+
+
+class SimulationError(FeedsimError):
+    """A simulation unit failed or the coupled run is not usable."""
+
+    exit_code = 3
+
+
+class OutputError(FeedsimError):
+    """A result cannot be written."""
+
+    exit_code = 4

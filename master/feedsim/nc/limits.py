@@ -1,0 +1,28 @@
+"""Checks of the planned motion against the axes' limits; every violation is found before any is reported."""
+
+from __future__ import annotations
+
+from feedsim.scenario import Axis
+
+# Limits are compared with results of arithmetic on them: a relative 1e-9, and 1 nm of travel, are rounding.
+ROUNDING = 1e-9
+
+
+def violations(name: str, axis: Axis, low: float, high: float, speed: float, acceleration: float) -> list[str]:
+    """What is wrong with a motion of axis ``name`` from ``low`` to ``high`` [m] with these peaks [m/s, m/s2]."""
+    found = []
+    least, most = axis.travel
+    outside = [x for x in (low, high) if not least - ROUNDING <= x <= most + ROUNDING]
+    if outside:
+        reached = " and ".join(f"{x * 1e3:.7g}" for x in dict.fromkeys(outside))
+        found.append(f"axis {name} reaches {reached} mm; allowed travel {least * 1e3:.7g} to {most * 1e3:.7g} mm")
+    if speed > axis.max_speed * (1 + ROUNDING):
+        found.append(
+            f"axis {name} reaches a speed of {speed * 60:.5g} m/min; allowed at most {axis.max_speed * 60:.5g} m/min"
+        )
+    if acceleration > axis.max_acceleration * (1 + ROUNDING):
+        found.append(
+            f"axis {name} reaches an acceleration of {acceleration:.5g} m/s^2; "
+            f"allowed at most {axis.max_acceleration:.5g} m/s^2"
+        )
+    return found

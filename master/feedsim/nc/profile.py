@@ -1,0 +1,143 @@
+"""Rest-to-rest profile along a path, limited in speed, acceleration and jerk.
+
+The profile itself comes from ruckig (one degree of freedom: the path length), which returns at most seven phases of
+constant jerk. ruckig's internal tolerances are absolute, so it is asked for a dimensionless path of length 1 with jerk
+1; a move of 1 nm is then as accurate as one of 1 km. Units outside: m, s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
+
+from feedsim.errors import InputError
+
+Array = NDArray[np.float64]
+
+_REASON = {
+    Result.Error: "an unclassified error",
+    Result.ErrorInvalidInput: "invalid limits",
+    Result.ErrorPositionalLimits: "positional limits cannot be kept",
+    Result.ErrorExecutionTimeCalculation: "no time-optimal profile was found",
+    Result.ErrorSynchronizationCalculation: "no synchronised profile was found",
+}
+
+# What is smaller than this share of its peak value is rounding of the profile calculation.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Phases of constant jerk between ``times``; the path is at rest before the first and after the last.
+
+    times, position, velocity, acceleration: values at the K + 1 phase boundaries [s, m, m/s, m/s2];
+    jerk: the K phases [m/s3].
+    """
+
+    times: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+    @property
+    def duration(self) -> float:
+        """Exact time from rest to rest [s]; no multiple of any cycle."""
+        return float(self.times[-1])
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+        return float(self.position[-1])
+
+    @property
+    def peak_speed(self) -> float:
+        """Largest path speed [m/s]; the programmed one unless the path is too short to reach it."""
+        return float(self.velocity.max())
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Largest path acceleration [m/s2]; reached at a phase boundary."""
+        return float(np.abs(self.acceleration).max())
+
+    @property
+    def steady(self) -> tuple[float, float] | None:
+        """Begin and end of the constant-speed phase [s]; None where the path is too short to have one."""
+        span = np.diff(self.times)
+        coasting = np.abs(self.acceleration[:-1]) <= _ROUNDING * self.peak_acceleration
+        at_speed = (self.jerk == 0) & coasting & (self.velocity[:-1] > 0) & (span > _ROUNDING * self.duration)
+        if not at_speed.any():
+            return None
+        phase = int(np.flatnonzero(at_speed)[np.argmax(span[at_speed])])
+        return float(self.times[phase]), float(self.times[phase + 1])
+
+    def at(self, time: Array) -> tuple[Array, Array, Array]:
+        """Path length [m], speed [m/s] and acceleration [m/s2] at the instants ``time`` (N,) [s]."""
+        t = np.clip(time, 0.0, self.times[-1])
+        k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.jerk) - 1)
+        dt = t - self.times[k]
+        j, a, v = self.jerk[k], self.acceleration[k], self.velocity[k]
+        s = self.position[k] + dt * (v + dt * (a / 2 + dt * j / 6))
+        return s, v + dt * (a + dt * j / 2), a + dt * j
+
+    def time_at(self, position: Array) -> Array:
+        """First instants [s] at which the path lengths ``position`` (N,) [m] are reached.
+
+        The path length never falls, so bisection within the phase finds it; 60 halvings exhaust double precision.
+        """
+        s = np.clip(position, 0.0, self.length)
+        k = np.clip(np.searchsorted(self.position, s, side="left") - 1, 0, len(self.jerk) - 1)
+        low, high = self.times[k].copy(), self.times[k + 1].copy()
+        for _ in range(60):
+            middle = (low + high) / 2
+            short = self.at(middle)[0] < s
+            low = np.where(short, middle, low)
+            high = np.where(short, high, middle)
+        # At the end the path is at rest: rounding of the length would be magnified to microseconds.
+        return np.where(s <= 0.0, 0.0, np.where(s >= self.length, self.times[-1], high))
+
+
+def rest_to_rest(length: float, speed: float, acceleration: float, jerk: float) -> Profile:
+    """Fastest profile over ``length`` [m] >= 0 within ``speed`` [m/s], ``acceleration`` [m/s2] and ``jerk`` [m/s3].
+
+    Raises InputError where a limit is not positive and finite, or where ruckig finds no profile.
+    """
+    limits = {"speed": (speed, "m/s"), "acceleration": (acceleration, "m/s2"), "jerk": (jerk, "m/s3")}
+    bad = [f"{name} {value:g} {unit}" for name, (value, unit) in limits.items() if not 0 < value < np.inf]
+    if bad or not 0 <= length < np.inf:
+        raise InputError(
+            f"path profile over {length:g} m: {', '.join(bad) or 'length'} not allowed; allowed: limits above 0 and "
+            "finite, length 0 or more and finite"
+        )
+    if length == 0:
+        return Profile(np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(1))
+
+    unit_time = float(np.cbrt(length / jerk))
+    task = InputParameter(1)
+    task.current_position = [0.0]
+    task.target_position = [1.0]
+    task.max_velocity = [speed * unit_time / length]
+    task.max_acceleration = [acceleration * unit_time**2 / length]
+    task.max_jerk = [1.0]
+    trajectory = Trajectory(1)
+    where = f"path profile over {length:g} m with {speed:g} m/s, {acceleration:g} m/s2, {jerk:g} m/s3"
+    try:
+        result = Ruckig(1).calculate(task, trajectory)
+    except RuckigError as error:
+        raise InputError(f"{where}: ruckig refuses it: {str(error).strip().splitlines()[0]}") from error
+    if result not in (Result.Working, Result.Finished):
+        raise InputError(f"{where}: {_REASON.get(result, f'ruckig result {result}')}")
+
+    phases = trajectory.profiles[0][0] if isinstance(trajectory.profiles[0], list) else trajectory.profiles[0]
+    position = np.array(phases.p) * length
+    position[-1] = length  # its last digit is ruckig's rounding
+    return Profile(
+        times=np.concatenate([[0.0], np.cumsum(phases.t)]) * unit_time,
+        position=position,
+        velocity=np.array(phases.v) * (length / unit_time),
+        acceleration=np.array(phases.a) * (length / unit_time**2),
+        jerk=np.array(phases.j) * jerk,
+    )

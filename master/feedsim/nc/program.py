@@ -1,0 +1,240 @@
+"""Plan a scenario's motions: from geometry and limits to setpoints at the position cycle.
+
+Every motion runs from rest to rest. It starts on the T_ipo grid: at 0, or at the first instant of the grid at or after
+the exact end of the motion before it. Its path is sampled at T_ipo, and one C2 cubic spline per axis runs through the
+samples of all motions (from one recording to the next, where there are recordings). Setpoints are its values at T_pos.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.errors import InputError
+from feedsim.nc.limits import violations
+from feedsim.nc.path import CircularPath, Line, arc, full_circle, line
+from feedsim.nc.profile import Profile, rest_to_rest
+from feedsim.nc.recorded import recorded, recording_violations
+from feedsim.nc.segment import Circular, Program, Recorded, Segment, Straight, whole_cycles
+from feedsim.nc.spline import RestSpline
+from feedsim.scenario import Arc, Circle, Dwell, MeasuredSetpoints, Motion, Move, Scenario
+
+Array = NDArray[np.float64]
+
+# Position cycles that a program may have; its setpoints then take about 2 GB for three axes.
+LONGEST = 40_000_000
+
+
+@dataclass
+class _Stretch:
+    """Points of all axes on the T_ipo grid from ``first`` on, between two recordings."""
+
+    first: int
+    points: dict[str, list[Array]]
+
+
+@dataclass
+class _Inset:
+    """Recorded setpoints, from grid instant ``first`` on."""
+
+    first: int
+    x_s: Mapping[str, Array]
+    v_s: Mapping[str, Array]
+
+
+@dataclass
+class _Plan:
+    """The program so far: where the axes are, at which instant of the T_ipo grid, and what is wrong with it."""
+
+    position: dict[str, float]
+    instant: int = 0
+    pieces: list[_Stretch | _Inset] = field(default_factory=list)
+    segments: list[Segment] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+
+
+def plan(scenario: Scenario) -> Program:
+    """Setpoints of all motions of ``scenario``; axes without a motion are held.
+
+    Raises InputError that lists every motion and axis whose travel, speed or acceleration limit is exceeded, with
+    actual and allowed values, and every motion whose geometry or recording is not usable.
+    """
+    machine = scenario.machine
+    state = _Plan({axis: float(machine.pose[axis]) for axis in machine.axes})
+    state.pieces.append(_stretch(state))
+    for index, motion in enumerate(scenario.motions, start=1):
+        try:
+            if isinstance(motion, MeasuredSetpoints):
+                _append_recording(state, scenario, index, motion)
+            else:
+                _append_planned(state, scenario, index, motion)
+        except InputError as error:
+            state.problems += [f"motion {index} ({motion.kind}): {problem}" for problem in error.problems]
+            break  # where the axes would be after it is not known
+        cycles = state.instant * machine.cycles.T_ipo / machine.cycles.T_pos
+        if cycles > LONGEST:
+            state.problems.append(
+                f"motion {index} ({motion.kind}): the program lasts {cycles * machine.cycles.T_pos:.6g} s up to its "
+                f"end, which is {cycles:.3g} position cycles; allowed: {LONGEST:.3g}"
+            )
+            break
+    if state.problems:
+        raise InputError.of(f"{scenario.file}: the motions cannot be driven", state.problems)
+    return _sample(state, scenario)
+
+
+def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion) -> None:
+    limits, cycles = scenario.machine.path, scenario.machine.cycles
+    start = state.instant * cycles.T_ipo
+    origin = dict(state.position)
+    if isinstance(motion, Dwell):
+        profile, path = None, None
+        duration = motion.duration
+    else:
+        assert isinstance(motion, Move | Arc | Circle)
+        path = _path(motion, origin)
+        profile = rest_to_rest(
+            path.length, motion.feed, motion.acceleration or limits.acceleration, motion.jerk or limits.jerk
+        )
+        duration = profile.duration
+    count = whole_cycles(duration, cycles.T_ipo)
+    if (state.instant + count) * (cycles.T_ipo / cycles.T_pos) > LONGEST:
+        state.instant += count
+        return  # plan() reports it; sampling it would exhaust the memory
+    stretch = state.pieces[-1]
+    if isinstance(stretch, _Inset):
+        stretch = _stretch(state)
+        state.pieces.append(stretch)
+    samples: Mapping[str, Array] = {}
+    if profile is not None and path is not None:
+        samples = path.position(profile.at(np.arange(1, count + 1, dtype=np.float64) * cycles.T_ipo)[0])
+        for axis, peaks in path.peaks(profile, cycles.T_ipo).items():
+            found = violations(axis, scenario.machine.axes[axis], *peaks)
+            state.problems += [f"motion {index} ({motion.kind}): {problem}" for problem in found]
+    for axis, points in stretch.points.items():
+        points.append(samples[axis] if axis in samples else np.full(count, origin[axis]))
+    if path is not None:
+        state.position |= {axis: float(x[0]) for axis, x in path.position(np.array([path.length])).items()}
+    if isinstance(motion, Move):
+        state.position |= motion.to
+    elif isinstance(motion, Circle):
+        state.position = dict(origin)
+    state.instant += count
+    state.segments.append(
+        Segment(
+            kind=motion.kind,
+            index=index,
+            start=start,
+            end=start + duration,
+            description=_describe(motion),
+            origin=origin,
+            target=dict(state.position),
+            geometry=_geometry(path, profile, start) if path is not None and profile is not None else None,
+        )
+    )
+
+
+def _append_recording(state: _Plan, scenario: Scenario, index: int, motion: MeasuredSetpoints) -> None:
+    cycles = scenario.machine.cycles
+    start = state.instant * cycles.T_ipo
+    origin = dict(state.position)
+    recording = recorded(motion, origin, cycles.T_pos)
+    for axis in motion.columns:
+        found = recording_violations(
+            axis, scenario.machine.axes[axis], origin[axis], recording.x_s[axis], recording.v_s[axis], cycles.T_pos
+        )
+        state.problems += [f"motion {index} ({motion.kind}): {problem}" for problem in found]
+    state.pieces.append(_Inset(state.instant, recording.x_s, recording.v_s))
+    state.position |= {axis: float(x[-1]) for axis, x in recording.x_s.items()}
+    state.instant += whole_cycles(recording.duration, cycles.T_ipo)
+    state.segments.append(
+        Segment(
+            kind=motion.kind,
+            index=index,
+            start=start,
+            end=start + recording.duration,
+            description=_describe(motion),
+            origin=origin,
+            target=dict(state.position),
+            geometry=Recorded(motion.file, tuple(motion.columns)),
+        )
+    )
+
+
+def _sample(state: _Plan, scenario: Scenario) -> Program:
+    """Setpoints at T_pos: pieces in their order, each from its first instant on; the next one begins on its last."""
+    machine = scenario.machine
+    ratio = round(machine.cycles.T_ipo / machine.cycles.T_pos)
+    total = state.instant * ratio + 1
+    x_s = {axis: np.empty(total) for axis in machine.axes}
+    v_s = {axis: np.zeros(total) for axis in machine.axes}
+    starts = [piece.first * ratio for piece in state.pieces]
+    held = dict(machine.pose)
+    for piece, first, last in zip(state.pieces, starts, [*starts[1:], total - 1], strict=True):
+        for axis in machine.axes:
+            x, v = x_s[axis][first : last + 1], v_s[axis][first : last + 1]
+            if isinstance(piece, _Stretch):
+                points = np.concatenate(piece.points[axis])
+                # Knots 1 apart: a position cycle is then 1/ratio, exact for the usual ratios, however long the program.
+                x[:], v[:] = RestSpline(points, 1.0)(np.arange(last - first + 1, dtype=np.float64) / ratio)
+                v /= machine.cycles.T_ipo
+                held[axis] = float(points[-1])
+            elif axis in piece.x_s:
+                used = len(piece.x_s[axis])
+                held[axis] = float(piece.x_s[axis][-1])
+                x[:used], x[used:] = piece.x_s[axis], held[axis]
+                v[:used], v[used:] = piece.v_s[axis], 0.0
+            else:
+                x[:], v[:] = held[axis], 0.0
+    time = np.arange(total, dtype=np.float64) * machine.cycles.T_pos
+    n_ffw = {axis: v_s[axis] / machine.axes[axis].I_P for axis in machine.axes}
+    return Program(time, x_s, n_ffw, tuple(state.segments))
+
+
+def _stretch(state: _Plan) -> _Stretch:
+    return _Stretch(state.instant, {axis: [np.array([x])] for axis, x in state.position.items()})
+
+
+def _path(motion: Move | Arc | Circle, start: Mapping[str, float]) -> Line | CircularPath:
+    if isinstance(motion, Move):
+        return line(motion, start)
+    return full_circle(motion, start) if isinstance(motion, Circle) else arc(motion, start)
+
+
+def _geometry(path: Line | CircularPath, profile: Profile, start: float) -> Straight | Circular:
+    steady = None if profile.steady is None else (start + profile.steady[0], start + profile.steady[1])
+    if isinstance(path, Line):
+        return Straight(path.length, steady)
+    turns = math.floor(path.sweep / (2 * math.pi) + 1e-9)
+    instants = start + profile.time_at(path.radius * (2 * math.pi * np.arange(turns + 1, dtype=np.float64)))
+    return Circular(
+        axes=path.axes,
+        centre=path.centre,
+        radius=path.radius,
+        sense=path.sense,
+        start_angle=path.start_angle,
+        sweep=path.sweep,
+        turns=tuple(pairwise(instants.tolist())),
+        steady=steady,
+    )
+
+
+def _describe(motion: Motion) -> str:
+    if isinstance(motion, Dwell):
+        return f"dwell {motion.duration:g} s"
+    if isinstance(motion, MeasuredSetpoints):
+        return f"recorded setpoints of {', '.join(motion.columns)} from {motion.file.name}"
+    feed = f"at {motion.feed * 6e4:.6g} mm/min"
+    if isinstance(motion, Move):
+        by = [f"{axis} by {d * 1e3:.6g} mm" for axis, d in motion.by.items()]
+        to = [f"{axis} to {x * 1e3:.6g} mm" for axis, x in motion.to.items()]
+        return f"move {', '.join(by + to)} {feed}"
+    plane = f"in {motion.plane[0]}-{motion.plane[1]}, {motion.direction}"
+    if isinstance(motion, Circle):
+        return f"circle {plane}, R {motion.radius * 1e3:.6g} mm, {motion.turns} turn{'s'[: motion.turns != 1]}, {feed}"
+    return f"arc {plane}, {feed}"

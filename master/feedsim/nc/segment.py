@@ -1,0 +1,109 @@
+"""What the planner hands on about each motion: when it runs, where it begins and ends, and its geometry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# An instant within this share of a cycle of the grid lies on it: exact ends carry rounding errors.
+ON_GRID = 1e-6
+
+
+def whole_cycles(duration: float, cycle: float) -> int:
+    """Cycles up to the first instant of the grid at or after ``duration`` [s]."""
+    return max(0, math.ceil(duration / cycle - ON_GRID))
+
+
+@dataclass(frozen=True)
+class Straight:
+    """Straight line in the space of the axes."""
+
+    length: float
+    """Length of the path [m]."""
+    steady: tuple[float, float] | None
+    """Begin and end of the constant-speed phase [s], program time; None where there is none."""
+
+
+@dataclass(frozen=True)
+class Circular:
+    """Circular path in the plane of two axes."""
+
+    axes: tuple[str, str]
+    """First and second axis of the plane; angles run from the first towards the second."""
+    centre: tuple[float, float]
+    """Programmed centre [m], first and second axis."""
+    radius: float
+    """Programmed radius [m]."""
+    sense: int
+    """+1 counterclockwise (from the first axis towards the second), -1 clockwise."""
+    start_angle: float
+    """Angle of the start as seen from the centre [rad]."""
+    sweep: float
+    """Angle that the path covers, positive [rad]."""
+    turns: tuple[tuple[float, float], ...]
+    """Begin and end of every full turn [s], program time: where the path length is a multiple of 2 pi R."""
+    steady: tuple[float, float] | None
+    """Begin and end of the constant-speed phase [s], program time; None where there is none."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Recorded setpoints."""
+
+    file: Path
+    axes: tuple[str, ...]
+    """Axes with a column of their own."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One motion of the program.
+
+    kind: that of the motion (move, arc, circle, dwell, setpoints); index: its place in the scenario, from 1;
+    start, end: exact begin and end of the motion [s], the start on the T_ipo grid; origin, target: positions of all
+    axes there [m]; geometry: None for a dwell.
+    """
+
+    kind: str
+    index: int
+    start: float
+    end: float
+    description: str
+    origin: Mapping[str, float]
+    target: Mapping[str, float]
+    geometry: Straight | Circular | Recorded | None = None
+
+    @property
+    def duration(self) -> float:
+        """Exact duration [s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Setpoints of all axes at the position cycle.
+
+    time (N,) [s]: multiples of T_pos from 0; x_s, n_ffw: axis -> (N,) [m], [rad/s]; segments: one per motion.
+    """
+
+    time: Array
+    x_s: Mapping[str, Array]
+    n_ffw: Mapping[str, Array]
+    segments: tuple[Segment, ...] = field(default=())
+
+    @property
+    def duration(self) -> float:
+        """Last instant of the program [s]."""
+        return float(self.time[-1])
+
+    def until(self, segment: Segment) -> float:
+        """Last instant before another motion of any axis takes over from ``segment`` [s]: dwells still belong to it."""
+        later = [other.start for other in self.segments if other.index > segment.index and other.kind != "dwell"]
+        return min(later, default=self.duration)

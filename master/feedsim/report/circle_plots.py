@@ -1,0 +1,266 @@
+"""Figures of a circular test: the magnified contour error, and the torques of the plane's axes over time and speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from feedsim.analysis import Contour, Figures, Glitch, Turn, contour
+from feedsim.report.style import (
+    BLUE,
+    GRID,
+    INK,
+    MOST_POINTS,
+    MUTED,
+    ORANGE,
+    PAPER,
+    VERMILLION,
+    Array,
+    Picture,
+    drawing,
+    finish,
+    thinned,
+)
+from feedsim.trace import Trace
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Widths of the scale rings [um] that a person reads easily.
+RING_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
+NOMINAL = 1.0  # radius of the nominal circle in the drawing
+RING_GAP = 0.36  # distance of the first ring from the nominal circle in the drawing
+
+
+def contour_picture(trace: Trace, turn: Turn, figures: Figures, stem: str) -> Picture:
+    """Contour error of one turn in polar form, magnified, with scale rings and the quadrant glitches.
+
+    figures: those of ``analysis.circularity`` without prefix.
+    """
+    by_scale = contour(trace, turn)
+    tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
+    by_tool = contour(trace, turn, tool) if all(name in trace.columns for name in tool) else None
+    ring = ring_step(float(np.abs(by_scale.deviation).max()) * 1e6)
+    with drawing(10.0, 6.9) as figure:
+        rooms = figure.subplot_mosaic(
+            [["polar", "angle"], ["polar", "table"]], width_ratios=[1.85, 1], height_ratios=[1, 0.8]
+        )
+        _polar(rooms["polar"], turn, by_scale, by_tool, ring)
+        _unrolled(rooms["angle"], turn, by_scale, by_tool)
+        _table(rooms["table"], turn, figures)
+        magnification = _per_um(ring) / (NOMINAL / turn.radius) * 1e6
+        return finish(
+            figure,
+            stem,
+            f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error",
+            f"Radius {turn.radius * 1e3:.6g} mm, {'counterclockwise' if turn.sense > 0 else 'clockwise'} from "
+            f"{turn.axes[0]} to {turn.axes[1]}, turn from {turn.begin:.4f} to {turn.end:.4f} s. "
+            f"Radius deviation magnified {magnification:,.0f} times; rings at ±{ring:g} µm about the programmed "
+            "circle. The markers show the quadrant glitches: the largest deviation within ±45° of an axis crossing, "
+            "less the median of the turn.",
+        )
+
+
+def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str) -> Picture | None:
+    """Torques of the plane's axes over time and over speed, during the evaluated turn; None where none is recorded.
+
+    signs: axis -> +-1, display sign of its torques.
+    """
+    axes = [axis for axis in turn.axes if f"{axis}.M_a" in trace.columns and f"{axis}.n_a" in trace.columns]
+    if not axes:
+        return None
+    part = trace.between(turn.begin, turn.end)
+    with drawing(10.0, 3.6 * len(axes)) as figure:
+        rooms = figure.subplots(len(axes), 3, squeeze=False, width_ratios=[1.25, 1, 1])
+        for row, axis in zip(rooms, axes, strict=True):
+            _torque_row(row, part, axis, signs.get(axis, 1))
+        reversed_ones = [axis for axis in axes if signs.get(axis, 1) < 0]
+        return finish(
+            figure,
+            stem,
+            f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: driving torque and friction torque",
+            f"Turn from {turn.begin:.4f} to {turn.end:.4f} s. Left: over time. Middle: over the motor speed. Right: "
+            "friction torque around the reversal of the motion, where its slope is that of the engaging transmission."
+            + (f" Torques of {', '.join(reversed_ones)} are drawn with reversed sign." if reversed_ones else ""),
+        )
+
+
+def ring_step(largest: float) -> float:
+    """Distance of the scale rings [um] for an error of up to ``largest`` [um]: 10 um as long as that is readable."""
+    if RING / 5 <= largest <= 2 * RING:
+        return RING
+    return next((step for step in RING_STEPS if largest <= 1.5 * step), RING_STEPS[-1])
+
+
+def _per_um(ring: float) -> float:
+    return RING_GAP / ring
+
+
+def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, ring: float) -> None:
+    per_um = _per_um(ring)
+    around = np.linspace(0, 2 * math.pi, 361)
+
+    def circle(radius: float, **style: Any) -> None:
+        axes.plot(radius * np.cos(around), radius * np.sin(around), **style)
+
+    def trail(measured: Contour, **style: Any) -> None:
+        r = NOMINAL + measured.deviation * 1e6 * per_um
+        rows = thinned(np.arange(len(r), dtype=float), r)[0].astype(int)
+        closed = np.append(rows, rows[0])
+        axes.plot(r[closed] * np.cos(measured.angle[closed]), r[closed] * np.sin(measured.angle[closed]), **style)
+
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    for value in (-2, -1, 1, 2):
+        if abs(value) == 2 and np.abs(by_scale.deviation).max() * 1e6 < 1.1 * ring:
+            continue
+        circle(NOMINAL + value * RING_GAP, color=GRID, linewidth=0.9)
+        _ring_label(axes, NOMINAL + value * RING_GAP, f"{value * ring:+g} µm".replace("-", "−"), MUTED)
+    outer = NOMINAL + 1.16 * RING_GAP * (2 if np.abs(by_scale.deviation).max() * 1e6 >= 1.1 * ring else 1)
+    for angle in (0.0, math.pi / 2):
+        ends = np.array([-outer, outer])
+        axes.plot(ends * math.cos(angle), ends * math.sin(angle), color=GRID, linewidth=0.9)
+    circle(NOMINAL, color=MUTED, linewidth=1.1, linestyle=(0, (6, 3)), label="programmed circle")
+    _ring_label(axes, NOMINAL, "0", MUTED)
+    if by_tool is not None:
+        trail(by_tool, color=ORANGE, linewidth=1.2, linestyle=(0, (5, 1.5)), label="tool point")
+    trail(by_scale, color=BLUE, linewidth=1.6, label="linear scales")
+    first, second = turn.axes
+    names = (f"{first}+", f"{second}+", f"{first}−", f"{second}−")
+    for text, (x, y) in zip(names, ((1, 0), (0, 1), (-1, 0), (0, -1)), strict=True):
+        axes.text(
+            x * (outer + 0.055), y * (outer + 0.055), text, ha="center", va="center", fontweight="bold", fontsize=11
+        )
+    for glitch in by_scale.glitches:
+        _mark(axes, glitch, per_um)
+    _sense(axes, turn)
+    axes.set_xlim(-1.12 * outer, 1.12 * outer)
+    axes.set_ylim(-1.12 * outer, 1.12 * outer)
+    axes.set_title(f"Contour error, {first}-{second}, R {turn.radius * 1e3:g} mm")
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.02, -0.02))
+
+
+def _ring_label(axes: Axes, radius: float, text: str, colour: str) -> None:
+    at = radius * math.cos(math.pi / 4)
+    axes.text(
+        at, at, text, color=colour, fontsize=8.5, ha="center", va="center", rotation=-45,
+        bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 1.0},
+    )  # fmt: skip
+
+
+def _mark(axes: Axes, glitch: Glitch, per_um: float) -> None:
+    r = NOMINAL + glitch.deviation * 1e6 * per_um
+    x, y = r * math.cos(glitch.angle), r * math.sin(glitch.angle)
+    inside = NOMINAL - 1.16 * RING_GAP
+    axes.annotate(
+        f"{glitch.name.replace('-', '−')}: {glitch.height * 1e6:.2f} µm",
+        (x, y),
+        xytext=(inside * math.cos(glitch.angle), inside * math.sin(glitch.angle)),
+        ha="center" if abs(math.cos(glitch.angle)) < 0.7 else "right" if math.cos(glitch.angle) > 0 else "left",
+        va="center" if abs(math.cos(glitch.angle)) > 0.7 else "top" if math.sin(glitch.angle) > 0 else "bottom",
+        color=INK,
+        bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 1.0},
+        arrowprops={"arrowstyle": "-", "color": VERMILLION, "linewidth": 0.9, "shrinkA": 2, "shrinkB": 2},
+        zorder=6,
+    )
+    axes.plot([x], [y], "o", color=VERMILLION, markersize=5, zorder=7)
+
+
+def _sense(axes: Axes, turn: Turn) -> None:
+    """Arrow in the centre that shows which way the circle is driven."""
+    span = np.deg2rad(np.linspace(50, 130, 41))[:: turn.sense]
+    radius = 0.16
+    x, y = radius * np.cos(span), radius * np.sin(span) - 0.36
+    axes.plot(x[:-1], y[:-1], color=MUTED, linewidth=1.2)
+    axes.annotate(
+        "", (x[-1], y[-1]), xytext=(x[-4], y[-4]), arrowprops={"arrowstyle": "-|>", "color": MUTED, "linewidth": 1.2}
+    )
+
+
+def _unrolled(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None) -> None:
+    styles: list[tuple[Contour, dict[str, Any]]] = [(by_scale, {"color": BLUE})]
+    if by_tool is not None:
+        styles.insert(0, (by_tool, {"color": ORANGE, "linestyle": (0, (5, 1.5)), "linewidth": 1.1}))
+    for measured, style in styles:
+        angle = np.rad2deg(measured.angle % (2 * math.pi))
+        order = np.argsort(angle)
+        a, e = thinned(angle[order], measured.deviation[order] * 1e6)
+        axes.plot(a, e, **style)
+    for glitch in by_scale.glitches:
+        at = np.rad2deg(glitch.angle % (2 * math.pi))
+        axes.plot([at], [glitch.deviation * 1e6], "o", color=VERMILLION, markersize=4)
+    axes.axhline(by_scale.median * 1e6, color=MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
+    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    axes.set(title="Over the angle", xlabel=f"angle from {turn.axes[0]}+ [°]", ylabel="radius deviation [µm]")
+    axes.set_xlim(0, 360)
+    axes.set_xticks(range(0, 361, 90))
+
+
+def _table(axes: Axes, turn: Turn, figures: Figures) -> None:
+    axes.set_axis_off()
+    rows = [
+        ("circular deviation G", "G"),
+        ("radial deviation F max", "F_max"),
+        ("radial deviation F min", "F_min"),
+        ("mean radius deviation", "mean"),
+        ("median radius deviation", "median"),
+        *((f"glitch, {axis} reverses", f"glitch_{axis}") for axis in turn.axes),
+    ]
+    has_tool = "tool.G" in figures
+    heads = [(0.70, "scales")] + ([(0.98, "tool")] if has_tool else [])
+    axes.text(0.0, 0.98, "µm", color=MUTED, va="top", fontsize=9)
+    for x, head in heads:
+        axes.text(x, 0.98, head, color=MUTED, ha="right", va="top", fontsize=9)
+    for k, (label, key) in enumerate(rows):
+        y = 0.87 - 0.125 * k
+        axes.text(0.0, y, label, va="top", fontsize=9)
+        for (x, _), prefix in zip(heads, ("", "tool."), strict=False):
+            value = figures[prefix + key].value
+            axes.text(x, y, f"{value:.2f}".replace("-", "−"), ha="right", va="top", fontsize=9)
+    axes.set_xlim(0, 1)
+    axes.set_ylim(0, 1)
+
+
+def _torque_row(row: Sequence[Axes], part: Trace, axis: str, sign: int) -> None:
+    time_room, speed_room, friction_room = row
+    torque, speed = sign * part[f"{axis}.M_a"], part[f"{axis}.n_a"]
+    friction: Array | None = sign * part[f"{axis}.M_fr"] if f"{axis}.M_fr" in part.columns else None
+    t, m = thinned(part.time, torque)
+    time_room.plot(t, m, color=BLUE, label="motor $M_a$")
+    _loop(speed_room, speed, torque, color=BLUE, linewidth=1.1)
+    if friction is not None:
+        t, f = thinned(part.time, friction)
+        time_room.plot(t, f, color=VERMILLION, linewidth=1.1, label=r"friction $M_{fr}$")
+        _loop(speed_room, speed, friction, color=VERMILLION, linewidth=1.1)
+        _loop(friction_room, speed, friction, color=VERMILLION)
+        friction_room.set_ylim(*_symmetric(friction))
+        friction_room.set_xlim(*(0.12 * np.array([-1, 1]) * float(np.abs(speed).max() or 1.0)))
+    else:
+        friction_room.set_visible(False)
+    note = ", sign reversed" if sign < 0 else ""
+    time_room.set(title=f"Axis {axis}: torque over time{note}", xlabel="time [s]", ylabel="torque [N·m]")
+    speed_room.set(title="Torque over speed", xlabel="motor speed $n_a$ [rad/s]", ylabel="torque [N·m]")
+    friction_room.set(title="Friction around the reversal", xlabel="motor speed $n_a$ [rad/s]", ylabel="torque [N·m]")
+    for room in (time_room, speed_room, friction_room):
+        room.axhline(0.0, color=MUTED, linewidth=0.8)
+    for room in (speed_room, friction_room):
+        room.axvline(0.0, color=MUTED, linewidth=0.8)
+    time_room.margins(x=0.01)
+    time_room.set_ylim(*_symmetric(torque, friction))
+    speed_room.set_ylim(*_symmetric(torque, friction))
+    handles, labels = time_room.get_legend_handles_labels()
+    speed_room.legend(handles, labels, loc="lower right", fontsize=8.5, handlelength=1.4, borderaxespad=0.2)
+
+
+def _symmetric(*curves: Array | None) -> tuple[float, float]:
+    largest = 1.12 * max(float(np.abs(curve).max()) for curve in curves if curve is not None) or 1.0
+    return -largest, largest
+
+
+def _loop(axes: Axes, speed: Array, torque: Array, **style: Any) -> None:
+    rows = np.append(np.arange(0, len(speed), max(1, len(speed) // MOST_POINTS)), 0)  # a full turn ends where it began
+    axes.plot(speed[rows], torque[rows], **style)

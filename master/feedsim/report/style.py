@@ -1,0 +1,153 @@
+"""How figures look: colours, fonts, and drawing a figure as PNG and as inline SVG.
+
+Colours are Okabe and Ito's, which stay apart for the colour-blind and in grey print. In the SVG every colour of the
+palette becomes a CSS variable, so that one drawing serves light, dark and paper; the PNG is drawn on white.
+matplotlib is imported on first use.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+Array = NDArray[np.float64]
+
+INK, MUTED, GRID, PAPER = "#1b1f24", "#59636e", "#d4dae1", "#fefefe"
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#b0528a", "#b87a00", "#3d9bd0"
+SETPOINT = MUTED
+
+# CSS variable, colour on light ground (= in the drawing), colour on dark ground
+PALETTE = (
+    ("ink", INK, "#e6e9ed"),
+    ("muted", MUTED, "#a3adb8"),
+    ("grid", GRID, "#3a424c"),
+    ("paper", PAPER, "#14181d"),
+    ("blue", BLUE, "#5bb8f0"),
+    ("vermillion", VERMILLION, "#ff9152"),
+    ("green", GREEN, "#3fd0a3"),
+    ("purple", PURPLE, "#e29ac5"),
+    ("orange", ORANGE, "#e8b04a"),
+    ("sky", SKY, "#8fd0f5"),
+)
+
+PNG_DPI = 160
+# An inline SVG above this size [bytes] is put into the page as PNG instead.
+LARGEST_SVG = 400_000
+# Points per curve that a figure some 1500 pixels wide can show: least and largest value of every bin are kept.
+MOST_POINTS = 6000
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A finished figure: file stem, caption (plain text), PNG bytes, SVG text with ids prefixed by the stem."""
+
+    stem: str
+    title: str
+    caption: str
+    png: bytes
+    svg: str
+
+
+@contextmanager
+def drawing(width: float, height: float) -> Iterator[Drawing]:
+    """An empty figure of ``width`` x ``height`` inches in the house style."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Drawing
+
+    settings: Any = {
+        "font.family": "DejaVu Sans",
+        "font.size": 10,
+        "axes.titlesize": 10.5,
+        "axes.titleweight": "bold",
+        "axes.titlelocation": "left",
+        "axes.labelsize": 10,
+        "axes.edgecolor": MUTED,
+        "axes.linewidth": 0.8,
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.facecolor": "none",
+        "figure.facecolor": PAPER,
+        "grid.color": GRID,
+        "grid.linewidth": 0.6,
+        "lines.linewidth": 1.4,
+        "lines.solid_capstyle": "round",
+        "legend.frameon": False,
+        "legend.fontsize": 9,
+        "xtick.labelsize": 9,
+        "ytick.labelsize": 9,
+        "text.color": INK,
+        "axes.labelcolor": INK,
+        "axes.titlecolor": INK,
+        "xtick.color": MUTED,
+        "ytick.color": MUTED,
+        "xtick.labelcolor": INK,
+        "ytick.labelcolor": INK,
+        "axes.formatter.useoffset": False,
+        "axes.unicode_minus": True,
+        "path.simplify_threshold": 0.15,
+        "svg.fonttype": "path",
+        "svg.hashsalt": "feedsim",
+    }
+    with rc_context(settings):
+        figure = Drawing(figsize=(width, height), layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+
+
+def finish(figure: Drawing, stem: str, title: str, caption: str) -> Picture:
+    """Render ``figure``; call inside its ``drawing``. The result depends on nothing but what was drawn."""
+    png = io.BytesIO()
+    figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
+    figure.patch.set_visible(False)
+    svg = io.StringIO()
+    figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    return Picture(stem, title, caption, png.getvalue(), _inline(svg.getvalue(), stem, title))
+
+
+def thinned(x: Array, *ys: Array) -> tuple[Array, ...]:
+    """x and ys, thinned to MOST_POINTS rows at most, keeping the extremes of every y in every bin (x increasing)."""
+    if len(x) <= MOST_POINTS:
+        return (x, *ys)
+    bins = MOST_POINTS // (2 * len(ys))
+    edges = np.linspace(0, len(x), bins + 1).astype(int)
+    keep = {0, len(x) - 1}
+    for first, last in pairwise(edges.tolist()):
+        for y in ys:
+            keep |= {first + int(np.argmin(y[first:last])), first + int(np.argmax(y[first:last]))}
+    rows = np.array(sorted(keep))
+    return (x[rows], *(y[rows] for y in ys))
+
+
+def css_variables(dark: bool) -> str:
+    """The palette as CSS declarations."""
+    return " ".join(f"--{name}: {on_dark if dark else on_light};" for name, on_light, on_dark in PALETTE)
+
+
+def _inline(svg: str, stem: str, title: str) -> str:
+    """SVG for use inside a page: no prologue, ids of its own, the palette as variables, scaled to its container."""
+    svg = svg[svg.index("<svg") :].rstrip()
+    svg = re.sub(r"<metadata>.*?</metadata>\s*", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"<style[^>]*>.*?</style>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"<defs>\s*</defs>\s*", "", svg)
+    svg = re.sub(r'\bid="', f'id="{stem}-', svg)
+    svg = re.sub(r'href="#', f'href="#{stem}-', svg)
+    svg = re.sub(r"url\(#", f"url(#{stem}-", svg)
+    svg = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", svg, count=1)
+    svg = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", svg, count=1)
+    for name, on_light, _ in PALETTE:
+        svg = re.sub(re.escape(on_light), f"var(--{name})", svg, flags=re.IGNORECASE)
+    return svg.replace("<svg", f'<svg role="img" aria-label="{title}" class="plot"', 1)

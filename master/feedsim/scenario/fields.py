@@ -1,0 +1,181 @@
+"""Field types of the scenario models: quantities with units, axis names, files."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+from math import inf, isfinite
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+from pydantic_core import PydanticCustomError, core_schema
+
+from feedsim import units
+from feedsim.errors import InputError
+
+RESERVED = ("time", "tool", "tcp")  # first parts of other column names
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a file's values are checked against while the models are built from text.
+
+    Without it (models built in Python) bare numbers are SI values. None: not known, so not checked.
+    """
+
+    axes: tuple[str, ...] | None = None  # of the machine
+    control_cycle: float | None = None  # T_c [s]
+
+
+class Model(BaseModel):
+    """Base of all scenario models: values that do not change, no unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=False)
+
+
+def fault(message: str) -> PydanticCustomError:
+    """A validation error that carries its own wording."""
+    return PydanticCustomError("feedsim", "{message}", {"message": message})
+
+
+def is_multiple(value: float, step: float) -> bool:
+    """Whether value is 1, 2, 3 ... times step; both come from decimal text, so a relative 1e-9 is rounding."""
+    ratio = value / step
+    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-9 * ratio
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Annotation of a float field that is written with a unit and kept in SI.
+
+    unit      SI unit of the value in the object (dimensionless: "1", where a bare number is fine)
+    minimum, maximum  closed range in that unit
+    above     open lower limit
+    example   shown in messages and editors; a usual one by default
+    """
+
+    unit: str
+    minimum: float = -inf
+    maximum: float = inf
+    above: float = -inf
+    example: str = ""
+
+    def read(self, value: Any, *, text: bool = True) -> float:
+        """`value` as SI number; PydanticCustomError with a message that a person can act on."""
+        shown = self.example or units.example(self.unit)
+        if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+            raise fault(f"{brief(value)} is no quantity; {units.article(self.kind)} is expected, for example {shown}")
+        if isinstance(value, str):
+            try:
+                number = units.parse(value, self.unit, shown)
+            except InputError as error:
+                raise fault(str(error)) from None
+        else:
+            number = float(value) if abs(value) < 1e308 else inf
+            if text and self.unit != "1":
+                raise fault(f"{value} has no unit; {units.article(self.kind)} is expected, for example {shown}")
+            if not isfinite(number):
+                raise fault(f"{value} is no number to calculate with; {units.article(self.kind)} is expected")
+        if not self.minimum <= number <= self.maximum or number <= self.above:
+            raise fault(f"{value} is outside the allowed range: {self.range}")
+        return number
+
+    @property
+    def kind(self) -> str:
+        return units.unit(self.unit).kind
+
+    @property
+    def range(self) -> str:
+        """The range in words: "at least 0 s", "from 0 to 1"."""
+        low, high = units.show(self.minimum, self.unit), units.show(self.maximum, self.unit)
+        if self.above > -inf:
+            low = units.show(self.above, self.unit)
+            return f"more than {low}" + (f", at most {high}" if self.maximum < inf else "")
+        if self.maximum == inf:
+            return f"at least {low}"
+        return f"at most {high}" if self.minimum == -inf else f"from {low} to {high}"
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        def validate(value: Any, info: ValidationInfo) -> float:
+            return self.read(value, text=isinstance(info.context, Reading))
+
+        return core_schema.with_info_plain_validator_function(
+            validate, serialization=core_schema.plain_serializer_function_ser_schema(lambda value: value)
+        )
+
+    def __get_pydantic_json_schema__(
+        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        from feedsim.scenario.schema import quantity_schema
+
+        return quantity_schema(self)
+
+
+class _AxisName:
+    """An axis of the machine."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        def validate(value: Any, info: ValidationInfo) -> str:
+            if not isinstance(value, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", value) or value in RESERVED:
+                raise fault(
+                    f"{brief(value)} is no axis name: a letter, then letters, digits and _ (not {', '.join(RESERVED)})"
+                )
+            if isinstance(info.context, Reading) and info.context.axes is not None and value not in info.context.axes:
+                raise fault(f"the machine has no axis {value!r}; it has {', '.join(info.context.axes)}")
+            return value
+
+        return core_schema.with_info_plain_validator_function(validate)
+
+    def __get_pydantic_json_schema__(
+        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "description": "Axis of the machine."}
+
+
+class ExistingFile:
+    """A file that is there. In a file's text the path is relative to that file."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        def validate(value: Any, info: ValidationInfo) -> Path:
+            if not isinstance(value, (str, Path)) or not str(value):
+                raise fault(f"{brief(value)} is no file name")
+            path = Path(value)
+            if not path.is_file():
+                raise fault(f"no such file: {value}" + (" (it is a folder)" if path.is_dir() else ""))
+            return path
+
+        return core_schema.with_info_plain_validator_function(
+            validate, serialization=core_schema.plain_serializer_function_ser_schema(str)
+        )
+
+    def __get_pydantic_json_schema__(
+        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"type": "string", "minLength": 1}
+
+
+AxisName = Annotated[str, _AxisName()]
+File = Annotated[Path, ExistingFile()]
+
+
+def brief(value: Any) -> str:
+    """A value as a message shows it."""
+    if value is None:
+        return "nothing (null)"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a group of keys"
+    if isinstance(value, (list, tuple)):
+        return "a list"
+    text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def did_you_mean(word: str, known: list[str]) -> str:
+    """'; did you mean ...?', else '; allowed: ...', as the tail of a message."""
+    same = [name for name in known if name.lower() == word.lower()]
+    close = same or get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"; did you mean {close[0]!r}?" if close else f"; allowed: {', '.join(known)}"

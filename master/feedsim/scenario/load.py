@@ -1,0 +1,162 @@
+"""Scenario file -> Scenario: read, fetch the files it names, apply changes, check; every problem with its line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import PydanticCustomError
+
+from feedsim.errors import InputError
+from feedsim.scenario import overrides as changes
+from feedsim.scenario import shape
+from feedsim.scenario.checks import contradictions
+from feedsim.scenario.fields import Quantity, Reading, brief
+from feedsim.scenario.machine import Cycles, Machine
+from feedsim.scenario.model import Scenario
+from feedsim.scenario.problems import describe, explain, in_order
+from feedsim.scenario.source import Place, Source, read
+
+MACHINE_FILE = "machine.yaml"
+M = TypeVar("M", bound=BaseModel)
+
+
+def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Read and check a scenario file.
+
+    `overrides` are KEY=VALUE texts as behind `--set`: dotted keys, values as in the file; they count after the
+    scenario's own `set` group. File names in them are relative to the working folder, those in a file relative to it.
+
+    Raises InputError that lists every problem with file and line.
+    """
+    path = Path(path)
+    source = _read_group(path)
+    faults: list[str] = []
+    options = []
+    for text in overrides:
+        with _collecting(faults):
+            options.append(changes.option(text, Path()))
+
+    # A machine chosen from outside comes first: the scenario's own settings then meet that machine.
+    for key, value in options:
+        if key == "machine":
+            source.put(("machine",), value)
+    own = list(_own_settings(source, faults))
+    _fetch(source, Scenario, (), faults)
+    for key, value in (*own, *((key, value) for key, value in options if key != "machine")):
+        with _collecting(faults):
+            for place in changes.apply(source, Scenario, key, value):
+                _fetch(source, Scenario, place, faults)
+    scenario = _check(source, Scenario, faults)
+    if scenario is not None:
+        faults += [describe(source, place, message) for place, message in contradictions(scenario)]
+    if faults or scenario is None:
+        raise InputError.of(str(path), in_order(faults))
+    scenario._file = path
+    scenario._overrides = tuple(overrides)
+    scenario.machine._directory = source.mark(("machine",)).folder
+    return scenario
+
+
+def load_machine(path: str | Path) -> Machine:
+    """Read and check a machine: a machine file, or a folder with a machine.yaml. Raises InputError like load()."""
+    path = Path(path)
+    path = path / MACHINE_FILE if path.is_dir() else path
+    source = _read_group(path)
+    faults: list[str] = []
+    _fetch(source, Machine, (), faults)
+    machine = _check(source, Machine, faults)
+    if machine is None:
+        raise InputError.of(str(path), in_order(faults))
+    machine._directory = path.parent
+    return machine
+
+
+def _read_group(path: Path) -> Source:
+    source = read(path)
+    if not isinstance(source.data, dict):
+        raise InputError(f"{source.mark(()).where}: a file of 'key: value' lines is expected, not {brief(source.data)}")
+    return source
+
+
+def _own_settings(source: Source, faults: list[str]) -> Iterator[tuple[str, Source]]:
+    """Take the `set` group out of the tree."""
+    settings = source.data.pop("set", None)
+    place: Place = ("set",)
+    if settings is not None and not isinstance(settings, dict):
+        faults.append(describe(source, place, f"a group of KEY: VALUE is expected, not {brief(settings)}"))
+    elif settings:
+        for key, value in settings.items():
+            inner = {at[2:]: mark for at, mark in source.marks.items() if at[:2] == ("set", key)}
+            yield key, Source(value, inner)
+    source.forget(place)
+
+
+def _fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
+    """Replace names of YAML files, where a group of keys is expected, by what the files hold; make other file names
+    relative to the file that names them."""
+    data: Any = source.data
+    for key in place:
+        data = data[key]
+    annotation = shape.expected(model, source.data, place)
+    if annotation is None:
+        return
+    if isinstance(data, str):
+        folder = source.mark(place).folder
+        if shape.is_file(annotation) and data:
+            parent: Any = source.data
+            for key in place[:-1]:
+                parent = parent[key]
+            parent[place[-1]] = str(folder / data)
+        elif shape.is_model(annotation) and (annotation is Machine or data.endswith((".yaml", ".yml"))):
+            named = folder / data
+            file = named / MACHINE_FILE if annotation is Machine and named.is_dir() else named
+            try:
+                source.put(place, _read_group(file))
+            except InputError as error:
+                inside = f"{file}:" in error.problems[0]
+                faults += error.problems if inside else [describe(source, place, str(error))]
+                source.put(place, Source(UNREAD, {(): source.mark(place)}))
+                return
+            _fetch(source, model, place, faults)
+    elif isinstance(data, dict):
+        for key in data:
+            _fetch(source, model, (*place, key), faults)
+    elif isinstance(data, list):
+        for i in range(len(data)):
+            _fetch(source, model, (*place, i), faults)
+
+
+UNREAD = "(not read)"  # stands for the content of a file whose problem is reported already
+
+
+def _check(source: Source, model: type[M], faults: list[str]) -> M | None:
+    try:
+        return model.model_validate(source.data, context=_reading(source.data))
+    except ValidationError as error:
+        faults += [text for detail in error.errors() if (text := explain(source, model, detail, UNREAD))]
+        return None
+
+
+def _reading(data: dict[str, Any]) -> Reading:
+    """What single values can be checked against, as far as the machine can be read."""
+    machine = data.get("machine", data)
+    machine = machine if isinstance(machine, dict) else {}
+    axes, cycles = machine.get("axes"), machine.get("cycles")
+    control = None
+    if isinstance(cycles, dict) and "control" in cycles:
+        quantity = next(note for note in Cycles.model_fields["control"].metadata if isinstance(note, Quantity))
+        with suppress(PydanticCustomError):
+            control = quantity.read(cycles["control"])
+    return Reading(axes=tuple(axes) if isinstance(axes, dict) and axes else None, control_cycle=control)
+
+
+@contextmanager
+def _collecting(faults: list[str]) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        faults += error.problems

@@ -1,0 +1,120 @@
+"""A scenario: a machine, its motions, how the units are coupled, what is recorded and what is evaluated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, PrivateAttr, StrictInt, StrictStr, ValidationInfo, field_validator, model_validator
+
+from feedsim.scenario.checks import contradictions, interval_fault
+from feedsim.scenario.fields import AxisName, Model, Quantity, Reading, fault
+from feedsim.scenario.machine import Machine
+from feedsim.scenario.motion import Motion
+
+Scheme = Literal["extrapolated", "gauss_seidel", "jacobi", "jacobi_extrapolated", "parallel"]
+
+
+class Coupling(Model):
+    """How plant and friction are exchanged."""
+
+    scheme: Scheme = Field(
+        default="extrapolated", description="Order of the units and use of input slopes within an exchange step"
+    )
+    substeps: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(
+        default=1, description="Exchange steps of plant and friction per control cycle"
+    )
+
+
+class Recording(Model):
+    """What goes into result.csv."""
+
+    interval: Annotated[float, Quantity("s", minimum=1e-6, example="1 ms")] = Field(
+        description="Time between rows, a whole multiple of the control cycle (default: the control cycle)"
+    )
+    variables: Annotated[tuple[Annotated[StrictStr, Field(min_length=1)], ...], Field(min_length=1)] | None = Field(
+        default=None, description='Names or patterns such as "Z.*" (default: everything)'
+    )
+
+    @field_validator("interval")
+    @classmethod
+    def _on_the_grid(cls, interval: float, info: ValidationInfo) -> float:
+        cycle = info.context.control_cycle if isinstance(info.context, Reading) else None
+        if cycle and (message := interval_fault(interval, cycle)):
+            raise fault(message)
+        return interval
+
+
+class Positioning(Model):
+    """Overshoot, settling time, ringing and rest torque of an axis after its last move."""
+
+    kind: Literal["positioning"] = "positioning"
+    axis: AxisName
+    band: Annotated[float, Quantity("m", above=0, example="1 um")] = Field(
+        default=1e-6, description="Half width of the band about the target that counts as settled"
+    )
+
+
+class CircleTest(Model):
+    """Circular deviations (ISO 230-4) and quadrant glitches of the last circle, over one full turn."""
+
+    kind: Literal["circle"] = "circle"
+    turn: Annotated[StrictInt, Field(ge=1)] | None = Field(
+        default=None, description="Turn evaluated, from 1 (default: the middle one)"
+    )
+
+
+Evaluation = Annotated[Positioning | CircleTest, Field(discriminator="kind")]
+
+
+class Scenario(Model):
+    """Everything that a run needs, checked."""
+
+    name: StrictStr = Field(description="Name in reports")
+    note: StrictStr = Field(default="", description="Remark")
+    machine: Machine = Field(description="Folder with a machine.yaml, a machine file, or the machine itself")
+    motions: Annotated[tuple[Motion, ...], Field(min_length=1)] = Field(
+        description="What the machine does, in this order"
+    )
+    coupling: Coupling = Coupling()
+    recording: Recording
+    evaluate: tuple[Evaluation, ...] = Field(default=(), description="Figures to derive")
+
+    _file: Path = PrivateAttr(default=Path("scenario.yaml"))
+    _overrides: tuple[str, ...] = PrivateAttr(default=())
+
+    @property
+    def file(self) -> Path:
+        """The scenario file."""
+        return self._file
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """What was changed from outside the file, as KEY=VALUE."""
+        return self._overrides
+
+    @model_validator(mode="before")
+    @classmethod
+    def _record_every_cycle(cls, data: Any, info: ValidationInfo) -> Any:
+        """The recording interval defaults to the machine's control cycle."""
+        if not isinstance(data, dict):
+            return data
+        recording, machine = data.get("recording", {}), data.get("machine")
+        interval: Any
+        if isinstance(info.context, Reading):
+            # A cycle that cannot be read is reported where it stands; what is recorded does not matter then.
+            interval = f"{info.context.control_cycle or 1.0!r} s"
+        elif isinstance(machine, Machine):
+            interval = machine.cycles.T_c
+        else:
+            return data
+        if isinstance(recording, dict) and "interval" not in recording:
+            return {**data, "recording": {**recording, "interval": interval}}
+        return data
+
+    @model_validator(mode="after")
+    def _no_contradictions(self, info: ValidationInfo) -> Self:
+        # A file's contradictions are reported by load(), which knows their lines.
+        if not isinstance(info.context, Reading) and (found := [message for _, message in contradictions(self)]):
+            raise fault("; ".join(found))
+        return self

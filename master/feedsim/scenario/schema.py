@@ -1,0 +1,101 @@
+"""JSON Schema of scenario and machine files, for editors."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import inf
+from typing import TYPE_CHECKING, Any, Literal
+
+from feedsim import units
+
+if TYPE_CHECKING:
+    from feedsim.scenario.fields import Quantity
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def json_schema(kind: Literal["scenario", "machine"] = "scenario") -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a scenario file or a machine file.
+
+    It knows keys, words and the spelling of quantities; it cannot know limits of quantities nor what needs two places
+    to be seen together. What it refuses, load() refuses too.
+    """
+    from feedsim.scenario.machine import Machine
+    from feedsim.scenario.model import Scenario
+
+    schema = (Scenario if kind == "scenario" else Machine).model_json_schema()
+    definitions: dict[str, Any] = schema.pop("$defs")
+    for group in (*definitions.values(), schema):
+        _open_to_files(group, definitions)
+    if kind == "scenario":
+        schema["properties"]["set"] = {
+            "type": "object",
+            "description": "Changes of single values by dotted key, of the machine too, as --set on the command line",
+            "examples": [{"machine.axes.Z.friction.W": "0 rad"}],
+        }
+        schema["required"].remove("recording")
+        definitions["Recording"].pop("required")
+        definitions["Column"] = {"anyOf": [{"type": "string", "minLength": 1}, definitions["Column"]]}
+    return {
+        "$schema": DIALECT,
+        "title": f"feedsim {kind} file",
+        **_without_titles(schema),
+        "$defs": _without_titles(definitions),
+    }
+
+
+def quantity_schema(quantity: Quantity) -> dict[str, Any]:
+    """Schema of a quantity: a number and known symbols; a symbol that stands alone must have the right dimension."""
+    dimension = units.unit(quantity.unit).dimension
+    symbols = sorted(_symbols(), key=len, reverse=True)
+    alone = "|".join(symbol for symbol in symbols if _symbols()[symbol] != dimension)
+    refused = rf"\s*{units.NUMBER}\s*(?:{alone})\s*$"
+    if quantity.unit != "1":
+        refused += rf"|\s*{units.NUMBER}\s*$"
+    expression = rf"(?:{'|'.join(symbols)}|[-0-9 .*/^()·⋅²³+])*"
+    example = quantity.example or units.example(quantity.unit)
+    text: dict[str, Any] = {
+        "type": "string",
+        "pattern": rf"^(?!{refused})\s*{units.NUMBER}\s*{expression}\s*$",
+        "examples": [example],
+    }
+    if quantity.unit != "1":
+        return text
+    number: dict[str, Any] = {"type": "number"}
+    if quantity.minimum > -inf:
+        number["minimum"] = quantity.minimum
+    if quantity.maximum < inf:
+        number["maximum"] = quantity.maximum
+    return {"anyOf": [number, text], "examples": [example]}
+
+
+@cache
+def _symbols() -> dict[str, str]:
+    """Symbol as a pattern -> its dimension."""
+    return {symbol: units.unit(symbol).dimension for symbol in (*units.DEFINITIONS, *units.ALIASES)}
+
+
+def _open_to_files(group: dict[str, Any], definitions: dict[str, Any]) -> None:
+    """Where a group of keys is expected the name of a YAML file may stand."""
+    for name, part in group.get("properties", {}).items():
+        file = {"type": "string", "pattern": "." if name == "machine" else r"\.ya?ml$"}
+        inner = part.get("additionalProperties", part)
+        options = inner.get("anyOf", [inner]) if isinstance(inner, dict) else []
+        references = [option["$ref"] for option in options if "$ref" in option]
+        if references and definitions[references[0].rpartition("/")[2]].get("type") == "object":
+            others = [option for option in options if "$ref" not in option]
+            inner.pop("$ref", None)
+            inner["anyOf"] = [{"$ref": references[0]}, file, *others]
+
+
+def _without_titles(schema: Any) -> Any:
+    """pydantic titles every key by its own name; editors show that name already."""
+    if isinstance(schema, dict):
+        return {
+            key: _without_titles(value)
+            if key != "properties"
+            else {name: _without_titles(part) for name, part in value.items()}
+            for key, value in schema.items()
+            if not (key == "title" and isinstance(value, str))
+        }
+    return [_without_titles(item) for item in schema] if isinstance(schema, list) else schema

@@ -1,0 +1,91 @@
+"""What the models expect at a place of a file's tree: which keys, a group or a file name."""
+
+from __future__ import annotations
+
+from types import NoneType, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+from feedsim.scenario.fields import ExistingFile
+from feedsim.scenario.source import Place
+
+
+def expected(model: Any, data: Any, place: Place) -> Any:
+    """Annotation at `place` of a tree `data` that is read as `model`; None where no key of that name belongs."""
+    annotation = resolve(model, data)
+    for key in place:
+        annotation = child(annotation, key)
+        data = data[key] if _holds(data, key) else None
+        annotation = resolve(annotation, data)
+        if annotation is None:
+            return None
+    return annotation
+
+
+def child(annotation: Any, key: str | int) -> Any:
+    """Annotation of what `key` names inside a value of `annotation` (resolved); None where there is no such key."""
+    if is_model(annotation):
+        info = annotation.model_fields.get(key)
+        if info is None:
+            return None
+        return Annotated[(info.annotation, *info.metadata)] if info.metadata else info.annotation
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is dict:
+        return arguments[1]
+    if origin is tuple and isinstance(key, int):
+        return arguments[0] if arguments[-1] is Ellipsis else arguments[key] if key < len(arguments) else None
+    return None
+
+
+def resolve(annotation: Any, data: Any) -> Any:
+    """Strip Annotated and Optional; of several models choose the one that the data's `kind` names."""
+    while True:
+        origin, arguments = get_origin(annotation), get_args(annotation)
+        if origin is Annotated:
+            if any(isinstance(note, ExistingFile) for note in arguments[1:]):
+                return annotation
+            annotation = arguments[0]
+        elif origin in (Union, UnionType):
+            options = [option for option in arguments if option is not NoneType]
+            if len(options) > 1:
+                kind = data.get("kind") if isinstance(data, dict) else None
+                options = [option for option in options if kind_of(option) == kind]
+                if not options:
+                    return None
+            annotation = options[0]
+        else:
+            return annotation
+
+
+def kind_of(model: Any) -> str | None:
+    """The `kind` that a model of a motion or an evaluation stands for."""
+    info = model.model_fields.get("kind") if is_model(model) else None
+    return info.default if info is not None else None
+
+
+def keys(annotation: Any) -> list[str] | None:
+    """Keys that a group may hold; None where keys are free (axis names) or it is no group."""
+    return list(annotation.model_fields) if is_model(annotation) else None
+
+
+def is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def is_group(annotation: Any) -> bool:
+    """Whether a mapping is expected."""
+    return is_model(annotation) or get_origin(annotation) is dict
+
+
+def is_file(annotation: Any) -> bool:
+    """Whether a file name is expected."""
+    return get_origin(annotation) is Annotated and any(
+        isinstance(note, ExistingFile) for note in get_args(annotation)[1:]
+    )
+
+
+def _holds(data: Any, key: str | int) -> bool:
+    return (isinstance(data, dict) and key in data) or (
+        isinstance(data, list) and isinstance(key, int) and 0 <= key < len(data)
+    )

@@ -1,0 +1,230 @@
+"""YAML text -> plain values, with the line of every value.
+
+YAML 1.2 core rules, so that what people write is what they get: `on`, `yes` and `off` are words, `6.5e7` is a number,
+dates are words. Stricter than YAML: a duplicate key is an error, a file is one document in UTF-8. Anchors, aliases and
+`<<` are fine as long as what they expand to stays small.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from feedsim.errors import InputError
+
+Place = tuple[str | int, ...]
+
+LARGEST = 100_000  # values in a file, aliases expanded
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Where a value comes from: "file:line" or "--set KEY=VALUE", and the folder its file names are relative to."""
+
+    where: str
+    folder: Path
+
+
+@dataclass
+class Source:
+    """Plain values (dict, list, str, int, float, bool, None) and the origin of each, by its place in the tree."""
+
+    data: Any
+    marks: dict[Place, Mark] = field(default_factory=dict)
+
+    def mark(self, place: Place) -> Mark:
+        """Origin of the value at `place`, or of what it is missing from."""
+        while place not in self.marks and place:
+            place = place[:-1]
+        return self.marks[place]
+
+    def put(self, place: Place, other: Source) -> None:
+        """Replace the value at `place` (its parent exists) by another tree, with its marks."""
+        parent: Any = self.data
+        for key in place[:-1]:
+            parent = parent[key]
+        parent[place[-1]] = other.data
+        self.forget(place)
+        self.marks.update({place + inner: mark for inner, mark in other.marks.items()})
+
+    def forget(self, place: Place) -> None:
+        """Drop the marks of a value and of all inside it."""
+        self.marks = {known: mark for known, mark in self.marks.items() if known[: len(place)] != place}
+
+
+def read(path: Path) -> Source:
+    """Read a YAML file. InputError (file, line): missing, not UTF-8, empty, bad syntax, duplicate key."""
+    try:
+        raw = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"no such file: {path}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path} is a folder, not a file") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from None
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{path}:{line}: not UTF-8 (byte 0x{raw[error.start]:02x}); save the file as UTF-8") from None
+    if not text.strip():
+        raise InputError(f"{path}: the file is empty")
+    return parse(text, str(path), path.parent)
+
+
+def parse(text: str, name: str, folder: Path, *, lines: bool = True) -> Source:
+    """Read YAML text. `name` stands before the line in messages; with lines=False it stands alone (one-line texts)."""
+    builder = _Builder(name, folder, lines)
+    try:
+        loader = _Loader(text)
+        try:
+            node = loader.get_single_node()
+        finally:
+            loader.dispose()
+    except RecursionError:
+        raise InputError(f"{name}: nested too deeply") from None
+    except yaml.MarkedYAMLError as error:
+        raise builder.error(_wording(error), error.problem_mark or error.context_mark) from None
+    except yaml.YAMLError as error:
+        raise InputError(f"{name}: {_control_character(error, text)}") from None
+    if node is None:
+        return Source(None, {(): Mark(name, folder)})
+    source = Source(None)
+    source.data = builder.build(node, (), source.marks)
+    if builder.problems:
+        raise InputError.of(name, builder.problems)
+    return source
+
+
+class _Loader(yaml.SafeLoader):
+    """Composes nodes and resolves plain scalars by the YAML 1.2 core schema."""
+
+    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012  (PyYAML's own name; emptied of the 1.1 rules)
+
+
+for _tag, _pattern, _first in (
+    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
+    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", list("-+0123456789")),
+    ("float", r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?", list("-+.0123456789")),
+    ("float", r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)", list("-+.")),
+    ("merge", r"<<", ["<"]),
+):
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(rf"^(?:{_pattern})$"), _first)
+
+
+class _Builder:
+    """Nodes -> plain values and marks; collects duplicate keys and the like instead of stopping at the first."""
+
+    def __init__(self, name: str, folder: Path, lines: bool) -> None:
+        self.name, self.folder, self.lines = name, folder, lines
+        self.problems: list[str] = []
+        self.count = 0
+        self.open: set[int] = set()
+
+    def where(self, mark: Any) -> str:
+        return f"{self.name}:{mark.line + 1}" if self.lines and mark is not None else self.name
+
+    def error(self, message: str, mark: Any) -> InputError:
+        return InputError(f"{self.where(mark)}: {message}")
+
+    def build(self, node: yaml.Node, place: Place, marks: dict[Place, Mark]) -> Any:
+        self.count += 1
+        if self.count > LARGEST:
+            raise InputError(
+                f"{self.name}: aliases expand to more than {LARGEST} values; write it out or make it smaller"
+            )
+        if id(node) in self.open:
+            raise self.error("an alias refers to the value that it is part of", node.start_mark)
+        marks.setdefault(place, Mark(self.where(node.start_mark), self.folder))
+        if isinstance(node, yaml.ScalarNode):
+            return self.scalar(node)
+        self.open.add(id(node))
+        try:
+            if isinstance(node, yaml.SequenceNode):
+                self.refuse_tag(node, "seq")
+                return [self.build(item, (*place, i), marks) for i, item in enumerate(node.value)]
+            assert isinstance(node, yaml.MappingNode)
+            self.refuse_tag(node, "map")
+            return self.mapping(node, place, marks)
+        finally:
+            self.open.discard(id(node))
+
+    def mapping(self, node: yaml.MappingNode, place: Place, marks: dict[Place, Mark]) -> dict[str, Any]:
+        values: dict[str, Any] = {}
+        lines: dict[str, Any] = {}
+        merged: list[yaml.Node] = []
+        for key_node, value_node in node.value:
+            if key_node.tag == "tag:yaml.org,2002:merge":
+                merged += value_node.value if isinstance(value_node, yaml.SequenceNode) else [value_node]
+                continue
+            if not isinstance(key_node, yaml.ScalarNode):
+                self.problems.append(f"{self.where(key_node.start_mark)}: a key must be a word")
+                continue
+            key = key_node.value
+            if key in values:
+                first = lines[key].line + 1
+                self.problems.append(
+                    f"{self.where(key_node.start_mark)}: duplicate key {key!r} (first in line {first})"
+                )
+                continue
+            lines[key] = key_node.start_mark
+            marks[(*place, key)] = Mark(self.where(key_node.start_mark), self.folder)
+            values[key] = self.build(value_node, (*place, key), marks)
+        for base in merged:
+            if not isinstance(base, yaml.MappingNode):
+                raise self.error("'<<' needs a group of keys", base.start_mark)
+            inner: dict[Place, Mark] = {}
+            for key, value in self.build(base, place, inner).items():
+                if key not in values:
+                    values[key] = value
+                    start = (*place, key)
+                    marks.update({known: mark for known, mark in inner.items() if known[: len(start)] == start})
+        return values
+
+    def scalar(self, node: yaml.ScalarNode) -> Any:
+        text, kind = node.value, node.tag.removeprefix("tag:yaml.org,2002:")
+        if kind == "str" or kind == "merge":
+            return text
+        if kind == "null":
+            return None
+        try:
+            if kind == "bool" and text.lower() in ("true", "false"):
+                return text.lower() == "true"
+            if kind == "int":
+                return int(text, 0 if text.lower().startswith(("0x", "0o")) else 10)
+            if kind == "float":
+                return float(re.sub(r"\.(inf|nan)", r"\1", text.lower()))
+        except ValueError:
+            raise self.error(f"{text[:40]!r} is no {kind}", node.start_mark) from None
+        raise self.error(f"tag {node.tag!r} is not known here", node.start_mark)
+
+    def refuse_tag(self, node: yaml.Node, kind: str) -> None:
+        if node.tag != f"tag:yaml.org,2002:{kind}":
+            raise self.error(f"tag {node.tag!r} is not known here", node.start_mark)
+
+
+def _wording(error: yaml.MarkedYAMLError) -> str:
+    problem = error.problem or error.context or "bad YAML"
+    if "'\\t'" in problem:
+        return "a tab cannot indent or start a value; use blanks"
+    if "could not find expected ':'" in problem:
+        return "expected 'key: value'"
+    if "mapping values are not allowed here" in problem:
+        return "a second ': ' in a line; put text that holds ': ' in quotes, or check the indentation"
+    if "expected a single document" in (error.context or ""):
+        return "a second document begins ('---'); one file holds one"
+    if "alias" in f"{problem} {error.context}":
+        return f"{problem}; text that begins with '*' needs quotes"
+    return problem + (f" ({error.context})" if error.context and error.context != problem else "")
+
+
+def _control_character(error: yaml.YAMLError, text: str) -> str:
+    if isinstance(error, yaml.reader.ReaderError):
+        line = text.count("\n", 0, error.position) + 1
+        return f"line {line} holds the control character U+{ord(text[error.position]):04X}"
+    return str(error)

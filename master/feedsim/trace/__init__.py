@@ -1,0 +1,9 @@
+"""Time series with names and units: the Trace, its CSV form, and the import of recorded data."""
+
+from feedsim.trace.csv import read_csv, write_csv
+from feedsim.trace.files import written_whole
+from feedsim.trace.mat import convert_mat
+from feedsim.trace.setpoints import read_setpoints
+from feedsim.trace.trace import Array, Trace
+
+__all__ = ["Array", "Trace", "convert_mat", "read_csv", "read_setpoints", "write_csv", "written_whole"]

@@ -1,0 +1,138 @@
+"""A trace: time series with names and units over one time axis."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedsim.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Columns of numbers over a common time.
+
+    time     (N,) [s], strictly increasing; need not be even
+    columns  name -> (N,) values
+    units    name -> unit as written in a CSV header ("m", "rad/s"; "" where none is known)
+
+    Arrays are copied to float64 and made read-only. InputError: lengths that differ, time that does not increase, a
+    name or unit that could not be written to a CSV header and read back, a unit for a column that does not exist.
+    """
+
+    time: Array
+    columns: Mapping[str, Array]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        time = _frozen_array(self.time, "time")
+        if time.size and not np.all(np.isfinite(time)):
+            raise InputError(f"time is not finite at row {int(np.argmin(np.isfinite(time)))} (counted from 0)")
+        if (wrong := np.flatnonzero(np.diff(time) <= 0)).size:
+            row = int(wrong[0]) + 1
+            raise InputError(
+                f"time must increase: {time[row]:.9g} s follows {time[row - 1]:.9g} s at row {row} (counted from 0)"
+            )
+        columns: dict[str, Array] = {}
+        for name, values in self.columns.items():
+            check_name(name)
+            columns[name] = _frozen_array(values, name)
+            if columns[name].shape != time.shape:
+                raise InputError(f"column {name!r} has {columns[name].size} values, the time has {time.size}")
+        if unknown := sorted(set(self.units) - set(columns)):
+            raise InputError(f"unit given for {unknown[0]!r}, which is no column")
+        units = {name: check_unit(self.units.get(name, "")) for name in columns}
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "columns", MappingProxyType(columns))
+        object.__setattr__(self, "units", MappingProxyType(units))
+
+    def __getitem__(self, name: str) -> Array:
+        """Values of a column; InputError with a suggestion if there is none of that name."""
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise InputError(f"no column {name!r}{suggest(name, self.columns)}") from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return int(self.time.size)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.columns)
+
+    def unit(self, name: str) -> str:
+        """Unit of a column as in the CSV header; "" where none is known."""
+        self[name]
+        return self.units[name]
+
+    def between(self, t0: float, t1: float) -> "Trace":
+        """Rows with t0 <= time <= t1 [s], give or take a millionth of the mean step (k h is rounded)."""
+        slack = 1e-6 * (self.time[-1] - self.time[0]) / (len(self) - 1) if len(self) > 1 else 0.0
+        first = int(np.searchsorted(self.time, t0 - slack, side="left"))
+        rows = slice(first, int(np.searchsorted(self.time, t1 + slack, side="right")))
+        return Trace(self.time[rows], {name: values[rows] for name, values in self.columns.items()}, self.units)
+
+    def select(self, patterns: Iterable[str]) -> "Trace":
+        """Columns whose name matches any of the glob patterns ("Z.*", "*.x_a"), in their present order.
+
+        InputError for a pattern that matches nothing.
+        """
+        wanted: set[str] = set()
+        for pattern in patterns:
+            matches = {name for name in self.columns if fnmatchcase(name, pattern)}
+            if not matches:
+                raise InputError(f"no column matches {pattern!r}{suggest(pattern, self.columns)}")
+            wanted |= matches
+        kept = [name for name in self.columns if name in wanted]
+        return Trace(self.time, {name: self.columns[name] for name in kept}, {name: self.units[name] for name in kept})
+
+
+def check_name(name: str) -> str:
+    """A name that a CSV header can hold and give back; InputError otherwise."""
+    if not name or name != name.strip() or any(c in "[]" or not c.isprintable() for c in name):
+        raise InputError(f"column name {name!r}: must be printable, without brackets and without blanks at its ends")
+    if name == "time":
+        raise InputError("column name 'time': the time is not a column of its own trace")
+    return name
+
+
+def check_unit(unit: str) -> str:
+    """A unit that a CSV header can hold and give back; InputError otherwise."""
+    if unit != unit.strip() or any(c in "[]" or not c.isprintable() for c in unit):
+        raise InputError(f"unit {unit!r}: must be printable, without brackets and without blanks at its ends")
+    return unit
+
+
+def suggest(name: str, known: Iterable[str]) -> str:
+    """'; did you mean ...?' or the list of what there is, as the tail of a message."""
+    names = [str(item) for item in known]
+    if close := get_close_matches(name, names, n=1, cutoff=0.6):
+        return f"; did you mean {close[0]!r}?"
+    lowered = [item for item in names if item.lower() == name.lower()]
+    if lowered:
+        return f"; did you mean {lowered[0]!r}?"
+    if not names:
+        return "; there is none"
+    shown = ", ".join(names[:12])
+    return f"; there is {shown}" + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+
+
+def _frozen_array(values: ArrayLike, name: str) -> Array:
+    array = np.array(values, dtype=np.float64)
+    if array.ndim != 1:
+        raise InputError(f"column {name!r} must be one-dimensional, has shape {array.shape}")
+    array.setflags(write=False)
+    return array

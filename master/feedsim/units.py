@@ -1,0 +1,310 @@
+"""Quantities written as text, "5000 mm/min", and their conversion to SI.
+
+The registry is small and built from nothing, so that it knows exactly what a machine-tool engineer writes and nothing
+that looks alike. An angle is a dimension of its own (base unit rad): hertz is one revolution (cycle) per second, so
+1 Hz is 2 pi rad/s and never 1 rad/s, and a controller gain in 1/s is no frequency in Hz. Factors are exact fractions:
+"125 us" is the double nearest to 125e-6, the same as the text 125e-6 itself.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+from fractions import Fraction
+from functools import cache, lru_cache
+from math import inf, isfinite
+from typing import TYPE_CHECKING
+
+from feedsim.errors import InputError
+
+if TYPE_CHECKING:
+    import pint
+
+# Spelling -> definition in spellings above it. "[...]" makes a base unit.
+DEFINITIONS = {
+    "m": "[length]",
+    "km": "1000 m",
+    "dm": "1/10 m",
+    "cm": "1/100 m",
+    "mm": "1/1000 m",
+    "um": "1/1000 mm",
+    "nm": "1/1000 um",
+    "s": "[time]",
+    "ms": "1/1000 s",
+    "us": "1/1000 ms",
+    "ns": "1/1000 us",
+    "min": "60 s",
+    "h": "60 min",
+    "kg": "[mass]",
+    "g": "1/1000 kg",
+    "t": "1000 kg",
+    "A": "[current]",
+    "mA": "1/1000 A",
+    "rad": "[angle]",
+    "mrad": "1/1000 rad",
+    "urad": "1/1000 mrad",
+    # 2 pi to 40 digits
+    "rev": "6283185307179586476925286766559005768394/1000000000000000000000000000000000000000 rad",
+    "deg": "1/360 rev",
+    "arcsec": "1/3600 deg",
+    "rpm": "rev/min",
+    "Hz": "rev/s",
+    "kHz": "1000 Hz",
+    "N": "kg*m/s^2",
+    "mN": "1/1000 N",
+    "kN": "1000 N",
+    "Nm": "N*m",
+    "V": "kg*m^2/s^3/A",
+    "mV": "1/1000 V",
+    "kV": "1000 V",
+    "Ohm": "V/A",
+    "mOhm": "1/1000 Ohm",
+    "H": "V*s/A",
+    "mH": "1/1000 H",
+    "uH": "1/1000 mH",
+    "Wb": "V*s",
+    "percent": "1/100",
+}
+# Other spellings of the same.
+ALIASES = {
+    "ohm": "Ohm",
+    "mohm": "mOhm",
+    "revolution": "rev",
+    "degree": "deg",
+    "radian": "rad",
+    "hertz": "Hz",
+    "sec": "s",
+    "%": "percent",
+    "°": "deg",
+    "µm": "um",
+    "µs": "us",
+    "µrad": "urad",
+    "µH": "uH",
+    "Ω": "Ohm",
+    "mΩ": "mOhm",
+}
+# What a quantity in a unit is called, and an example to show.
+KINDS = {
+    "m": ("length", "100 mm"),
+    "s": ("time", "125 us"),
+    "kg": ("mass", "435 kg"),
+    "rad": ("angle", "0.04 rad"),
+    "1": ("plain number", "0.35"),
+    "m/s": ("speed", "5000 mm/min"),
+    "m/s^2": ("acceleration", "14.4 m/s^2"),
+    "m/s^3": ("jerk", "150 m/s^3"),
+    "rad/s": ("angular speed or frequency", "915.3 rad/s"),
+    "Hz": ("angular speed or frequency", "602 Hz"),
+    "1/s": ("position controller gain", "4 (m/min)/mm"),
+    "m/rad": ("lead", "20 mm/rev"),
+    "N": ("force", "120 N"),
+    "N.m": ("torque", "2.1 N.m"),
+    "N.m/rad": ("torsional stiffness", "300 N.m/rad"),
+    "N.m.s/rad": ("torque per angular speed", "6.18 N.m.s/rad"),
+    "N.m/A": ("torque constant", "2.0 N.m/A"),
+    "V": ("voltage", "350 V"),
+    "A": ("current", "12 A"),
+    "Ohm": ("resistance", "0.45 Ohm"),
+    "V/A": ("voltage per current", "17.28 V/A"),
+    "H": ("inductance", "5 mH"),
+    "Wb": ("flux linkage", "0.27 Wb"),
+    "1/A": ("1/current", "1 1/A"),
+}
+
+DIMENSIONLESS = "1"
+LONGEST = 60  # characters of a unit
+
+NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_QUANTITY = re.compile(rf"\s*({NUMBER})(.*)", re.DOTALL)
+_SYMBOL = re.compile(r"[^\W\d_]+|[%°]")
+_EXPRESSION = re.compile(r"(?:(?<![)^0-9])\^[+-]?[0-9](?![0-9^])|(?<![0-9^])1(?![0-9])|[^\W\d_]+|[*/()])*")
+_LEGAL = re.compile(r"(?:[^\W\d_]+|[%°]|[0-9]|[-+ ().*/^])*")
+_SPELLINGS = str.maketrans({"μ": "µ", "Ω": "Ω", "·": ".", "⋅": ".", "×": "*", "²": "^2", "³": "^3"})
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit expression: as written, its factor to the SI base units (with rad), and its dimension."""
+
+    text: str
+    factor: Fraction
+    dimension: str
+
+    @property
+    def kind(self) -> str:
+        """What a quantity of this dimension is called, e.g. "speed"; the dimension itself where it has no name."""
+        named = {unit(known).dimension: name for known, (name, _) in reversed(KINDS.items())}
+        return named.get(self.dimension, self.dimension)
+
+
+def example(text: str) -> str:
+    """A quantity that could stand where one in unit `text` is expected."""
+    return KINDS[text][1] if text in KINDS else f"1 {text}"
+
+
+def parse(text: str, expected: str, example_text: str = "") -> float:
+    """Value of a quantity such as "5000 mm/min" in the SI unit `expected`, such as "m/s".
+
+    Any unit of the same dimension is converted, correctly rounded. `example_text` is what messages show (a usual
+    quantity by default). Raises InputError: not a number with a unit, an unknown or ambiguous unit, another dimension
+    than expected; each message names what is expected and shows an example.
+    """
+    target = unit(expected)
+    wanted = f"{article(target.kind)} is expected, for example {example_text or example(expected)}"
+    match = _QUANTITY.fullmatch(text)
+    if not match:
+        raise InputError(f"{text!r} is not a number with a unit; {wanted}")
+    number, rest = match[1], match[2].strip()
+    if re.match(r",[0-9]", rest):
+        raise InputError(f"{text!r}: write a decimal point, not a comma; {wanted}")
+    if not rest:
+        if target.dimension != unit(DIMENSIONLESS).dimension:
+            raise InputError(f"{number} has no unit; {wanted}")
+        return finite(number)
+    try:
+        given = unit(rest)
+    except InputError as error:
+        raise InputError(f"{text.strip()!r}: {error}; {wanted}") from None
+    if given.dimension != target.dimension:
+        raise InputError(f"{text.strip()!r} is {article(given.kind)}; {wanted}{_hint(given, target)}")
+    if finite(number) == 0.0:
+        return 0.0
+    try:
+        return float(Fraction(number) * given.factor / target.factor)
+    except OverflowError:
+        raise InputError(f"{text.strip()!r} is too large to calculate with; {wanted}") from None
+
+
+def convert(value: float, given: str, expected: str) -> float:
+    """`value` in unit `given` as a value in unit `expected`. InputError: unknown unit, dimensions differ."""
+    return value * float(factor(given, expected))
+
+
+def factor(given: str, expected: str) -> Fraction:
+    """Exact factor from unit `given` to unit `expected`. InputError: unknown unit, dimensions differ."""
+    source, target = unit(given), unit(expected)
+    if source.dimension != target.dimension:
+        raise InputError(
+            f"unit {given!r} is that of {article(source.kind)}; one of {article(target.kind)} is expected, such as "
+            f"{expected}{_hint(source, target)}"
+        )
+    return source.factor / target.factor
+
+
+@lru_cache(maxsize=1024)
+def unit(text: str) -> Unit:
+    """Read a unit expression: symbols joined by . * / or a blank, powers ^2 or **2 (also m/s2), brackets, "1" for none.
+
+    InputError: unknown symbol (with a suggestion), a product behind a division without brackets, bad syntax.
+    """
+    plain = " ".join(text.translate(_SPELLINGS).split())
+    if len(plain) > LONGEST:
+        raise InputError(f"unit {text[:20]!r}... has more than {LONGEST} characters")
+    if not _LEGAL.fullmatch(plain):
+        bad = next(c for c in plain if not _LEGAL.fullmatch(c))
+        raise InputError(f"unit {text!r} holds {bad!r}")
+    for symbol in _SYMBOL.findall(plain):
+        if symbol not in DEFINITIONS and symbol not in ALIASES:
+            raise InputError(f"unknown unit {symbol!r}{_suggest(symbol)}")
+    plain = _SYMBOL.sub(lambda match: ALIASES.get(match[0], match[0]), plain)
+    plain = re.sub(r"(?<=[a-zA-Z])([0-9])", r"^\1", plain).replace("**", "^")
+    plain = re.sub(r" ?([.*/^()]) ?", r"\1", plain)
+    plain = re.sub(r"(?<=[\w)])[ .](?=[\w(])", "*", plain)
+    plain = re.sub(r"(?<=[\w)])\((?!$)", "*(", plain)
+    if _product_behind_division(plain):
+        raise InputError(f"unit {text!r} is ambiguous; put what stands under the line in brackets, as in N.m/(rad.s)")
+    # Beside the units: powers of one digit, 1 as in 1/s, and each bracket closed.
+    if not _EXPRESSION.fullmatch(plain) or _unbalanced(plain):
+        raise InputError(f"unit {text!r} cannot be read")
+    return Unit(text, *_resolve(plain, text))
+
+
+def article(kind: str) -> str:
+    """ "a speed", "an angle"."""
+    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
+
+
+def finite(number: str) -> float:
+    """The double nearest to `number`; InputError where it overflows."""
+    value = float(number)
+    if not isfinite(value):
+        raise InputError(f"{number} is too large (largest is about 1.8e308)")
+    return value
+
+
+def show(value: float, text: str) -> str:
+    """A value with its unit for a message: "0.08 m/s", "0.35"."""
+    if value in (inf, -inf):
+        return "unlimited"
+    return f"{value:.9g}" if text in ("1", "") else f"{value:.9g} {text}"
+
+
+def _resolve(plain: str, text: str) -> tuple[Fraction, str]:
+    from pint.errors import PintError
+
+    registry = _registry()
+    try:
+        quantity = registry.Quantity(Fraction(1), registry.parse_units(plain)).to_root_units()
+    except (PintError, ValueError, TypeError, SyntaxError, AttributeError, AssertionError, ZeroDivisionError) as error:
+        # pint meets what it cannot read in many ways
+        raise InputError(f"unit {text!r} cannot be read") from error
+    powers = {str(name).strip("[]"): float(str(power)) for name, power in quantity.dimensionality.items()}
+    return Fraction(quantity.magnitude), _dimension(powers)
+
+
+def _dimension(powers: dict[str, float]) -> str:
+    """Canonical text of a dimension, e.g. "length/time^2"."""
+
+    def term(name: str, power: float) -> str:
+        return name if power == 1 else f"{name}^{power:g}"
+
+    over = [term(name, power) for name, power in sorted(powers.items()) if power > 0]
+    under = [term(name, -power) for name, power in sorted(powers.items()) if power < 0]
+    return "/".join(["*".join(over) or "1", *under])
+
+
+def _unbalanced(plain: str) -> bool:
+    depth = 0
+    for c in plain:
+        depth += (c == "(") - (c == ")")
+        if depth < 0:
+            return True
+    return depth != 0
+
+
+def _product_behind_division(plain: str) -> bool:
+    """Whether a * follows a / on the same level of brackets: people differ on what N.m/rad.s means."""
+    divided = [False]
+    for c in plain:
+        if c == "(":
+            divided.append(False)
+        elif c == ")" and len(divided) > 1:
+            divided.pop()
+        elif c == "/":
+            divided[-1] = True
+        elif c == "*" and divided[-1]:
+            return True
+    return False
+
+
+def _hint(given: Unit, target: Unit) -> str:
+    if given.dimension == unit("rad/s").dimension and target.dimension == unit("1/s").dimension:
+        return "; Hz and rad/s hold an angle and are not the same as 1/s"
+    return ""
+
+
+def _suggest(symbol: str) -> str:
+    known = [*DEFINITIONS, *ALIASES]
+    same = [name for name in known if name.lower() == symbol.lower()]
+    close = same or get_close_matches(symbol, known, n=1, cutoff=0.6)
+    return f"; did you mean {close[0]!r}?" if close else f"; known are {', '.join(DEFINITIONS)}"
+
+
+@cache
+def _registry() -> pint.UnitRegistry[Fraction]:
+    import pint
+
+    registry: pint.UnitRegistry[Fraction] = pint.UnitRegistry(None, non_int_type=Fraction)
+    registry.load_definitions([f"{name} = {definition.replace('^', '**')}" for name, definition in DEFINITIONS.items()])
+    return registry

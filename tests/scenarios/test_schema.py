@@ -1,0 +1,130 @@
+"""JSON Schema for editors: accepts what load() accepts, refuses the usual mistakes."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+import yaml
+
+from feedsim.scenario import json_schema
+
+jsonschema = pytest.importorskip("jsonschema")
+
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+
+
+@cache
+def validator(kind: Literal["scenario", "machine"]) -> Any:
+    schema = json_schema(kind)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+def content(path: Path) -> Any:
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+def errors(kind: Literal["scenario", "machine"], data: Any) -> list[str]:
+    return [".".join(map(str, error.absolute_path)) for error in validator(kind).iter_errors(data)]
+
+
+@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.name)
+def test_shipped_scenarios_are_valid(path: Path) -> None:
+    assert errors("scenario", content(path)) == []
+
+
+def test_shipped_machine_is_valid_alone_and_inside_a_scenario() -> None:
+    machine = content(SCENARIOS / "machines" / "test_centre" / "machine.yaml")
+    assert errors("machine", machine) == []
+    assert (
+        errors("scenario", {"name": "s", "machine": machine, "motions": [{"kind": "dwell", "duration": "1 s"}]}) == []
+    )
+
+
+SCENARIO: dict[str, Any] = {
+    "name": "s",
+    "machine": "m",
+    "motions": [{"kind": "move", "by": {"Z": "100 mm"}, "feed": "5000 mm/min"}],
+    "recording": {"interval": "1 ms"},
+}
+
+
+def changed(key: str, value: Any) -> dict[str, Any]:
+    data: Any = yaml.safe_load(yaml.safe_dump(SCENARIO))
+    *path, last = key.split(".")
+    place: Any = data
+    for part in path:
+        place = place[int(part)] if isinstance(place, list) else place[part]
+    place[last] = value
+    return dict(data)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("motions.0.feed", "5000 mm"),  # a symbol alone of the wrong dimension
+        ("motions.0.feed", 5000),
+        ("motions.0.feed", "5000"),
+        ("motions.0.feed", "fast"),
+        ("motions.0.feed", "5,5 m/min"),
+        ("motions.0.feed", "5 inch/min"),
+        ("motions.0.fed", "5 m/min"),
+        ("motions.0.by", {"Z": 100}),
+        ("motions.0.by", {"Z": "100 s"}),
+        ("motions.0.kind", "mov"),
+        ("recording.interval", "1 mm"),
+        ("coupling", {"scheme": "jacoby"}),
+        ("coupling", {"substeps": 0}),
+        ("coupling", "scheme"),
+        ("evaluate", [{"kind": "positioning"}]),
+        ("motions", []),
+        ("extra", 1),
+        ("set", [1]),
+    ],
+)
+def test_usual_mistakes_are_refused(key: str, value: Any) -> None:
+    assert errors("scenario", SCENARIO) == []
+    assert errors("scenario", changed(key, value))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("motions.0.feed", "5 m/min"),
+        ("motions.0.feed", "5e3 mm.min^-1"),
+        ("motions.0.feed", "83.3 mm/s"),
+        ("motions.0.by", {"Z": "100µm", "X": "-1 m"}),
+        ("machine", "other/machine.yaml"),
+        ("coupling", "coupling.yaml"),
+        ("set", {"machine.axes.Z.friction.W": "0 rad"}),
+        ("motions.0.acceleration", "2 m/s²"),
+        ("motions.0.jerk", None),
+    ],
+)
+def test_other_spellings_are_accepted(key: str, value: Any) -> None:
+    assert errors("scenario", changed(key, value)) == []
+
+
+def test_machine_mistakes() -> None:
+    machine = content(SCENARIOS / "machines" / "test_centre" / "machine.yaml")
+    del machine["axes"]["Z"]["friction"]["F_C"]
+    machine["axes"]["X"]["drive"]["K_v"] = "66 Hz"
+    machine["axes"]["X"]["drive"]["ramp_speed_setpoint"] = "on"
+    machine["axes"]["Y"]["friction"]["gamma"] = 1.5
+    machine["axes"]["Y"]["travel"] = ["0 mm"]
+    found = {path.partition("axes.")[2].split(".drive")[0].split(".friction")[0] for path in errors("machine", machine)}
+    assert found >= {"Z", "X", "Y", "Y.travel"}
+
+
+def test_every_key_is_described() -> None:
+    for kind in ("scenario", "machine"):
+        schema = json_schema(kind)
+        groups = {"": schema, **schema["$defs"]}
+        silent = [
+            f"{name}.{key}"
+            for name, group in groups.items()
+            for key, part in group.get("properties", {}).items()
+            if key != "kind" and "description" not in part and "$ref" not in str(part)
+        ]
+        assert silent == []

@@ -1,0 +1,120 @@
+# Every command a person needs; `make help` lists them. Two do everything on a fresh machine: `make run` and `make test`.
+#
+#   PYTHON    interpreter that makes the virtual environment (3.11 or newer)        default python3
+#   CC        C compiler; without one on the machine, zig from PyPI is fetched      default cc, gcc or clang
+#   RESULTS   where `make run` leaves its results                                    default results
+
+PYTHON  ?= python3
+RESULTS ?= results
+BUILD   ?= build
+VENV    := .venv
+PY      := $(VENV)/bin/python
+PIP     := $(PY) -m pip --disable-pip-version-check --quiet
+
+UNITS   := plant controller friction
+FMUS    := $(UNITS:%=fmus/%.fmu)
+SCENARIOS := z_positioning xz_circle
+
+# make's own default for CC is not a compiler that must exist.
+ifeq ($(origin CC),default)
+CC := $(firstword $(foreach name,cc gcc clang,$(if $(shell command -v $(name) 2>/dev/null),$(name))))
+endif
+ifeq ($(strip $(CC)),)
+CC := $(abspath $(PY)) -m ziglang cc
+COMPILER := $(VENV)/.compiler
+endif
+export CC
+
+.DEFAULT_GOAL := help
+.SUFFIXES:
+MAKEFLAGS += --no-builtin-rules
+.PHONY: help run test test-c test-python test-sanitize test-valgrind fmus lint format reference check-reference bench lock clean
+
+help: ## list the commands
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-16s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+# --- environment ---------------------------------------------------------------------------------------------------
+
+$(VENV)/.created:
+	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.run: $(VENV)/.created requirements.lock pyproject.toml
+	@echo "installing the locked packages (requirements.lock)"
+	$(PIP) install -r requirements.lock
+	$(PIP) install --no-build-isolation --no-deps -e .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.run requirements-dev.lock
+	@echo "installing the locked development packages (requirements-dev.lock)"
+	$(PIP) install -r requirements-dev.lock
+	@touch $@
+
+$(VENV)/.compiler: $(VENV)/.run requirements-zig.lock
+	@echo "no C compiler found: installing zig from PyPI (requirements-zig.lock)"
+	$(PIP) install -r requirements-zig.lock
+	@touch $@
+
+# --- the units -----------------------------------------------------------------------------------------------------
+
+fmus: $(FMUS) ## build the three FMUs into fmus/
+
+PACKAGER := $(wildcard src/fmi2/packager/*.py)
+SHELL_SOURCES := $(wildcard src/fmi2/*.[ch] src/fmi2/standard/*.h)
+
+fmus/%.fmu: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml LICENSE
+	$(PY) src/fmi2/packager build $* --out $@ --build-dir $(BUILD)/fmus
+
+fmus/friction.fmu: $(wildcard src/friction_fmu/*.*)
+fmus/controller.fmu: $(wildcard src/controller_fmu/*.*)
+fmus/plant.fmu: $(wildcard src/plant_fmu/*.* src/plant_fmu/resources/*) scenarios/machines/test_centre/modes.csv
+
+# --- run -----------------------------------------------------------------------------------------------------------
+
+run: fmus $(VENV)/.run ## build, run both scenarios, leave results, figures and reports in results/
+	@set -e; for scenario in $(SCENARIOS); do \
+	    $(VENV)/bin/feedsim run scenarios/$$scenario.yaml --out $(RESULTS)/$$scenario; done
+	@echo "open $(RESULTS)/*/report.html"
+
+# --- test ----------------------------------------------------------------------------------------------------------
+
+-include tests/unit_c/tests.mk
+
+test: test-c test-sanitize test-valgrind test-python ## everything: C tests, sanitisers, leak check, Python tests
+
+test-python: fmus $(VENV)/.dev
+	$(PY) -m pytest
+
+reference: $(VENV)/.dev ## make the pinned reference CSVs anew, from scipy
+	$(PY) tests/reference/make_reference.py
+
+check-reference: fmus $(VENV)/.run ## compare the units' outputs with the pinned reference CSVs
+	$(PY) tests/reference/check_reference.py
+
+bench: fmus $(VENV)/.run ## measure the units and the master loop
+	$(PY) benchmarks/cycle.py
+
+# --- keep ----------------------------------------------------------------------------------------------------------
+
+C_FILES = $(shell git ls-files 'src/*.c' 'src/*.h' 'tests/*.c' 'tests/*.h' ':!src/fmi2/standard')
+
+lint: $(VENV)/.dev ## style, types, formatting
+	$(PY) -m ruff check
+	$(PY) -m ruff format --check
+	$(PY) -m mypy
+	$(PY) -m mypy --strict src/fmi2/packager
+	$(VENV)/bin/clang-format --dry-run --Werror $(C_FILES)
+
+format: $(VENV)/.dev ## bring all sources into the one format
+	$(PY) -m ruff check --fix --exit-zero
+	$(PY) -m ruff format
+	$(VENV)/bin/clang-format -i $(C_FILES)
+
+lock: ## resolve the dependencies of pyproject.toml anew
+	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group build -o requirements.lock
+	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
+	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --group zig -o requirements-zig.lock
+
+clean: ## remove what was built, keep the environment
+	rm -rf $(BUILD) $(FMUS) $(RESULTS)

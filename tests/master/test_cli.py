@@ -61,7 +61,7 @@ def test_default_output_folder_is_named_after_the_scenario(scenario_file: Path, 
         ("machine.axes.Z.friction.F_S=1 N.m", ["F_S", "F_C"]),
         ("machine.axes.Z.friction.W=-0.1 rad", ["W", "-0.1"]),
         ("machine.cycles.position=1.1 ms", ["position", "1.1"]),
-        ("motions.0.feed=40 m/min", ["Z", "30 m/min"]),
+        ("motions.0={kind: move, by: {Z: 100 mm}, feed: 40 m/min}", ["Z", "40 m/min", "30 m/min"]),
         ("motions.0.by.Z=700 mm", ["Z", "685"]),
     ],
 )

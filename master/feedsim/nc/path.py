@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 # How far an arc's programmed end point may lie off the circle through its start [m]; it then ends on the circle.
 END_POINT_TOLERANCE = 1e-6
+# Phases of the profile may be shorter than a cycle; the peak of the combined acceleration lies within one.
+POINTS_PER_PHASE = 33
 
 
 @dataclass(frozen=True)
@@ -70,11 +72,13 @@ class CircularPath:
         }
 
     def peaks(self, profile: Profile, step: float) -> dict[str, tuple[float, float, float, float]]:
-        """As for a line. The path is looked at every ``step`` [s] and where an axis is at an extreme of its motion.
+        """As for a line. The path is looked at every ``step`` [s], at 33 instants of every phase of the profile, and
+        where an axis is at an extreme of its motion.
 
         Acceleration is the axis' share of tangential acceleration and centripetal acceleration v^2/R together.
         """
-        t = np.concatenate([np.arange(0.0, profile.duration, step), self._crossings(profile), [profile.duration]])
+        within_phases = np.linspace(profile.times[:-1], profile.times[1:], POINTS_PER_PHASE).ravel()
+        t = np.concatenate([np.arange(0.0, profile.duration, step), within_phases, self._crossings(profile)])
         s, v, a = profile.at(t)
         phi = self.angle(s)
         tangent = (-self.sense * np.sin(phi), self.sense * np.cos(phi))

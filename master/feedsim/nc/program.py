@@ -114,7 +114,7 @@ def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion
     if profile is not None and path is not None:
         samples = path.position(profile.at(np.arange(1, count + 1, dtype=np.float64) * cycles.T_ipo)[0])
         for axis, peaks in path.peaks(profile, cycles.T_ipo).items():
-            found = violations(axis, scenario.machine.axes[axis], *peaks)
+            found = violations(axis, scenario.machine.axes[axis], origin[axis], *peaks)
             state.problems += [f"motion {index} ({motion.kind}): {problem}" for problem in found]
     for axis, points in stretch.points.items():
         points.append(samples[axis] if axis in samples else np.full(count, origin[axis]))

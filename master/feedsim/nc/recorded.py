@@ -64,5 +64,5 @@ def recording_violations(name: str, axis: Axis, start: float, x_s: Array, v_s: A
         ]
     steps = np.diff(np.concatenate([[start, start], x_s, [x_s[-1], x_s[-1]]]), 2) / cycle**2
     return violations(
-        name, axis, float(x_s.min()), float(x_s.max()), float(np.abs(v_s).max()), float(np.abs(steps).max())
+        name, axis, start, float(x_s.min()), float(x_s.max()), float(np.abs(v_s).max()), float(np.abs(steps).max())
     )

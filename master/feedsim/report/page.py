@@ -117,8 +117,8 @@ def _figure(picture: Picture) -> str:
         data = base64.b64encode(picture.png).decode("ascii")
         image = f'<img class="plot" alt="{escape(picture.title, quote=True)}" src="data:image/png;base64,{data}">'
     return (
-        f'<figure id="{picture.stem}">\n<div class="scroll">{image}</div>\n<figcaption><strong>{escape(picture.title)}</strong>'
-        f"{escape(picture.caption)}</figcaption>\n</figure>"
+        f'<figure id="{picture.stem}">\n<div class="scroll">{image}</div>\n<figcaption>'
+        f"<strong>{escape(picture.title)}</strong>{escape(picture.caption)}</figcaption>\n</figure>"
     )
 
 

@@ -41,7 +41,7 @@ class System:
     Shared buffers, one entry per axis in the machine's order; an exchange step runs from its start to its end:
 
     ======================= ==============================================================================
-    M_a_start, M_a_end      motor torque at the ends of the control cycle, M_a_slope in between (M_a_start: behind a jump)
+    M_a_start, M_a_end      motor torque at the ends of the control cycle, M_a_slope in between
     M_a                     motor torque at the start of the exchange step
     M_fr, M_fr_slope        friction torque at the start of the exchange step and the slope of the last one
     n_start, n_end          speed at the friction contact at the ends of the exchange step

@@ -143,7 +143,7 @@ def _append_recording(state: _Plan, scenario: Scenario, index: int, motion: Meas
     cycles = scenario.machine.cycles
     start = state.instant * cycles.T_ipo
     origin = dict(state.position)
-    recording = recorded(motion, origin, cycles.T_pos)
+    recording = recorded(motion, origin, cycles.T_pos, scenario.machine.path)
     for axis in motion.columns:
         found = recording_violations(
             axis, scenario.machine.axes[axis], origin[axis], recording.x_s[axis], recording.v_s[axis], cycles.T_pos

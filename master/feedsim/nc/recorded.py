@@ -1,4 +1,8 @@
-"""Recorded position setpoints in place of the interpolator's: a cubic spline through the rows of a CSV file."""
+"""Recorded position setpoints in place of the interpolator's: a cubic spline through the rows of a CSV file.
+
+A recording that was cut while an axis was moving begins or ends at a speed. The axis then gets a run-in from rest to
+that speed ahead of the first row, and a run-out behind the last one, as fast as the limits of the path allow.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +14,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from feedsim.nc.limits import violations
+from feedsim.nc.run_in import SpeedChange, speed_change
 from feedsim.nc.segment import whole_cycles
-from feedsim.scenario import Axis, MeasuredSetpoints
+from feedsim.scenario import Axis, MeasuredSetpoints, PathLimits
 from feedsim.trace import read_setpoints
 
 Array = NDArray[np.float64]
@@ -19,18 +24,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Recorded setpoints at the position cycle from their first row on.
+    """Recorded setpoints at the position cycle, with run-in and run-out.
 
-    duration: from the first row to the last [s]; x_s, v_s: axis -> (N,) position [m] and its derivative [m/s], from 0
-    to the first instant at or after the end, where the last row stands.
+    run_in: time ahead of the first row [s]; duration: from the start of the run-in to the end of the run-out [s];
+    x_s, v_s: axis -> (N,) position [m] and its derivative [m/s], from 0 to the first instant at or after the end.
     """
 
+    run_in: float
     duration: float
     x_s: Mapping[str, Array]
     v_s: Mapping[str, Array]
 
 
-def recorded(motion: MeasuredSetpoints, start: Mapping[str, float], cycle: float) -> Recording:
+def recorded(motion: MeasuredSetpoints, start: Mapping[str, float], cycle: float, limits: PathLimits) -> Recording:
     """Setpoints of ``motion`` at multiples of ``cycle`` [s], from the positions ``start`` [m].
 
     Raises InputError where the file cannot be read, lacks a column or a unit, or has too few rows.
@@ -41,14 +47,33 @@ def recorded(motion: MeasuredSetpoints, start: Mapping[str, float], cycle: float
         time=(motion.time.column, motion.time.unit),
         between=motion.between,
     )
-    duration = float(rows.time[-1])
-    grid = np.minimum(np.arange(whole_cycles(duration, cycle) + 1) * cycle, duration)
+    length = float(rows.time[-1])
+    splines = {axis: CubicSpline(rows.time, rows[axis] - rows[axis][0]) for axis in motion.columns}
+    into = {axis: _change(float(spline(0.0, 1)), cycle, limits) for axis, spline in splines.items()}
+    out = {axis: _change(float(spline(length, 1)), cycle, limits) for axis, spline in splines.items()}
+    # Whole cycles, so that rows recorded at the position cycle stay on it.
+    before = whole_cycles(max(change.duration for change in into.values()), cycle)
+    duration = before * cycle + length + max(change.duration for change in out.values())
+    time: Array = (np.arange(whole_cycles(duration, cycle) + 1, dtype=np.float64) - before) * cycle
+    ahead, behind = time < 0, time > length
     x_s, v_s = {}, {}
-    for axis in motion.columns:
-        x = rows[axis]
-        spline = CubicSpline(rows.time, x - x[0] + start[axis] if motion.relative else x)
-        x_s[axis], v_s[axis] = spline(grid), spline(grid, 1)
-    return Recording(duration, x_s, v_s)
+    for axis, spline in splines.items():
+        origin = start[axis] + into[axis].distance if motion.relative else float(rows[axis][0])
+        within = np.clip(time, 0.0, length)
+        x, v = spline(within), spline(within, 1)
+        covered, v[ahead] = into[axis].at(time[ahead] + into[axis].duration)
+        x[ahead] = covered - into[axis].distance
+        # A run-out is a run-in backwards in time.
+        left, v[behind] = out[axis].at(out[axis].duration - (time[behind] - length))
+        x[behind] += out[axis].distance - left
+        x_s[axis], v_s[axis] = origin + x, v
+    return Recording(before * cycle, duration, x_s, v_s)
+
+
+def _change(speed: float, cycle: float, limits: PathLimits) -> SpeedChange:
+    # A speed that the jerk limit could undo within a position cycle is none to speak of.
+    at_rest = abs(speed) <= limits.jerk * cycle**2
+    return speed_change(0.0 if at_rest else speed, limits.acceleration, limits.jerk)
 
 
 def recording_violations(name: str, axis: Axis, start: float, x_s: Array, v_s: Array, cycle: float) -> list[str]:

@@ -1,0 +1,184 @@
+"""Figures of a circular test, against circles whose deviations are known in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from feedsim.analysis import CircleTask, Figure, Turn, circularity, contour, tasks
+from feedsim.errors import InputError
+from feedsim.nc import plan
+from feedsim.scenario import Circle, CircleTest, Dwell, Move
+from feedsim.trace import Trace
+from scenario_helpers import scenario
+
+RADIUS, OMEGA = 0.015, 0.05 / 0.015
+CENTRE = (0.785, 0.1)
+LAP = 2 * math.pi / OMEGA
+Array = NDArray[np.float64]
+
+
+def turn(sense: int = 1) -> Turn:
+    return Turn(("X", "Z"), CENTRE, RADIUS, sense, LAP, 2 * LAP)
+
+
+def bump(angle: Array, centre: float, height: float) -> Array:
+    """Smooth bump of 12 deg in width, exactly zero elsewhere, highest at ``centre`` [rad]."""
+    off = np.abs((angle - centre + math.pi) % (2 * math.pi) - math.pi) / np.deg2rad(6)
+    return height * np.where(off < 1, np.cos(math.pi / 2 * np.minimum(off, 1)) ** 2, 0.0)
+
+
+def circle(deviation: Array, angle: Array, time: Array, names: tuple[str, str] = ("X.x_a", "Z.x_a")) -> Trace:
+    r = RADIUS + deviation
+    return Trace(time, {names[0]: CENTRE[0] + r * np.cos(angle), names[1]: CENTRE[1] + r * np.sin(angle)})
+
+
+def instants(step: float = 250e-6) -> Array:
+    return np.asarray(np.arange(round(3 * LAP / step) + 1) * step, dtype=np.float64)
+
+
+# heights [um] at X+, Z+, X-, Z-; the peaks lie 4 deg behind the crossings, 30 and 38 deg for the last two
+HEIGHTS = {"X+": (4.0, 4.0), "Z+": (7.0, 94.0), "X-": (5.0, 210.0), "Z-": (8.0, 308.0)}
+
+
+def bumpy(sense: int = 1, level: float = 0.3e-6) -> Trace:
+    t = instants()
+    angle = sense * OMEGA * t
+    e = level + sum(bump(angle, math.radians(at), height * 1e-6) for height, at in HEIGHTS.values())
+    return circle(np.asarray(e), angle, t)
+
+
+def values(figures: dict[str, Figure]) -> dict[str, float]:
+    return {name: figure.value for name, figure in figures.items()}
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_bumps_of_known_height(sense: int) -> None:
+    figures = circularity(bumpy(sense), turn(sense))
+    found = values(figures)
+    # 250 us are 0.05 deg: the top of a bump of 6 deg half width is missed by up to (pi/2 0.025/6)^2 = 4e-5 of it
+    tolerance = 5e-4
+    for name, (height, _) in HEIGHTS.items():
+        assert found[f"glitch_{name}"] == pytest.approx(height, abs=tolerance)
+    # where X reverses, at the half axes X+ and X-, and likewise Z: the larger of the two
+    assert found["glitch_X"] == pytest.approx(5.0, abs=tolerance)
+    assert found["glitch_Z"] == pytest.approx(8.0, abs=tolerance)
+    assert found["G"] == pytest.approx(8.0, abs=tolerance)
+    assert found["F_max"] == pytest.approx(8.3, abs=tolerance)
+    assert found["F_min"] == pytest.approx(0.3, abs=1e-6)
+    assert found["median"] == pytest.approx(0.3, abs=1e-6)
+    # a cos^2 bump of 12 deg holds half its height over 12 of 360 deg
+    assert found["mean"] == pytest.approx(0.3 + (4 + 7 + 5 + 8) * 6 / 360, abs=1e-3)
+    # ISO 230-4 names the sense by the order of the letters
+    assert ("G_XZ" in figures["G"].meaning) == (sense > 0)
+    assert ("G_ZX" in figures["G"].meaning) == (sense < 0)
+    assert {figure.unit for figure in figures.values()} == {"um"}
+
+
+def test_reversing_axis_is_the_one_whose_half_axis_is_crossed() -> None:
+    """A stick at the reversal of X alone: X stays behind by 3 um after each of its extremes, Z is perfect."""
+    t = instants()
+    angle = OMEGA * t
+    x = RADIUS * np.cos(angle)
+    stuck = bump(angle, 0.05, 3e-6) - bump(angle, math.pi + 0.05, 3e-6)
+    trace = Trace(t, {"X.x_a": CENTRE[0] + x + stuck, "Z.x_a": CENTRE[1] + RADIUS * np.sin(angle)})
+    found = values(circularity(trace, turn()))
+    assert found["glitch_X"] == pytest.approx(3.0, rel=5e-3)  # cos(0.05) of it points outwards
+    assert found["glitch_Z"] == pytest.approx(0.0, abs=1e-3)
+    assert {glitch.name: glitch.axis for glitch in contour(trace, turn()).glitches} == {
+        "X+": "X", "Z+": "Z", "X-": "X", "Z-": "Z",
+    }  # fmt: skip
+
+
+def test_glitch_window_ends_at_45_degrees() -> None:
+    """A bump at 50 deg belongs to Z+, one at 40 deg to X+."""
+    t = instants()
+    for at, owner, other in ((50.0, "glitch_Z+", "glitch_X+"), (40.0, "glitch_X+", "glitch_Z+")):
+        trace = circle(bump(OMEGA * t, math.radians(at), 2e-6), OMEGA * t, t)
+        found = values(circularity(trace, turn()))
+        assert found[owner] == pytest.approx(2.0, abs=1e-3)
+        assert found[other] < 0.5
+
+
+def test_shifted_circle_is_round_about_its_own_centre() -> None:
+    """A centre 5 um off: G is 10 um about the programmed centre and 0 about the least-squares one."""
+    t = instants()
+    trace = Trace(
+        t,
+        {
+            "X.x_a": CENTRE[0] + 3e-6 + RADIUS * np.cos(OMEGA * t),
+            "Z.x_a": CENTRE[1] - 4e-6 + RADIUS * np.sin(OMEGA * t),
+        },
+    )
+    found = values(circularity(trace, turn()))
+    assert found["G"] == pytest.approx(10.0, abs=1e-4)
+    assert found["G_ls"] == pytest.approx(0.0, abs=1e-7)
+    # d^2/(4 R) = 0.4 nm of mean radius from the shift; over whole turns only
+    assert found["mean"] == pytest.approx(25e-12 / 4 / RADIUS * 1e6, abs=2e-3)
+
+
+def test_radius_change_is_the_mean_and_no_circularity() -> None:
+    t = instants()
+    found = values(circularity(circle(np.full(len(t), -1.5e-6), OMEGA * t, t), turn()))
+    assert found["mean"] == pytest.approx(-1.5, abs=1e-7)
+    assert found["median"] == pytest.approx(-1.5, abs=1e-7)
+    assert found["G"] == pytest.approx(0, abs=1e-7)
+
+
+def test_only_the_turn_counts() -> None:
+    """A run-in error of 100 um in the first and the last turn changes nothing."""
+    clean = bumpy()
+    outside = (clean.time < LAP - 1e-9) | (clean.time > 2 * LAP + 1e-9)
+    spoilt = Trace(clean.time, {name: x + 1e-4 * outside for name, x in clean.columns.items()})
+    assert values(circularity(spoilt, turn())) == values(circularity(clean, turn()))
+
+
+def test_tool_point_is_reported_beside_the_scales() -> None:
+    t = instants()
+    both = dict(bumpy().columns) | dict(circle(np.full(len(t), 2e-6), OMEGA * t, t, ("tcp.x_X", "tcp.x_Z")).columns)
+    found = values(circularity(Trace(t, both), turn()))
+    assert found["tool.mean"] == pytest.approx(2.0, abs=1e-6)
+    assert found["tool.G"] == pytest.approx(0.0, abs=1e-6)
+    assert found["G"] == pytest.approx(8.0, abs=1e-3)
+
+
+def test_too_little_of_a_trace_is_refused() -> None:
+    with pytest.raises(InputError, match=r"circularity in the plane XZ needs Z\.x_a, which is not recorded"):
+        circularity(bumpy().select(["X.x_a"]), turn())
+    with pytest.raises(InputError, match=r"needs the trace from 1\.88496 to 3\.76991 s"):
+        circularity(bumpy().between(0.0, 1.5 * LAP), turn())
+    with pytest.raises(InputError, match=r"covers 180 deg, no full turn"):
+        circularity(bumpy(), Turn(("X", "Z"), CENTRE, RADIUS, 1, LAP, 1.5 * LAP))
+
+
+@pytest.mark.parametrize(
+    ("turns", "chosen", "number"), [(1, None, 1), (2, None, 2), (3, None, 2), (5, None, 3), (3, 3, 3)]
+)
+def test_task_is_the_chosen_or_the_middle_turn_of_the_last_circle(turns: int, chosen: int | None, number: int) -> None:
+    circle = Circle(plane=("Z", "Y"), radius=0.01, feed=0.1, turns=turns, direction="clockwise")
+    other = Circle(plane=("X", "Z"), radius=0.01, feed=0.1)
+    described = scenario(
+        other, Move(by={"Z": 0.1}, feed=0.1), circle, Dwell(duration=0.3), evaluate=(CircleTest(turn=chosen),)
+    )
+    program = plan(described)
+    (task,) = tasks(described, program)
+    assert isinstance(task, CircleTask)
+    geometry = program.segments[2].geometry
+    assert (task.turn.begin, task.turn.end) == geometry.turns[number - 1]  # type: ignore[union-attr]
+    assert (task.prefix, task.turn.axes, task.turn.sense) == ("ZY", ("Z", "Y"), -1)
+
+
+def test_setpoints_of_a_planned_circle_are_round() -> None:
+    """From the planner to the figures: x_s taken as measured positions leaves nothing but the spline's 8e-14 m."""
+    described = scenario(
+        Circle(plane=("X", "Z"), radius=RADIUS, feed=0.05, turns=3), Dwell(duration=0.3), evaluate=(CircleTest(),)
+    )
+    program = plan(described)
+    perfect = Trace(program.time, {f"{axis}.x_a": x for axis, x in program.x_s.items()})
+    (task,) = tasks(described, program)
+    found = values(task.figures(perfect))
+    assert found["G"] == pytest.approx(0, abs=1e-6)
+    assert found["mean"] == pytest.approx(0, abs=1e-6)

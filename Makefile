@@ -28,7 +28,7 @@ export CC
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-sanitize test-valgrind fmus lint format reference check-reference bench lock clean
+.PHONY: help run test test-c test-python test-sanitize test-sanitize-scenario test-valgrind fmus lint format reference check-reference bench lock clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-16s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -81,7 +81,21 @@ run: fmus $(VENV)/.run ## build, run both scenarios, leave results, figures and 
 
 -include tests/unit_c/tests.mk
 
-test: test-c test-sanitize test-valgrind test-python ## everything: C tests, sanitisers, leak check, Python tests
+test: test-c test-sanitize test-sanitize-scenario test-valgrind test-python ## everything: C tests, sanitisers, leak check, Python tests
+
+# One scenario on units built with AddressSanitizer and UndefinedBehaviorSanitizer. Python itself is not built with them, so their
+# runtime is loaded ahead of it, and leaks (Python's own included) are left to test-valgrind.
+ASAN_RUNTIME = $(shell $(CC) -print-file-name=libasan.so 2>/dev/null | grep /)
+SANITIZED := $(abspath $(BUILD))/sanitized-fmus
+
+$(SANITIZED)/%.fmu: fmus/%.fmu
+	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) src/fmi2/packager build $* --out $@ --build-dir $(SANITIZED)
+
+test-sanitize-scenario: $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu)) ## a scenario on units with sanitisers
+	@if [ -z "$(ASAN_RUNTIME)" ]; then echo "the compiler has no AddressSanitizer runtime: scenario under sanitisers left out"; else \
+	    LD_PRELOAD=$(ASAN_RUNTIME) ASAN_OPTIONS=detect_leaks=0 FEEDSIM_FMUS=$(SANITIZED) \
+	    $(PY) -c 'import feedsim, sys; result = feedsim.run(feedsim.load_scenario(sys.argv[1])); print(sys.argv[1], "under sanitisers: clean,", len(result.trace), "rows")' \
+	    scenarios/z_positioning.yaml; fi
 
 test-python: fmus $(VENV)/.dev
 	$(PY) -m pytest

@@ -5,9 +5,8 @@ from __future__ import annotations
 import contextlib
 import json
 import re
-import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from feedsim.analysis import Figure, PositioningTask, tasks
@@ -30,7 +29,7 @@ def check_writable(directory: Path | str) -> None:
     Leaves nothing behind. Meant to be called before a simulation, whose result would else be lost.
     """
     directory = Path(directory)
-    existing = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.exists())
+    existing = _existing(directory)
     if not existing.is_dir():
         raise OutputError(f"{directory}: cannot be written, {existing} is a file; allowed: a directory")
     for name in (RESULT, SUMMARY, REPORT, FIGURES):
@@ -50,24 +49,22 @@ def write(run: Run, figures: Mapping[str, Figure], directory: Path | str) -> tup
     """
     directory = Path(directory)
     check_writable(directory)
-    pictures = draw(run, figures)
-    names = [*(f"{FIGURES}/{picture.stem}.png" for picture in pictures), RESULT, REPORT, SUMMARY]
-    warnings: Sequence[str] = getattr(run, "warnings", ())
-    texts: dict[str, Callable[[], str]] = {
-        REPORT: lambda: page(run, figures, pictures, warnings),
-        SUMMARY: lambda: to_json(summary(run, figures, names)),
-    }
-    with _as_output_error(directory):
-        directory.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".feedsim-", dir=directory) as scratch:
-            fresh = Path(scratch) / "fresh"
-            (fresh / FIGURES).mkdir(parents=True)
-            for picture in pictures:
-                (fresh / FIGURES / f"{picture.stem}.png").write_bytes(picture.png)
-            write_csv(fresh / RESULT, run.trace)
-            for name, text in texts.items():
-                (fresh / name).write_text(text(), encoding="utf-8", newline="\n")
-            _move(fresh, directory, names, _stale(directory, names), Path(scratch) / "kept")
+    with (
+        _as_output_error(directory),
+        tempfile.TemporaryDirectory(prefix=".feedsim-", dir=_existing(directory)) as scratch,
+    ):
+        fresh = Path(scratch) / "fresh"
+        (fresh / FIGURES).mkdir(parents=True)
+        write_csv(fresh / RESULT, run.trace)
+        pictures = draw(run, figures)
+        for picture in pictures:
+            (fresh / FIGURES / f"{picture.stem}.png").write_bytes(picture.png)
+        names = [*(f"{FIGURES}/{picture.stem}.png" for picture in pictures), RESULT, REPORT, SUMMARY]
+        warnings: Sequence[str] = getattr(run, "warnings", ())
+        texts = {REPORT: page(run, figures, pictures, warnings), SUMMARY: to_json(summary(run, figures, names))}
+        for name, text in texts.items():
+            (fresh / name).write_text(text, encoding="utf-8", newline="\n")
+        _move(fresh, directory, names, _stale(directory, names), Path(scratch) / "kept")
     return tuple(directory / name for name in names)
 
 
@@ -81,6 +78,8 @@ def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
         own = {
             name.removeprefix(f"{task.prefix}."): f for name, f in figures.items() if name.startswith(f"{task.prefix}.")
         }
+        if not own:
+            continue
         if isinstance(task, PositioningTask):
             axis = task.approach.axis
             pictures.append(
@@ -99,6 +98,11 @@ def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
     return [*pictures, overview] if overview is not None else pictures
 
 
+def _existing(directory: Path) -> Path:
+    """``directory``, or the nearest folder above it that is there already."""
+    return next(path for path in (directory.absolute(), *directory.absolute().parents) if path.exists())
+
+
 def _stale(directory: Path, names: Sequence[str]) -> list[str]:
     """Figures that the summary of an earlier run in ``directory`` lists and this run does not write."""
     try:
@@ -114,7 +118,8 @@ def _stale(directory: Path, names: Sequence[str]) -> list[str]:
 
 def _move(fresh: Path, directory: Path, names: Sequence[str], stale: Sequence[str], kept: Path) -> None:
     """Move ``names`` from ``fresh`` into ``directory`` and ``stale`` files away; on failure everything is put back."""
-    (directory / FIGURES).mkdir(exist_ok=True)
+    folders = [path for path in (directory / FIGURES, directory, *directory.absolute().parents) if not path.exists()]
+    (directory / FIGURES).mkdir(parents=True, exist_ok=True)
     (kept / FIGURES).mkdir(parents=True)
     done: list[str] = []
     try:
@@ -124,17 +129,19 @@ def _move(fresh: Path, directory: Path, names: Sequence[str], stale: Sequence[st
                 (directory / name).replace(kept / name)
             if name in names:
                 (fresh / name).replace(directory / name)
-    except OSError:
+        with contextlib.suppress(OSError):  # not empty, as a rule
+            (directory / FIGURES).rmdir()
+    except BaseException:
         for name in done:
             with contextlib.suppress(OSError):
                 if (kept / name).exists():
                     (kept / name).replace(directory / name)
                 elif name in names:
                     (directory / name).unlink(missing_ok=True)
+        for path in folders:
+            with contextlib.suppress(OSError):
+                path.rmdir()
         raise
-    finally:
-        if not any((directory / FIGURES).iterdir()):
-            shutil.rmtree(directory / FIGURES, ignore_errors=True)
 
 
 @contextlib.contextmanager

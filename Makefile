@@ -111,7 +111,7 @@ bench: fmus $(VENV)/.run ## measure the units and the master loop
 
 # --- keep ----------------------------------------------------------------------------------------------------------
 
-C_FILES = $(shell git ls-files 'src/*.c' 'src/*.h' 'tests/*.c' 'tests/*.h' ':!src/fmi2/standard')
+C_FILES = $(shell git ls-files 'src/*.c' 'src/*.h' 'tests/*.c' 'tests/*.h' 'benchmarks/*.c' ':!src/fmi2/standard')
 
 lint: $(VENV)/.dev ## style, types, formatting
 	$(PY) -m ruff check

@@ -4,8 +4,8 @@
  *     -> current PI -> one T_c of computing delay -> motor -> M_a(t_k+1)
  *
  * M_a is linear over the cycle from M_a(t_k) to M_a(t_k+1). With an ideal current loop the filtered torque setpoint of
- * t_k acts at once and is held over the cycle. Memory is the caller's and pointer-free: a DriveState, and behind it p->samples doubles for
- * the delay lines. No FMI, no time: the caller counts the instants. */
+ * t_k acts at once and is held over the cycle. Memory is the caller's and pointer-free: a DriveState, and behind it
+ * p->samples doubles for the delay lines. No FMI, no time: the caller counts the instants. */
 #ifndef FEEDSIM_DRIVE_H
 #define FEEDSIM_DRIVE_H
 

@@ -57,7 +57,7 @@ static void ideal_current_loop_acts_at_once(void) {
         const DriveInputs in = {.n_add = k, .n_a = 0.5 * k, .M_add = 1.0};
         drive_instant(&p, &x, lines, &in);
         CHECK_NEAR(x.right.M_a, 6.18 * 0.5 * k + 1.0, 1e-13); /* P controller on this very instant's speeds */
-        CHECK(x.left.M_a == x.right.M_a); /* held over the cycle */
+        CHECK(x.left.M_a == x.right.M_a);                     /* held over the cycle */
         CHECK(x.right.i.i_q == x.right.M_a / 2.0 && x.right.i.i_d == 0.0 && x.u_q == 0.0);
     }
 }

@@ -253,7 +253,8 @@ def test_rings_are_10_um_where_that_is_readable() -> None:
     assert ring_step(1.5) == 1
     assert ring_step(0.3) == 0.2
     assert ring_step(66.0) == 50
-    assert ring_step(1e9) == 1000
+    assert ring_step(3e4) == 20_000
+    assert ring_step(0.0) == 0.1
 
 
 def test_long_curves_are_thinned_but_keep_their_extremes() -> None:

@@ -35,11 +35,13 @@ class Turn:
 
 @dataclass(frozen=True)
 class Glitch:
-    """Quadrant glitch: name of the crossed half axis ("X+"), the axis that reverses there, and the contour's largest
-    radius deviation within +-45 deg of it: angle [rad], deviation [m], and height [m] above the turn's median."""
+    """Quadrant glitch: name of the crossed half axis ("X+"), the axis that reverses there, the angle of the crossing
+    [rad], and the contour's largest radius deviation within +-45 deg of it: angle [rad], deviation [m], and height [m]
+    above the turn's median."""
 
     name: str
     axis: str
+    crossing: float
     angle: float
     deviation: float
     height: float
@@ -107,6 +109,7 @@ def _glitch(turn: Turn, quarter: int, angle: Array, deviation: Array, median: fl
     return Glitch(
         name=f"{axis}{'+' if quarter < 2 else '-'}",
         axis=axis,
+        crossing=quarter * QUARTER,
         angle=float(angle[peak]),
         deviation=float(deviation[peak]),
         height=float(deviation[peak]) - median,

@@ -13,10 +13,12 @@ from feedsim.errors import InputError
 def run(options: Namespace) -> None:
     from tqdm import tqdm
 
-    from feedsim import analysis, cosim, report, scenario
+    from feedsim import analysis, cosim, nc, report, scenario
 
     plan = scenario.load(options.scenario, options.overrides)
     directory: Path = options.out or Path("results") / options.scenario.stem
+    program = nc.plan(plan)
+    analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
     report.check_writable(directory)
     with tqdm(
         desc=plan.name, unit=" cycles", unit_scale=True, leave=False, disable=options.quiet or not sys.stderr.isatty()
@@ -26,7 +28,7 @@ def run(options: Namespace) -> None:
             bar.total = total
             bar.update(done - bar.n)
 
-        result = cosim.run(plan, fmus=options.fmus, progress=progress)
+        result = cosim.run(plan, program=program, fmus=options.fmus, progress=progress)
     figures = analysis.evaluate(result)
     report.write(result, figures, directory)
     for warning in result.warnings:
@@ -36,10 +38,11 @@ def run(options: Namespace) -> None:
 
 
 def validate(options: Namespace) -> None:
-    from feedsim import nc, scenario
+    from feedsim import analysis, nc, scenario
 
     checked = scenario.load(options.scenario, options.overrides)
     program = nc.plan(checked)
+    analysis.check(checked, program)
     motions = f"{len(checked.motions)} motion{'s'[: len(checked.motions) != 1]}"
     print(f"{options.scenario}: valid; {motions}, {program.time[-1]:.4g} s on {checked.machine.name}")
 

@@ -57,10 +57,17 @@ def fmus_directory() -> Path:
     return Path(named) if named else Path(__file__).resolve().parents[3] / "fmus"
 
 
-def run(scenario: Scenario, *, fmus: Path | None = None, progress: Progress | None = None) -> Run:
+def run(
+    scenario: Scenario,
+    *,
+    program: Program | None = None,
+    fmus: Path | None = None,
+    progress: Progress | None = None,
+) -> Run:
     """Run `scenario` and return its trace.
 
     Args:
+        program: the scenario's planned motions, where they are at hand already.
         fmus: folder with plant.fmu, controller.fmu, friction.fmu; default :func:`fmus_directory`.
         progress: called now and then with (cycles done, cycles in all).
 
@@ -68,7 +75,7 @@ def run(scenario: Scenario, *, fmus: Path | None = None, progress: Progress | No
         InputError: the motion violates a limit, the archives do not fit the machine.
         SimulationError: a unit failed; the message names the unit, the time and the unit's reason.
     """
-    program = plan(scenario)
+    program = program or plan(scenario)
     cycles = scenario.machine.cycles
     ratio = round(cycles.T_pos / cycles.T_c)
     every = round(scenario.recording.interval / cycles.T_c)

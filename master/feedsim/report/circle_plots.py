@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -29,11 +29,9 @@ from feedsim.trace import Trace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Widths of the scale rings [um] that a person reads easily.
-RING_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
 NOMINAL = 1.0  # radius of the nominal circle in the drawing
-RING_GAP = 0.36  # distance of the first ring from the nominal circle in the drawing
+RING_GAPS = {1: 0.36, 2: 0.24}  # rings to either side -> their distance in the drawing
 
 
 def contour_picture(trace: Trace, turn: Turn, figures: Figures, stem: str) -> Picture:
@@ -44,15 +42,18 @@ def contour_picture(trace: Trace, turn: Turn, figures: Figures, stem: str) -> Pi
     by_scale = contour(trace, turn)
     tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
     by_tool = contour(trace, turn, tool) if all(name in trace.columns for name in tool) else None
-    ring = ring_step(float(np.abs(by_scale.deviation).max()) * 1e6)
+    largest = float(np.abs(by_scale.deviation).max()) * 1e6
+    ring = ring_step(largest)
+    rings = 1 if largest < 1.1 * ring else 2
+    gap = RING_GAPS[rings]
     with drawing(10.0, 6.9) as figure:
         rooms = figure.subplot_mosaic(
             [["polar", "angle"], ["polar", "table"]], width_ratios=[1.85, 1], height_ratios=[1, 0.8]
         )
-        _polar(rooms["polar"], turn, by_scale, by_tool, ring)
+        _polar(rooms["polar"], turn, by_scale, by_tool, ring, rings)
         _unrolled(rooms["angle"], turn, by_scale, by_tool)
         _table(rooms["table"], turn, figures)
-        magnification = _per_um(ring) / (NOMINAL / turn.radius) * 1e6
+        magnification = gap / ring * 1e6 / (NOMINAL / turn.radius)
         return finish(
             figure,
             stem,
@@ -93,15 +94,13 @@ def ring_step(largest: float) -> float:
     """Distance of the scale rings [um] for an error of up to ``largest`` [um]: 10 um as long as that is readable."""
     if RING / 5 <= largest <= 2 * RING:
         return RING
-    return next((step for step in RING_STEPS if largest <= 1.5 * step), RING_STEPS[-1])
+    decade = 10.0 ** math.floor(math.log10(max(largest, 0.1)))
+    return next(step for step in (decade, 2 * decade, 5 * decade, 10 * decade) if max(largest, 0.1) <= 1.5 * step)
 
 
-def _per_um(ring: float) -> float:
-    return RING_GAP / ring
-
-
-def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, ring: float) -> None:
-    per_um = _per_um(ring)
+def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, ring: float, rings: int) -> None:
+    gap = RING_GAPS[rings]
+    per_um = gap / ring
     around = np.linspace(0, 2 * math.pi, 361)
 
     def circle(radius: float, **style: Any) -> None:
@@ -110,17 +109,16 @@ def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, r
     def trail(measured: Contour, **style: Any) -> None:
         r = NOMINAL + measured.deviation * 1e6 * per_um
         rows = thinned(np.arange(len(r), dtype=float), r)[0].astype(int)
-        closed = np.append(rows, rows[0])
+        closes = abs(r[-1] - r[0]) < 0.02 * gap  # a turn with the machine's start or stop in it does not
+        closed = np.append(rows, rows[0]) if closes else rows
         axes.plot(r[closed] * np.cos(measured.angle[closed]), r[closed] * np.sin(measured.angle[closed]), **style)
 
     axes.set_aspect("equal")
     axes.set_axis_off()
-    for value in (-2, -1, 1, 2):
-        if abs(value) == 2 and np.abs(by_scale.deviation).max() * 1e6 < 1.1 * ring:
-            continue
-        circle(NOMINAL + value * RING_GAP, color=GRID, linewidth=0.9)
-        _ring_label(axes, NOMINAL + value * RING_GAP, f"{value * ring:+g} µm".replace("-", "−"), MUTED)
-    outer = NOMINAL + 1.16 * RING_GAP * (2 if np.abs(by_scale.deviation).max() * 1e6 >= 1.1 * ring else 1)
+    for value in (*range(-rings, 0), *range(1, rings + 1)):
+        circle(NOMINAL + value * gap, color=GRID, linewidth=0.9)
+        _ring_label(axes, NOMINAL + value * gap, f"{value * ring:+g} µm".replace("-", "−"), MUTED)
+    outer = NOMINAL + 1.16 * gap * rings
     for angle in (0.0, math.pi / 2):
         ends = np.array([-outer, outer])
         axes.plot(ends * math.cos(angle), ends * math.sin(angle), color=GRID, linewidth=0.9)
@@ -136,7 +134,7 @@ def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, r
             x * (outer + 0.055), y * (outer + 0.055), text, ha="center", va="center", fontweight="bold", fontsize=11
         )
     for glitch in by_scale.glitches:
-        _mark(axes, glitch, per_um)
+        _mark(axes, glitch, gap, per_um)
     _sense(axes, turn)
     axes.set_xlim(-1.12 * outer, 1.12 * outer)
     axes.set_ylim(-1.12 * outer, 1.12 * outer)
@@ -152,16 +150,17 @@ def _ring_label(axes: Axes, radius: float, text: str, colour: str) -> None:
     )  # fmt: skip
 
 
-def _mark(axes: Axes, glitch: Glitch, per_um: float) -> None:
+def _mark(axes: Axes, glitch: Glitch, gap: float, per_um: float) -> None:
     r = NOMINAL + glitch.deviation * 1e6 * per_um
     x, y = r * math.cos(glitch.angle), r * math.sin(glitch.angle)
-    inside = NOMINAL - 1.16 * RING_GAP
+    across, up = round(math.cos(glitch.crossing)), round(math.sin(glitch.crossing))
+    inside = NOMINAL - 1.16 * gap
     axes.annotate(
         f"{glitch.name.replace('-', '−')}: {glitch.height * 1e6:.2f} µm",
         (x, y),
-        xytext=(inside * math.cos(glitch.angle), inside * math.sin(glitch.angle)),
-        ha="center" if abs(math.cos(glitch.angle)) < 0.7 else "right" if math.cos(glitch.angle) > 0 else "left",
-        va="center" if abs(math.cos(glitch.angle)) > 0.7 else "top" if math.sin(glitch.angle) > 0 else "bottom",
+        xytext=(inside * across, inside * up),
+        ha={1: "right", 0: "center", -1: "left"}[across],
+        va={1: "top", 0: "center", -1: "bottom"}[up],
         color=INK,
         bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 1.0},
         arrowprops={"arrowstyle": "-", "color": VERMILLION, "linewidth": 0.9, "shrinkA": 2, "shrinkB": 2},
@@ -241,10 +240,10 @@ def _torque_row(row: Sequence[Axes], part: Trace, axis: str, sign: int) -> None:
         friction_room.set_xlim(*(0.12 * np.array([-1, 1]) * float(np.abs(speed).max() or 1.0)))
     else:
         friction_room.set_visible(False)
-    note = ", sign reversed" if sign < 0 else ""
-    time_room.set(title=f"Axis {axis}: torque over time{note}", xlabel="time [s]", ylabel="torque [N·m]")
-    speed_room.set(title="Torque over speed", xlabel="motor speed $n_a$ [rad/s]", ylabel="torque [N·m]")
-    friction_room.set(title="Friction around the reversal", xlabel="motor speed $n_a$ [rad/s]", ylabel="torque [N·m]")
+    ordinate = "torque [N·m]" if sign > 0 else "torque, sign reversed [N·m]"
+    time_room.set(title=f"Axis {axis}: torque over time", xlabel="time [s]", ylabel=ordinate)
+    speed_room.set(title="Torque over speed", xlabel="motor speed $n_a$ [rad/s]", ylabel=ordinate)
+    friction_room.set(title="Friction around the reversal", xlabel="motor speed $n_a$ [rad/s]", ylabel=ordinate)
     for room in (time_room, speed_room, friction_room):
         room.axhline(0.0, color=MUTED, linewidth=0.8)
     for room in (speed_room, friction_room):
@@ -253,7 +252,8 @@ def _torque_row(row: Sequence[Axes], part: Trace, axis: str, sign: int) -> None:
     time_room.set_ylim(*_symmetric(torque, friction))
     speed_room.set_ylim(*_symmetric(torque, friction))
     handles, labels = time_room.get_legend_handles_labels()
-    speed_room.legend(handles, labels, loc="lower right", fontsize=8.5, handlelength=1.4, borderaxespad=0.2)
+    corner: Literal["lower right", "lower left"] = "lower right" if sign > 0 else "lower left"
+    speed_room.legend(handles, labels, loc=corner, fontsize=8.5, handlelength=1.4, borderaxespad=0.2)
 
 
 def _symmetric(*curves: Array | None) -> tuple[float, float]:
@@ -262,5 +262,9 @@ def _symmetric(*curves: Array | None) -> tuple[float, float]:
 
 
 def _loop(axes: Axes, speed: Array, torque: Array, **style: Any) -> None:
-    rows = np.append(np.arange(0, len(speed), max(1, len(speed) // MOST_POINTS)), 0)  # a full turn ends where it began
+    rows = np.arange(0, len(speed), max(1, len(speed) // MOST_POINTS))
+    closes = abs(torque[-1] - torque[0]) < 0.02 * float(np.ptp(torque)) and abs(speed[-1] - speed[0]) < 0.02 * float(
+        np.ptp(speed)
+    )
+    rows = np.append(rows, 0) if closes else rows
     axes.plot(speed[rows], torque[rows], **style)

@@ -168,7 +168,7 @@ def _provenance(run: Run) -> str:
             (f"Unit {name}", f"version {unit.get('version', '?')}, GUID {unit.get('guid', '?')}")
             for name, unit in run.units.items()
         ),
-        *((f"Interface energy {name}", f"{value:.4g} J") for name, value in run.coupling.items()),
+        *((f"Coupling energy {name}", f"{value:.4g} J") for name, value in run.coupling.items()),
         *((name, text) for name, text in software().items()),
     ]
     body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)

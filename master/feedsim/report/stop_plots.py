@@ -111,7 +111,7 @@ def _zoom(axes: Axes, trace: Trace, approach: Approach, figures: Figures, band: 
             zorder=5,
         )
         axes.plot([settled], [side * band * 1e6], "o", color=VERMILLION, markersize=5, zorder=5)
-    ordinate = "beyond the target [µm]" if approach.sense > 0 else "beyond the target, towards minus [µm]"
+    ordinate = "beyond the target [µm]" if approach.sense > 0 else "beyond the target, to minus [µm]"
     axes.set(title="Distance beyond the target", xlabel="time after the end of the NC motion [ms]", ylabel=ordinate)
     axes.legend(loc="upper right")
 

@@ -20,7 +20,7 @@ ifeq ($(origin CC),default)
 CC := $(firstword $(foreach name,cc gcc clang,$(if $(shell command -v $(name) 2>/dev/null),$(name))))
 endif
 ifeq ($(strip $(CC)),)
-CC := $(abspath $(PY)) -m ziglang cc
+CC := "$(CURDIR)/$(PY)" -m ziglang cc
 COMPILER := $(VENV)/.compiler
 endif
 export CC
@@ -86,7 +86,7 @@ test: test-c test-sanitize test-sanitize-scenario test-valgrind test-python ## e
 # One scenario on units built with AddressSanitizer and UndefinedBehaviorSanitizer. Python itself is not built with them, so their
 # runtime is loaded ahead of it, and leaks (Python's own included) are left to test-valgrind.
 ASAN_RUNTIME = $(shell $(CC) -print-file-name=libasan.so 2>/dev/null | grep /)
-SANITIZED := $(abspath $(BUILD))/sanitized-fmus
+SANITIZED := $(BUILD)/sanitized-fmus
 
 $(SANITIZED)/%.fmu: fmus/%.fmu
 	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) src/fmi2/packager build $* --out $@ --build-dir $(SANITIZED)
@@ -111,19 +111,22 @@ bench: fmus $(VENV)/.run ## measure the units and the master loop
 
 # --- keep ----------------------------------------------------------------------------------------------------------
 
-C_FILES = $(shell git ls-files 'src/*.c' 'src/*.h' 'tests/*.c' 'tests/*.h' 'benchmarks/*.c' ':!src/fmi2/standard')
+C_FILES := $(foreach folder,src/fmi2 src/plant_fmu src/controller_fmu src/friction_fmu tests/unit_c tests/unit_c/toy_unit \
+    tests/reference/monolithic benchmarks,$(wildcard $(folder)/*.[ch]))
 
 lint: $(VENV)/.dev ## style, types, formatting
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
 	$(PY) -m mypy
 	$(PY) -m mypy --strict src/fmi2/packager
-	$(VENV)/bin/clang-format --dry-run --Werror $(C_FILES)
+	@echo clang-format --dry-run
+	@$(VENV)/bin/clang-format --dry-run --Werror $(C_FILES)
 
 format: $(VENV)/.dev ## bring all sources into the one format
 	$(PY) -m ruff check --fix --exit-zero
 	$(PY) -m ruff format
-	$(VENV)/bin/clang-format -i $(C_FILES)
+	@echo clang-format -i
+	@$(VENV)/bin/clang-format -i $(C_FILES)
 
 lock: ## resolve the dependencies of pyproject.toml anew
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group build -o requirements.lock

@@ -11,9 +11,9 @@
  * Instant k lies at t_k = start + k T_c; k is counted, so that nothing drifts. A step [t, t + H) works the instants in
  * that interval and reads the inputs at each, value + slope (t_k - t). H may be anything. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "drive.h"
+#include "numbers.h"
 #include "unit.h"
 
 /* An importer's sum of steps runs off the grid: adding 125 us ten million times ends 1.6e-3 cycles late. An instant
@@ -36,8 +36,9 @@ static bool derive_cycles(Unit *unit, const Scalars *v, Drive *p) {
     double ticks = round(ratio);
     /* Times of four significant digits that do not fit are off by far more, quotients of doubles by far less. */
     if (ticks < 1.0 || fabs(ratio - ticks) > 1e-9 * ticks) {
-        return unit_fail(unit, "T_pos = %.12g s is not a whole multiple of T_c = %.12g s (ratio %.12g)", v->T_pos,
-                         v->T_c, ratio);
+        char text[3][NUMBER_TEXT_SIZE];
+        return unit_fail(unit, "T_pos = %s s is not a whole multiple of T_c = %s s (ratio %s)",
+                         number_text(text[0], v->T_pos), number_text(text[1], v->T_c), number_text(text[2], ratio));
     }
     p->T_c = v->T_c;
     p->ticks = (int32_t)ticks;
@@ -63,8 +64,9 @@ static bool derive_filters(Unit *unit, const Scalars *v, Drive *p) {
             continue;
         }
         if (filters[i].f >= 0.5 / v->T_c) {
-            good = unit_fail(unit, "%s.f = %.12g Hz is not below half the sampling rate, 1/(2 T_c) = %.12g Hz",
-                             filters[i].name, filters[i].f, 0.5 / v->T_c);
+            char text[2][NUMBER_TEXT_SIZE];
+            good = unit_fail(unit, "%s.f = %s Hz is not below half the sampling rate, 1/(2 T_c) = %s Hz",
+                             filters[i].name, number_text(text[0], filters[i].f), number_text(text[1], 0.5 / v->T_c));
             continue;
         }
         double K = tan(pi * filters[i].f * v->T_c);
@@ -100,9 +102,9 @@ static void derive_blocks(const Scalars *v, Drive *p) {
 static bool derive(Unit *unit) {
     Drive *p = unit_derived(unit);
     if (p == NULL) {
-        p = calloc(1, sizeof *p);
+        p = unit_alloc(unit, 1, sizeof *p);
         if (p == NULL) {
-            return unit_fail(unit, "no memory for the coefficients (%u bytes)", (unsigned)sizeof *p);
+            return false;
         }
         unit_set_derived(unit, p);
     }
@@ -123,7 +125,7 @@ static size_t state_size(const Unit *unit) {
 }
 
 static void release(Unit *unit) {
-    free(unit_derived(unit));
+    unit_free(unit, unit_derived(unit));
     unit_set_derived(unit, NULL);
 }
 

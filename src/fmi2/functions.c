@@ -123,8 +123,9 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
     (void)toleranceDefined; /* the models' methods have no tolerance to choose */
     (void)tolerance;
-    BEGIN(SetupExperiment, "startTime = %g, stopTimeDefined = %d, stopTime = %g", startTime, stopTimeDefined, stopTime);
     char text[2][NUMBER_TEXT_SIZE];
+    BEGIN(SetupExperiment, "startTime = %s, stopTimeDefined = %d, stopTime = %s", number_text(text[0], startTime),
+          stopTimeDefined, number_text(text[1], stopTime));
     if (!isfinite(startTime))
         return STATUS(unit_fail(unit, "the start time is not finite: %s", number_text(text[0], startTime)));
     if (stopTimeDefined && !(stopTime >= startTime))
@@ -147,14 +148,16 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     if (!run_refresh(unit))
         return fmi2Error;
     unit_header(unit)->phase = PHASE_STEPPING;
-    log_write(unit, LOG_EVENTS, "initialised, start time %g s", unit_header(unit)->start_time);
+    char text[NUMBER_TEXT_SIZE];
+    log_write(unit, LOG_EVENTS, "initialised, start time %s s", number_text(text, unit_header(unit)->start_time));
     return fmi2OK;
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
     BEGIN(Terminate, "called");
     unit_header(unit)->phase = PHASE_TERMINATED;
-    log_write(unit, LOG_EVENTS, "terminated at %g s", unit_header(unit)->time);
+    char text[NUMBER_TEXT_SIZE];
+    log_write(unit, LOG_EVENTS, "terminated at %s s", number_text(text, unit_header(unit)->time));
     return fmi2OK;
 }
 

@@ -29,7 +29,7 @@
 #include "unit.h"
 
 #define NO_AXIS ((size_t)-1)
-#define MESSAGE_SIZE 1024
+#define MESSAGE_SIZE (STRING_SIZE + 512) /* a message that names modes_file must not lose the fault behind it */
 
 static const double pi = 3.14159265358979323846;
 

@@ -10,7 +10,7 @@
 BUILD  ?= build
 PY     ?= python3
 UNIT_C  := tests/unit_c
-C_BUILD := $(abspath $(BUILD))/tests
+C_BUILD := $(BUILD)/tests
 TOY    := toy
 
 SOURCES_test_shell_calls     := $(TOY)
@@ -61,7 +61,8 @@ endef
 define C_TOY
 $(C_BUILD)/$(1)/toy.built: $(TOY_SOURCES) $(C_HEADERS)
 	@rm -rf $(C_BUILD)/$(1)/toy && mkdir -p $(C_BUILD)/$(1)/toy
-	cd $(C_BUILD)/$(1)/toy && $$(CC) $$(C_FLAGS) $$(FLAGS_$(1)) $(patsubst -I%,-I$(CURDIR)/%,$(TOY_INCLUDES)) -c $(addprefix $(CURDIR)/,$(TOY_SOURCES))
+	@set -e; for source in $(TOY_SOURCES); do \
+	    $$(CC) $$(C_FLAGS) $$(FLAGS_$(1)) $(TOY_INCLUDES) -c $$$$source -o $(C_BUILD)/$(1)/toy/$$$$(basename $$$$source .c).o; done
 	@touch $$@
 endef
 
@@ -99,8 +100,9 @@ $(C_BUILD)/sanitized/%.so: $(C_BUILD)/packed/%.unpacked
 # The same with prefixed functions, three units in one program.
 $(C_BUILD)/sanitized/%.objects: $(C_BUILD)/packed/%.unpacked
 	@rm -rf $(@:.objects=) && mkdir -p $(@:.objects=)
-	cd $(@:.objects=) && $(CC) -std=c99 -ffp-contract=off $(FLAGS_sanitized) -DFMI2_FUNCTION_PREFIX=$*_ \
-	    -I$(<:.unpacked=)/sources -c $(<:.unpacked=)/sources/*.c
+	@set -e; for source in $(<:.unpacked=)/sources/*.c; do \
+	    $(CC) -std=c99 -ffp-contract=off $(FLAGS_sanitized) -DFMI2_FUNCTION_PREFIX=$*_ \
+	        -I$(<:.unpacked=)/sources -c $$source -o $(@:.objects=)/$$(basename $$source .c).o; done
 	@touch $@
 
 $(C_BUILD)/sanitized/one_program: $(UNIT_C)/one_program.c $(foreach unit,friction controller plant,$(C_BUILD)/sanitized/$(unit).objects)

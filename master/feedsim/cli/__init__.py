@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 EPILOG = """exit codes:
@@ -31,16 +31,13 @@ def parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    top.add_argument("--version", action="version", version=f"feedsim {version('feedsim')}")
+    top.add_argument("--version", action="version", version=f"feedsim {_version()}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
 
     run = commands.add_parser("run", help="run a scenario; write result.csv, summary.json, report.html and figures")
     _add_scenario(run)
     run.add_argument(
         "--out", type=Path, metavar="DIR", help="where the results go (default: results/<name of the scenario file>)"
-    )
-    run.add_argument(
-        "--fmus", type=Path, metavar="DIR", help="folder of the archives (default: $FEEDSIM_FMUS or fmus/)"
     )
     run.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
 
@@ -69,7 +66,17 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def _version() -> str:
+    try:
+        return version("feedsim")
+    except PackageNotFoundError:
+        return "(run from its sources, not installed)"
+
+
 def _add_scenario(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--fmus", type=Path, metavar="DIR", help="folder of the archives (default: $FEEDSIM_FMUS, else fmus/)"
+    )
     command.add_argument("scenario", type=Path, metavar="SCENARIO.yaml")
     command.add_argument(
         "--set",
@@ -86,14 +93,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
 
     from feedsim.cli import commands
-    from feedsim.errors import FeedsimError, InputError, OutputError, SimulationError
+    from feedsim.errors import FeedsimError
 
-    codes: dict[type[FeedsimError], int] = {InputError: 2, SimulationError: 3, OutputError: 4}
     try:
         getattr(commands, options.command)(options)
     except FeedsimError as error:
         print(f"feedsim: {error}", file=sys.stderr)
-        return next((code for kind, code in codes.items() if isinstance(error, kind)), 1)
+        return error.exit_code
     except KeyboardInterrupt:
         print("feedsim: interrupted; nothing was written", file=sys.stderr)
         return 130

@@ -38,11 +38,12 @@ def run(options: Namespace) -> None:
 
 
 def validate(options: Namespace) -> None:
-    from feedsim import analysis, nc, scenario
+    from feedsim import analysis, cosim, nc, scenario
 
     checked = scenario.load(options.scenario, options.overrides)
     program = nc.plan(checked)
     analysis.check(checked, program)
+    cosim.check(checked, program, fmus=options.fmus)
     motions = f"{len(checked.motions)} motion{'s'[: len(checked.motions) != 1]}"
     print(f"{options.scenario}: valid; {motions}, {program.time[-1]:.4g} s on {checked.machine.name}")
 

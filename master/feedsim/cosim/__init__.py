@@ -1,6 +1,6 @@
 """Co-simulation of the units: instances, wiring, schedule, run (sole user of fmpy, in `unit`)."""
 
-from feedsim.cosim.run import Progress, Run, fmus_directory, run
+from feedsim.cosim.run import Progress, Run, check, fmus_directory, run
 from feedsim.cosim.schedule import SCHEMES, Scheme
 
-__all__ = ["SCHEMES", "Progress", "Run", "Scheme", "fmus_directory", "run"]
+__all__ = ["SCHEMES", "Progress", "Run", "Scheme", "check", "fmus_directory", "run"]

@@ -6,7 +6,6 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from feedsim.cosim.unit import Floats, Log
 from feedsim.errors import InputError
 from feedsim.nc import Program, plan
 from feedsim.scenario import Scenario
-from feedsim.trace import Trace
+from feedsim.trace import Trace, matching
 
 Progress = Callable[[int, int], None]
 
@@ -27,6 +26,7 @@ CONTROLLER_SIGNALS = (
 )  # fmt: skip
 FRICTION_SIGNALS = ("M_fr", "z", "c", "k", "lambda")
 PLANT_SIGNALS = ("x_a", "n_a")
+TRUSTED_SHARE, TRUSTED_ENERGY = 0.05, 1e-3  # of the friction work; J: an axis at rest has no work to speak of
 TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
 
 
@@ -76,6 +76,7 @@ def run(
         SimulationError: a unit failed; the message names the unit, the time and the unit's reason.
     """
     program = program or plan(scenario)
+    recorded = recorded_columns(scenario)
     cycles = scenario.machine.cycles
     ratio = round(cycles.T_pos / cycles.T_c)
     every = round(scenario.recording.interval / cycles.T_c)
@@ -83,8 +84,8 @@ def run(
     with System(scenario.machine, fmus or fmus_directory()) as system:
         cycle = Cycle(system, SCHEMES[scenario.coupling.scheme], cycles.T_c, scenario.coupling.substeps)
         logs = _logs(system, total // every + 1)
-        begun = time.perf_counter()
         system.initialise(program, stop=total * cycles.T_c)
+        begun = time.perf_counter()
         for k in range(total):
             if k % ratio == 0:
                 system.set_setpoints(program, k // ratio)
@@ -103,15 +104,46 @@ def run(
         return Run(
             scenario=scenario,
             program=program,
-            trace=_trace(scenario, system, program, logs, every, ratio),
+            trace=_trace(scenario, system, program, logs, every, ratio).select(recorded),
             coupling=_coupling(system, cycle),
             wall_time=wall_time,
             units={
                 name: {"guid": unit.archive.guid, "version": unit.archive.version}
                 for name, unit in system.units.items()
             },
-            warnings=tuple(system.warnings),
+            warnings=(*system.warnings, *_coupling_warnings(scenario, system, cycle)),
         )
+
+
+def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> None:
+    """Let the units judge their parameters, without a step.
+
+    Raises:
+        InputError: what :func:`run` would refuse before its first step.
+    """
+    recorded_columns(scenario)
+    with System(scenario.machine, fmus or fmus_directory()) as system:
+        system.initialise(program, stop=float(program.time[-1]))
+
+
+def recorded_columns(scenario: Scenario) -> list[str]:
+    """Columns of the trace that a run of `scenario` will leave.
+
+    Raises:
+        InputError: an entry of recording.variables matches none.
+    """
+    names = [
+        f"{axis}.{signal}"
+        for axis in scenario.machine.axes
+        for signal in (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *CONTROLLER_SIGNALS, *FRICTION_SIGNALS)
+    ]
+    names += TOOL_SIGNALS
+    if scenario.recording.variables is None:
+        return names
+    try:
+        return matching(names, scenario.recording.variables)
+    except InputError as error:
+        raise InputError(f"{scenario.file}: recording.variables: {error}") from None
 
 
 def _logs(system: System, rows: int) -> dict[str, Log]:
@@ -145,22 +177,8 @@ def _trace(
     for signal in TOOL_SIGNALS:
         columns[signal] = plant.columns()[signal]
         units[signal] = plant.unit.archive.unit_of(signal)
-    wanted = _selected(scenario, list(columns))
-    return Trace(
-        time=np.asarray(cycle * scenario.machine.cycles.T_c, dtype=np.float64),
-        columns={name: columns[name] for name in wanted},
-        units={name: units[name] for name in wanted},
-    )
-
-
-def _selected(scenario: Scenario, names: list[str]) -> list[str]:
-    patterns = scenario.recording.variables
-    if patterns is None:
-        return names
-    for pattern in patterns:
-        if not any(fnmatchcase(name, pattern) for name in names):
-            raise InputError(f"{scenario.file}: recording.variables: '{pattern}' matches none of: {', '.join(names)}")
-    return [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
+    time = np.asarray(cycle * scenario.machine.cycles.T_c, dtype=np.float64)
+    return Trace(time=time, columns=columns, units=units)
 
 
 def _coupling(system: System, cycle: Cycle) -> dict[str, float]:
@@ -170,3 +188,13 @@ def _coupling(system: System, cycle: Cycle) -> dict[str, float]:
         coupling[f"{axis}.residual_peak"] = float(cycle.residual_peak[i])
         coupling[f"{axis}.friction_work"] = float(cycle.dissipated[i])
     return coupling
+
+
+def _coupling_warnings(scenario: Scenario, system: System, cycle: Cycle) -> list[str]:
+    return [
+        f"axis {axis}: the exchange between plant and friction has lost {residual:.3g} J against {work:.3g} J of "
+        f"friction work (scheme {cycle.scheme.name}, exchange step {cycle.step * 1e6:.6g} us): it is unstable or too "
+        f"coarse, and the result is not to be trusted; try coupling.substeps above {scenario.coupling.substeps}"
+        for axis, residual, work in zip(system.axes, cycle.residual_peak, np.abs(cycle.dissipated), strict=True)
+        if residual > max(TRUSTED_SHARE * work, TRUSTED_ENERGY)
+    ]

@@ -124,6 +124,7 @@ class System:
         """Initialise every unit at t = 0 and bring the buffers to the initial outputs. The run ends at `stop` [s]."""
         for unit in self.units.values():
             unit.enter_initialisation(0.0, stop)
+            unit.check_parameters()
         self.plant_measured.get()
         self.plant_contact.get()
         self.n_start[:] = self.n[:] = self.n_end

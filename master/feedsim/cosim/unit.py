@@ -97,7 +97,8 @@ class Unit:
         try:
             self._fmu.instantiate(callbacks=callbacks)
         except Exception as error:
-            raise SimulationError(f"unit {name}: cannot be instantiated: {self._said() or error}") from error
+            self._fmu.freeLibrary()
+            raise InputError(f"unit {name}: cannot be instantiated: {self._said() or error}") from error
         self._component = self._fmu.component
         library = self._fmu.dll
         self._set_real = _EXCHANGE(("fmi2SetReal", library))
@@ -108,7 +109,7 @@ class Unit:
         self._do_step = _STEP(("fmi2DoStep", library))
 
     def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
-        text = message.decode("utf-8", errors="replace").replace("%%", "%")
+        text = message.decode("utf-8", errors="replace").replace("%%", "%").replace("##", "#")
         if status == WARNING:
             self.warnings.append(f"{self.name}: {text}")
         elif status > WARNING:
@@ -135,23 +136,26 @@ class Unit:
         """Set start values by name, before initialisation.
 
         Raises:
-            InputError: the unit has no such variable.
-            SimulationError: the unit refuses the value.
+            InputError: the unit has no such variable, or refuses the value.
         """
         for name, value in parameters.items():
             variable = self.archive.variables.get(name)
             if variable is None:
                 raise InputError(f"{self.archive.path.name}: no variable '{name}'")
             reference = [variable.valueReference]
-            action = f"{name} = {value!r}"
-            if variable.type == "Real":
-                self._checked(action, self._fmu.setReal, reference, [float(value)])
-            elif variable.type == "Integer":
-                self._checked(action, self._fmu.setInteger, reference, [int(value)])
-            elif variable.type == "Boolean":
-                self._checked(action, self._fmu.setBoolean, reference, [bool(value)])
-            else:
-                self._checked(action, self._fmu.setString, reference, [str(value)])
+            try:
+                if variable.type == "Real":
+                    self._fmu.setReal(reference, [float(value)])
+                elif variable.type == "Integer":
+                    self._fmu.setInteger(reference, [int(value)])
+                elif variable.type == "Boolean":
+                    self._fmu.setBoolean(reference, [bool(value)])
+                else:
+                    self._fmu.setString(reference, [str(value)])
+            except Exception:
+                raise InputError(
+                    f"unit {self.name} refuses {name} = {value!r}: {self._said() or 'no message'}"
+                ) from None
 
     def enter_initialisation(self, start: float, stop: float) -> None:
         self._time = start
@@ -160,6 +164,19 @@ class Unit:
 
     def exit_initialisation(self) -> None:
         self._checked("fmi2ExitInitializationMode", self._fmu.exitInitializationMode)
+
+    def check_parameters(self) -> None:
+        """In initialisation mode: let the unit judge its parameters together, by asking for an initial value.
+
+        Raises:
+            InputError: with the unit's own words.
+        """
+        reals = [v for v in self.archive.variables.values() if v.causality == "output" and v.type == "Real"]
+        try:
+            self._fmu.getReal([reals[0].valueReference])
+        except Exception:
+            said = self._said().removeprefix("fmi2GetReal: ") or "no message"
+            raise InputError(f"unit {self.name} refuses its parameters: {said}") from None
 
     def step(self, t: float, h: float) -> None:
         """Advance from t to t + h [s]."""
@@ -170,8 +187,8 @@ class Unit:
     def close(self) -> None:
         """Free the instance; never raises, so that it can stand in a `finally`."""
         if self._component is not None:
-            self._fmu.fmi2FreeInstance(self._component)
             self._component = None
+            self._fmu.freeInstance()  # and unloads the library
 
     def references(self, names: Iterable[str]) -> NDArray[np.uint32]:
         """Value references of the named variables.

@@ -13,7 +13,6 @@ from feedsim.report.style import LARGEST_SVG, Picture, css_variables
 from feedsim.report.summary import HEADER, Run, is_leading, real_time_factor, software
 
 DISPLAY_UNITS = {"um": "µm", "N.m": "N·m", "1": ""}
-SYNTHETIC = "The numbers of the default machine are synthetic: plausible for its size, but measured on no machine."
 
 STYLE = """
 :root { color-scheme: light dark; %(light)s --ground: #ffffff; --card: #f6f8fa; }
@@ -179,7 +178,7 @@ def _footer(run: Run) -> str:
     factor = real_time_factor(run)
     speed = f" ({factor:.2g} times real time)" if factor is not None else ""
     return (
-        f"<footer><p>{SYNTHETIC}</p><p>Definitions of the figures: docs/figures.md. Values in full precision: "
+        f"<footer><p>Definitions of the figures: docs/figures.md. Values in full precision: "
         f"summary.json; time series: result.csv. {run.program.duration:.4g} s simulated "
         f"in {run.wall_time:.3g} s{speed}.</p></footer>"
     )

@@ -15,6 +15,11 @@ from feedsim.scenario import Scenario
 from feedsim.trace import Trace
 
 FORMAT = 1
+COUPLING = {
+    "residual": "interface energy residual: what the plant gave to the friction bond less what friction took from it",
+    "residual_peak": "largest magnitude of the interface energy residual during the run",
+    "friction_work": "work of the friction torque, to hold the residual against",
+}
 
 
 class Run(Protocol):
@@ -82,7 +87,10 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
             "pose": {a: {"value": x, "unit": "m"} for a, x in machine.pose.items()},
         },
         "units": {name: dict(unit) for name, unit in run.units.items()},
-        "coupling": {name: value for name, value in run.coupling.items()},
+        "coupling": {
+            name: {"value": value, "unit": "J", "meaning": COUPLING[name.partition(".")[2]]}
+            for name, value in run.coupling.items()
+        },
         "software": software(),
         "performance": {
             "wall_time": {"value": run.wall_time, "unit": "s"},

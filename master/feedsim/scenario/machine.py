@@ -172,7 +172,8 @@ class Drive(ParameterGroup):
 
     # current loop and motor
     ideal_current_loop: StrictBool = Field(
-        default=False, description="The torque reaches its setpoint within one control cycle; no motor equations"
+        default=False,
+        description="The torque takes its setpoint at every sample instant and holds it; no motor equations",
     )
     current: CurrentController | None = Field(default=None, description="Current controller")
     u_max: Annotated[float, Quantity("V", minimum=0)] | None = Field(

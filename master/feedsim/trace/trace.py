@@ -90,14 +90,19 @@ class Trace:
 
         InputError for a pattern that matches nothing.
         """
-        wanted: set[str] = set()
-        for pattern in patterns:
-            matches = {name for name in self.columns if fnmatchcase(name, pattern)}
-            if not matches:
-                raise InputError(f"no column matches {pattern!r}{suggest(pattern, self.columns)}")
-            wanted |= matches
-        kept = [name for name in self.columns if name in wanted]
+        kept = matching(self.columns, patterns)
         return Trace(self.time, {name: self.columns[name] for name in kept}, {name: self.units[name] for name in kept})
+
+
+def matching(names: Iterable[str], patterns: Iterable[str]) -> list[str]:
+    """Names that match any of the glob patterns, in their order. InputError for a pattern that matches nothing."""
+    names, wanted = list(names), set[str]()
+    for pattern in patterns:
+        matches = {name for name in names if fnmatchcase(name, pattern)}
+        if not matches:
+            raise InputError(f"no column matches {pattern!r}{suggest(pattern, names)}")
+        wanted |= matches
+    return [name for name in names if name in wanted]
 
 
 def check_name(name: str) -> str:

@@ -10,6 +10,7 @@
  *
  * Instant k lies at t_k = start + k T_c; k is counted, so that nothing drifts. A step [t, t + H) works the instants in
  * that interval and reads the inputs at each, value + slope (t_k - t). H may be anything. */
+#include <float.h>
 #include <math.h>
 
 #include "drive.h"
@@ -18,8 +19,17 @@
 
 /* An importer's sum of steps runs off the grid: adding 125 us ten million times ends 1.6e-3 cycles late. An instant
  * that lies so little ahead of the end of a step belongs to the next one, as it was meant; reading the inputs a
- * hundredth of a cycle late instead (extrapolated by the slope) is far below a cycle's own effect. */
+ * hundredth of a cycle late instead (extrapolated by the slope) is far below a cycle's own effect. In parts of the
+ * cycle or of the step, whichever is shorter: an instant at the start of a step is worked in that step, however short.
+ * Steps much shorter than a cycle may drift further than that. Then an instant is worked one of them early, still with
+ * its inputs run on to t_k; instants are counted, so that none is skipped or worked twice. */
 #define DRIFT 1e-2
+
+/* A clock that runs since t has no finer grain than this [parts of t], a few units in the last place. */
+#define GRAIN (16 * DBL_EPSILON)
+
+/* More instants in one step are taken for a mistake: the unit would not come back for minutes. */
+#define MOST_INSTANTS 1e9
 
 /* An end of a step so close to the end of a cycle [T_c] is the end of the cycle. */
 #define ROUNDING 1e-6
@@ -38,7 +48,8 @@ static bool derive_cycles(Unit *unit, const Scalars *v, Drive *p) {
     if (ticks < 1.0 || fabs(ratio - ticks) > 1e-9 * ticks) {
         char text[3][NUMBER_TEXT_SIZE];
         return unit_fail(unit, "T_pos = %s s is not a whole multiple of T_c = %s s (ratio %s)",
-                         number_text(text[0], v->T_pos), number_text(text[1], v->T_c), number_text(text[2], ratio));
+                         number_text(text[0], v->T_pos), number_text(text[1], v->T_c),
+                         number_text(text[2], round(1e10 * ratio) / 1e10));
     }
     p->T_c = v->T_c;
     p->ticks = (int32_t)ticks;
@@ -164,6 +175,12 @@ static void start(Unit *unit) {
     v->x_e = v->x_s - v->x_a;
 }
 
+/* How far ahead of the end of a step from t to t + h an instant belongs to the next step [s]. */
+static double margin(double t, double h, double T_c) {
+    const double drift = fmax(DRIFT * fmin(T_c, h), GRAIN * (fabs(t) + h));
+    return fmin(drift, 0.5 * h); /* steps of a few grains */
+}
+
 static bool step(Unit *unit, double t, double h) {
     const Drive *p = unit_derived(unit);
     State *state = unit_state(unit);
@@ -179,7 +196,17 @@ static bool step(Unit *unit, double t, double h) {
                                .M_add = unit_slope(unit, VR_M_add)};
 
     double t_k = start_time + (double)x->instant * p->T_c;
-    while (t_k < end - DRIFT * p->T_c) {
+    const double instants = (end - t_k) / p->T_c;
+    if (instants > MOST_INSTANTS) {
+        char text[3][NUMBER_TEXT_SIZE];
+        return unit_fail(unit,
+                         "the step would hold %s sample instants, T_c = %s s apart; allowed are at most %.0e, which is "
+                         "a step of %s s",
+                         number_text(text[0], ceil(instants)), number_text(text[1], p->T_c), MOST_INSTANTS,
+                         number_text(text[2], MOST_INSTANTS * p->T_c));
+    }
+    const double last = end - margin(t, h, p->T_c);
+    while (t_k < last) {
         const double since = t_k - t;
         const DriveInputs in = {.x_s = v->x_s + slope.x_s * since,
                                 .n_ffw = v->n_ffw + slope.n_ffw * since,
@@ -217,12 +244,14 @@ static double output_derivative(Unit *unit, unsigned vr) {
     }
 }
 
-/* Every output is sampled or computed from samples: no input acts on one at once. */
-static double partial(Unit *unit, unsigned output, unsigned input) {
+/* Every output is sampled or computed from samples: no input acts on one at once. Ahead of the first instant x_e shows
+ * the difference of its inputs. */
+static double partial(Unit *unit, unsigned output, unsigned input, bool initial) {
     (void)unit;
-    (void)output;
-    (void)input;
-    return 0.0;
+    if (!initial || output != VR_x_e) {
+        return 0.0;
+    }
+    return input == VR_x_s ? 1.0 : input == VR_x_a ? -1.0 : 0.0;
 }
 
 const Model MODEL = {.identifier = "controller",

@@ -73,6 +73,11 @@ void derivatives_clear_inputs(Unit *unit) {
 
 /* --- outputs */
 
+/* Where parameters were refused the coefficients may be anything, of another size of the state even. */
+static bool has_coefficients(Unit *unit) {
+    return unit->derived_valid || unit_fail(unit, "no derivatives: the parameters of now were refused");
+}
+
 bool derivatives_get_outputs(Unit *unit, size_t count, const fmi2ValueReference references[],
                              const fmi2Integer orders[], fmi2Real values[]) {
     if (!values_arrays(unit, count, references, values) || !values_arrays(unit, count, references, orders))
@@ -81,6 +86,8 @@ bool derivatives_get_outputs(Unit *unit, size_t count, const fmi2ValueReference 
         if (!is(unit, references[i], CAUSALITY_output, "derivatives with respect to time are those of an") ||
             !first_order(unit, references[i], orders[i], "maxOutputDerivativeOrder"))
             return false;
+    if (!has_coefficients(unit))
+        return false;
     for (size_t i = 0; i < count; i++)
         values[i] = MODEL.output_derivative(unit, references[i]);
     return true;
@@ -97,12 +104,13 @@ bool derivatives_get_directional(Unit *unit, size_t unknown_count, const fmi2Val
     for (size_t k = 0; k < known_count; k++)
         if (!is(unit, knowns[k], CAUSALITY_input, "a known of a directional derivative is an"))
             return false;
-    if (unit_header(unit)->phase == PHASE_INITIALIZATION && !run_refresh(unit))
+    const bool initial = unit_header(unit)->phase == PHASE_INITIALIZATION;
+    if (initial ? !run_refresh(unit) : !has_coefficients(unit))
         return false;
     for (size_t i = 0; i < unknown_count; i++) {
         sensitivity[i] = 0;
         for (size_t k = 0; k < known_count; k++)
-            sensitivity[i] += MODEL.partial(unit, unknowns[i], knowns[k]) * seed[k];
+            sensitivity[i] += MODEL.partial(unit, unknowns[i], knowns[k], initial) * seed[k];
     }
     return true;
 }

@@ -38,7 +38,8 @@ static bool hash_digits(const char *text) {
     return strspn(text, "0123456789abcdef") >= HASH_TEXT_SIZE - 1;
 }
 
-/* <hash of the table>-<hash of the resources>: the first half is this binary's, the second the model's to check. */
+/* <hash of the table>-<hash of the resources>: the first half is this binary's, the second the model's to check where
+ * it has resources. */
 static bool accept_guid(Unit *unit, const char *guid) {
     char own[HASH_TEXT_SIZE];
     table_hash(own);
@@ -53,6 +54,12 @@ static bool accept_guid(Unit *unit, const char *guid) {
                          "the GUID '%s' does not belong to this binary, whose table of variables is '%s-...': "
                          "modelDescription.xml and binary are of different builds",
                          guid, own);
+    char nothing[HASH_TEXT_SIZE];
+    if (!MODEL.has_resources && strcmp(guid + HASH_TEXT_SIZE, hash_text(nothing, HASH_OF_NOTHING)) != 0)
+        return unit_fail(unit,
+                         "the GUID '%s' speaks of resources, but the unit '%s' has none: its GUID is '%s-%s'; "
+                         "modelDescription.xml and binary do not belong together",
+                         guid, MODEL.identifier, own, nothing);
     memcpy(unit->guid, guid, GUID_SIZE);
     return true;
 }

@@ -5,6 +5,7 @@
 
 #include "numbers.h"
 #include "shell.h"
+#include "text.h"
 
 #define MESSAGE_SIZE 2048
 
@@ -41,6 +42,7 @@ void log_write_list(Unit *unit, unsigned category, const char *format, va_list a
     }
     used += snprintf(text + used, sizeof text - (size_t)used, ": ");
     vsnprintf(text + used, sizeof text - (size_t)used, format, arguments);
+    text_mend(text);
     escape(text, escaped);
     for (int i = 0; i < CATEGORY_COUNT; i++) {
         if (categories[i].categories == category) {

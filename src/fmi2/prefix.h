@@ -63,6 +63,7 @@
 #define derivatives_get_directional PREFIXED(derivatives_get_directional)
 
 #define run_derive PREFIXED(run_derive)
+#define run_derived_for PREFIXED(run_derived_for)
 #define run_refresh PREFIXED(run_refresh)
 #define run_step PREFIXED(run_step)
 #define run_reset PREFIXED(run_reset)
@@ -75,6 +76,9 @@
 
 #define hash_bytes PREFIXED(hash_bytes)
 #define hash_text PREFIXED(hash_text)
+
+#define text_whole PREFIXED(text_whole)
+#define text_mend PREFIXED(text_mend)
 
 #define number_parse PREFIXED(number_parse)
 #define number_text PREFIXED(number_text)

@@ -15,19 +15,23 @@ static size_t field_size(Kind kind) {
     return kind == KIND_REAL ? sizeof(double) : kind == KIND_STRING ? STRING_SIZE : sizeof(int);
 }
 
-static bool parameters_differ(const Unit *unit) {
+static bool parameters_differ(const Unit *unit, const unsigned char *block) {
     for (size_t i = 0; i < unit->variable_count; i++) {
         const Variable *variable = &unit->variables[i];
         if (variable->info->causality == CAUSALITY_parameter &&
-            memcmp(unit_address(unit, variable), unit->derived_for + (variable->offset - SCALARS_AT),
+            memcmp(block + variable->offset, unit->derived_for + (variable->offset - SCALARS_AT),
                    field_size(variable->info->kind)) != 0)
             return true;
     }
     return false;
 }
 
+bool run_derived_for(const Unit *unit, const unsigned char *block) {
+    return unit->derived_valid && !parameters_differ(unit, block);
+}
+
 bool run_derive(Unit *unit, bool may_resize) {
-    if (unit->derived_valid && !(unit->parameters_touched && parameters_differ(unit))) {
+    if (unit->derived_valid && !(unit->parameters_touched && parameters_differ(unit, unit->block))) {
         unit->parameters_touched = false;
         return true;
     }

@@ -86,7 +86,9 @@ bool unit_resize_state(Unit *unit, size_t state_size); /* keeps all but the mode
 
 /* --- run.c: false with the reason logged */
 bool run_derive(Unit *unit, bool may_resize); /* where parameters changed since the last time */
-bool run_refresh(Unit *unit);                 /* initial values that belong to the parameters and inputs of now */
+bool run_derived_for(const Unit *unit,
+                     const unsigned char *block); /* the coefficients are those of block's parameters */
+bool run_refresh(Unit *unit);                     /* initial values that belong to the parameters and inputs of now */
 bool run_step(Unit *unit, double t, double h);
 void run_reset(Unit *unit);
 

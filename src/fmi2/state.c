@@ -65,6 +65,10 @@ bool state_known(Unit *unit, const Snapshot *snapshot) {
     if (snapshot->format != FORMAT)
         return unit_fail(unit, "the state has format version %lu, expected is %lu", (unsigned long)snapshot->format,
                          (unsigned long)FORMAT);
+    for (size_t i = sizeof unit->guid; i < sizeof snapshot->guid; i++)
+        if (snapshot->guid[i] != '\0')
+            return unit_fail(unit, "the state is damaged: byte %.0f behind its GUID is not 0",
+                             (double)(i - sizeof unit->guid));
     if (memcmp(snapshot->guid, unit->guid, sizeof unit->guid) != 0)
         return unit_fail(unit, "the state belongs to GUID '%.*s', this instance has '%s'", (int)sizeof snapshot->guid,
                          snapshot->guid, unit->guid);
@@ -74,23 +78,63 @@ bool state_known(Unit *unit, const Snapshot *snapshot) {
     return true;
 }
 
+/* The model's part of the state, into a block that was sized for the snapshot's parameters. */
+static bool restore_model(Unit *unit, const Snapshot *snapshot) {
+    const size_t state_size = unit->block_size - unit->state_at;
+    if (snapshot->state_size != state_size)
+        return unit_fail(unit, "the state holds %.0f bytes of model state, its parameters need %.0f",
+                         (double)snapshot->state_size, (double)state_size);
+    memcpy(unit_state(unit), content(snapshot) + unit->state_at, state_size);
+    return true;
+}
+
+static bool accepted(Unit *unit, const Snapshot *snapshot) {
+    const void *scalars = content(snapshot) + SCALARS_AT;
+    return MODEL.accepts == NULL ||
+           MODEL.accepts(unit, scalars, content(snapshot) + unit->state_at, (size_t)snapshot->state_size);
+}
+
+/* With coefficients of other parameters. Where they cannot be had, or are not those of the state, the block of before
+ * is put back and its coefficients are derived again. */
+static bool restore_with_parameters(Unit *unit, const Snapshot *snapshot) {
+    const bool had_coefficients = unit->derived_valid;
+    const size_t own_size = unit->block_size;
+    unsigned char *own = unit_alloc(unit, own_size, 1);
+    if (own == NULL)
+        return false;
+    memcpy(own, unit->block, own_size);
+    memcpy(unit->block, content(snapshot), unit->state_at);
+    unit->parameters_touched = true;
+    bool good = run_derive(unit, true) && accepted(unit, snapshot) && restore_model(unit, snapshot);
+    if (good) {
+        unit_free(unit, own);
+        return true;
+    }
+    unit_free(unit, unit->block);
+    unit->block = own;
+    unit->block_size = own_size;
+    unit->derived_valid = false;
+    if (!unit_header(unit)->stale && !run_derive(unit, false) && had_coefficients)
+        unit_header(unit)->phase = PHASE_FAILED; /* say, the file they came from is gone by now */
+    return false;
+}
+
 bool state_restore(Unit *unit, const Snapshot *snapshot) {
     if (!state_known(unit, snapshot))
         return false;
+    Header header;
+    memcpy(&header, content(snapshot), sizeof header);
+    if (!header.stale) {
+        if (!accepted(unit, snapshot))
+            return false;
+        if (!run_derived_for(unit, content(snapshot)))
+            return restore_with_parameters(unit, snapshot);
+        if (!restore_model(unit, snapshot))
+            return false;
+    }
     memcpy(unit->block, content(snapshot), unit->state_at);
     unit->parameters_touched = true;
-    if (unit_header(unit)->stale)
-        return true;
-    bool good = run_derive(unit, true);
-    size_t state_size = unit->block_size - unit->state_at;
-    if (good && snapshot->state_size != state_size)
-        good = unit_fail(unit, "the state holds %.0f bytes of model state, its parameters need %.0f",
-                         (double)snapshot->state_size, (double)state_size);
-    if (good)
-        memcpy(unit_state(unit), content(snapshot) + unit->state_at, state_size);
-    else
-        unit_header(unit)->phase = PHASE_FAILED;
-    return good;
+    return true;
 }
 
 bool state_serialize(Unit *unit, const Snapshot *snapshot, fmi2Byte bytes[], size_t size) {

@@ -21,8 +21,8 @@ typedef struct Snapshot {
 
 /* All return false with the reason logged where they fail. */
 bool state_save(Unit *unit, Snapshot **snapshot); /* overwrites *snapshot where it is not NULL and large enough */
-bool state_restore(Unit *unit, const Snapshot *snapshot);
-bool state_known(Unit *unit, const Snapshot *snapshot); /* made by state_save or state_deserialize, for this unit */
+bool state_restore(Unit *unit, const Snapshot *snapshot); /* a state that is refused leaves the instance's own */
+bool state_known(Unit *unit, const Snapshot *snapshot);   /* made by state_save or state_deserialize, for this unit */
 bool state_serialize(Unit *unit, const Snapshot *snapshot, fmi2Byte bytes[], size_t size);
 bool state_deserialize(Unit *unit, const fmi2Byte bytes[], size_t size, Snapshot **snapshot);
 

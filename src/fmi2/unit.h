@@ -69,6 +69,10 @@ void unit_free(Unit *unit, void *memory);
 typedef struct Model {
     const char *identifier; /* "plant", "controller", "friction" */
 
+    /* The archive has resource files; load() checks that they are those of unit_resource_hash(). Without, the shell
+     * sees to it that this is the hash of nothing. */
+    bool has_resources;
+
     /* Once, at instantiation: read resources, name the axes, set per-axis start values. NULL where there is nothing to
      * load. */
     bool (*load)(Unit *unit);
@@ -81,6 +85,11 @@ typedef struct Model {
     /* Bytes of model state after derive(). */
     size_t (*state_size)(const Unit *unit);
 
+    /* Whether a saved model state, state[size] made with the variables `scalars`, belongs to the data that derive()
+     * finds for them; false with the reason logged. Changes nothing. NULL where derive() depends on the variables
+     * alone. */
+    bool (*accepts)(Unit *unit, const Scalars *scalars, const void *state, size_t size);
+
     /* Initial state and outputs from parameters and the inputs at the start; the state arrives zeroed. Called whenever
      * an initial value is asked for in initialisation mode, and when that mode ends. */
     void (*start)(Unit *unit);
@@ -92,9 +101,9 @@ typedef struct Model {
     /* First derivative of Real output `vr` with respect to time at the end of the last step [unit/s]. */
     double (*output_derivative)(Unit *unit, unsigned vr);
 
-    /* Partial derivative of Real output `output` with respect to Real input `input` at the communication point, the
-     * state held (0 without direct feed-through). */
-    double (*partial)(Unit *unit, unsigned output, unsigned input);
+    /* Partial derivative of Real output `output` with respect to Real input `input`. initial: in initialisation mode,
+     * of what start() computes; else at the communication point, the state held (0 without direct feed-through). */
+    double (*partial)(Unit *unit, unsigned output, unsigned input, bool initial);
 
     /* Free what unit_derived() points to. NULL where nothing is derived. */
     void (*release)(Unit *unit);

@@ -25,7 +25,7 @@ static const Variable *not_found(Unit *unit, fmi2ValueReference reference, Kind 
     }
     const Variable *variable = &unit->variables[reference];
     char name[VARIABLE_NAME_SIZE];
-    unit_fail(unit, "value reference %u is the %s %s '%s'; a %s is expected here", reference,
+    unit_fail(unit, "value reference %u is the %s %s '%s'; expected here is type %s", reference,
               kind_names[variable->info->kind], table_causality(variable->info->causality),
               values_name(unit, variable, name), kind_names[kind]);
     return NULL;

@@ -112,9 +112,7 @@ static bool friction_step(Unit *unit, double t, double h) {
     if (!isfinite(shown.M_fr)) {
         char text[2][NUMBER_TEXT_SIZE];
         return unit_fail(
-            unit,
-            "M_fr would be no finite number at the end of the step, in which n_fr goes from %s to %s rad/s; the "
-            "state was kept",
+            unit, "M_fr would be no finite number at the end of the step, in which n_fr goes from %s to %s rad/s",
             number_text(text[0], n_start), number_text(text[1], n_end));
     }
     next.M_fr_slope = (shown.M_fr - v->M_fr) / h;
@@ -128,7 +126,8 @@ static double friction_output_derivative(Unit *unit, unsigned vr) {
     return vr == VR_M_fr ? state->M_fr_slope : 0;
 }
 
-static double friction_partial(Unit *unit, unsigned output, unsigned input) {
+static double friction_partial(Unit *unit, unsigned output, unsigned input, bool initial) {
+    (void)initial; /* z = 0 then, and the law is the same */
     if (output != VR_M_fr || input != VR_n_fr) {
         return 0;
     }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "csv.h"
+#include "text.h"
 
 size_t axes_capacity(const char *text, size_t size) {
     return csv_lines(text, size);
@@ -67,7 +68,7 @@ bool axes_read(const char *text, size_t size, const char *source, AxisRow *rows,
     while (csv_next_row(&csv, &row)) {
         const char *fault = axes_read_row(row, rows, count);
         if (fault != NULL) {
-            const int shown = row.end - row.at < 40 ? (int)(row.end - row.at) : 40;
+            const int shown = (int)text_whole(row.at, (size_t)(row.end - row.at), 40);
             snprintf(message, message_size, "%s, line %u: '%.*s': %s", source, csv.line, shown, row.at, fault);
             return false;
         }

@@ -2,6 +2,13 @@
 
 #include <math.h>
 
+/* C99's restrict; compilers for C++ in the first place know it by another name. */
+#ifdef _MSC_VER
+#define UNALIASED __restrict
+#else
+#define UNALIASED restrict
+#endif
+
 /* Everything about a mode's step follows from its impulse response g (g(0) = 0, g'(0) = 1) and its integrals, here made
  * dimensionless with x = omega h:
  *   rate = g'(h),  once = g(h)/h,  twice = integral of g / h^2,  thrice = double integral of g / h^3
@@ -145,8 +152,9 @@ void modal_prepare(Modal *modal, double h) {
     modal->h = h;
 }
 
-void modal_advance(const Modal *modal, size_t inputs, const double *restrict u, const double *restrict du,
-                   const double *restrict q, const double *restrict v, double *restrict q_end, double *restrict v_end) {
+void modal_advance(const Modal *modal, size_t inputs, const double *UNALIASED u, const double *UNALIASED du,
+                   const double *UNALIASED q, const double *UNALIASED v, double *UNALIASED q_end,
+                   double *UNALIASED v_end) {
     const Modal m = *modal;
     for (size_t k = 0; k < m.size; k += MODAL_LANES) {
         double f[MODAL_LANES] = {0}, df[MODAL_LANES] = {0};
@@ -170,9 +178,9 @@ void modal_advance(const Modal *modal, size_t inputs, const double *restrict u, 
     }
 }
 
-double modal_sum(const Modal *modal, size_t port, const double *restrict q) {
+double modal_sum(const Modal *modal, size_t port, const double *UNALIASED q) {
     const size_t size = modal->size;
-    const double *restrict b = modal->shape + port * size;
+    const double *UNALIASED b = modal->shape + port * size;
     double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
     for (size_t k = 0; k < size; k += MODAL_LANES) {
         s0 += b[k] * q[k];

@@ -212,6 +212,43 @@ static bool plant_derive(Unit *unit) {
     return good;
 }
 
+/* Hash of the table that plant_derive() would take for this modes_file; false with the reason logged. */
+static bool plant_find_table(Unit *unit, const Plant *plant, const char *path, uint64_t *hash) {
+    if (path[0] == '\0' || (plant->ready && strcmp(plant->table, path) == 0)) {
+        *hash = path[0] == '\0' ? plant->archive_hash : plant->table_hash;
+        return true;
+    }
+    size_t size;
+    char *text = file_read(unit, NULL, path, &size);
+    if (text == NULL) {
+        return unit_fail(unit, "the state needs its mode table, parameter 'modes_file': %s cannot be read", path);
+    }
+    *hash = hash_bytes(HASH_OF_NOTHING, text, size);
+    unit_free(unit, text);
+    return true;
+}
+
+static bool plant_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size) {
+    StateHead head;
+    if (size < sizeof head) {
+        return unit_fail(unit, "the state holds %.0f bytes of model state, its head alone has %.0f", (double)size,
+                         (double)sizeof head);
+    }
+    memcpy(&head, state, sizeof head);
+    uint64_t found = 0;
+    if (!plant_find_table(unit, unit_derived(unit), scalars->modes_file, &found)) {
+        return false;
+    }
+    if (found != head.table_hash) {
+        char text[2][HASH_TEXT_SIZE];
+        return unit_fail(unit,
+                         "the state belongs to other contents of the mode table (modes_file '%s', hash %s) than this "
+                         "instance finds there (hash %s)",
+                         scalars->modes_file, hash_text(text[0], head.table_hash), hash_text(text[1], found));
+    }
+    return true;
+}
+
 static size_t plant_state_size(const Unit *unit) {
     return sizeof(StateHead) + plant_state_doubles(unit_derived(unit)) * sizeof(double);
 }
@@ -294,12 +331,6 @@ static bool plant_step(Unit *unit, double t, double h) {
     Plant *plant = unit_derived(unit);
     const size_t inputs = plant_inputs(plant), size = plant->modal.size;
     double *state = plant_state(unit), *end = plant->end;
-    if (((StateHead *)unit_state(unit))->table_hash != plant->table_hash) {
-        return unit_fail(unit,
-                         "the state belongs to other contents of the mode table (modes_file '%s') than this instance "
-                         "has read",
-                         plant->table);
-    }
     plant_gather(unit, h, plant->u, plant->du);
     size_t active = plant->axes; /* mostly, no force is on the tool: nothing to add then */
     for (size_t i = 0; i < inputs; i++) {
@@ -312,7 +343,7 @@ static bool plant_step(Unit *unit, double t, double h) {
     modal_advance(&plant->modal, active, plant->u, plant->du, state + inputs, state + inputs + size, end + inputs,
                   end + inputs + size);
     if (!plant_measure(plant, end + inputs, end + inputs + size, plant->y)) {
-        return unit_fail(unit, "an output would be no finite number at the end of the step; the state was kept");
+        return unit_fail(unit, "an output would be no finite number at the end of the step");
     }
     memcpy(state, end, plant_state_doubles(plant) * sizeof *state);
     plant_show(unit, plant, plant->y);
@@ -354,18 +385,21 @@ static double plant_output_derivative(Unit *unit, unsigned vr) {
 }
 
 /* The torques and forces act on accelerations: no output reacts at once. */
-static double plant_partial(Unit *unit, unsigned output, unsigned input) {
+static double plant_partial(Unit *unit, unsigned output, unsigned input, bool initial) {
     (void)unit;
     (void)output;
     (void)input;
+    (void)initial;
     return 0;
 }
 
 const Model MODEL = {
     .identifier = "plant",
+    .has_resources = true,
     .load = plant_load,
     .derive = plant_derive,
     .state_size = plant_state_size,
+    .accepts = plant_accepts,
     .start = plant_start,
     .step = plant_step,
     .output_derivative = plant_output_derivative,

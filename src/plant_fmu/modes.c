@@ -7,8 +7,9 @@
 
 #include "csv.h"
 #include "numbers.h"
+#include "text.h"
 
-#define CELL_SHOWN 40 /* characters of a cell that a message repeats */
+#define CELL_SHOWN 40 /* bytes of a cell that a message repeats, fewer where that would divide a character */
 #define HEADER_SIZE 80
 
 static const char *const directions[TOOL_DIRECTIONS] = {"X", "Y", "Z"};
@@ -38,7 +39,7 @@ static bool modes_fail(const Reader *reader, unsigned line, const char *format, 
 }
 
 static int modes_shown(CsvCell cell) {
-    return cell.length < CELL_SHOWN ? cell.length : CELL_SHOWN;
+    return (int)text_whole(cell.text, (size_t)cell.length, CELL_SHOWN);
 }
 
 size_t modes_width(size_t axes) {

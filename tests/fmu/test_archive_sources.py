@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fmu.unpacked import PLATFORM, UNITS, Archive, initialize, instantiate, unpack
-from packager import build, resources, toolchain, variables
+from packager import build, compile, resources, toolchain, variables
 
 
 def test_rebuilding_gives_the_same_bytes(unit: str, tmp_path: Path) -> None:
@@ -24,6 +24,20 @@ def test_rebuilding_gives_the_same_bytes(unit: str, tmp_path: Path) -> None:
 
 def _compiler() -> list[str]:
     return list(toolchain.find_compiler())
+
+
+def test_sources_compile_without_a_warning(archive: Archive, tmp_path: Path) -> None:
+    flags = [*compile.FLAGS, "-pedantic", "-Werror", "-c"]
+    for source in archive.source_files:
+        target = str(tmp_path / f"{Path(source).stem}.o")
+        done = subprocess.run(
+            [*_compiler(), *flags, source, "-o", target],
+            cwd=archive.folder / "sources",
+            capture_output=True,
+            encoding="utf-8",
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
 
 
 def test_sources_build_by_themselves(archive: Archive, tmp_path: Path) -> None:

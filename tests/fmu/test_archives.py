@@ -64,7 +64,6 @@ def test_every_declared_variable_is_described(archive: Archive) -> None:
         for key in ("causality", "variability", "description"):
             assert attributes[key] == row[key], row["name"]
         assert typed.get("unit", "") == row["unit"]
-        assert typed.get("displayUnit", row["unit"]) == row.get("display", "")
         for bound in ("min", "max"):
             assert (bound in typed.attrib) == (row[bound] != f"NO_{bound.upper()}"), row["name"]
             assert bound not in typed.attrib or float(typed.attrib[bound]) == float(row[bound])
@@ -95,6 +94,16 @@ def test_units_and_types_are_defined(archive: Archive) -> None:
     for real in reals:
         assert types[real.attrib["declaredType"]].attrib["unit"] == real.attrib["unit"]
     assert len({each.attrib["unit"] for each in types.values()}) == len(types)
+
+
+def test_a_variables_display_unit_is_that_of_its_row(archive: Archive) -> None:
+    """As importers find it: the variable's own, else its type's, else the unit."""
+    types = {each.attrib["name"]: each[0] for each in archive.description.iterfind("TypeDefinitions/SimpleType")}
+    rows = [row for row in expected_variables(archive.unit) if row["kind"] == "REAL"]
+    for row in rows:
+        real = archive.variables()[row["name"]][0]
+        inherited = types[real.attrib["declaredType"]].get("displayUnit", real.attrib["unit"])
+        assert real.get("displayUnit", inherited) == row["display"], row["name"]
 
 
 def _structure(archive: Archive, part: str) -> dict[int, set[int]]:

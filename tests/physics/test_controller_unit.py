@@ -154,6 +154,85 @@ def test_a_clock_that_drifts_does_not_shift_the_instants(archive: Archive) -> No
     assert np.max(np.abs(np.subtract(torque[2], torque[0]))) <= 5e-3 * step * (1 + 1e-6)
 
 
+# K_v = k_ffw = 0 and an excitation n_add = RATE t make n_s tell the time of the instant that was worked last.
+RATE = 1000.0
+CLOCK = {"K_v": 0, "k_ffw": 0, "filter_1.type": 0, "M_max": 1e9, "u_max": 1e9}
+
+
+@pytest.mark.parametrize("T_c", [T_C, 2e-3, 1.0])
+@pytest.mark.parametrize("h", [1.25e-6, 1e-6, 1e-7, 1e-5])
+def test_an_instant_at_the_start_of_a_short_step_is_worked_in_it(archive: Archive, T_c: float, h: float) -> None:
+    unit = archive.instance()
+    unit.start({**CLOCK, "T_c": T_c, "T_pos": T_c})
+    for k in range(5):  # held inputs: the value of t = 0 is that of the first step
+        unit.step(k * h, h, [0.0, 0.0, 0.0, 0.0, 7.0 + k, 0.0])
+        assert unit.get("n_s") == 7.0
+    unit.close()
+
+
+@pytest.mark.parametrize("start_time", [0.0, 1000.0])
+@pytest.mark.parametrize("drift", [0.0, 1e-5, 1e-3, -1e-3])
+@pytest.mark.parametrize("parts", [1, 4, 16, 100, 0.3, 0.7])
+def test_no_instant_is_skipped_or_worked_twice(archive: Archive, parts: float, drift: float, start_time: float) -> None:
+    """Steps of T_c/parts that drift off the grid: each instant is worked once, at its own t_k, in the step it lies in
+    or, where it lies less than a hundredth of the step ahead of its end, in the next."""
+    h = T_C / parts * (1 + drift)
+    unit = archive.instance()
+    unit.start({**CLOCK, "T_pos": T_C}, time=start_time)
+    t, last = start_time, -1
+    # Rounding of the clock, in cycles; 1000 s are known to 1e-13 s, 1e-9 cycles, and summed 2000 times.
+    rounding = 1e-9 if start_time == 0 else 1e-6
+    for _ in range(2000):
+        since = t - start_time
+        unit.step(t, h, [0.0, 0.0, 0.0, 0.0, RATE * since, 0.0], [0.0, 0.0, 0.0, 0.0, RATE, 0.0])
+        t += h
+        shown = unit.get("n_s") / (RATE * T_C)
+        instant = round(shown)
+        assert shown == pytest.approx(instant, abs=rounding)  # worked with its own time, wherever the step began
+        end = (t - start_time) / T_C
+        step = min(h / T_C, 1.0)
+        assert end - 1 - rounding <= instant + 0.01 * step
+        assert instant + 0.01 * step <= end + rounding
+        assert instant - last <= math.ceil(h / T_C) + 1
+        if h <= T_C:
+            assert instant - last in (0, 1)
+        last = instant
+    unit.close()
+
+
+def test_torque_moves_over_a_short_step_at_the_start_of_a_cycle(archive: Archive) -> None:
+    """It is linear from the cycle's first moment on; and the rest of the cycle ends where it would have ended."""
+    signals = random_signals(21)
+    ends = []
+    for h in (T_C, 1e-7):
+        unit = archive.instance()
+        unit.start(NO_LIMITS)
+        for k in range(50):
+            unit.step(k * T_C, T_C, signals.value(k * T_C))
+        before = unit.get("M_a")
+        unit.step(50 * T_C, h, signals.value(50 * T_C))
+        (slope,) = unit.fmu.getRealOutputDerivatives(unit.references(["M_a"]), [1])
+        assert slope != 0
+        # 50 T_c and h are rounded to 1e-18 s: 1e-11 of the short step
+        assert unit.get("M_a") - before == pytest.approx(slope * h, rel=1e-9)
+        if h < T_C:
+            unit.step(50 * T_C + h, T_C - h, signals.value(0.123))  # too late for these
+        ends.append(unit.get("M_a"))
+        unit.close()
+    assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize("h", [2e5, 1e300])
+def test_an_enormous_step_is_refused(archive: Archive, h: float) -> None:
+    unit = archive.instance()
+    unit.start({})
+    with pytest.raises(FMICallException):
+        unit.step(0.0, h, [0.0] * 6)
+    (text,) = unit.messages
+    assert "sample instants, T_c = 0.000125 s apart; allowed are at most 1e+09, which is a step of 125000 s" in text
+    unit.close()
+
+
 def test_at_the_start(archive: Archive) -> None:
     unit = archive.instance()
     unit.start({}, {"x_s": 0.3, "x_a": 0.25, "n_a": 5.0, "n_add": 3.0})

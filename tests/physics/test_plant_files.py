@@ -68,11 +68,63 @@ def test_state_of_a_changed_mode_table_is_refused(archive: Archive, tmp_path: Pa
         content, time = unit.serialized(), unit.time
     single_mode(path, 0.03)
     with archive.instance() as other:
-        other.restore_serialized(content, time)
         with pytest.raises(FMICallException):
-            other.step(1e-3)
+            other.restore_serialized(content, time)
         assert "other contents of the mode table" in other.texts(3)
         assert str(path) in other.texts(3)
+
+
+@pytest.mark.parametrize("fault", ["changed", "gone", "broken"])
+@pytest.mark.parametrize("own", ["archive", "own table", "own table, gone", "same table"])
+def test_a_refused_state_leaves_the_instance_as_it_was(archive: Archive, tmp_path: Path, own: str, fault: str) -> None:
+    path = single_mode(tmp_path / "single.csv", 0.02)
+    own_path = write_modes(tmp_path / "own.csv", [RIGID, ELASTIC])
+    with archive.instance({"modes_file": str(path)}) as unit:
+        unit.step(1e-3, {"Z.M_a": 5.0})
+        content, time = unit.serialized(), unit.time
+    if own == "same table":
+        single_mode(path, 0.03)
+    parameters = {"archive": {}, "same table": {"modes_file": str(path)}}.get(own, {"modes_file": str(own_path)})
+    with archive.instance(parameters) as target, archive.instance(parameters) as twin:
+        if own == "own table, gone":
+            own_path.unlink()
+        match fault:
+            case "changed":
+                single_mode(path, 0.04)
+            case "gone":
+                path.unlink()
+            case "broken":
+                path.write_text("no table")
+        for instance in (target, twin):
+            instance.step(1e-3, {"Z.M_a": 5.0})
+        before = target.serialized()
+        with pytest.raises(FMICallException):
+            target.restore_serialized(content, time)
+        text = "cannot be read" if fault == "gone" and own != "same table" else "other contents of the mode table"
+        assert text in target.texts(3)
+        assert str(path) in target.texts(3)
+        assert target.serialized() == before
+        for instance in (target, twin):
+            instance.time = 1e-3
+            instance.step(1e-3, {"Z.M_a": 5.0}, {"Z.M_a": 100.0})
+        assert (target.gets(OUTPUTS) == twin.gets(OUTPUTS)).all()
+        assert target.derivative("Z.n_a") == twin.derivative("Z.n_a")
+
+
+def test_a_state_that_was_refused_is_taken_when_its_table_is_back(archive: Archive, tmp_path: Path) -> None:
+    path = single_mode(tmp_path / "single.csv", 0.02)
+    table = path.read_bytes()
+    with archive.instance({"modes_file": str(path)}) as unit, Instance(archive) as fresh:
+        unit.step(1e-3, {"Z.M_a": 5.0})
+        content, time = unit.serialized(), unit.time
+        path.unlink()
+        with pytest.raises(FMICallException):
+            fresh.restore_serialized(content, time)
+        path.write_bytes(table)
+        fresh.restore_serialized(content, time)
+        for instance in (unit, fresh):
+            instance.step(1e-3)
+        assert (unit.gets(OUTPUTS) == fresh.gets(OUTPUTS)).all()
 
 
 def test_reset_goes_back_to_the_archive(archive: Archive, tmp_path: Path) -> None:
@@ -101,12 +153,14 @@ def test_all_memory_is_given_back(archive: Archive, tmp_path: Path) -> None:
     assert not unit.blocks
 
 
-def test_overflow_is_an_error_that_keeps_the_state(unit: Instance) -> None:
+def test_overflow_is_an_error_that_a_saved_state_heals(unit: Instance) -> None:
     unit.step(H, {"Z.M_a": 5.0})
     state, before = unit.state(), unit.gets(OUTPUTS)
     with pytest.raises(FMICallException):
         unit.step(1e10, {"Z.M_a": 1e300})
     assert "no finite number" in unit.texts(3)
+    with pytest.raises(FMICallException):
+        unit.step(H, {"Z.M_a": 5.0})  # in state 'error'
     unit.restore(state)
     assert (unit.gets(OUTPUTS) == before).all()
 

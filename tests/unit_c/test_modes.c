@@ -15,6 +15,8 @@
 enum { AXES = 2, WIDTH = 2 + 2 * AXES + 3, CAPACITY = 10 };
 static const char *const AXIS_NAMES[AXES] = {"X", "Z"};
 
+static void refuse_axes(const char *text, const char *where, const char *what);
+
 static double values[CAPACITY * WIDTH];
 static size_t modes;
 static char message[300];
@@ -95,6 +97,21 @@ static void faults_of_a_row(void) {
     refuse(HEADER "0,0,0,1,2,0,4,5,6,7\n", "table.csv: ", "'x_X' is 0 in every row");
 }
 
+/* A cell is repeated up to 40 bytes, and no character is cut in two. */
+static void messages_keep_characters_whole(void) {
+#define A39 "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
+    refuse(HEADER "0,0,0," A39 "\xC3\xA4xyz,2,3,4,5,6,7\n", "line 2", "'n_X': '" A39 "' is");
+    refuse(HEADER "0,0,0,a" A39 "\xC3\xA4xyz,2,3,4,5,6,7\n", "line 2", "'n_X': 'a" A39 "' is");
+    refuse(HEADER "0,0,0,\xC3\xA4"
+                  "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa\xE2\x82\xAC,2,3,4,5,6,7\n",
+           "line 2",
+           "'n_X': '\xC3\xA4"
+           "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa' is");
+    refuse(A39 "\xC3\xA4,frequency [Hz]\n", "line 1", "column '" A39 "' is unknown");
+    refuse_axes("axis,x_0 [m]\n" A39 "\xC3\xA4,1\n", "line 2", "'" A39 "': column 'axis'");
+#undef A39
+}
+
 static void messages_fit(void) {
     char small[24];
     memset(small, '#', sizeof small);
@@ -164,6 +181,7 @@ int main(void) {
     good_tables();
     faults_of_the_header();
     faults_of_a_row();
+    messages_keep_characters_whole();
     messages_fit();
     zero_bytes();
     numbers_ignore_the_locale();

@@ -40,11 +40,16 @@ static void what_does_not_belong_is_refused(void) {
     CHECK(make("a", fmi2CoSimulation, NULL, NULL, &log) == NULL);
     CHECK(log.count == 4 + 7 + 1);
 
-    /* The model sees the second half, and its refusal is told as it said it: both signs of the logger's format are
-     * kept. */
+    /* A unit without resources has a second half of its own. */
     snprintf(guid, sizeof guid, "%s-ffffffffffffffff", hash);
     CHECK(make("a", fmi2CoSimulation, guid, NULL, &log) == NULL);
-    CHECK_TEXT(log.message, "fmi2Instantiate: resources of hash ffffffffffffffff are refused, 100 % sure, see ##1");
+    CHECK_CONTAINS(log.message, "speaks of resources, but the unit 'toy' has none");
+    CHECK_CONTAINS(log.message, guid);
+    CHECK_CONTAINS(log.message, toy_guid());
+
+    /* A model's refusal is told as it said it: both signs of the logger's format are kept. */
+    CHECK(make("a", fmi2CoSimulation, toy_guid(), "/refused", &log) == NULL);
+    CHECK_TEXT(log.message, "fmi2Instantiate: resources in /refused are refused, 100 % sure, see ##1");
     CHECK(memory.held == 0);
 }
 
@@ -294,6 +299,25 @@ static void long_messages_are_cut(void) {
     CHECK(strlen(log.message) < 2048);
 }
 
+/* Cut between two characters, wherever the end of the buffer lies among them. */
+static void long_messages_end_with_a_whole_character(void) {
+    for (int shift = 0; shift < 4; shift++) {
+        Log log = {.count = 0};
+        char guid[4000] = "";
+        for (int k = 0; k < shift; k++)
+            strcat(guid, "a");
+        for (int k = 0; k < 1000; k++)
+            strcat(guid, "\xE2\x82\xAC");
+        CHECK(make("a", fmi2CoSimulation, guid, NULL, &log) == NULL);
+        const size_t length = strlen(log.message);
+        CHECK(length > 2040 && length < 2048);
+        CHECK_TEXT(log.message + length - 3, "\xE2\x82\xAC");
+    }
+    Log log = {.count = 0};
+    CHECK(make("a", fmi2CoSimulation, "M\xE4rz", NULL, &log) == NULL); /* Latin-1 */
+    CHECK_CONTAINS(log.message, "'M?rz'");
+}
+
 int main(void) {
     what_does_not_belong_is_refused();
     resource_locations();
@@ -305,6 +329,7 @@ int main(void) {
     categories();
     calls_are_told_with_their_arguments();
     long_messages_are_cut();
+    long_messages_end_with_a_whole_character();
     CHECK(memory.held == 0);
     return CHECK_RESULT;
 }

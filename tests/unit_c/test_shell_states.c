@@ -156,6 +156,7 @@ static void serialised_forms_that_do_not_fit(void) {
         {12, 77, {"byte order", "01020304"}},
         {16, '!', {"belongs to GUID '!", toy_guid()}}, /* another table */
         {16 + 32, '!', {"48422232!'", toy_guid()}},    /* other resources */
+        {16 + 34, 1, {"damaged", "byte 0 behind its GUID"}},
         {56, 1, {"its heading speaks of", "the serialized state has"}},
         {64, 1, {"bytes of variables", "this instance has"}},
         {72, 1, {"its heading speaks of", "the serialized state has"}},
@@ -182,8 +183,7 @@ static void serialised_forms_that_do_not_fit(void) {
     for (size_t at = 0; at < size; at++) {
         memcpy(bad, bytes, size);
         bad[at] = (char)(bad[at] ^ 0x10);
-        bool in_guid_padding = at >= 16 + GUID_SIZE && at < 56;
-        missed += !in_guid_padding && fmi2DeSerializeFMUstate(c, bad, size, &state) != fmi2Error;
+        missed += fmi2DeSerializeFMUstate(c, bad, size, &state) != fmi2Error;
     }
     CHECK(missed == 0);
     CHECK(state == NULL);
@@ -200,6 +200,8 @@ static void serialised_forms_that_do_not_fit(void) {
 static void state_of_another_size(void) {
     static char bytes[IMAGE_SIZE];
     size_t size;
+    static char own[IMAGE_SIZE];
+    size_t own_size;
     Log log = {.count = 0};
     fmi2FMUstate state = NULL;
     fmi2Component c = toy_in(PHASE_STEPPING, &log);
@@ -215,20 +217,82 @@ static void state_of_another_size(void) {
     uint64_t checksum = hash_bytes(HASH_OF_NOTHING, bytes + 88, (size_t)whole - 88);
     memcpy(bytes + 80, &checksum, 8);
     CHECK(fmi2DeSerializeFMUstate(c, bytes, (size_t)whole, &state) == fmi2OK);
-    CHECK(fmi2SetFMUstate(c, state) == fmi2Error);
-    CHECK_CONTAINS(log.message, "bytes of model state, its parameters need");
-    CHECK(fmi2DoStep(c, 0, 1, fmi2True) == fmi2Error);
-    CHECK_CONTAINS(log.message, "'error'");
+    /* into instances with the same parameters and with others, stepping and not yet */
+    for (int k = 0; k < 4; k++) {
+        CHECK(fmi2Reset(c) == fmi2OK);
+        if (k % 2 > 0)
+            CHECK(set_integer(c, VR_cells, 7) == fmi2OK);
+        toy_enter(c, k < 2 ? PHASE_STEPPING : PHASE_INSTANTIATED);
+        image_of(c, own, &own_size);
+        CHECK(fmi2SetFMUstate(c, state) == fmi2Error);
+        CHECK_CONTAINS(log.message, "bytes of model state, its parameters need");
+        CHECK(same_image(c, own, own_size));
+        if (k >= 2)
+            toy_enter(c, PHASE_STEPPING);
+        CHECK(fmi2DoStep(c, 0, 1, fmi2True) == fmi2OK);
+        CHECK(get_integer(c, VR_cells) == (k % 2 > 0 ? 7 : 3));
+    }
     CHECK(fmi2FreeFMUstate(c, &state) == fmi2OK);
+    fmi2Component fresh = toy_in(PHASE_INSTANTIATED, &log); /* without coefficients of its own */
+    CHECK(fmi2DeSerializeFMUstate(fresh, bytes, (size_t)whole, &state) == fmi2OK);
+    CHECK(fmi2SetFMUstate(fresh, state) == fmi2Error);
+    toy_enter(fresh, PHASE_STEPPING);
+    CHECK(fmi2DoStep(fresh, 0, 1, fmi2True) == fmi2OK);
+    CHECK(fmi2FreeFMUstate(fresh, &state) == fmi2OK);
+    fmi2FreeInstance(fresh);
+    fmi2FreeInstance(c);
+}
+
+/* What the model does not accept, or whose parameters it refuses, is refused at once and leaves the instance as it was:
+ * it goes on with its own state and coefficients. */
+static void refused_states_leave_the_instance(void) {
+    static char own[IMAGE_SIZE];
+    size_t size;
+    Log log = {.count = 0};
+    fmi2FMUstate refused = NULL, broken = NULL;
+    fmi2Component other = toy_in(PHASE_STEPPING, &log);
+    double results[3 * 13], expected[3 * COUNT], seen[3 * COUNT];
+    run(other, 0, 13, results);
+    CHECK(fmi2GetFMUstate(other, &refused) == fmi2OK);
+    fmi2FreeInstance(other);
+    other = toy_in(PHASE_INITIALIZATION, &log);
+    CHECK(set_integer(other, VR_cells, 6) == fmi2OK);
+    CHECK(fmi2ExitInitializationMode(other) == fmi2OK);
+    CHECK(set_real(other, VR_gain, 13) == fmi2OK); /* the next step would refuse it */
+    CHECK(fmi2GetFMUstate(other, &broken) == fmi2OK);
+    fmi2FreeInstance(other);
+
+    fmi2Component c = toy_in(PHASE_STEPPING, &log);
+    run(c, 0, 10, results);
+    image_of(c, own, &size);
+    fmi2FMUstate saved = NULL;
+    CHECK(fmi2GetFMUstate(c, &saved) == fmi2OK);
+    run(c, 1, COUNT, expected);
+    CHECK(fmi2SetFMUstate(c, saved) == fmi2OK);
+    CHECK(fmi2SetFMUstate(c, refused) == fmi2Error);
+    CHECK_CONTAINS(log.message, "state of label 'toy' after 13 steps is refused");
+    CHECK(same_image(c, own, size));
+    CHECK(fmi2SetFMUstate(c, broken) == fmi2Error);
+    CHECK_CONTAINS(log.message, "gain 13");
+    CHECK(same_image(c, own, size));
+    memory.fail_at = memory.allocations; /* no memory to keep the own state in */
+    CHECK(fmi2SetFMUstate(c, broken) == fmi2Error);
+    memory.fail_at = -1;
+    CHECK_CONTAINS(log.message, "out of memory");
+    CHECK(same_image(c, own, size));
+    run(c, 1, COUNT, seen);
+    CHECK(memcmp(seen, expected, sizeof seen) == 0);
+    CHECK(fmi2FreeFMUstate(c, &saved) == fmi2OK);
+    CHECK(fmi2FreeFMUstate(c, &refused) == fmi2OK);
+    CHECK(fmi2FreeFMUstate(c, &broken) == fmi2OK);
     fmi2FreeInstance(c);
 }
 
 static void states_of_other_resources_are_refused(void) {
     Log log = {.count = 0};
-    char guid[GUID_SIZE];
-    snprintf(guid, sizeof guid, "%.16s-0123456789abcdef", toy_guid());
-    fmi2CallbackFunctions callbacks = {log_record, memory_allocate, memory_free, NULL, &log};
-    fmi2Component c = fmi2Instantiate("c", fmi2CoSimulation, guid, NULL, &callbacks, fmi2False, fmi2False);
+    fmi2Component c = toy_in(PHASE_INSTANTIATED, &log);
+    Unit *unit = c; /* the toy has no resources: give it the identity of a unit that has */
+    snprintf(unit->guid, sizeof unit->guid, "%.16s-0123456789abcdef", toy_guid());
     fmi2Component other = toy_in(PHASE_STEPPING, NULL);
     fmi2FMUstate state = NULL;
     CHECK(fmi2GetFMUstate(other, &state) == fmi2OK);
@@ -266,6 +330,7 @@ int main(void) {
     a_state_brings_its_phase();
     serialised_forms_that_do_not_fit();
     state_of_another_size();
+    refused_states_leave_the_instance();
     states_of_other_resources_are_refused();
     states_hold_no_pointers();
     CHECK(memory.held == 0);

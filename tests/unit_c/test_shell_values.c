@@ -128,7 +128,7 @@ static void bad_others(void) {
     CHECK(set_integer(c, VR_steps, 1) == fmi2Error);
     CHECK(set_boolean(c, VR_positive, 1) == fmi2Error);
     CHECK(set_boolean(c, VR_i, 1) == fmi2Error);
-    CHECK_CONTAINS(log.message, "Boolean is expected");
+    CHECK_CONTAINS(log.message, "expected here is type Boolean");
     const fmi2ValueReference both[] = {VR_i, VR_cells};
     CHECK(fmi2SetInteger(c, both, 2, (const int[]){2, 0}) == fmi2Error);
     CHECK(get_integer(c, VR_i) == 0);
@@ -151,7 +151,8 @@ static void bad_others(void) {
     double real;
     fmi2ValueReference vr = VR_label;
     CHECK(fmi2GetReal(c, &vr, 1, &real) == fmi2Error);
-    CHECK_CONTAINS(log.message, "fmi2GetReal: value reference 17 is the String parameter 'label'; a Real is expected");
+    CHECK_CONTAINS(log.message,
+                   "fmi2GetReal: value reference 17 is the String parameter 'label'; expected here is type Real");
     vr = 99;
     CHECK(fmi2GetReal(c, &vr, 1, &real) == fmi2Error);
     CHECK_CONTAINS(log.message, "fmi2GetReal: value reference 99 does not exist");

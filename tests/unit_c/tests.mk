@@ -21,12 +21,13 @@ SOURCES_test_shell_instances := $(TOY)
 SOURCES_test_table           := $(TOY)
 SOURCES_test_location        := $(TOY)
 SOURCES_test_numbers         :=
+SOURCES_test_text            := src/fmi2/text.c
 
 SOURCES_test_lugre := src/friction_fmu/lugre.c
 SOURCES_test_tem   := src/friction_fmu/tem.c
 
 SOURCES_test_modal := src/plant_fmu/modal.c
-SOURCES_test_modes := $(addprefix src/plant_fmu/,axes.c csv.c modes.c) src/fmi2/numbers.c
+SOURCES_test_modes := $(addprefix src/plant_fmu/,axes.c csv.c modes.c) src/fmi2/numbers.c src/fmi2/text.c
 
 SOURCES_test_controller_delay   := $(addprefix src/controller_fmu/,delay.c lag.c)
 SOURCES_test_controller_drive   := $(filter-out %/model.c,$(wildcard src/controller_fmu/*.c))

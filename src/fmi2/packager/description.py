@@ -126,17 +126,16 @@ def _add_units(root: ET.Element, rows: Sequence[Row]) -> None:
 
 
 def _add_types(root: ET.Element, rows: Sequence[Row], variable_names: set[str]) -> None:
-    typed = {unit: names for unit, names in _display_units(rows).items() if unit in TYPES}
+    typed = [unit for unit in _display_units(rows) if unit in TYPES]
     if not typed:
         return
     definitions = ET.SubElement(root, "TypeDefinitions")
-    for unit, display_names in typed.items():
+    for unit in typed:
         name, quantity = TYPES[unit]
         if name in variable_names:
             raise InputError(f"variable {name}: the name is taken by the type of unit {unit}; FMI wants both unique")
-        real = ET.SubElement(ET.SubElement(definitions, "SimpleType", name=name), "Real", quantity=quantity, unit=unit)
-        if display_names:
-            real.set("displayUnit", display_names[0])
+        # No displayUnit: a variable that has none of its own would inherit it.
+        ET.SubElement(ET.SubElement(definitions, "SimpleType", name=name), "Real", quantity=quantity, unit=unit)
 
 
 def _add_variables(root: ET.Element, variables: Iterable[Variable]) -> None:

@@ -20,8 +20,8 @@ typedef struct ToyState {
 
 static bool toy_load(Unit *unit) {
     static const char *const names[] = {"A", "B"};
-    if (strcmp(unit_resource_hash(unit), "ffffffffffffffff") == 0)
-        return unit_fail(unit, "resources of hash %s are refused, 100 %% sure, see #1", unit_resource_hash(unit));
+    if (unit_resources(unit) != NULL && strstr(unit_resources(unit), "refused") != NULL)
+        return unit_fail(unit, "resources in %s are refused, 100 %% sure, see #1", unit_resources(unit));
     if (!unit_set_axes(unit, 2, names))
         return false;
     unit_axis(unit, 1)->load = -0.5; /* per-axis start value, as a machine's data would give it */
@@ -98,7 +98,8 @@ static double toy_output_derivative(Unit *unit, unsigned vr) {
     return vr == VR_x ? ((const Toy *)unit_derived(unit))->gain * state->u_end + unit_scalars(unit)->offset : 0;
 }
 
-static double toy_partial(Unit *unit, unsigned output, unsigned input) {
+static double toy_partial(Unit *unit, unsigned output, unsigned input, bool initial) {
+    (void)initial;
     const Scalars *v = unit_scalars(unit);
     if (output == VR_y)
         return input == VR_u ? v->feed : input == VR_w ? 1 : 0;
@@ -112,5 +113,20 @@ static void toy_release(Unit *unit) {
     unit_free(unit, unit_derived(unit));
 }
 
-const Model MODEL = {"toy",       toy_load,   toy_derive, toy_state_size, toy_start, toy_step, toy_output_derivative,
-                     toy_partial, toy_release};
+/* A saved state after 13 steps is of other data. */
+static bool toy_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size) {
+    (void)size;
+    const ToyState *saved = state;
+    return saved->steps != 13 || unit_fail(unit, "state of label '%s' after 13 steps is refused", scalars->label);
+}
+
+const Model MODEL = {.identifier = "toy",
+                     .load = toy_load,
+                     .derive = toy_derive,
+                     .state_size = toy_state_size,
+                     .accepts = toy_accepts,
+                     .start = toy_start,
+                     .step = toy_step,
+                     .output_derivative = toy_output_derivative,
+                     .partial = toy_partial,
+                     .release = toy_release};

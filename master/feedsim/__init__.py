@@ -13,14 +13,30 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from feedsim.analysis import evaluate  # type: ignore[no-redef]
     from feedsim.cosim import Run, run  # type: ignore[no-redef]
+    from feedsim.errors import FeedsimError, InputError, OutputError, SimulationError
     from feedsim.scenario import load as load_scenario  # type: ignore[no-redef]
     from feedsim.trace import Trace
     from feedsim.trace import read_csv as read_trace
 
-__all__ = ["Run", "Trace", "evaluate", "load_scenario", "read_trace", "run"]
+__all__ = [
+    "FeedsimError",
+    "InputError",
+    "OutputError",
+    "Run",
+    "SimulationError",
+    "Trace",
+    "evaluate",
+    "load_scenario",
+    "read_trace",
+    "run",
+]
 
 # Loaded on first use: `feedsim --help` should not wait for numpy and fmpy.
 _HOMES = {
+    "FeedsimError": ("errors", "FeedsimError"),
+    "InputError": ("errors", "InputError"),
+    "OutputError": ("errors", "OutputError"),
+    "SimulationError": ("errors", "SimulationError"),
     "Run": ("cosim", "Run"),
     "Trace": ("trace", "Trace"),
     "evaluate": ("analysis", "evaluate"),

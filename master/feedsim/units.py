@@ -9,6 +9,7 @@ that looks alike. An angle is a dimension of its own (base unit rad): hertz is o
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
@@ -138,6 +139,14 @@ class Unit:
         return named.get(self.dimension, self.dimension)
 
 
+class UnknownSymbol(InputError):
+    """A unit expression holds a symbol that is none."""
+
+    def __init__(self, symbol: str) -> None:
+        self.symbol = symbol
+        super().__init__(f"unknown unit {symbol!r}{_suggest(symbol)}")
+
+
 def example(text: str) -> str:
     """A quantity that could stand where one in unit `text` is expected."""
     return KINDS[text][1] if text in KINDS else f"1 {text}"
@@ -164,6 +173,9 @@ def parse(text: str, expected: str, example_text: str = "") -> float:
         return finite(number)
     try:
         given = unit(rest)
+    except UnknownSymbol as error:
+        hint = _suggest_for(error.symbol, rest, target)
+        raise InputError(f"{text.strip()!r}: unknown unit {error.symbol!r}{hint}; {wanted}") from None
     except InputError as error:
         raise InputError(f"{text.strip()!r}: {error}; {wanted}") from None
     if given.dimension != target.dimension:
@@ -206,7 +218,7 @@ def unit(text: str) -> Unit:
         raise InputError(f"unit {text!r} holds {bad!r}")
     for symbol in _SYMBOL.findall(plain):
         if symbol not in DEFINITIONS and symbol not in ALIASES:
-            raise InputError(f"unknown unit {symbol!r}{_suggest(symbol)}")
+            raise UnknownSymbol(symbol)
     plain = _SYMBOL.sub(lambda match: ALIASES.get(match[0], match[0]), plain)
     plain = re.sub(r"(?<=[a-zA-Z])([0-9])", r"^\1", plain).replace("**", "^")
     plain = re.sub(r" ?([.*/^()]) ?", r"\1", plain)
@@ -299,6 +311,19 @@ def _suggest(symbol: str) -> str:
     same = [name for name in known if name.lower() == symbol.lower()]
     close = same or get_close_matches(symbol, known, n=1, cutoff=0.6)
     return f"; did you mean {close[0]!r}?" if close else f"; known are {', '.join(DEFINITIONS)}"
+
+
+def _suggest_for(symbol: str, text: str, target: Unit) -> str:
+    """A symbol close to ``symbol`` with which ``text`` has the dimension of ``target``; else all known ones."""
+    known = [*DEFINITIONS, *ALIASES]
+    close = [name for name in known if name.lower() == symbol.lower()]
+    close += get_close_matches(symbol, known, n=10, cutoff=0.5)
+    for name in close:
+        corrected = re.sub(rf"(?<![^\W\d_]){re.escape(symbol)}(?![^\W\d_])", name, text)
+        with suppress(InputError):
+            if unit(corrected).dimension == target.dimension:
+                return f"; did you mean {name!r}?"
+    return f"; known are {', '.join(DEFINITIONS)}"
 
 
 @cache

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from feedsim.analysis import CircleTask, Figure, Turn, circularity, contour, tasks
 from feedsim.errors import InputError
@@ -169,6 +170,24 @@ def test_task_is_the_chosen_or_the_middle_turn_of_the_last_circle(turns: int, ch
     geometry = program.segments[2].geometry
     assert (task.turn.begin, task.turn.end) == geometry.turns[number - 1]  # type: ignore[union-attr]
     assert (task.prefix, task.turn.axes, task.turn.sense) == ("ZY", ("Z", "Y"), -1)
+
+
+def test_circle_can_be_chosen() -> None:
+    small, large = (Circle(plane=("X", "Z"), radius=r, feed=0.1, turns=3) for r in (0.01, 0.02))
+    described = scenario(
+        small, Dwell(duration=0.1), large, evaluate=(CircleTest(), CircleTest(motion=0), CircleTest(motion=2, turn=1))
+    )
+    program = plan(described)
+    found = tasks(described, program)
+    assert [task.prefix for task in found] == ["XZ", "XZ#2", "XZ#3"]
+    assert [task.turn.radius for task in found if isinstance(task, CircleTask)] == [0.02, 0.01, 0.02]
+    assert found[2].turn.begin == program.segments[2].start  # type: ignore[union-attr]
+    with pytest.raises(ValidationError, match=r"motions\.1 \(dwell\) is not of kind circle"):
+        scenario(small, Dwell(duration=0.1), evaluate=(CircleTest(motion=1),))
+    with pytest.raises(ValidationError, match="turn 4 of a circle of 3 turns"):
+        scenario(
+            small, Circle(plane=("X", "Z"), radius=0.01, feed=0.1, turns=9), evaluate=(CircleTest(motion=0, turn=4),)
+        )
 
 
 def test_setpoints_of_a_planned_circle_are_round() -> None:

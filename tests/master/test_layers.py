@@ -10,7 +10,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[2] / "master" / "feedsim"
 # A room may import the rooms below it.
-ORDER = ["cli", "report", "analysis", "cosim", "nc", "scenario", "trace", "units", "errors"]
+ORDER = ["cli", "report", "analysis", "cosim", "structure", "nc", "scenario", "trace", "units", "errors"]
 SOLE_USERS = {
     "fmpy": {"cosim/unit.py"},
     "ctypes": {"cosim/unit.py"},

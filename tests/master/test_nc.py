@@ -1,121 +1,22 @@
-"""NC: profile, spline, planning of moves, circles and arcs, limits. Oracles are closed forms."""
+"""NC: planning of moves, circles and arcs, limits, messages. Oracles are closed forms."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from feedsim.errors import InputError
 from feedsim.nc import Circular, Program, Straight, plan
 from feedsim.nc.profile import rest_to_rest
-from feedsim.nc.spline import RestSpline
-from feedsim.scenario import Arc, Circle, Dwell, Move
-from scenario_helpers import default_machine, scenario
+from feedsim.scenario import Arc, Circle, Dwell, Move, load
+from scenario_helpers import MACHINE, default_machine, scenario
 
 POSE = {"X": 0.8, "Y": 0.327, "Z": 0.1}
 LEAD = 0.020 / (2 * math.pi)
 T_IPO, JERK = 2e-3, 150.0
-
-
-def closed_form_duration(length: float, speed: float, acceleration: float, jerk: float) -> float:
-    """Rest-to-rest time with limited jerk, from the three textbook cases (cruise; acceleration reached; neither)."""
-
-    def ramp(v: float) -> float:
-        return v / acceleration + acceleration / jerk if v * jerk >= acceleration**2 else 2 * math.sqrt(v / jerk)
-
-    if length >= speed * ramp(speed):
-        return length / speed + ramp(speed)
-    half = acceleration**2 / (2 * jerk)
-    v = -half + math.sqrt(half**2 + acceleration * length)
-    if v * jerk >= acceleration**2:
-        return 2 * ramp(v)
-    return 4 * math.sqrt((length**2 * jerk / 4) ** (1 / 3) / jerk)
-
-
-# -- profile ----------------------------------------------------------------------------------------------------------
-
-
-def test_default_z_move_lasts_as_long_as_the_closed_form() -> None:
-    profile = rest_to_rest(0.1, 5.0 / 60, 14.4, JERK)
-    assert profile.duration == pytest.approx(0.1 / (5 / 60) + 2 * math.sqrt(5 / 60 / JERK), rel=1e-14)
-    assert profile.duration == pytest.approx(1.2471, abs=5e-5)
-    assert profile.steady == pytest.approx((2 * math.sqrt(5 / 60 / JERK), 0.1 / (5 / 60)), rel=1e-12)
-
-
-@settings(max_examples=200, derandomize=True, deadline=None)
-@given(
-    length=st.floats(-9, 4), speed=st.floats(-6, 1), acceleration=st.floats(-3, 2.5), jerk=st.floats(-2, 5)
-)  # decimal exponents
-def test_profile_keeps_its_limits_and_is_as_fast_as_the_closed_form(
-    length: float, speed: float, acceleration: float, jerk: float
-) -> None:
-    limits = [10.0**exponent for exponent in (length, speed, acceleration, jerk)]
-    profile = rest_to_rest(*limits)
-    # rounding: lengths and times are scaled twice, 1e-12 is some thousand units of the last place
-    assert profile.duration == pytest.approx(closed_form_duration(*limits), rel=1e-12)
-    t = np.linspace(0, profile.duration, 400)
-    s, v, a = profile.at(t)
-    assert (s[0], s[-1]) == (0.0, pytest.approx(limits[0], rel=1e-13))
-    assert np.all(np.diff(s) >= -1e-13 * limits[0])
-    assert np.abs(v).max() <= limits[1] * (1 + 1e-9)
-    assert np.abs(a).max() <= limits[2] * (1 + 1e-9)
-    assert np.abs(profile.jerk).max() <= limits[3] * (1 + 1e-9)
-    # at the end, an instant rounded to 2e-16 of the duration is worth that much speed
-    assert v[[0, -1]] == pytest.approx(0, abs=1e-9 * profile.peak_speed + 1e-15 * profile.duration * limits[2])
-    # time_at is the inverse of at, where the path moves
-    wanted = limits[0] * np.array([0.0, 0.1, 0.5, 0.9, 1.0])
-    assert profile.at(profile.time_at(wanted))[0] == pytest.approx(wanted, rel=1e-12)
-
-
-def test_profile_without_length_takes_no_time() -> None:
-    profile = rest_to_rest(0.0, 1.0, 1.0, 1.0)
-    assert profile.duration == 0
-    assert profile.steady is None
-    assert profile.at(np.array([0.0, 1.0]))[0].tolist() == [0, 0]
-
-
-@pytest.mark.parametrize(
-    "bad", [(-1.0, 1, 1, 1), (1, 0.0, 1, 1), (1, 1, math.nan, 1), (1, 1, 1, -2.0), (math.inf, 1, 1, 1)]
-)
-def test_profile_refuses_limits_that_make_no_sense(bad: tuple[float, float, float, float]) -> None:
-    with pytest.raises(InputError, match="not allowed; allowed: limits above 0"):
-        rest_to_rest(*bad)
-
-
-# -- spline -----------------------------------------------------------------------------------------------------------
-
-
-def test_spline_is_the_c2_interpolant_at_rest_on_both_sides() -> None:
-    """Against the textbook's tridiagonal system for the slopes, solved densely."""
-    rng = np.random.default_rng(7)
-    points = np.cumsum(rng.normal(size=12))
-    pad = 40
-    y = np.concatenate([np.full(pad, points[0]), points, np.full(pad, points[-1])])
-    n = len(y)
-    matrix, right = np.eye(n), np.zeros(n)
-    for i in range(1, n - 1):
-        matrix[i, i - 1 : i + 2] = (1, 4, 1)
-        right[i] = 3 * (y[i + 1] - y[i - 1])
-    slopes = np.linalg.solve(matrix, right)
-    spline = RestSpline(points, 0.25)
-    x, v = spline(np.arange(12) * 0.25)
-    # the pad of the unit under test is shorter: 0.268**28 = 1e-16 of the slopes, which are about 1
-    assert x == pytest.approx(points, abs=1e-14)
-    assert v * 0.25 == pytest.approx(slopes[pad : pad + 12], abs=1e-13)
-    u = 0.3  # Hermite form between two knots
-    k = pad + 4
-    between = (
-        y[k] * (1 + 2 * u) * (1 - u) ** 2 + slopes[k] * u * (1 - u) ** 2
-        + y[k + 1] * u**2 * (3 - 2 * u) + slopes[k + 1] * u**2 * (u - 1)
-    )  # fmt: skip
-    assert spline(np.array([(4 + u) * 0.25]))[0] == pytest.approx([between], abs=1e-13)
-    outside, speed = spline(np.array([-100.0, 100.0]))
-    assert outside == pytest.approx(points[[0, -1]], abs=1e-15)
-    assert speed == pytest.approx(0, abs=1e-15)
 
 
 # -- moves ------------------------------------------------------------------------------------------------------------
@@ -141,7 +42,7 @@ def test_z_move_is_held_after_its_exact_end() -> None:
     steady = (program.time > 0.11) & (program.time < 1.14)
     assert program.n_ffw["Z"][steady] == pytest.approx(5 / 60 / LEAD, rel=1e-12)
     assert move.geometry == Straight(pytest.approx(0.1), pytest.approx(profile.steady))
-    assert program.until(move) == program.duration
+    assert program.until(move, "Z") == program.duration
 
 
 def test_feedforward_is_the_derivative_of_the_position() -> None:
@@ -183,8 +84,12 @@ def test_next_motion_starts_at_the_next_interpolator_instant_where_the_last_ende
     first, second = program.segments[:2]
     k = round(second.start / 1e-3)
     assert program.x_s["Z"][k] == pytest.approx(first.target["Z"], abs=1e-15)
-    assert program.until(first) == second.start
-    assert program.until(second) == last.start  # the dwell still belongs to the stop
+    assert program.until(first, "Z") == second.start
+    # the dwell still belongs to the stop, and so does the move of another axis
+    assert program.until(second, "Z") == program.duration
+    assert program.until(second, "X") == last.start
+    assert [segment.axes for segment in program.segments] == [("Z",), ("Z",), (), ("X",)]
+    assert [segment.index for segment in program.segments] == [0, 1, 2, 3]
 
 
 def test_move_without_distance_takes_no_time() -> None:
@@ -262,7 +167,7 @@ def test_arc_by_angle_and_arc_that_ends_where_it_begins() -> None:
 def test_arc_whose_end_is_off_the_circle_is_refused() -> None:
     off = Arc(plane=("X", "Z"), centre_by={"X": -0.02, "Z": 0.0}, to={"X": 0.78, "Z": 0.1201}, feed=0.05)
     with pytest.raises(
-        InputError, match=r"motion 1 \(arc\): the end point .* 20\.1 mm .* 20 mm.*allowed difference: 1 um"
+        InputError, match=r"^motions\.0 \(arc\): the end point .* 20\.1 mm .* 20 mm.*allowed difference: 1 um"
     ):
         plan(scenario(off))
     with pytest.raises(InputError, match="centre of the arc lies 0 um from its start"):
@@ -282,9 +187,73 @@ def test_all_violations_are_reported_with_motion_axis_actual_and_allowed() -> No
         plan(scenario(*motions))
     assert len(caught.value.problems) == 3
     travel, speed, acceleration = caught.value.problems
-    assert travel == "motion 1 (move): axis Z reaches 700 mm; allowed travel 0 to 685 mm"
-    assert speed == "motion 2 (move): axis Z reaches a speed of 36 m/min; allowed at most 30 m/min"
-    assert "motion 3 (move): axis X reaches an acceleration of 20 m/s^2; allowed at most 14.4 m/s^2" in acceleration
+    assert travel == "motions.0 (move): axis Z reaches 700 mm; allowed travel 0 to 685 mm"
+    assert speed == "motions.1 (move): axis Z reaches a speed of 36 m/min; allowed at most 30 m/min"
+    assert "motions.2 (move): axis X reaches an acceleration of 20 m/s^2; allowed at most 14.4 m/s^2" in acceleration
+
+
+def test_short_move_is_judged_by_the_speed_that_it_reaches() -> None:
+    """100 mm at 150 m/s3 reach j (L/2j)^(2/3) = 43.3 m/min however much more is programmed; 14.4 m/s2 are not."""
+    with pytest.raises(InputError, match=r"axis Z reaches a speed of 43\.267 m/min; allowed at most 30 m/min"):
+        plan(scenario(Move(by={"Z": 0.1}, feed=1.0)))
+    # a move whose feed is within the limit, and one too short to exceed it, are fine
+    plan(scenario(Move(by={"Z": 0.1}, feed=0.5)))
+    plan(scenario(Move(by={"Z": 0.05}, feed=1.0)))
+    with pytest.raises(InputError, match=r"axis Z reaches a speed of 38\.547"):
+        plan(scenario(Move(by={"X": 0.1, "Z": 0.1}, feed=1.0)))
+
+
+def test_short_arc_is_judged_by_the_speed_that_it_reaches() -> None:
+    """A quarter circle of 157 mm reaches 0.974 m/s in its middle, where both axes have 0.707 of it."""
+    length = 0.1 * math.pi / 2
+    profile = rest_to_rest(length, 1.2, 14.4, JERK)
+    peak = JERK * (length / (2 * JERK)) ** (2 / 3)
+    assert profile.turning_points == pytest.approx([profile.duration / 2])
+    arc = Arc(plane=("X", "Z"), centre_by={"X": -0.1, "Z": 0.0}, angle=math.pi / 2, feed=1.2)
+    with pytest.raises(InputError, match="axis Z reaches a speed of") as caught:
+        plan(scenario(arc))
+    found = float(caught.value.problems[0].partition("speed of ")[2].split()[0]) / 60
+    s, v, _ = profile.at(np.linspace(0, profile.duration, 200_001))
+    assert found == pytest.approx(np.abs(v * np.sin(s / 0.1)).max(), rel=1e-4)
+    assert found > peak * math.sqrt(0.5)
+
+
+def test_after_a_motion_that_is_not_usable_the_others_are_judged_as_far_as_they_can() -> None:
+    off = Arc(plane=("X", "Z"), centre_by={"X": -0.02, "Z": 0.0}, by={"X": -0.02, "Z": 0.03}, feed=0.05)
+    motions = [
+        off,
+        Move(by={"Y": 0.4}, feed=0.1),  # 727 of 655 mm
+        Move(by={"X": 0.2}, feed=0.6),  # too fast wherever it begins; where it ends is not known
+        Move(by={"X": 5.0}, feed=0.1),  # perhaps too far
+        Move(to={"X": 5.0}, feed=0.1),  # neither length nor start are known
+        Move(by={"X": 0.1}, feed=0.1),  # from where the last one should have ended: beyond the travel
+        Arc(plane=("X", "Z"), centre={"X": 0.8, "Z": 0.1}, angle=1.0, feed=0.1),  # Z is not known
+    ]
+    with pytest.raises(InputError) as caught:
+        plan(scenario(*motions))
+    assert [problem.partition(":")[0] for problem in caught.value.problems] == [
+        "motions.0 (arc)", "motions.1 (move)", "motions.2 (move)", "motions.5 (move)",
+    ]  # fmt: skip
+
+
+def test_messages_name_the_line_of_the_motion_and_what_was_set(tmp_path: Path) -> None:
+    file = tmp_path / "s.yaml"
+    lines = [
+        "name: s", f"machine: {MACHINE}", "motions:", "  - {kind: dwell, duration: 1 s}",
+        "  - kind: move", "    by: {Z: 100 mm}", "    feed: 40 m/min", "  - {kind: move, to: {Y: 9 m}, feed: 5 m/min}",
+    ]  # fmt: skip
+    file.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        plan(load(file))
+    assert caught.value.problems == (
+        f"{file}:5: motions.1 (move): axis Z reaches a speed of 40 m/min; allowed at most 30 m/min",
+        f"{file}:8: motions.2 (move): axis Y reaches 9000 mm; allowed travel 0 to 655 mm",
+    )
+    with pytest.raises(InputError) as caught:
+        plan(load(file, ["motions.1.feed=50 m/min", "motions.2={kind: move, by: {X: 9 m}, feed: 5 m/min}"]))
+    first, second = caught.value.problems
+    assert first.startswith(f"{file}:5, --set motions.1.feed=50 m/min: motions.1 (move): axis Z reaches a speed of 43.")
+    assert second.startswith("--set motions.2={kind: move, by: {X: 9 m}, feed: 5 m/min}: motions.2 (move): axis X")
 
 
 def test_speed_counts_per_axis_not_along_the_path() -> None:
@@ -303,7 +272,7 @@ def test_centripetal_acceleration_counts() -> None:
     with pytest.raises(InputError) as caught:
         driven(0.38)
     assert caught.value.problems[0] == (
-        "motion 1 (circle): axis X reaches an acceleration of 14.44 m/s^2; allowed at most 14.4 m/s^2"
+        "motions.0 (circle): axis X reaches an acceleration of 14.44 m/s^2; allowed at most 14.4 m/s^2"
     )
     assert "axis Z" in caught.value.problems[1]
 
@@ -351,7 +320,7 @@ def test_many_motions_follow_one_another() -> None:
 
 
 def test_program_without_end_is_refused() -> None:
-    with pytest.raises(InputError, match=r"motion 2 \(dwell\): the program lasts .* s up to its end.*allowed"):
+    with pytest.raises(InputError, match=r"motions\.1 \(dwell\): the program lasts .* s up to its end.*allowed"):
         plan(scenario(Move(by={"X": 0.1}, feed=0.1), Dwell(duration=1e9)))
 
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from pydantic import ValidationError
 from scipy.optimize import brentq
 
-from feedsim.analysis import Approach, Figure, check, positioning, tasks
+from feedsim.analysis import Approach, Figure, PositioningTask, check, positioning, tasks
 from feedsim.errors import InputError
 from feedsim.nc import plan
-from feedsim.scenario import Circle, Dwell, Move, Positioning, Recording
+from feedsim.scenario import Circle, Dwell, Move, Positioning, Recording, load
 from feedsim.trace import Trace
-from scenario_helpers import scenario
+from scenario_helpers import MACHINE, scenario
 
 START, END, UNTIL = 0.2, 1.2, 3.0
 ORIGIN, TARGET = 0.1, 0.2
@@ -128,13 +132,18 @@ def test_too_little_of_a_trace_is_refused() -> None:
         Approach("Z", START, END, UNTIL, TARGET, TARGET, None)
 
 
-def test_task_is_the_axis_last_move_and_lasts_until_another_motion() -> None:
-    motions = [
-        Move(by={"Z": 0.05}, feed=0.1),
-        Move(by={"Z": 0.05}, feed=5 / 60),
-        Dwell(duration=0.5),
-        Move(by={"X": 0.1}, feed=0.1),
-    ]
+MOTIONS = (
+    Move(by={"Z": 0.05}, feed=0.1),
+    Dwell(duration=0.06),
+    Move(by={"Z": 0.05}, feed=5 / 60),
+    Dwell(duration=0.5),
+    Move(by={"X": 0.1}, feed=0.1),
+    Dwell(duration=0.1),
+)
+
+
+def test_task_is_the_axis_last_move_and_lasts_until_its_next_motion() -> None:
+    motions = MOTIONS
     described = scenario(
         *motions, evaluate=(Positioning(axis="Z", band=2e-6), Positioning(axis="X"), Positioning(axis="Z"))
     )
@@ -143,11 +152,114 @@ def test_task_is_the_axis_last_move_and_lasts_until_another_motion() -> None:
     assert [task.prefix for task in (first, x, again)] == ["Z", "X", "Z#2"]
     assert first.band == 2e-6  # type: ignore[union-attr]
     got: Approach = first.approach  # type: ignore[union-attr]
-    move, dwell, after = program.segments[1:]
-    assert (got.start, got.end, got.until) == (move.start, move.end, after.start)
+    move, dwell = program.segments[2:4]
+    assert (got.start, got.end, got.until) == (move.start, move.end, program.duration)  # the move of X does not end it
     assert (got.origin, got.target) == (pytest.approx(0.15), pytest.approx(0.2))
     assert got.steady == move.geometry.steady  # type: ignore[union-attr]
     assert dwell.start < got.until
+    check(described, program)
+
+
+def test_motion_of_another_axis_is_seen_as_coupling_on_the_axis_at_rest() -> None:
+    """X begins 4 ms after the stop of Z and pulls it 7 um over: that is what one wants to see."""
+    described = scenario(
+        Move(by={"Z": 0.05}, feed=0.1), Move(by={"X": 0.1}, feed=0.1), evaluate=(Positioning(axis="Z"),)
+    )
+    program = plan(described)
+    z, x = program.segments
+    assert x.start - z.end < 0.002
+    t = program.time
+    pulled = 7e-6 * ((t > x.start + 0.2) & (t < x.start + 0.201 + 1e-9))
+    (task,) = tasks(described, program)
+    figures = values(task.figures(Trace(t, {"Z.x_a": program.x_s["Z"] + pulled})))
+    assert figures["overshoot"] == pytest.approx(7.0, abs=0.02)  # the spline overshoots by 12 nm
+    assert figures["settling_time"] > 200
+
+
+def test_motion_can_be_chosen() -> None:
+    stops = (Positioning(axis="Z"), Positioning(axis="Z", motion=0), Positioning(axis="Z", motion=2))
+    described = scenario(*MOTIONS, evaluate=stops)
+    program = plan(described)
+    last, first, same = tasks(described, program)
+    assert [task.prefix for task in (last, first, same)] == ["Z", "Z#2", "Z#3"]
+    assert isinstance(first, PositioningTask)
+    assert first.approach.end == program.segments[0].end
+    assert first.approach.until == program.segments[2].start
+    assert same.approach == last.approach  # type: ignore[union-attr]
+    with pytest.raises(ValidationError, match=r"axis X, which motions\.0 \(move\) does not move"):
+        scenario(*MOTIONS, evaluate=(Positioning(axis="X", motion=0),))
+    with pytest.raises(ValidationError, match=r"6 is no entry of motions \(entries: 0 to 5, counted from 0\)"):
+        scenario(*MOTIONS, evaluate=(Positioning(axis="X", motion=6),))
+    stays = Move(to={"Z": 0.1, "X": 0.9}, feed=0.1)
+    described = scenario(stays, Dwell(duration=1), evaluate=(Positioning(axis="Z", motion=0),))
+    with pytest.raises(InputError, match=r"evaluate\.0: positioning of axis Z: motions\.0 does not take it to another"):
+        check(described, plan(described))
+
+
+@pytest.mark.parametrize(
+    ("motions", "then"),
+    [
+        ([Move(by={"Z": 0.05}, feed=0.1)], "the end of the program"),
+        ([Move(by={"Z": 0.05}, feed=0.1), Dwell(duration=0.04)], "the end of the program"),
+        (
+            [Move(by={"Z": 0.05}, feed=0.1), Circle(plane=("X", "Z"), radius=0.01, feed=0.1), Dwell(duration=1)],
+            r"the next motion of Z, motions\.1",
+        ),
+    ],
+)
+def test_rest_too_short_to_evaluate_is_refused_before_the_run(motions: list[Any], then: str) -> None:
+    described = scenario(*motions, evaluate=(Positioning(axis="Z"),))
+    wanted = (
+        rf"^evaluate\.0: positioning of Z: only [0-9.]+ ms between the end of motions\.0 and {then}; at least 50 ms"
+    )
+    with pytest.raises(InputError, match=wanted):
+        check(described, plan(described))
+    enough = (motions[0], Dwell(duration=0.05), *motions[1:])
+    described = scenario(*enough, evaluate=(Positioning(axis="Z"),))
+    check(described, plan(described))
+
+
+def test_figures_of_a_rest_too_short_are_nan() -> None:
+    """Cut 30 ms after the end: the first crest, 11.6 ms behind it, is there by luck."""
+    for part, made in ((stop().between(0.0, END + 0.03), approach()), (stop(), replace(approach(), until=END + 0.03))):
+        found = values(positioning(part, made))
+        assert all(math.isnan(found[name]) for name in ("overshoot", "settling_time", "ringing_frequency"))
+        assert found["duration"] == pytest.approx(1.0)
+        assert found["peak_torque"] == 20.0
+
+
+def test_passing_through_the_band_is_not_settling() -> None:
+    """Cut while the swing passes through the band for the third time: it leaves it again."""
+    crossing = 3 * math.pi / OMEGA
+    part = stop().between(0.0, END + crossing)
+    assert abs(part["Z.x_a"][-1] - TARGET) < 1e-6
+    found = values(positioning(part, approach()))
+    assert math.isnan(found["settling_time"])
+    assert found["overshoot"] > 3  # 72 ms are enough for that
+    settled = values(positioning(stop(), approach()))["settling_time"]
+    whole = stop().between(0.0, END + settled / 1e3 + 0.051)
+    assert values(positioning(whole, approach()))["settling_time"] == settled
+
+
+def test_every_evaluation_that_is_not_possible_is_named_with_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "s.yaml"
+    lines = [
+        "name: s", f"machine: {MACHINE}", "motions:", "  - {kind: circle, plane: [X, Z], radius: 9 mm, feed: 1 m/min}",
+        "  - {kind: move, by: {Z: 1 mm}, feed: 1 m/min}", "evaluate:", "  - {kind: positioning, axis: X}",
+        "  - {kind: circle}", "  - {kind: positioning, axis: Z, motion: 0}",
+    ]  # fmt: skip
+    file.write_text("\n".join(lines), encoding="utf-8")
+    described = load(file)
+    with pytest.raises(InputError) as caught:
+        check(described, plan(described))
+    first, second = caught.value.problems
+    assert first == f"{file}:7: evaluate.0: positioning of axis X: no motion takes it to another position"
+    assert second.startswith(f"{file}:9: evaluate.2: positioning of axis Z: motions.0 does not take it")
+    described = load(file, ["evaluate=[{kind: positioning, axis: Z}]"])
+    with pytest.raises(
+        InputError, match=r"^--set evaluate=\[.*\]: evaluate\.0: positioning of Z: only 0?\.?[0-9.]+ ms"
+    ):
+        check(described, plan(described))
 
 
 def test_what_cannot_be_evaluated_is_said_before_the_simulation() -> None:
@@ -157,6 +269,7 @@ def test_what_cannot_be_evaluated_is_said_before_the_simulation() -> None:
         check(described, plan(described))
     described = scenario(
         Move(by={"Z": 0.1}, feed=0.1),
+        Dwell(duration=0.1),
         evaluate=(Positioning(axis="Z"),),
         recording=Recording(interval=125e-6, variables=("*.M_a", "X.*")),
     )

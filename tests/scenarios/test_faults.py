@@ -44,6 +44,8 @@ def refused(tmp_path: Path) -> Refused:
         ("move, by: {Z: 1 mm}", ".feed: missing; a speed, for example feed: 5000 mm/min"),
         ("move, by: {Z: 1}, feed: 5 m/s", ".by.Z: 1 has no unit; a length is expected, for example 100 mm"),
         ("move, by: {Q: 1 mm}, feed: 5 m/s", ".by.Q: the machine has no axis 'Q'; it has X, Y, Z"),
+        ("move, by: {z: 1 mm}, feed: 5 m/s", ".by.z: the machine has no axis 'z'; did you mean 'Z'?"),
+        ("move, by: {Z: 1 mm}, feed: 5 mm/mn", ".feed: '5 mm/mn': unknown unit 'mn'; did you mean 'min'?; a speed"),
         ("move, by: 1 mm, feed: 5 m/s", ".by: '1 mm'; a group of keys is expected"),
         ("move, feed: 5 m/s", ": a move needs 'by' (distances) or 'to' (positions)"),
         ("move, by: {Z: 1 mm}, to: {Z: 1 mm}, feed: 5 m/s", ": axis Z stands in 'by' and in 'to'"),
@@ -110,6 +112,22 @@ def test_motions(refused: Refused, motion: str, message: str) -> None:
             [MOVE, "evaluate: [{kind: circle}]"],
             "s.yaml:4: evaluate.0: a circle is to be evaluated, but no motion is of kind",
         ),
+        (
+            [MOVE, "evaluate: [{kind: positioning, axis: Z, motion: 1}]"],
+            "s.yaml:4: evaluate.0.motion: 1 is no entry of motions (entries: 0 only, counted from 0)",
+        ),
+        (
+            [MOVE, "evaluate: [{kind: positioning, axis: X, motion: 0}]"],
+            "s.yaml:4: evaluate.0: positioning of axis X, which motions.0 (move) does not move",
+        ),
+        (
+            [MOVE, "evaluate: [{kind: circle, motion: 0}]"],
+            "s.yaml:4: evaluate.0: a circle is to be evaluated, but motions.0 (move) is not of kind circle",
+        ),
+        (
+            [MOVE, "evaluate: [{kind: circle, motion: -1}]"],
+            "s.yaml:4: evaluate.0.motion: -1 is outside the allowed range: at least 0",
+        ),
         ([MOVE, "notes: x"], "s.yaml:4: notes: unknown key; did you mean 'note'?"),
         ([MOVE, "sets: x"], "s.yaml:4: sets: unknown key; did you mean 'set'?"),
         ([MOVE, "name: t"], "s.yaml:4: duplicate key 'name' (first in line 1)"),
@@ -123,7 +141,7 @@ def test_scenario(refused: Refused, lines: list[str], message: str) -> None:
 def test_turn_beyond_the_circle(refused: Refused) -> None:
     motions = "motions: [{kind: circle, plane: [X, Z], radius: 15 mm, feed: 1 m/min, turns: 3}]"
     message = refused(motions, "evaluate: [{kind: circle, turn: 4}]")
-    assert "s.yaml:4: evaluate.0.turn: turn 4 of a circle of 3 turn(s)" in message
+    assert "s.yaml:4: evaluate.0.turn: turn 4 of a circle of 3 turns" in message
 
 
 @pytest.mark.parametrize(
@@ -188,9 +206,9 @@ def test_machine_file_and_line_are_named(tmp_path: Path, refused: Refused, old: 
         (
             "travel: [0 mm, 1770 mm]",
             "travel: [0 mm, 700 mm]",
-            "axes: the pose of X, 0.8 m, is outside its travel, 0 to 0.7 m",
+            "m.yaml:13: machine.pose.X: the pose of X, 0.8 m, is outside its travel, 0 to 0.7 m",
         ),
-        ("pose: {X: 800 mm, ", "pose: {", "axes: the pose lacks the position of axis X"),
+        ("pose: {X: 800 mm, ", "pose: {", "m.yaml:13: machine.pose: the pose lacks the position of axis X"),
         ("pose: {", "pose: {A: 0 m, ", "machine.pose.A: the machine has no axis 'A'; it has X, Y, Z"),
         ("modes.csv\n", "none.csv\n", "machine.modes: no such file: "),
     ],

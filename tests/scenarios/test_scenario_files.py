@@ -176,13 +176,22 @@ def test_the_default_machines_z_axis_is_what_the_units_start_with() -> None:
                 assert float(given[name]) == pytest.approx(float(row["start"]), rel=3e-16, abs=0), name
 
 
+@pytest.mark.parametrize(("override", "interval"), [((), 1e-3), (("machine.cycles.position=0.5 ms",), 0.5e-3)])
+def test_recording_interval_defaults_to_the_position_cycle(
+    tmp_path: Path, override: tuple[str, ...], interval: float
+) -> None:
+    path = tmp_path / "s.yaml"
+    path.write_text(f"name: s\nmachine: {MACHINE}\nmotions: [{{kind: dwell, duration: 1 s}}]\n", encoding="utf-8")
+    assert load(path, list(override)).recording.interval == interval
+
+
 # --- models built in Python -----------------------------------------------------------------------------------------
 
 
 def test_numbers_are_si_in_python() -> None:
     machine = load_machine(MACHINE)
     scenario = Scenario.model_validate({"name": "s", "machine": machine, "motions": [Move(by={"Z": 0.1}, feed=0.08)]})
-    assert scenario.recording.interval == machine.cycles.T_c
+    assert scenario.recording.interval == machine.cycles.T_pos
     with_units = Move.model_validate({"kind": "move", "by": {"Z": "100 mm"}, "feed": "5 m/min"})
     assert with_units == Move(by={"Z": 0.1}, feed=5 / 60)
     with pytest.raises(ValidationError, match="the machine has no axis 'Q'"):

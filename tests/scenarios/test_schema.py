@@ -78,6 +78,8 @@ def changed(key: str, value: Any) -> dict[str, Any]:
         ("coupling", {"substeps": 0}),
         ("coupling", "scheme"),
         ("evaluate", [{"kind": "positioning"}]),
+        ("evaluate", [{"kind": "positioning", "axis": "Z", "motion": -1}]),
+        ("evaluate", [{"kind": "circle", "motion": "last"}]),
         ("motions", []),
         ("extra", 1),
         ("set", [1]),
@@ -100,6 +102,7 @@ def test_usual_mistakes_are_refused(key: str, value: Any) -> None:
         ("set", {"machine.axes.Z.friction.W": "0 rad"}),
         ("motions.0.acceleration", "2 m/s²"),
         ("motions.0.jerk", None),
+        ("evaluate", [{"kind": "positioning", "axis": "Z", "motion": 0}, {"kind": "circle", "motion": 3}]),
     ],
 )
 def test_other_spellings_are_accepted(key: str, value: Any) -> None:

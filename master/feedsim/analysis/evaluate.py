@@ -8,9 +8,10 @@ from typing import Protocol
 
 from feedsim.analysis.circularity import Turn, axis_letters, circularity
 from feedsim.analysis.figures import Figure
-from feedsim.analysis.positioning import Approach, positioning
+from feedsim.analysis.fitted import recorded_circle
+from feedsim.analysis.positioning import LEAST_REST, Approach, positioning
 from feedsim.errors import InputError
-from feedsim.nc import Circular, Program, Straight
+from feedsim.nc import Circular, Program, Recorded, Segment, Straight
 from feedsim.scenario import CircleTest, Positioning, Scenario
 from feedsim.trace import Trace
 
@@ -28,11 +29,12 @@ class Result(Protocol):
 
 @dataclass(frozen=True)
 class PositioningTask:
-    """A stop to evaluate; ``band`` [m], ``prefix`` of its figures."""
+    """A stop to evaluate; ``band`` [m], ``prefix`` of its figures, the ``segment`` that it ends."""
 
     prefix: str
     approach: Approach
     band: float
+    segment: Segment
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -65,26 +67,43 @@ Task = PositioningTask | CircleTask
 
 
 def tasks(scenario: Scenario, program: Program) -> tuple[Task, ...]:
-    """One task per entry of ``scenario.evaluate``. Raises InputError where the program has nothing to evaluate."""
+    """One task per entry of ``scenario.evaluate``.
+
+    Raises InputError that lists every entry for which the program has nothing to evaluate.
+    """
     found: list[Task] = []
-    for item in scenario.evaluate:
-        task = _stop(item, program) if isinstance(item, Positioning) else _turn(item, program)
+    problems: list[str] = []
+    for i, item in enumerate(scenario.evaluate):
+        try:
+            task = _stop(item, program) if isinstance(item, Positioning) else _turn(item, program)
+        except InputError as error:
+            problems += [f"{scenario.at('evaluate', i)}: {problem}" for problem in error.problems]
+            continue
         same = sum(other.prefix.partition("#")[0] == task.prefix for other in found)
         if same:  # the same axis or plane once more: X, X#2, X#3
             task = _renamed(task, f"{task.prefix}#{same + 1}")
         found.append(task)
+    if problems:
+        raise InputError.of(f"{scenario.file}: the evaluation is not possible", problems)
     return tuple(found)
 
 
 def check(scenario: Scenario, program: Program) -> None:
-    """Raise InputError where ``evaluate`` would after the simulation: nothing to evaluate, or too little recorded."""
+    """Raise InputError where the figures asked for could not be had from the simulation.
+
+    Nothing to evaluate, too little recorded, or too short a rest behind the motion to be positioned.
+    """
     patterns = scenario.recording.variables
-    problems = [
-        f"{scenario.file}: evaluation of {task.prefix} needs {name}, which recording.variables leaves out"
-        for task in tasks(scenario, program)
-        for name in task.needs
-        if patterns is not None and not any(fnmatchcase(name, pattern) for pattern in patterns)
-    ]
+    problems = []
+    for i, task in enumerate(tasks(scenario, program)):
+        found = [
+            f"evaluation of {task.prefix} needs {name}, which recording.variables leaves out"
+            for name in task.needs
+            if patterns is not None and not any(fnmatchcase(name, pattern) for pattern in patterns)
+        ]
+        if isinstance(task, PositioningTask):
+            found += _short_rest(task, program)
+        problems += [f"{scenario.at('evaluate', i)}: {problem}" for problem in found]
     if problems:
         raise InputError.of(f"{scenario.file}: the evaluation is not possible", problems)
 
@@ -99,33 +118,65 @@ def evaluate(result: Result) -> dict[str, Figure]:
 
 
 def _stop(item: Positioning, program: Program) -> PositioningTask:
-    moved = [s for s in program.segments if s.origin[item.axis] != s.target[item.axis]]
+    moved = [s for s in _chosen(program, item.motion) if s.origin[item.axis] != s.target[item.axis]]
     if not moved:
-        raise InputError(f"positioning of axis {item.axis}: no motion takes it to another position")
+        what = "no motion takes it" if item.motion is None else f"motions.{item.motion} does not take it"
+        raise InputError(f"positioning of axis {item.axis}: {what} to another position")
     segment = moved[-1]
     approach = Approach(
         axis=item.axis,
         start=segment.start,
         end=segment.end,
-        until=program.until(segment),
+        until=program.until(segment, item.axis),
         origin=segment.origin[item.axis],
         target=segment.target[item.axis],
         steady=segment.geometry.steady if isinstance(segment.geometry, Straight) else None,
     )
-    return PositioningTask(item.axis, approach, item.band)
+    return PositioningTask(item.axis, approach, item.band, segment)
+
+
+def _short_rest(task: PositioningTask, program: Program) -> list[str]:
+    """What is wrong where another motion of the axis, or the end of the program, follows too soon."""
+    axis, rest = task.approach.axis, task.approach.until - task.approach.end
+    own = f"motions.{task.segment.index}"
+    if rest >= LEAST_REST:
+        return []
+    following = program.following(task.segment, axis)
+    then = f"the next motion of {axis}, motions.{following.index}" if following else "the end of the program"
+    return [
+        f"positioning of {axis}: only {max(rest, 0.0) * 1e3:.2g} ms between the end of {own} and {then}; "
+        f"at least {LEAST_REST * 1e3:g} ms are needed: add a dwell"
+    ]
+
+
+def _chosen(program: Program, motion: int | None) -> tuple[Segment, ...]:
+    return program.segments if motion is None else program.segments[motion : motion + 1]
 
 
 def _turn(item: CircleTest, program: Program) -> CircleTask:
-    circles = [s.geometry for s in program.segments if s.kind == "circle" and isinstance(s.geometry, Circular)]
-    if not circles:
-        raise InputError("circularity: the program has no circle")
-    circle = circles[-1]
+    circle = _circle(item, _chosen(program, item.motion), program)
     number = item.turn or len(circle.turns) // 2 + 1
-    if number > len(circle.turns):
-        raise InputError(f"circularity: turn {number} of a circle of {len(circle.turns)} turns")
+    turns = len(circle.turns)
+    if number > turns:
+        raise InputError(f"circularity: turn {number} of a circle of {turns} turn{'s'[: turns != 1]}")
     begin, end = circle.turns[number - 1]
     turn = Turn(circle.axes, circle.centre, circle.radius, circle.sense, begin, end)
     return CircleTask(axis_letters(circle.axes), turn)
+
+
+def _circle(item: CircleTest, chosen: tuple[Segment, ...], program: Program) -> Circular:
+    """The last circle of the chosen segments, or else their last recorded setpoints taken as one."""
+    circles = [s.geometry for s in chosen if s.kind == "circle" and isinstance(s.geometry, Circular)]
+    if circles:
+        return circles[-1]
+    recorded = [s for s in chosen if isinstance(s.geometry, Recorded)]
+    if not recorded:
+        what = "the program has no circle" if item.motion is None else f"motions.{item.motion} is no circle"
+        raise InputError(f"circularity: {what}")
+    plane = item.plane or recorded[-1].geometry.axes  # type: ignore[union-attr]
+    if len(plane) != 2:
+        raise InputError(f"circularity: recorded setpoints of {', '.join(plane)}: say which two with plane: [X, Z]")
+    return recorded_circle(program, recorded[-1], (plane[0], plane[1]), item.centre, item.radius)
 
 
 def _renamed(task: Task, prefix: str) -> Task:

@@ -16,6 +16,9 @@ from feedsim.trace import Trace
 
 RINGING_WINDOW = (0.030, 0.400)  # s after the end of the NC motion: the first swing is left out, it is a forced one
 REST_DELAY = 1.0  # s after the end of the NC motion
+# An axis' ringing is 20 Hz and more (the default Z axis' 21 Hz): over one period of it the first swing, which makes the
+# overshoot, is seen whole, and an axis that stays within its band so long does not just pass through it.
+LEAST_REST = 0.050  # s
 PLATEAU = (0.4, 0.9)  # share of the constant-speed phase: its begin still rings from the acceleration
 
 
@@ -23,8 +26,9 @@ PLATEAU = (0.4, 0.9)  # share of the constant-speed phase: its begin still rings
 class Approach:
     """One axis of one programmed motion.
 
-    axis: name; start, end: of the NC motion [s]; until: last instant that belongs to it [s] (the next motion's start
-    or the end of the program); origin, target: programmed positions [m]; steady: constant-speed phase [s] or None.
+    axis: name; start, end: of the NC motion [s]; until: last instant that belongs to it [s] (the start of the axis'
+    next motion, or the end of the program); origin, target: programmed positions [m]; steady: constant-speed phase [s]
+    or None.
     """
 
     axis: str
@@ -48,8 +52,9 @@ class Approach:
 def positioning(trace: Trace, approach: Approach, *, band: float = 1e-6) -> dict[str, Figure]:
     """Figures of ``approach``: overshoot, settling time to ``band`` [m], ringing, torques; by scale and by tool point.
 
-    Torque and tool-point figures are present where M_a, M_fr and tcp.x_<axis> are recorded. Raises InputError where
-    the axis' position is not recorded, or not up to the end of the motion.
+    Overshoot, settling and ringing are NaN where less than LEAST_REST of the rest behind the motion is recorded. Torque
+    and tool-point figures are present where M_a, M_fr and tcp.x_<axis> are recorded. Raises InputError where the axis'
+    position is not recorded, or not up to the end of the motion.
     """
     axis = approach.axis
     figures = {
@@ -85,6 +90,12 @@ def ringing_frequency(time: Array, speed: Array) -> float:
     return (len(crossings) - 1) / float(crossings[-1] - crossings[0]) if len(crossings) > 1 else math.nan
 
 
+def _rest_is_seen(time: Array, approach: Approach, since: float) -> bool:
+    """Whether the rest behind the motion is recorded, at ``time`` (N,) [s], for LEAST_REST after ``since`` [s]."""
+    interval = float(np.median(np.diff(time))) if len(time) > 1 else 0.0  # the end may lie between two samples
+    return min(approach.until, float(time[-1]) + interval) - since >= LEAST_REST
+
+
 def _rows(trace: Trace, approach: Approach) -> slice:
     """The motion and what follows it, as far as it is recorded."""
     until = max(approach.end, min(approach.until, float(trace.time[-1]))) if len(trace) else approach.until
@@ -99,12 +110,17 @@ def _stop(trace: Trace, approach: Approach, name: str, band: float, what: str) -
             f"positioning of axis {approach.axis}: nothing is recorded after the end of the motion at "
             f"{approach.end:.6g} s"
         )
-    settled = last_outside(time[after], beyond[after], band) - approach.end
+    seen = _rest_is_seen(time, approach, approach.end)
+    settled = max(last_outside(time[after], beyond[after], band), approach.end)
     width = f"{band * 1e6:g} um"
     return {
-        "overshoot": Figure(max(float(beyond.max()), 0.0) * 1e6, "um", f"largest distance beyond the target, {what}"),
+        "overshoot": Figure(
+            max(float(beyond.max()), 0.0) * 1e6 if seen else math.nan,
+            "um",
+            f"largest distance beyond the target, {what}",
+        ),
         "settling_time": Figure(
-            max(settled, 0.0) * 1e3 if not math.isnan(settled) else math.nan,
+            (settled - approach.end) * 1e3 if _rest_is_seen(time, approach, settled) else math.nan,
             "ms",
             f"last instant outside +-{width} about the target, counted from the end of the NC motion, {what}",
         ),
@@ -117,8 +133,9 @@ def _stop(trace: Trace, approach: Approach, name: str, band: float, what: str) -
 def _ringing(time: Array, speed: Array, approach: Approach, what: str) -> Figure:
     begin, end = (approach.end + delay for delay in RINGING_WINDOW)
     inside = (time >= begin) & (time <= min(end, approach.until))
+    seen = _rest_is_seen(time, approach, approach.end)
     return Figure(
-        ringing_frequency(time[inside], speed[inside]),
+        ringing_frequency(time[inside], speed[inside]) if seen else math.nan,
         "Hz",
         f"{what}: mean frequency of its up-crossings of zero, 30 to 400 ms after the end of the NC motion",
     )

@@ -1,12 +1,13 @@
 """Command line: ``feedsim COMMAND``. Commands, messages, progress, exit codes; all else is in the rooms below.
 
 Exit codes: 0 done; 1 an error of feedsim itself (please report it); 2 bad input or usage; 3 a unit failed during the
-simulation; 4 the results could not be written; 130 interrupted.
+simulation; 4 the results could not be written; 130 interrupted (143 and 129: by SIGTERM and SIGHUP).
 """
 
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -37,7 +38,10 @@ def parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="run a scenario; write result.csv, summary.json, report.html and figures")
     _add_scenario(run)
     run.add_argument(
-        "--out", type=Path, metavar="DIR", help="where the results go (default: results/<name of the scenario file>)"
+        "--out",
+        type=_directory,
+        metavar="DIR",
+        help="where the results go (default: results/<name of the scenario file>)",
     )
     run.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
 
@@ -95,8 +99,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from feedsim.cli import commands
     from feedsim.errors import FeedsimError
 
+    _end_cleanly_on_signals()
     try:
         getattr(commands, options.command)(options)
+        sys.stdout.flush()
     except FeedsimError as error:
         print(f"feedsim: {error}", file=sys.stderr)
         return error.exit_code
@@ -104,8 +110,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("feedsim: interrupted; nothing was written", file=sys.stderr)
         return 130
     except BrokenPipeError:
+        sys.stdout = None  # who read the output has gone; Python would flush into the closed pipe once more
         return 0
+    except OSError as error:
+        print(f"feedsim: {error.filename or 'standard output'}: {error.strerror}", file=sys.stderr)
+        sys.stdout = None
+        return 4
     return 0
+
+
+def _end_cleanly_on_signals() -> None:
+    """Let the signals that end a job unwind the stack, so that instances are freed and temporary folders removed."""
+
+    def leave(number: int, frame: object) -> None:
+        raise SystemExit(128 + number)
+
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):  # Windows has no SIGHUP
+            signal.signal(getattr(signal, name), leave)
+
+
+def _directory(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("a directory is needed, not an empty text; '.' is the working directory")
+    return Path(text)
 
 
 def entry() -> None:

@@ -20,17 +20,18 @@ class Scheme:
     name: str
     torque_ramp: bool  # plant: M_a runs linearly from M_a(t_k) to M_a(t_k+1); else M_a(t_k) is held
     friction_ramp: bool  # plant: M_fr is extrapolated with the slope of its last step; else held
+    stable_share: float  # of 2 J_inf/h that the friction's slope sigma_1 + sigma_2 may reach; found by trial on Z
     speed: str  # friction: n_fr linear "within" the step, held at its "end" or its "start", or "extrapolated"
 
 
 SCHEMES = {
     scheme.name: scheme
     for scheme in (
-        Scheme("extrapolated", torque_ramp=True, friction_ramp=True, speed="within"),
-        Scheme("gauss_seidel", torque_ramp=True, friction_ramp=False, speed="end"),
-        Scheme("jacobi", torque_ramp=True, friction_ramp=False, speed="start"),
-        Scheme("jacobi_extrapolated", torque_ramp=True, friction_ramp=True, speed="extrapolated"),
-        Scheme("parallel", torque_ramp=False, friction_ramp=False, speed="start"),
+        Scheme("extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.28, speed="within"),
+        Scheme("gauss_seidel", torque_ramp=True, friction_ramp=False, stable_share=0.5, speed="end"),
+        Scheme("jacobi", torque_ramp=True, friction_ramp=False, stable_share=0.28, speed="start"),
+        Scheme("jacobi_extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.11, speed="extrapolated"),
+        Scheme("parallel", torque_ramp=False, friction_ramp=False, stable_share=0.11, speed="start"),
     )
 }
 

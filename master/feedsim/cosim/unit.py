@@ -8,7 +8,7 @@ addresses go straight into the FMI calls: wiring two units is sharing memory, an
 from __future__ import annotations
 
 import ctypes
-import shutil
+import re
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -39,7 +39,9 @@ class Archive:
         if not path.is_file():
             raise InputError(f"{path}: no such file; `make fmus` builds the archives, FEEDSIM_FMUS names their folder")
         self.path = path
-        self.directory = Path(tempfile.mkdtemp(prefix="feedsim-"))
+        # An object that removes its folder even when a signal ends the program while the archive is being unpacked.
+        self._folder = tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True)
+        self.directory = Path(self._folder.name)
         try:
             extract(str(path), unzipdir=str(self.directory))
             self.description = read_model_description(str(self.directory))
@@ -60,7 +62,7 @@ class Archive:
         return str(self.description.version)
 
     def close(self) -> None:
-        shutil.rmtree(self.directory, ignore_errors=True)
+        self._folder.cleanup()
 
     def __enter__(self) -> Self:
         return self
@@ -95,7 +97,8 @@ class Unit:
         callbacks.allocateMemory = defaultCallbacks.allocateMemory
         callbacks.freeMemory = defaultCallbacks.freeMemory
         try:
-            self._fmu.instantiate(callbacks=callbacks)
+            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
+            self._fmu.setDebugLogging(True, ["logStatusWarning", "logStatusError"])
         except Exception as error:
             self._fmu.freeLibrary()
             raise InputError(f"unit {name}: cannot be instantiated: {self._said() or error}") from error
@@ -110,6 +113,7 @@ class Unit:
 
     def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
         text = message.decode("utf-8", errors="replace").replace("%%", "%").replace("##", "#")
+        text = re.sub(r"^fmi2[A-Za-z]+: ", "", text)  # which call it was says nothing to the master's user
         if status == WARNING:
             self.warnings.append(f"{self.name}: {text}")
         elif status > WARNING:
@@ -175,8 +179,7 @@ class Unit:
         try:
             self._fmu.getReal([reals[0].valueReference])
         except Exception:
-            said = self._said().removeprefix("fmi2GetReal: ") or "no message"
-            raise InputError(f"unit {self.name} refuses its parameters: {said}") from None
+            raise InputError(f"unit {self.name} refuses its parameters: {self._said() or 'no message'}") from None
 
     def step(self, t: float, h: float) -> None:
         """Advance from t to t + h [s]."""

@@ -29,6 +29,11 @@ class Line:
     direction: Mapping[str, float]
     length: float
 
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Axes that the path moves."""
+        return tuple(axis for axis, share in self.direction.items() if share != 0)
+
     def position(self, s: Array) -> dict[str, Array]:
         """Axis positions [m] at path lengths ``s`` (N,) [m]."""
         return {axis: self.origin[axis] + share * s for axis, share in self.direction.items()}
@@ -55,6 +60,11 @@ class CircularPath:
     sense: int
 
     @property
+    def moving(self) -> tuple[str, ...]:
+        """Axes that the path moves."""
+        return self.axes
+
+    @property
     def length(self) -> float:
         """Length of the path [m]."""
         return self.radius * self.sweep
@@ -72,13 +82,15 @@ class CircularPath:
         }
 
     def peaks(self, profile: Profile, step: float) -> dict[str, tuple[float, float, float, float]]:
-        """As for a line. The path is looked at every ``step`` [s], at 33 instants of every phase of the profile, and
-        where an axis is at an extreme of its motion.
+        """As for a line. The path is looked at every ``step`` [s], at 33 instants of every phase of the profile, where
+        the path speed is at an extreme, and where an axis is at an extreme of its motion.
 
         Acceleration is the axis' share of tangential acceleration and centripetal acceleration v^2/R together.
         """
         within_phases = np.linspace(profile.times[:-1], profile.times[1:], POINTS_PER_PHASE).ravel()
-        t = np.concatenate([np.arange(0.0, profile.duration, step), within_phases, self._crossings(profile)])
+        t = np.concatenate(
+            [np.arange(0.0, profile.duration, step), within_phases, profile.turning_points, self._crossings(profile)]
+        )
         s, v, a = profile.at(t)
         phi = self.angle(s)
         tangent = (-self.sense * np.sin(phi), self.sense * np.cos(phi))

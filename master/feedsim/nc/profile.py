@@ -56,11 +56,22 @@ class Profile:
     @property
     def peak_speed(self) -> float:
         """Largest path speed [m/s]; the programmed one unless the path is too short to reach it."""
-        return float(self.velocity.max())
+        within = self.at(self.turning_points)[1]
+        return float(max(self.velocity.max(), within.max(initial=0.0)))
+
+    @property
+    def turning_points(self) -> Array:
+        """Instants [s] inside phases at which the acceleration passes through zero: the speed is at an extreme there.
+
+        A short path is one phase from largest acceleration to largest deceleration; no boundary marks its peak speed.
+        """
+        before, after = self.acceleration[:-1], self.acceleration[1:]
+        within = np.flatnonzero((before * after < 0) & (self.jerk != 0))
+        return np.asarray(self.times[within] - before[within] / self.jerk[within], dtype=np.float64)
 
     @property
     def peak_acceleration(self) -> float:
-        """Largest path acceleration [m/s2]; reached at a phase boundary."""
+        """Largest path acceleration [m/s2]; reached at a phase boundary, since it is linear between two of them."""
         return float(np.abs(self.acceleration).max())
 
     @property

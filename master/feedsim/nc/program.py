@@ -22,7 +22,7 @@ from feedsim.nc.profile import Profile, rest_to_rest
 from feedsim.nc.recorded import recorded, recording_violations
 from feedsim.nc.segment import Circular, Program, Recorded, Segment, Straight, whole_cycles
 from feedsim.nc.spline import RestSpline
-from feedsim.scenario import Arc, Circle, Dwell, MeasuredSetpoints, Motion, Move, Scenario
+from feedsim.scenario import Arc, Circle, Dwell, MeasuredSetpoints, Motion, Move, Scenario, moved_axes
 
 Array = NDArray[np.float64]
 
@@ -49,10 +49,14 @@ class _Inset:
 
 @dataclass
 class _Plan:
-    """The program so far: where the axes are, at which instant of the T_ipo grid, and what is wrong with it."""
+    """The program so far: where the axes are, at which instant of the T_ipo grid, and what is wrong with it.
+
+    lost: axes of which it is not known where they are, since a motion that is not usable was to take them there.
+    """
 
     position: dict[str, float]
     instant: int = 0
+    lost: set[str] = field(default_factory=set)
     pieces: list[_Stretch | _Inset] = field(default_factory=list)
     segments: list[Segment] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
@@ -62,33 +66,59 @@ def plan(scenario: Scenario) -> Program:
     """Setpoints of all motions of ``scenario``; axes without a motion are held.
 
     Raises InputError that lists every motion and axis whose travel, speed or acceleration limit is exceeded, with
-    actual and allowed values, and every motion whose geometry or recording is not usable.
+    actual and allowed values, and every motion whose geometry or recording is not usable. After one that is not usable,
+    the others are judged as far as they do not depend on where it would have ended.
     """
     machine = scenario.machine
     state = _Plan({axis: float(machine.pose[axis]) for axis in machine.axes})
     state.pieces.append(_stretch(state))
-    for index, motion in enumerate(scenario.motions, start=1):
+    for index, motion in enumerate(scenario.motions):
+        found: list[str] = []
         try:
-            if isinstance(motion, MeasuredSetpoints):
-                _append_recording(state, scenario, index, motion)
+            if _depends_on(motion, state.lost):
+                _leave_out(state, motion)
+            elif isinstance(motion, MeasuredSetpoints):
+                found = _append_recording(state, scenario, index, motion)
             else:
-                _append_planned(state, scenario, index, motion)
+                found = _append_planned(state, scenario, index, motion)
         except InputError as error:
-            state.problems += [f"motion {index} ({motion.kind}): {problem}" for problem in error.problems]
-            break  # where the axes would be after it is not known
+            found = list(error.problems)
+            _leave_out(state, motion)
         cycles = state.instant * machine.cycles.T_ipo / machine.cycles.T_pos
         if cycles > LONGEST:
-            state.problems.append(
-                f"motion {index} ({motion.kind}): the program lasts {cycles * machine.cycles.T_pos:.6g} s up to its "
-                f"end, which is {cycles:.3g} position cycles; allowed: {LONGEST:.3g}"
+            found.append(
+                f"the program lasts {cycles * machine.cycles.T_pos:.6g} s up to its end, which is {cycles:.3g} "
+                f"position cycles; allowed: {LONGEST:.3g}"
             )
+        state.problems += [f"{scenario.at('motions', index)} ({motion.kind}): {problem}" for problem in found]
+        if cycles > LONGEST:
             break
     if state.problems:
         raise InputError.of(f"{scenario.file}: the motions cannot be driven", state.problems)
     return _sample(state, scenario)
 
 
-def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion) -> None:
+def _depends_on(motion: Motion, lost: set[str]) -> bool:
+    """Whether nothing can be said of a motion as long as the positions of the ``lost`` axes are not known."""
+    if isinstance(motion, Move):
+        return not lost.isdisjoint(motion.to)
+    if isinstance(motion, Arc):
+        return bool(motion.centre or motion.to) and not lost.isdisjoint(motion.plane)
+    return isinstance(motion, MeasuredSetpoints) and motion.relative and not lost.isdisjoint(motion.columns)
+
+
+def _leave_out(state: _Plan, motion: Motion) -> None:
+    """Go on behind a motion that cannot be planned: its axes are where it says, if it says so."""
+    if isinstance(motion, MeasuredSetpoints):
+        ends: Mapping[str, float] = {}
+    else:
+        ends = motion.to if isinstance(motion, Move | Arc) else {}
+    state.lost = (state.lost | set(moved_axes(motion))) - set(ends)
+    state.position |= ends
+
+
+def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion) -> list[str]:
+    """Plan a motion and append it; what is wrong with it."""
     limits, cycles = scenario.machine.path, scenario.machine.cycles
     start = state.instant * cycles.T_ipo
     origin = dict(state.position)
@@ -105,17 +135,19 @@ def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion
     count = whole_cycles(duration, cycles.T_ipo)
     if (state.instant + count) * (cycles.T_ipo / cycles.T_pos) > LONGEST:
         state.instant += count
-        return  # plan() reports it; sampling it would exhaust the memory
+        return []  # plan() reports it; sampling it would exhaust the memory
     stretch = state.pieces[-1]
     if isinstance(stretch, _Inset):
         stretch = _stretch(state)
         state.pieces.append(stretch)
     samples: Mapping[str, Array] = {}
+    problems: list[str] = []
     if profile is not None and path is not None:
         samples = path.position(profile.at(np.arange(1, count + 1, dtype=np.float64) * cycles.T_ipo)[0])
         for axis, peaks in path.peaks(profile, cycles.T_ipo).items():
-            found = violations(axis, scenario.machine.axes[axis], origin[axis], *peaks)
-            state.problems += [f"motion {index} ({motion.kind}): {problem}" for problem in found]
+            if axis in state.lost:
+                peaks = (origin[axis], origin[axis], *peaks[2:])
+            problems += violations(axis, scenario.machine.axes[axis], origin[axis], *peaks)
     for axis, points in stretch.points.items():
         points.append(samples[axis] if axis in samples else np.full(count, origin[axis]))
     if path is not None:
@@ -134,21 +166,26 @@ def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion
             description=_describe(motion),
             origin=origin,
             target=dict(state.position),
+            axes=() if path is None else path.moving,
             geometry=_geometry(path, profile, start) if path is not None and profile is not None else None,
         )
     )
+    return problems
 
 
-def _append_recording(state: _Plan, scenario: Scenario, index: int, motion: MeasuredSetpoints) -> None:
+def _append_recording(state: _Plan, scenario: Scenario, index: int, motion: MeasuredSetpoints) -> list[str]:
+    """Append recorded setpoints; what is wrong with them."""
     cycles = scenario.machine.cycles
     start = state.instant * cycles.T_ipo
     origin = dict(state.position)
     recording = recorded(motion, origin, cycles.T_pos, scenario.machine.path)
-    for axis in motion.columns:
-        found = recording_violations(
-            axis, scenario.machine.axes[axis], origin[axis], recording.x_s[axis], recording.v_s[axis], cycles.T_pos
-        )
-        state.problems += [f"motion {index} ({motion.kind}): {problem}" for problem in found]
+    problems: list[str] = []
+    for axis, x_s in recording.x_s.items():
+        begin = float(x_s[0]) if axis in state.lost else origin[axis]
+        limits = scenario.machine.axes[axis]
+        problems += recording_violations(axis, limits, begin, x_s, recording.v_s[axis], cycles.T_pos)
+    if not motion.relative:
+        state.lost -= set(motion.columns)
     state.pieces.append(_Inset(state.instant, recording.x_s, recording.v_s))
     state.position |= {axis: float(x[-1]) for axis, x in recording.x_s.items()}
     state.instant += whole_cycles(recording.duration, cycles.T_ipo)
@@ -161,9 +198,11 @@ def _append_recording(state: _Plan, scenario: Scenario, index: int, motion: Meas
             description=_describe(motion),
             origin=origin,
             target=dict(state.position),
+            axes=tuple(axis for axis, x in recording.x_s.items() if np.any(x != origin[axis])),
             geometry=Recorded(motion.file, tuple(motion.columns)),
         )
     )
+    return problems
 
 
 def _sample(state: _Plan, scenario: Scenario) -> Program:

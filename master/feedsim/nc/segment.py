@@ -66,9 +66,9 @@ class Recorded:
 class Segment:
     """One motion of the program.
 
-    kind: that of the motion (move, arc, circle, dwell, setpoints); index: its place in the scenario, from 1;
+    kind: that of the motion (move, arc, circle, dwell, setpoints); index: its place in the scenario's list, from 0;
     start, end: exact begin and end of the motion [s], the start on the T_ipo grid; origin, target: positions of all
-    axes there [m]; geometry: None for a dwell.
+    axes there [m]; axes: those whose setpoint it moves; geometry: None for a dwell.
     """
 
     kind: str
@@ -78,6 +78,7 @@ class Segment:
     description: str
     origin: Mapping[str, float]
     target: Mapping[str, float]
+    axes: tuple[str, ...] = ()
     geometry: Straight | Circular | Recorded | None = None
 
     @property
@@ -103,7 +104,14 @@ class Program:
         """Last instant of the program [s]."""
         return float(self.time[-1])
 
-    def until(self, segment: Segment) -> float:
-        """Last instant before another motion of any axis takes over from ``segment`` [s]: dwells still belong to it."""
-        later = [other.start for other in self.segments if other.index > segment.index and other.kind != "dwell"]
-        return min(later, default=self.duration)
+    def following(self, segment: Segment, axis: str) -> Segment | None:
+        """The next motion behind ``segment`` that moves the setpoint of ``axis``; None where there is none."""
+        return next((other for other in self.segments[segment.index + 1 :] if axis in other.axes), None)
+
+    def until(self, segment: Segment, axis: str) -> float:
+        """Last instant [s] at which ``axis`` stands where ``segment`` took it: the start of its next motion.
+
+        Dwells belong to it, and so do motions of other axes: what they do to an axis at rest is coupling.
+        """
+        later = self.following(segment, axis)
+        return self.duration if later is None else later.start

@@ -1,5 +1,6 @@
 """Scenario and machine files: YAML with units, checked, as objects in SI."""
 
+from feedsim.scenario.checks import moved_axes
 from feedsim.scenario.load import load, load_machine
 from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine, PathLimits
 from feedsim.scenario.model import CircleTest, Coupling, Evaluation, Positioning, Recording, Scenario
@@ -31,4 +32,5 @@ __all__ = [
     "json_schema",
     "load",
     "load_machine",
+    "moved_axes",
 ]

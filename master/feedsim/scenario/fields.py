@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from math import inf, isfinite
@@ -27,6 +28,7 @@ class Reading:
 
     axes: tuple[str, ...] | None = None  # of the machine
     control_cycle: float | None = None  # T_c [s]
+    position_cycle: float | None = None  # T_pos [s], where it is a multiple of the control cycle
 
 
 class Model(BaseModel):
@@ -35,9 +37,16 @@ class Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", validate_default=False)
 
 
-def fault(message: str) -> PydanticCustomError:
-    """A validation error that carries its own wording."""
-    return PydanticCustomError("feedsim", "{message}", {"message": message})
+def fault(message: str, beside: tuple[str, ...] = ()) -> PydanticCustomError:
+    """A validation error that carries its own wording; `beside`: what it is about, a key next to the one checked."""
+    return PydanticCustomError("feedsim", "{message}", {"message": message, "beside": beside})
+
+
+def no_axis(name: str, axes: Iterable[str]) -> str:
+    """Message about a name that is none of the machine's `axes`."""
+    same = [axis for axis in axes if axis.lower() == name.lower()]
+    hint = f"did you mean {same[0]!r}?" if same else f"it has {', '.join(axes)}"
+    return f"the machine has no axis {name!r}; {hint}"
 
 
 def is_multiple(value: float, step: float) -> bool:
@@ -123,7 +132,7 @@ class _AxisName:
                     f"{brief(value)} is no axis name: a letter, then letters, digits and _ (not {', '.join(RESERVED)})"
                 )
             if isinstance(info.context, Reading) and info.context.axes is not None and value not in info.context.axes:
-                raise fault(f"the machine has no axis {value!r}; it has {', '.join(info.context.axes)}")
+                raise fault(no_axis(value, info.context.axes))
             return value
 
         return core_schema.with_info_plain_validator_function(validate)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,7 +15,7 @@ from feedsim.errors import InputError
 from feedsim.scenario import overrides as changes
 from feedsim.scenario import shape
 from feedsim.scenario.checks import contradictions
-from feedsim.scenario.fields import Quantity, Reading, brief
+from feedsim.scenario.fields import Quantity, Reading, brief, is_multiple
 from feedsim.scenario.machine import Cycles, Machine
 from feedsim.scenario.model import Scenario
 from feedsim.scenario.problems import describe, explain, in_order
@@ -45,10 +46,12 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         if key == "machine":
             source.put(("machine",), value)
     own = list(_own_settings(source, faults))
+    changed: list[tuple[Place, str]] = []
     _fetch(source, Scenario, (), faults)
     for key, value in (*own, *((key, value) for key, value in options if key != "machine")):
         with _collecting(faults):
             for place in changes.apply(source, Scenario, key, value):
+                changed.append((place, value.mark(()).where))
                 _fetch(source, Scenario, place, faults)
     scenario = _check(source, Scenario, faults)
     if scenario is not None:
@@ -57,6 +60,10 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         raise InputError.of(str(path), in_order(faults))
     scenario._file = path
     scenario._overrides = tuple(overrides)
+    scenario._origins = {place: mark.where for place, mark in source.marks.items()}
+    scenario._changes = tuple(changed)
+    scenario._settings = tuple(f"{key}={_text(value.data)}" for key, value in own)
+    scenario._files = tuple(_files(source, path))
     scenario.machine._directory = source.mark(("machine",)).folder
     return scenario
 
@@ -73,6 +80,22 @@ def load_machine(path: str | Path) -> Machine:
         raise InputError.of(str(path), in_order(faults))
     machine._directory = path.parent
     return machine
+
+
+def _text(value: Any) -> str:
+    """A value of the `set` group as it stands behind KEY= on the command line."""
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+
+
+def _files(source: Source, path: Path) -> Iterator[tuple[str, Path]]:
+    """The scenario file and every other one that values come from, with the place nearest to the root."""
+    seen = {str(path)}
+    yield "", path
+    for place, mark in sorted(source.marks.items(), key=lambda item: len(item[0])):
+        file, colon, line = mark.where.rpartition(":")
+        if colon and line.isdecimal() and not file.startswith("--set ") and file not in seen:
+            seen.add(file)
+            yield ".".join(str(key) for key in place), Path(file)
 
 
 def _read_group(path: Path) -> Source:
@@ -146,12 +169,18 @@ def _reading(data: dict[str, Any]) -> Reading:
     machine = data.get("machine", data)
     machine = machine if isinstance(machine, dict) else {}
     axes, cycles = machine.get("axes"), machine.get("cycles")
-    control = None
-    if isinstance(cycles, dict) and "control" in cycles:
-        quantity = next(note for note in Cycles.model_fields["control"].metadata if isinstance(note, Quantity))
-        with suppress(PydanticCustomError):
-            control = quantity.read(cycles["control"])
-    return Reading(axes=tuple(axes) if isinstance(axes, dict) and axes else None, control_cycle=control)
+    control, position = (_cycle(cycles, name) if isinstance(cycles, dict) else None for name in ("control", "position"))
+    if control and position and not is_multiple(position, control):
+        position = None
+    return Reading(tuple(axes) if isinstance(axes, dict) and axes else None, control, position)
+
+
+def _cycle(cycles: dict[str, Any], name: str) -> float | None:
+    """A cycle [s]; None where it cannot be read, which is reported where it stands."""
+    quantity = next(note for note in Cycles.model_fields[name].metadata if isinstance(note, Quantity))
+    with suppress(PydanticCustomError):
+        return quantity.read(cycles.get(name))
+    return None
 
 
 @contextmanager

@@ -315,11 +315,13 @@ class Machine(Model):
         if pose is None:
             return axes
         if missing := [name for name in axes if name not in pose]:
-            raise fault(f"the pose lacks the position of axis {missing[0]}")
+            raise fault(f"the pose lacks the position of axis {missing[0]}", beside=("pose",))
         if extra := [name for name in pose if name not in axes]:
-            raise fault(f"the pose names {extra[0]!r}, which is no axis; axes are {', '.join(axes)}")
+            message = f"the pose names {extra[0]!r}, which is no axis; axes are {', '.join(axes)}"
+            raise fault(message, beside=("pose", extra[0]))
         for name, axis in axes.items():
             low, high = axis.travel
             if not low <= pose[name] <= high:
-                raise fault(f"the pose of {name}, {pose[name]:.9g} m, is outside its travel, {low:.9g} to {high:.9g} m")
+                message = f"the pose of {name}, {pose[name]:.9g} m, is outside its travel, {low:.9g} to {high:.9g} m"
+                raise fault(message, beside=("pose", name))
         return axes

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, StrictInt, StrictStr, ValidationInfo, field_validator, model_validator
 
-from feedsim.scenario.checks import contradictions, interval_fault
+from feedsim.scenario.checks import Place, contradictions, interval_fault
 from feedsim.scenario.fields import AxisName, Model, Quantity, Reading, fault
 from feedsim.scenario.machine import Machine
 from feedsim.scenario.motion import Motion
@@ -30,7 +31,7 @@ class Recording(Model):
     """What goes into result.csv."""
 
     interval: Annotated[float, Quantity("s", minimum=1e-6, example="1 ms")] = Field(
-        description="Time between rows, a whole multiple of the control cycle (default: the control cycle)"
+        description="Time between rows, a whole multiple of the control cycle (default: the position cycle)"
     )
     variables: Annotated[tuple[Annotated[StrictStr, Field(min_length=1)], ...], Field(min_length=1)] | None = Field(
         default=None, description='Names or patterns such as "Z.*" (default: everything)'
@@ -45,22 +46,40 @@ class Recording(Model):
         return interval
 
 
+MotionIndex = Annotated[StrictInt, Field(ge=0)]
+
+
 class Positioning(Model):
-    """Overshoot, settling time, ringing and rest torque of an axis after its last move."""
+    """Overshoot, settling time, ringing and rest torque of an axis after a motion."""
 
     kind: Literal["positioning"] = "positioning"
     axis: AxisName
     band: Annotated[float, Quantity("m", above=0, example="1 um")] = Field(
         default=1e-6, description="Half width of the band about the target that counts as settled"
     )
+    motion: MotionIndex | None = Field(
+        default=None, description="Place of the motion in motions, from 0 (default: the last one that moves the axis)"
+    )
 
 
 class CircleTest(Model):
-    """Circular deviations (ISO 230-4) and quadrant glitches of the last circle, over one full turn."""
+    """Circular deviations (ISO 230-4) and quadrant glitches of a circle, over one full turn."""
 
     kind: Literal["circle"] = "circle"
     turn: Annotated[StrictInt, Field(ge=1)] | None = Field(
         default=None, description="Turn evaluated, from 1 (default: the middle one)"
+    )
+    motion: MotionIndex | None = Field(
+        default=None, description="Place of the circle in motions, from 0 (default: the last circle)"
+    )
+    plane: tuple[AxisName, AxisName] | None = Field(
+        default=None, description="Only for recorded setpoints: first and second axis (default: the recording's two)"
+    )
+    centre: dict[AxisName, Annotated[float, Quantity("m")]] | None = Field(
+        default=None, description="Only for recorded setpoints: centre (default: fitted to the setpoints)"
+    )
+    radius: Annotated[float, Quantity("m", above=0, example="15 mm")] | None = Field(
+        default=None, description="Only for recorded setpoints: radius (default: fitted to the setpoints)"
     )
 
 
@@ -82,6 +101,11 @@ class Scenario(Model):
 
     _file: Path = PrivateAttr(default=Path("scenario.yaml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())
+    # Where the values come from, as messages say it: "file:line" or "--set KEY=VALUE"; what was set from outside.
+    _origins: Mapping[Place, str] = PrivateAttr(default={})
+    _changes: tuple[tuple[Place, str], ...] = PrivateAttr(default=())
+    _settings: tuple[str, ...] = PrivateAttr(default=())
+    _files: tuple[tuple[str, Path], ...] = PrivateAttr(default=())
 
     @property
     def file(self) -> Path:
@@ -93,19 +117,42 @@ class Scenario(Model):
         """What was changed from outside the file, as KEY=VALUE."""
         return self._overrides
 
+    def at(self, *place: str | int) -> str:
+        """A place as messages name it: "s.yaml:6: motions.0", with the changes inside it; without a file the key alone.
+
+        >>> scenario.at("motions", 0)
+        's.yaml:6, --set motions.0.feed=60 m/min: motions.0'
+        """
+        key = ".".join(map(str, place))
+        known = next((place[:n] for n in range(len(place), -1, -1) if place[:n] in self._origins), None)
+        if known is None:
+            return key
+        inside = [where for changed, where in self._changes if changed[: len(place)] == place]
+        return f"{', '.join(dict.fromkeys([self._origins[known], *inside]))}: {key}"
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The file's own `set` group, as KEY=VALUE."""
+        return self._settings
+
+    @property
+    def files(self) -> tuple[tuple[str, Path], ...]:
+        """YAML files that it was read from, each with the first key that it gives; "" for the scenario file."""
+        return self._files
+
     @model_validator(mode="before")
     @classmethod
-    def _record_every_cycle(cls, data: Any, info: ValidationInfo) -> Any:
-        """The recording interval defaults to the machine's control cycle."""
+    def _record_position_cycles(cls, data: Any, info: ValidationInfo) -> Any:
+        """The recording interval defaults to the machine's position cycle."""
         if not isinstance(data, dict):
             return data
         recording, machine = data.get("recording", {}), data.get("machine")
         interval: Any
         if isinstance(info.context, Reading):
             # A cycle that cannot be read is reported where it stands; what is recorded does not matter then.
-            interval = f"{info.context.control_cycle or 1.0!r} s"
+            interval = f"{info.context.position_cycle or info.context.control_cycle or 1.0!r} s"
         elif isinstance(machine, Machine):
-            interval = machine.cycles.T_c
+            interval = machine.cycles.T_pos
         else:
             return data
         if isinstance(recording, dict) and "interval" not in recording:

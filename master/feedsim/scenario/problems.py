@@ -43,6 +43,8 @@ def explain(source: Source, model: Any, detail: ErrorDetails, unread: str) -> st
     if detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]:
         return None  # pydantic does not count entries that are wrong themselves; those are reported
     place = _place(source.data, detail["loc"])
+    if beside := detail.get("ctx", {}).get("beside"):
+        place = (*place[:-1], *beside)
     if detail["type"] == "extra_forbidden":
         known = shape.keys(shape.expected(model, source.data, place[:-1])) or []
         known += [] if place[:-1] or "motions" not in known else ["set"]
@@ -74,9 +76,9 @@ def _message(source: Source, model: Any, detail: ErrorDetails, place: Place) -> 
     if kind in ("too_short", "too_long"):
         limit = f"at least {context['min_length']}" if kind == "too_short" else f"at most {context['max_length']}"
         return (
-            f"{context['actual_length']} entries; {limit} needed"
+            f"{_entries(context['actual_length'])}; {limit} needed"
             if kind == "too_short"
-            else f"{context['actual_length']} entries; {limit}"
+            else f"{_entries(context['actual_length'])}; {limit}"
         )
     simple = {
         "int_type": f"{value} is no whole number",
@@ -89,6 +91,10 @@ def _message(source: Source, model: Any, detail: ErrorDetails, place: Place) -> 
         "list_type": f"{value}; a list is expected",
     }
     return simple.get(kind, detail["msg"])
+
+
+def _entries(count: int) -> str:
+    return f"{count} entr{'y' if count == 1 else 'ies'}"
 
 
 def _wanted(source: Source, model: Any, place: Place) -> str:

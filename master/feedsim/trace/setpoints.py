@@ -41,8 +41,8 @@ def read_setpoints(
     if len(trace) < FEWEST_ROWS:
         part = f" between {between[0]:.9g} and {between[1]:.9g} s" if between else ""
         raise InputError(
-            f"{path}: {len(trace)} rows{part}; at least {FEWEST_ROWS} are needed (the file runs from "
-            f"{whole.time[0]:.9g} to {whole.time[-1]:.9g} s)"
+            f"{path}: {len(trace)} row{'s'[: len(trace) != 1]}{part}; at least {FEWEST_ROWS} are needed "
+            f"(the file runs from {whole.time[0]:.9g} to {whole.time[-1]:.9g} s)"
         )
     values = {}
     for axis, (name, unit) in columns.items():

@@ -1,0 +1,162 @@
+"""The mode table of a machine: mass-normalised mode shapes at the ports, read and checked.
+
+Ports of an axis A: n_A (rotor against stator: torque in, speed out) and x_A (linear scale). Ports of the tool: tcp_X,
+tcp_Y, tcp_Z (tool against workpiece: force in, displacement out). The format is described in docs/scenarios.md.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.errors import InputError
+from feedsim.scenario import Machine
+
+Floats = NDArray[np.float64]
+
+MODE, FREQUENCY, DAMPING = "mode", "frequency [Hz]", "damping ratio [1]"
+TOOL_PORTS = ("tcp_X", "tcp_Y", "tcp_Z")
+# A lead from mode shapes carries the eigensolver's error (1e-8 and less); a wrong pitch is off by per cents.
+LEAD_TOLERANCE = 1e-3
+MOST_PROBLEMS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """A mode table.
+
+    Attributes:
+        frequency: (N,) [Hz]; exactly 0 for rigid modes.
+        damping: (N,) damping ratios [1].
+        ports: port -> (N,) mass-normalised mode shape [1/sqrt(kg) for displacements, 1/(m sqrt(kg)) for rotations].
+    """
+
+    file: Path
+    frequency: Floats
+    damping: Floats
+    ports: Mapping[str, Floats]
+
+    @property
+    def rigid(self) -> NDArray[np.bool_]:
+        """(N,) which modes are rigid."""
+        return np.asarray(self.frequency == 0)
+
+    def J_tot(self, axis: str) -> float:
+        """Inertia that a slow torque of `axis` accelerates [kg.m2]: 1 / sum of n^2 over the rigid modes."""
+        return float(1 / np.sum(self.ports[f"n_{axis}"][self.rigid] ** 2))
+
+    def J_inf(self, axis: str) -> float:
+        """Inertia that a sudden torque meets [kg.m2]: 1 / sum of n^2 over all modes; limits explicit coupling."""
+        return float(1 / np.sum(self.ports[f"n_{axis}"] ** 2))
+
+    def leads(self, axes: Sequence[str]) -> Floats:
+        """(K, K) travel of each axis's scale (columns) per radian of each axis's rotor (rows) in rigid motion [m/rad].
+
+        Raises:
+            InputError: the rigid modes do not move every axis on its own.
+        """
+        n = np.column_stack([self.ports[f"n_{axis}"][self.rigid] for axis in axes])
+        x = np.column_stack([self.ports[f"x_{axis}"][self.rigid] for axis in axes])
+        if len(n) != len(axes) or np.linalg.matrix_rank(n) < len(axes):
+            still = [axis for axis, column in zip(axes, n.T, strict=True) if not np.any(column)]
+            which = f"; none moves {', '.join(still)}" if still else ""
+            raise InputError(
+                f"{self.file}: {len(n)} rigid modes (frequency 0); {len(axes)} are needed that move the axes "
+                f"{', '.join(axes)} independently of one another{which}"
+            )
+        return np.asarray(np.linalg.solve(n, x))
+
+
+def read_modes(file: Path, axes: Sequence[str]) -> Modes:
+    """Read a mode table with the ports of `axes`.
+
+    Raises:
+        InputError: lists what is wrong, with file and line.
+    """
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as stream:
+            rows = list(csv.reader(stream))
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file (table of modes)") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{file}: cannot be read as a table of modes: {error}") from error
+    ports = [f"{quantity}_{axis}" for quantity in ("n", "x") for axis in axes] + list(TOOL_PORTS)
+    header = rows[0] if rows else []
+    problems = _header_problems(file, header, (MODE, FREQUENCY, DAMPING, *ports))
+    if not problems and not any(rows[1:]):
+        problems = [f"{file}: empty: a header, but no modes"]
+    if problems:
+        raise InputError.of(f"{file}: not a table of modes", problems)
+    table, problems = _numbers(file, header, rows[1:])
+    columns = dict(zip(header, table.T, strict=True))
+    if not problems:
+        problems = [
+            f"{file}: column '{port}': all zero, nothing moves there"
+            for port in ports[: 2 * len(axes)]
+            if not columns[port].any()
+        ]
+    if problems:
+        raise InputError.of(f"{file}: not a usable table of modes", problems[:MOST_PROBLEMS])
+    return Modes(file, columns[FREQUENCY], columns[DAMPING], {port: columns[port] for port in ports})
+
+
+def _header_problems(file: Path, header: Sequence[str], needed: Sequence[str]) -> list[str]:
+    if not header:
+        return [f"{file}: empty; a table of modes begins with a header: {', '.join(needed)}"]
+    there = ", ".join(header)
+    problems = [f"{file}:1: column '{name}' is missing; there is {there}" for name in needed if name not in header]
+    problems += [f"{file}:1: column '{name}' belongs to no axis here" for name in header if name not in needed]
+    problems += [f"{file}:1: column '{name}' occurs twice" for name in dict.fromkeys(header) if header.count(name) > 1]
+    return problems
+
+
+def _numbers(file: Path, header: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[Floats, list[str]]:
+    problems: list[str] = []
+    table = []
+    for line, row in enumerate(rows, start=2):
+        if not row:
+            continue
+        if len(row) != len(header):
+            problems.append(f"{file}:{line}: {len(row)} cells; the header has {len(header)}")
+            continue
+        values = [_number(cell) for cell in row]
+        for name, cell, value in zip(header, row, values, strict=True):
+            if not math.isfinite(value):
+                problems.append(f"{file}:{line}: column '{name}': '{cell}' is no finite number")
+            elif name in (FREQUENCY, DAMPING) and value < 0:
+                problems.append(f"{file}:{line}: column '{name}': {cell} is negative; 0 or more is allowed")
+        table.append(values)
+    return np.array(table, dtype=np.float64).reshape(-1, len(header)), problems
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
+
+
+def checked_modes(machine: Machine) -> Modes:
+    """The machine's mode table, consistent with its axes: one rigid mode per axis, leads that agree with the pitches.
+
+    Raises:
+        InputError: the table is broken or contradicts the machine file.
+    """
+    axes = list(machine.axes)
+    modes = read_modes(machine.modes, axes)
+    problems = []
+    for (name, axis), lead in zip(machine.axes.items(), np.diag(modes.leads(axes)), strict=True):
+        if abs(lead - axis.I_P) > LEAD_TOLERANCE * axis.I_P:
+            problems.append(
+                f"{machine.modes}: axis {name} travels {2e3 * math.pi * lead:.6g} mm per revolution by its modes; "
+                f"the machine says pitch: {axis.pitch * 1e3:.6g} mm"
+            )
+    if problems:
+        raise InputError.of(f"{machine.modes}: the modes contradict the machine", problems)
+    return modes

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import re
 import stat
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -18,68 +18,15 @@ import pytest
 from feedsim import report
 from feedsim.analysis import Figure, evaluate
 from feedsim.errors import OutputError
-from feedsim.nc import Program, plan
-from feedsim.report.circle_plots import ring_step
-from feedsim.report.style import LARGEST_SVG, MOST_POINTS, PALETTE, thinned
-from feedsim.report.write import draw
-from feedsim.scenario import Circle, CircleTest, Dwell, Move, Positioning, Scenario
+from feedsim.report.page import tile
+from feedsim.report.provenance import archives, input_files
+from feedsim.report.style import PALETTE
+from feedsim.report.summary import HEADER, real_time_factor, summary
+from feedsim.report.tables import duration, path, provenance
+from feedsim.scenario import Arc, Dwell, Move, load
 from feedsim.trace import Trace, read_csv
-from scenario_helpers import default_machine, scenario
-
-LEAD = 0.020 / (2 * math.pi)
-
-
-@dataclass(frozen=True)
-class FakeRun:
-    """A run as the report sees it; its trace is the plan with a delay, a ring-down and a friction step."""
-
-    scenario: Scenario
-    program: Program
-    trace: Trace
-    coupling: Mapping[str, float] = field(default_factory=lambda: {"Z.residual": 1.4e-5})
-    wall_time: float = 0.5
-    units: Mapping[str, Mapping[str, str]] = field(
-        default_factory=lambda: {"plant": {"guid": "0011223344556677-8899aabbccddeeff", "version": "0.1.0"}}
-    )
-    warnings: tuple[str, ...] = ()
-
-
-def run_of(described: Scenario, **changes: Any) -> FakeRun:
-    program = plan(described)
-    t = program.time
-    columns: dict[str, Any] = {}
-    for axis, x_s in program.x_s.items():
-        n = program.n_ffw[axis]
-        friction = 2.0 * np.tanh(n)
-        ringing = 3e-6 * np.exp(-8 * t) * np.sin(130 * t)
-        columns |= {
-            f"{axis}.x_s": x_s,
-            f"{axis}.x_a": x_s + ringing,
-            f"{axis}.n_a": n,
-            f"{axis}.M_fr": friction,
-            f"{axis}.M_a": friction + 0.01 * np.gradient(n, t),
-            f"{axis}.x_e": -ringing,
-            f"tcp.x_{axis}": x_s + 1.2 * ringing,
-        }
-    return FakeRun(described, program, Trace(t, columns, dict.fromkeys(columns, "m")), **changes)
-
-
-def positioning_run(**changes: Any) -> FakeRun:
-    motions = (Move(by={"Z": 0.05}, feed=5 / 60), Dwell(duration=1.2))
-    return run_of(scenario(*motions, evaluate=(Positioning(axis="Z"),), **changes))
-
-
-def circle_run(**changes: Any) -> FakeRun:
-    motions = (Circle(plane=("X", "Z"), radius=0.015, feed=0.1, turns=3), Dwell(duration=0.25))
-    return run_of(scenario(*motions, evaluate=(CircleTest(),), **changes))
-
-
-def small_run(**changes: Any) -> FakeRun:
-    return run_of(scenario(Move(by={"X": 0.01}, feed=0.1)), **changes)
-
-
-def contents(directory: Path) -> dict[str, bytes]:
-    return {p.relative_to(directory).as_posix(): p.read_bytes() for p in sorted(directory.rglob("*")) if p.is_file()}
+from report_helpers import FakeRun, circle_run, contents, positioning_run, run_of, small_run
+from scenario_helpers import MACHINE, scenario
 
 
 class Page(HTMLParser):
@@ -133,8 +80,8 @@ def test_files_of_a_positioning_run(tmp_path: Path) -> None:
     assert (directory / "figures/positioning-Z.png").read_bytes().startswith(b"\x89PNG")
     back = read_csv(directory / "result.csv")
     assert np.array_equal(back["Z.x_a"], run.trace["Z.x_a"])
-    for path in written:
-        assert stat.S_IMODE(path.stat().st_mode) & 0o444 == 0o444, f"{path} is not readable for others"
+    for file in written:
+        assert stat.S_IMODE(file.stat().st_mode) & 0o444 == 0o444, f"{file} is not readable for others"
 
 
 def test_summary_holds_every_figure_and_where_it_comes_from(tmp_path: Path) -> None:
@@ -177,7 +124,7 @@ def test_page_is_self_contained_and_well_formed(tmp_path: Path, make: Any) -> No
     assert not re.search(r"#[0-9a-fA-F]{6}\b", "".join(drawings))
     assert set(re.findall(r"var\(--([a-z]+)\)", "".join(drawings))) <= {name for name, _, _ in PALETTE}
     words = " ".join(page.words)
-    assert "synthetic" in words
+    assert "Synthetic machine" in words
     assert "0011223344556677-8899aabbccddeeff" in words
     for figure in evaluate(run):
         assert figure in words
@@ -199,8 +146,134 @@ def test_names_from_files_cannot_break_the_page(tmp_path: Path) -> None:
 
 
 def test_warnings_stand_at_the_top(tmp_path: Path) -> None:
-    report.write(small_run(warnings=("Z: the torque was limited",)), {}, tmp_path)
-    assert "Warning: Z: the torque was limited" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    run = replace(positioning_run(), warnings=("Z: the torque was < limited",))
+    report.write(run, evaluate(run), tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    warning = text.index("<strong>Warning:</strong> Z: the torque was &lt; limited")
+    assert text.index("<h1>") < warning < text.index('class="note"') < text.index('class="keys"')
+    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["warnings"] == list(run.warnings)
+    report.write(positioning_run(), {}, tmp_path)
+    assert 'role="alert"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_real_time_factor_is_simulated_over_elapsed_time() -> None:
+    run = replace(positioning_run(), wall_time=0.25)
+    assert real_time_factor(run) == pytest.approx(4 * run.program.duration, rel=1e-15)
+    assert summary(run, {}, ())["performance"]["real_time_factor"]["value"] == real_time_factor(run)
+    assert f"({4 * run.program.duration:.2g} x real time)" in report.summary_line(run, {})
+    assert real_time_factor(replace(positioning_run(), wall_time=0.0)) is None
+
+
+def test_tiles_speak_in_words_and_in_few_digits() -> None:
+    assert tile("Z.settling_time", Figure(math.nan, "ms", "")) == ("not determined", "Z: settling time")
+    assert tile("XZ.G", Figure(8.191, "um", "")) == ("8.19 µm", "XZ: circular deviation G")
+    assert tile("XZ.mean", Figure(-0.7733, "um", "")) == ("−0.77 µm", "XZ: mean radius deviation")
+    assert tile("ZX#2.glitch_X", Figure(1.0, "um", ""))[1] == "ZX no. 2: quadrant glitch, X reverses"
+    values = {1.24712: "1.247 s", 12.34567: "12.35 s", 999.96: "1000 s", 123456.7: "123500 s", 0.01234: "0.0123 s"}
+    for value, text in values.items():
+        assert tile("Z.duration", Figure(value, "s", ""))[0] == text
+    labels = [tile(f"Z.{name}", Figure(1.0, "s", ""))[1] for name in HEADER]
+    assert not any("_" in label for label in labels)
+
+
+def test_page_fits_on_paper(tmp_path: Path) -> None:
+    report.write(positioning_run(), {}, tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    paper = text[text.index("@media print") : text.index("</style>")]
+    assert "max-height: 150mm" in paper
+    assert "repeat(4, minmax(0, 1fr))" in paper
+
+
+def test_motions_have_their_path_and_a_note_on_their_start(tmp_path: Path) -> None:
+    arc = Arc(plane=("X", "Z"), centre_by={"X": 0.015, "Z": 0.0}, angle=math.pi / 2, feed=0.05)
+    run = run_of(scenario(arc, Dwell(duration=0.1), Move(by={"X": 0.003, "Y": 0.004}, feed=0.05)))
+    assert [path(segment) for segment in run.program.segments] == ["R 15 mm, 90°", "", "length 5 mm"]
+    report.write(run, {}, tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "R 15 mm, 90°" in text
+    assert "next instant of the interpolator (T_ipo 2 ms)" in text
+    circle = path(circle_run().program.segments[0])
+    assert circle == "R 15 mm, 1080° (3 full turns)"
+
+
+def test_durations_read_well() -> None:
+    assert [duration(t) for t in (125e-6, 1e-3, 1e-6, 0.25, 2.0)] == ["125 µs", "1 ms", "1 µs", "250 ms", "2 s"]
+
+
+# -- where the numbers come from --------------------------------------------------------------------------------------
+
+
+def test_each_archive_stands_once() -> None:
+    units = {
+        "plant": {"guid": "p", "version": "1"},
+        "controller_X": {"guid": "c", "version": "1"},
+        "controller_Z": {"guid": "c", "version": "1"},
+        "friction_X": {"guid": "f", "version": "1"},
+        "friction_Z": {"guid": "other", "version": "1"},
+    }
+    found = [(a.name, a.guid, a.instances) for a in archives(units)]
+    assert found == [
+        ("plant", "p", ("plant",)),
+        ("controller", "c", ("controller_X", "controller_Z")),
+        ("friction", "f", ("friction_X",)),
+        ("friction", "other", ("friction_Z",)),
+    ]
+
+
+def test_coupling_is_one_table_with_the_share(tmp_path: Path) -> None:
+    coupling = {"Z.residual": -2e-5, "Z.residual_peak": 3e-5, "Z.friction_work": 80.0, "X.residual": 0.0}
+    report.write(replace(positioning_run(), coupling=coupling), {}, tmp_path)
+    words = " ".join(Page((tmp_path / "report.html").read_text(encoding="utf-8")).words)
+    assert "Z 80 −2e−05 2.5e−07" in words
+    assert "X – 0 –" in words
+
+
+def test_inputs_are_named_and_hashed(tmp_path: Path) -> None:
+    (tmp_path / "positions.csv").write_text("time [s],Z.x_s [mm]\n0,0\n1,0\n", encoding="utf-8")
+    (tmp_path / "soft.yaml").write_text("interval: 1 ms\n", encoding="utf-8")
+    (tmp_path / "test.yaml").write_text(
+        f"name: t\nmachine: {MACHINE}\nset: {{machine.axes.Z.friction.W: 0.1 rad}}\n"
+        "motions: [{kind: setpoints, file: positions.csv, columns: {Z: Z.x_s}, relative: true}]\n"
+        "recording: soft.yaml\n",
+        encoding="utf-8",
+    )
+    described = load(tmp_path / "test.yaml", ["machine.axes.Z.friction.gamma=0.5"])
+    content = summary(FakeRun(described, positioning_run().program, positioning_run().trace), {}, ())
+    paths = {
+        "scenario": tmp_path / "test.yaml",
+        "machine": MACHINE / "machine.yaml",
+        "recording": tmp_path / "soft.yaml",
+        "modes": MACHINE / "modes.csv",
+        "recorded setpoints": tmp_path / "positions.csv",
+    }
+    found = {item["role"]: (item["name"], item["sha256"]) for item in content["inputs"]}
+    assert found == {r: (p.name, hashlib.sha256(p.read_bytes()).hexdigest()) for r, p in paths.items()}
+    assert content["scenario"]["set"] == ["machine.axes.Z.friction.W=0.1 rad"]
+    assert content["scenario"]["overrides"] == ["machine.axes.Z.friction.gamma=0.5"]
+    assert str(tmp_path) not in json.dumps(content)
+    (tmp_path / "positions.csv").unlink()
+    assert [f.sha256 for f in input_files(described) if f.name == "positions.csv"] == [None]
+    page = provenance(FakeRun(described, positioning_run().program, positioning_run().trace))
+    assert "machine.axes.Z.friction.W=0.1 rad" in page
+    assert str(tmp_path) not in page
+
+
+def test_parameters_of_every_axis_are_in_si_under_the_names_of_the_units() -> None:
+    run = small_run()
+    axes = summary(run, {}, ())["machine"]["axes"]
+    assert list(axes) == ["X", "Y", "Z"]
+    for name, axis in run.scenario.machine.axes.items():
+        assert axes[name]["pitch"] == {"value": axis.pitch, "unit": "m"}
+        assert axes[name]["M_0"] == {"value": axis.M_0, "unit": "N.m"}
+        for group, parameters in (("drive", axis.drive.parameters()), ("friction", axis.friction.parameters())):
+            listed = {n: v["value"] if isinstance(v, dict) else v for n, v in axes[name][group].items()}
+            assert listed == parameters
+            bare = {n for n, v in axes[name][group].items() if isinstance(v, float)}
+            assert not bare, f"{bare} without unit"
+    assert axes["Z"]["drive"]["K_v"]["unit"] == "1/s"
+    assert axes["Z"]["drive"]["filter_1.f"]["unit"] == "Hz"
+    assert axes["Z"]["drive"]["current.K_p"]["unit"] == "V/A"
+    assert axes["Z"]["friction"]["sigma_0"]["unit"] == "N.m/rad"
 
 
 def test_one_line_for_the_terminal() -> None:
@@ -211,70 +284,6 @@ def test_one_line_for_the_terminal() -> None:
     assert line.startswith("XZ.G 8.19 um, XZ.glitch_X 4.84 um, ")
     assert "simulated in 0.5 s" in line
     assert "\n" not in line
-
-
-# -- figures ----------------------------------------------------------------------------------------------------------
-
-
-def test_display_sign_turns_torques_over_and_says_so() -> None:
-    machine = default_machine()
-    turned = machine.axes["Z"].model_copy(update={"display_sign": -1})
-    run = positioning_run()
-    other = positioning_run(machine=machine.model_copy(update={"axes": {**machine.axes, "Z": turned}}))
-    figures = evaluate(run)
-    assert figures == evaluate(other)  # a display sign is no result
-    (plain,), (reversed_,) = draw(run, figures), draw(other, figures)
-    assert "reversed" not in plain.caption
-    assert "drawn with reversed sign" in reversed_.caption
-    assert plain.png != reversed_.png
-
-
-def test_axes_that_no_evaluation_shows_get_an_overview() -> None:
-    run = run_of(
-        scenario(Move(by={"X": 0.01, "Z": 0.02}, feed=0.1), Dwell(duration=0.5), evaluate=(Positioning(axis="Z"),))
-    )
-    stems = [picture.stem for picture in draw(run, evaluate(run))]
-    assert stems == ["positioning-Z", "overview"]
-    assert [picture.stem for picture in draw(small_run(), {})] == ["overview"]
-
-
-def test_figures_do_with_what_is_recorded() -> None:
-    """Positions alone: no torque, no tool point, no setpoint."""
-    run = positioning_run()
-    few = FakeRun(run.scenario, run.program, run.trace.select(["Z.x_a"]))
-    assert [picture.stem for picture in draw(few, evaluate(few))] == ["positioning-Z"]
-    run = circle_run()
-    few = FakeRun(run.scenario, run.program, run.trace.select(["*.x_a"]))
-    assert [picture.stem for picture in draw(few, evaluate(few))] == ["contour-XZ"]
-
-
-def test_rings_are_10_um_where_that_is_readable() -> None:
-    assert [ring_step(e) for e in (2.0, 8.2, 19.9)] == [10, 10, 10]
-    assert ring_step(1.5) == 1
-    assert ring_step(0.3) == 0.2
-    assert ring_step(66.0) == 50
-    assert ring_step(3e4) == 20_000
-    assert ring_step(0.0) == 0.1
-
-
-def test_long_curves_are_thinned_but_keep_their_extremes() -> None:
-    x = np.arange(1_000_000.0)
-    y = np.sin(x / 1000)
-    y[[123_456, 654_321]] = 5.0, -7.0
-    t, thin = thinned(x, y)
-    assert len(t) <= MOST_POINTS + 2
-    assert np.all(np.diff(t) > 0)
-    assert (thin.max(), thin.min()) == (5.0, -7.0)
-    assert thinned(x[:100], y[:100])[0] is not None
-
-
-def test_long_recordings_stay_small_enough_for_a_page() -> None:
-    machine = default_machine()
-    run = run_of(scenario(*[Move(by={"Z": 0.02 * (-1) ** k}, feed=0.05) for k in range(120)], machine=machine))
-    assert len(run.trace) > 40_000
-    (picture,) = draw(run, {})
-    assert len(picture.svg) < 3 * LARGEST_SVG
-    assert len(picture.png) < 1_000_000
 
 
 # -- whole or not at all ----------------------------------------------------------------------------------------------

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from feedsim.analysis import Contour, Figures, Glitch, Turn, contour
+from feedsim.report.labels import heading, legend_above, plain_box
 from feedsim.report.style import (
     BLUE,
     GRID,
@@ -16,7 +17,6 @@ from feedsim.report.style import (
     MOST_POINTS,
     MUTED,
     ORANGE,
-    PAPER,
     VERMILLION,
     Array,
     Picture,
@@ -46,7 +46,7 @@ def contour_picture(trace: Trace, turn: Turn, figures: Figures, stem: str) -> Pi
     ring = ring_step(largest)
     rings = 1 if largest < 1.1 * ring else 2
     gap = RING_GAPS[rings]
-    with drawing(10.0, 6.9) as figure:
+    with drawing(10.0, 7.0) as figure:
         rooms = figure.subplot_mosaic(
             [["polar", "angle"], ["polar", "table"]], width_ratios=[1.85, 1], height_ratios=[1, 0.8]
         )
@@ -75,7 +75,7 @@ def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str
     if not axes:
         return None
     part = trace.between(turn.begin, turn.end)
-    with drawing(10.0, 3.6 * len(axes)) as figure:
+    with drawing(10.0, 3.8 * len(axes)) as figure:
         rooms = figure.subplots(len(axes), 3, squeeze=False, width_ratios=[1.25, 1, 1])
         for row, axis in zip(rooms, axes, strict=True):
             _torque_row(row, part, axis, signs.get(axis, 1))
@@ -113,7 +113,7 @@ def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, r
         closed = np.append(rows, rows[0]) if closes else rows
         axes.plot(r[closed] * np.cos(measured.angle[closed]), r[closed] * np.sin(measured.angle[closed]), **style)
 
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", anchor="N")
     axes.set_axis_off()
     for value in (*range(-rings, 0), *range(1, rings + 1)):
         circle(NOMINAL + value * gap, color=GRID, linewidth=0.9)
@@ -123,7 +123,7 @@ def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, r
         ends = np.array([-outer, outer])
         axes.plot(ends * math.cos(angle), ends * math.sin(angle), color=GRID, linewidth=0.9)
     circle(NOMINAL, color=MUTED, linewidth=1.1, linestyle=(0, (6, 3)), label="programmed circle")
-    _ring_label(axes, NOMINAL, "0", MUTED)
+    _ring_label(axes, _beside_the_curves(per_um, gap, by_scale, by_tool), "0", MUTED)
     if by_tool is not None:
         trail(by_tool, color=ORANGE, linewidth=1.2, linestyle=(0, (5, 1.5)), label="tool point")
     trail(by_scale, color=BLUE, linewidth=1.6, label="linear scales")
@@ -135,10 +135,11 @@ def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, r
         )
     for glitch in by_scale.glitches:
         _mark(axes, glitch, gap, per_um)
+    axes.text(0, 0.22, "quadrant glitches\n(less the median)", color=MUTED, ha="center", va="center", fontsize=8.5)
     _sense(axes, turn)
     axes.set_xlim(-1.12 * outer, 1.12 * outer)
     axes.set_ylim(-1.12 * outer, 1.12 * outer)
-    axes.set_title(f"Contour error, {first}-{second}, R {turn.radius * 1e3:g} mm")
+    heading(axes, f"Contour error, {first}-{second}, R {turn.radius * 1e3:g} mm")
     axes.legend(loc="lower left", bbox_to_anchor=(-0.02, -0.02))
 
 
@@ -146,8 +147,19 @@ def _ring_label(axes: Axes, radius: float, text: str, colour: str) -> None:
     at = radius * math.cos(math.pi / 4)
     axes.text(
         at, at, text, color=colour, fontsize=8.5, ha="center", va="center", rotation=-45,
-        bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 1.0},
+        bbox=plain_box(),
     )  # fmt: skip
+
+
+def _beside_the_curves(per_um: float, gap: float, *curves: Contour | None) -> float:
+    """Radius for the label of the programmed circle: beside the circle, on the side where no curve is at 45 degrees."""
+    near = [
+        per_um * 1e6 * curve.deviation[np.abs((curve.angle - math.pi / 4 + math.pi) % (2 * math.pi) - math.pi) < 0.06]
+        for curve in curves
+        if curve is not None
+    ]
+    taken = np.concatenate([*near, [0.0]])
+    return NOMINAL + max((-0.3 * gap, 0.3 * gap), key=lambda offset: float(np.abs(taken - offset).min()))
 
 
 def _mark(axes: Axes, glitch: Glitch, gap: float, per_um: float) -> None:
@@ -162,7 +174,7 @@ def _mark(axes: Axes, glitch: Glitch, gap: float, per_um: float) -> None:
         ha={1: "right", 0: "center", -1: "left"}[across],
         va={1: "top", 0: "center", -1: "bottom"}[up],
         color=INK,
-        bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 1.0},
+        bbox=plain_box(),
         arrowprops={"arrowstyle": "-", "color": VERMILLION, "linewidth": 0.9, "shrinkA": 2, "shrinkB": 2},
         zorder=6,
     )
@@ -181,9 +193,10 @@ def _sense(axes: Axes, turn: Turn) -> None:
 
 
 def _unrolled(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None) -> None:
-    styles: list[tuple[Contour, dict[str, Any]]] = [(by_scale, {"color": BLUE})]
+    styles: list[tuple[Contour, dict[str, Any]]] = [(by_scale, {"color": BLUE, "label": "scales"})]
     if by_tool is not None:
-        styles.insert(0, (by_tool, {"color": ORANGE, "linestyle": (0, (5, 1.5)), "linewidth": 1.1}))
+        dashes = (0, (5, 1.5))
+        styles.insert(0, (by_tool, {"color": ORANGE, "linestyle": dashes, "linewidth": 1.1, "label": "tool point"}))
     for measured, style in styles:
         angle = np.rad2deg(measured.angle % (2 * math.pi))
         order = np.argsort(angle)
@@ -192,9 +205,11 @@ def _unrolled(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None
     for glitch in by_scale.glitches:
         at = np.rad2deg(glitch.angle % (2 * math.pi))
         axes.plot([at], [glitch.deviation * 1e6], "o", color=VERMILLION, markersize=4)
-    axes.axhline(by_scale.median * 1e6, color=MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
+    axes.axhline(by_scale.median * 1e6, color=MUTED, linewidth=1.1, linestyle=(0, (1, 2)), label="median (scales)")
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
-    axes.set(title="Over the angle", xlabel=f"angle from {turn.axes[0]}+ [°]", ylabel="radius deviation [µm]")
+    heading(axes, "Over the angle")
+    legend_above(axes)
+    axes.set(xlabel=f"angle from {turn.axes[0]}+ [°]", ylabel="radius deviation [µm]")
     axes.set_xlim(0, 360)
     axes.set_xticks(range(0, 361, 90))
 
@@ -241,9 +256,12 @@ def _torque_row(row: Sequence[Axes], part: Trace, axis: str, sign: int) -> None:
     else:
         friction_room.set_visible(False)
     ordinate = "torque [N·m]" if sign > 0 else "torque, sign reversed [N·m]"
-    time_room.set(title=f"Axis {axis}: torque over time", xlabel="time [s]", ylabel=ordinate)
-    speed_room.set(title="Torque over speed", xlabel="motor speed $n_a$ [rad/s]", ylabel=ordinate)
-    friction_room.set(title="Friction around the reversal", xlabel="motor speed $n_a$ [rad/s]", ylabel=ordinate)
+    heading(time_room, f"Axis {axis}: torque over time")
+    heading(speed_room, "Torque over speed")
+    heading(friction_room, "Friction around the reversal")
+    time_room.set(xlabel="time [s]", ylabel=ordinate)
+    for room in (speed_room, friction_room):
+        room.set(xlabel="motor speed $n_a$ [rad/s]", ylabel=ordinate)
     for room in (time_room, speed_room, friction_room):
         room.axhline(0.0, color=MUTED, linewidth=0.8)
     for room in (speed_room, friction_room):
@@ -251,9 +269,7 @@ def _torque_row(row: Sequence[Axes], part: Trace, axis: str, sign: int) -> None:
     time_room.margins(x=0.01)
     time_room.set_ylim(*_symmetric(torque, friction))
     speed_room.set_ylim(*_symmetric(torque, friction))
-    handles, labels = time_room.get_legend_handles_labels()
-    corner: Literal["lower right", "lower left"] = "lower right" if sign > 0 else "lower left"
-    speed_room.legend(handles, labels, loc=corner, fontsize=8.5, handlelength=1.4, borderaxespad=0.2)
+    legend_above(time_room)
 
 
 def _symmetric(*curves: Array | None) -> tuple[float, float]:

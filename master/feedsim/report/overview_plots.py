@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from feedsim.report.labels import heading, legend_above
 from feedsim.report.style import BLUE, MUTED, SETPOINT, VERMILLION, Picture, drawing, finish, thinned
 from feedsim.trace import Trace
 
@@ -20,7 +21,7 @@ def overview_picture(trace: Trace, axes: Iterable[str], signs: Mapping[str, int]
     shown = [axis for axis in axes if any(f"{axis}.{name}" in trace.columns for name in ("x_a", "x_s", "M_a"))]
     if not shown:
         return None
-    with drawing(10.0, 0.5 + 2.5 * len(shown)) as figure:
+    with drawing(10.0, 0.5 + 2.7 * len(shown)) as figure:
         rooms = figure.subplots(len(shown), 3, squeeze=False, sharex=True)
         for (position, error, torque), axis in zip(rooms, shown, strict=True):
             for name, scale, style, label in (
@@ -33,19 +34,21 @@ def overview_picture(trace: Trace, axes: Iterable[str], signs: Mapping[str, int]
             _curve(torque, trace, f"{axis}.M_a", sign, "motor $M_a$", {"color": BLUE})
             _curve(torque, trace, f"{axis}.M_fr", sign, r"friction $M_{fr}$", {"color": VERMILLION, "linewidth": 1.1})
             note = " (sign reversed)" if sign < 0 else ""
-            position.set(title=f"Axis {axis}: position", ylabel="position [mm]")
-            error.set(title="Following error", ylabel="following error [µm]")
-            torque.set(title=f"Torque{note}", ylabel="torque [N·m]")
+            heading(position, f"Axis {axis}: position")
+            heading(error, "Following error")
+            heading(torque, f"Torque{note}")
+            position.set_ylabel("position [mm]")
+            error.set_ylabel("following error [µm]")
+            torque.set_ylabel("torque [N·m]")
             for room in (position, error, torque):
                 room.margins(x=0.01)
                 if not room.lines:
                     room.set_visible(False)
             for room in (error, torque):
                 room.axhline(0.0, color=MUTED, linewidth=0.8)
-            if torque.get_visible():
-                torque.legend(loc="best", fontsize=8.5)
-            if position.get_visible():
-                position.legend(loc="best", fontsize=8.5)
+            for room in (position, torque):
+                if room.get_visible():
+                    legend_above(room)
         for room in rooms[-1]:
             room.set_xlabel("time [s]")
         return finish(

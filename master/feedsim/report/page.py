@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import base64
-import math
-import re
 from collections.abc import Mapping, Sequence
 from html import escape
 
 from feedsim.analysis import Figure
 from feedsim.report.style import LARGEST_SVG, Picture, css_variables
-from feedsim.report.summary import HEADER, Run, is_leading, real_time_factor, software
+from feedsim.report.summary import HEADER, Run, is_leading, real_time_factor
+from feedsim.report.tables import figures_table, minus, motions_table, provenance, shown, typeset
 
-DISPLAY_UNITS = {"um": "µm", "N.m": "N·m", "1": ""}
+# Significant digits of a tile; the table has more.
+TILE_DIGITS = 4
+TILES = {
+    "overshoot": "overshoot",
+    "settling_time": "settling time",
+    "duration": "duration of the motion",
+    "peak_torque": "largest motor torque",
+    "plateau_torque": "motor torque at constant speed",
+    "rest_torque": "friction torque at rest",
+    "ringing_frequency": "ringing frequency",
+    "G": "circular deviation G",
+    "F_max": "largest radial deviation F max",
+    "F_min": "smallest radial deviation F min",
+    "mean": "mean radius deviation",
+}
 
 STYLE = """
 :root { color-scheme: light dark; %(light)s --ground: #ffffff; --card: #f6f8fa; }
@@ -22,12 +35,14 @@ body { margin: 0 auto; padding: 1.5rem 1.25rem 3rem; max-width: 72rem; backgroun
   font: 16px/1.5 system-ui, "Segoe UI", Arial, sans-serif; }
 h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .3rem; }
 h2 { font-size: 1.2rem; margin: 2.2rem 0 .7rem; }
+h3 { font-size: 1rem; margin: 1.4rem 0 .4rem; }
 p { margin: .3rem 0; }
 .muted, figcaption, footer { color: var(--muted); }
 .keys { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: .7rem; margin: 1.2rem 0; }
 .key { background: var(--card); border: 1px solid var(--grid); border-radius: 8px; padding: .6rem .85rem; }
 .key b { display: block; font-size: 1.35rem; font-weight: 650; white-space: nowrap;
   font-variant-numeric: tabular-nums; }
+.key b.words { font-size: 1rem; line-height: 2.03rem; }
 .key span { color: var(--muted); font-size: .88rem; }
 figure { margin: 1rem 0 2rem; }
 svg.plot, img.plot { display: block; width: 100%%; min-width: 44rem; height: auto; }
@@ -43,18 +58,34 @@ th { font-weight: 600; color: var(--muted); }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 code { font: .9em ui-monospace, "SFMono-Regular", Consolas, monospace; }
 td code { white-space: nowrap; }
+.warning { border: 2px solid var(--vermillion); border-radius: 8px; background: var(--card); padding: .5rem .9rem;
+  margin: 1rem 0; }
+.warning strong { color: var(--vermillion); }
 .note { border-left: 4px solid var(--orange); background: var(--card); padding: .55rem .9rem; margin: 1rem 0; }
+.provenance table { font-size: .84rem; margin-bottom: .9rem; }
 footer { margin-top: 2.5rem; font-size: .85rem; }
 @media print {
   :root { %(light)s --ground: #ffffff; --card: #ffffff; }
   body { max-width: none; padding: 0; font-size: 10.5pt; }
-  svg.plot, img.plot { min-width: 0; } h2 { break-after: avoid; } figure, .key, tr { break-inside: avoid; }
+  h1 { font-size: 16pt; } h2 { font-size: 12pt; margin: 14pt 0 4pt; } h3 { font-size: 10pt; }
+  .note, .warning { padding: 3pt 8pt; margin: 6pt 0; }
+  .keys { grid-template-columns: repeat(4, minmax(0, 1fr)); gap: 5pt; margin: 8pt 1px; }
+  .key { padding: 3pt 6pt; } .key b { font-size: 12pt; } .key b.words { font-size: 10pt; line-height: 18pt; }
+  .key span { font-size: 8pt; line-height: 1.2; display: block; }
+  .scroll { overflow: visible; } td.meaning { min-width: 0; }
+  figure { margin: 6pt 0 10pt; } figcaption { font-size: 8.5pt; line-height: 1.35; }
+  svg.plot, img.plot { min-width: 0; max-height: 150mm; object-fit: contain; }
+  table { font-size: 8.5pt; } th, td { padding: 1.5pt 6pt 1.5pt 0; } thead { display: table-header-group; }
+  .provenance table, footer { font-size: 7pt; } .provenance table { margin-bottom: 6pt; }
+  .provenance th, .provenance td { padding: .6pt 6pt .6pt 0; } .provenance h3 { font-size: 8.5pt; margin: 6pt 0 2pt; }
+  main p { font-size: 8.5pt; } .provenance p { font-size: 7pt; margin: 0 0 6pt; }
+  h2, h3 { break-after: avoid; } figure, .key, .note, .warning, tr { break-inside: avoid; }
   @page { size: A4; margin: 16mm 15mm; }
 }
 """
 
 
-def page(run: Run, figures: Mapping[str, Figure], pictures: Sequence[Picture], warnings: Sequence[str] = ()) -> str:
+def page(run: Run, figures: Mapping[str, Figure], pictures: Sequence[Picture]) -> str:
     """HTML text of the report."""
     scenario, machine = run.scenario, run.scenario.machine
     style = STYLE % {"light": css_variables(dark=False), "dark": css_variables(dark=True)}
@@ -66,47 +97,52 @@ def page(run: Run, figures: Mapping[str, Figure], pictures: Sequence[Picture], w
         f"<header>\n<h1>{escape(scenario.name)}</h1>",
         f'<p class="muted">{escape(machine.name)} · {len(scenario.motions)} motion(s), '
         f"{run.program.duration:.4g} s</p>",
+        _warnings(run.warnings),
         *(f'<p class="note">{escape(note)}</p>' for note in notes),
-        *(f'<p class="note">Warning: {escape(warning)}</p>' for warning in warnings),
         _keys(figures),
         "</header>",
         "<main>",
         *(_figure(picture) for picture in pictures),
-        _figures_table(figures),
-        _motions_table(run),
-        _provenance(run),
+        figures_table(figures),
+        motions_table(run),
+        provenance(run),
         "</main>",
-        _footer(run),
+        _footer(run, figures),
         "</body>\n</html>\n",
     ]
     return "\n".join(part for part in parts if part)
 
 
-def shown(figure: Figure) -> tuple[str, str]:
-    """Value and unit for display; an en dash where the value is not determined."""
-    unit = DISPLAY_UNITS.get(figure.unit, figure.unit)
-    if not math.isfinite(figure.value):
-        return "–", unit
-    digits = {"um": 2, "ms": 1, "Hz": 2, "N.m": 3, "s": 4}.get(figure.unit)
-    text = f"{figure.value:.{digits}f}" if digits is not None else f"{figure.value:.5g}"
-    return text.replace("-", "−"), unit
+def tile(name: str, figure: Figure) -> tuple[str, str]:
+    """Value with unit, to TILE_DIGITS digits at most, and label of a figure's tile."""
+    value, unit = shown(figure)
+    if unit and sum(c.isdigit() for c in value.lstrip("−0.")) > TILE_DIGITS:
+        rounded = float(f"{figure.value:.{TILE_DIGITS}g}")
+        whole = len(f"{abs(rounded):.0f}") if abs(rounded) >= 1 else 0
+        value = minus(f"{rounded:.{max(0, TILE_DIGITS - whole)}f}")
+    prefix, _, key = name.partition(".")
+    label = f"quadrant glitch, {key[7:]} reverses" if key.startswith("glitch_") else TILES.get(key, key)
+    return f"{value} {unit}".strip(), f"{prefix.replace('#', ' no. ')}: {label}"
 
 
 def _keys(figures: Mapping[str, Figure]) -> str:
     cards = []
     for name, figure in figures.items():
         if is_leading(name, HEADER):
-            value, unit = shown(figure)
-            label = name.replace(".", " ").replace("_", " ").replace("#", " no. ")
-            title = escape(_typeset(figure.meaning), quote=True)
+            value, label = tile(name, figure)
+            title = escape(typeset(figure.meaning), quote=True)
+            words = ' class="words"' if value[-1:].isalpha() and not any(c.isdigit() for c in value) else ""
             cards.append(
-                f'<div class="key" title="{title}"><b>{value} {escape(unit)}</b><span>{escape(label)}</span></div>'
+                f'<div class="key" title="{title}"><b{words}>{escape(value)}</b><span>{escape(label)}</span></div>'
             )
     return f'<div class="keys">{"".join(cards)}</div>' if cards else ""
 
 
-def _typeset(text: str) -> str:
-    return re.sub(r"\bum\b", "µm", text.replace("+-", "±"))
+def _warnings(warnings: Sequence[str]) -> str:
+    if not warnings:
+        return ""
+    items = "".join(f"<p><strong>Warning:</strong> {escape(warning)}</p>" for warning in warnings)
+    return f'<div class="warning" role="alert">{items}</div>'
 
 
 def _figure(picture: Picture) -> str:
@@ -121,64 +157,14 @@ def _figure(picture: Picture) -> str:
     )
 
 
-def _figures_table(figures: Mapping[str, Figure]) -> str:
-    if not figures:
-        return ""
-    rows = []
-    for name, figure in figures.items():
-        value, unit = shown(figure)
-        rows.append(
-            f'<tr><td><code>{escape(name)}</code></td><td class="number">{value}</td><td>{escape(unit)}</td>'
-            f'<td class="meaning">{escape(_typeset(figure.meaning))}</td></tr>'
-        )
-    return (
-        '<h2>Derived figures</h2>\n<div class="scroll"><table><thead><tr><th>Figure</th>'
-        f'<th class="number">Value</th><th>Unit</th><th>Meaning</th></tr></thead>\n'
-        f"<tbody>{''.join(rows)}</tbody></table></div>"
-    )
-
-
-def _motions_table(run: Run) -> str:
-    rows = "".join(
-        f'<tr><td class="number">{segment.index}</td><td>{escape(segment.description)}</td>'
-        f'<td class="number">{segment.start:.4f}</td><td class="number">{segment.end:.4f}</td></tr>'
-        for segment in run.program.segments[:200]
-    )
-    more = len(run.program.segments) - 200
-    tail = f'<p class="muted">and {more} more</p>' if more > 0 else ""
-    return (
-        '<h2>Motions</h2>\n<div class="scroll"><table><thead><tr><th class="number">No.</th><th>Motion</th>'
-        f'<th class="number">Start [s]</th><th class="number">End [s]</th></tr></thead>\n'
-        f"<tbody>{rows}</tbody></table></div>{tail}"
-    )
-
-
-def _provenance(run: Run) -> str:
-    scenario, machine = run.scenario, run.scenario.machine
-    cycles = machine.cycles
-    rows = [
-        ("Scenario", f"{scenario.name} ({scenario.file.name})"),
-        ("Changed from outside", ", ".join(scenario.overrides) or "nothing"),
-        ("Machine", machine.name),
-        ("Cycles", f"T_c {cycles.T_c * 1e6:g} µs, T_pos {cycles.T_pos * 1e3:g} ms, T_ipo {cycles.T_ipo * 1e3:g} ms"),
-        ("Coupling", f"{scenario.coupling.scheme}, {scenario.coupling.substeps} exchange step(s) per control cycle"),
-        ("Recording", f"every {scenario.recording.interval * 1e6:g} µs, {len(run.trace)} rows"),
-        *(
-            (f"Unit {name}", f"version {unit.get('version', '?')}, GUID {unit.get('guid', '?')}")
-            for name, unit in run.units.items()
-        ),
-        *((f"Coupling energy {name}", f"{value:.4g} J") for name, value in run.coupling.items()),
-        *((name, text) for name, text in software().items()),
-    ]
-    body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
-    return f'<h2>Where the numbers come from</h2>\n<div class="scroll"><table><tbody>{body}</tbody></table></div>'
-
-
-def _footer(run: Run) -> str:
+def _footer(run: Run, figures: Mapping[str, Figure]) -> str:
     factor = real_time_factor(run)
     speed = f" ({factor:.2g} times real time)" if factor is not None else ""
+    defined = (
+        'What each figure means stands beside it in the table <a href="#figures">Derived figures</a>; the full '
+        "definitions come with the software (docs/figures.md). "
+    )
     return (
-        f"<footer><p>Definitions of the figures: docs/figures.md. Values in full precision: "
-        f"summary.json; time series: result.csv. {run.program.duration:.4g} s simulated "
-        f"in {run.wall_time:.3g} s{speed}.</p></footer>"
+        f"<footer><p>{defined if figures else ''}Values in full precision: summary.json; time series: result.csv. "
+        f"{run.program.duration:.4g} s simulated in {run.wall_time:.3g} s{speed}.</p></footer>"
     )

@@ -6,6 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from feedsim.analysis import Approach, Figures, deviation
+from feedsim.analysis.positioning import PLATEAU
+from feedsim.report.labels import beside, heading, keep_inside, legend_above, mark_instant, place_beside_level
 from feedsim.report.style import (
     BLUE,
     GREEN,
@@ -24,6 +26,7 @@ from feedsim.trace import Trace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+END = "end of NC motion"
 ZOOM_BEFORE, ZOOM_AFTER = 0.030, 0.400  # s about the end of the NC motion
 
 
@@ -67,10 +70,11 @@ def _overview(axes: Axes, trace: Trace, approach: Approach) -> None:
         axes.plot(t, x, color=SETPOINT, linestyle=(0, (4, 2)), linewidth=1.6, label="setpoint $x_s$")
     t, x = thinned(part.time, part[f"{axis}.x_a"] * 1e3)
     axes.plot(t, x, color=BLUE, label="linear scale $x_a$")
-    _end_of_motion(axes, approach.end, 0.06 if approach.sense > 0 else 0.9)
-    axes.set(title=f"Position of axis {axis}", xlabel="time [s]", ylabel="position [mm]")
+    heading(axes, f"Position of axis {axis}")
+    axes.set(xlabel="time [s]", ylabel="position [mm]")
     axes.margins(x=0.01)
-    axes.legend(loc="upper left" if approach.sense > 0 else "lower left")
+    mark_instant(axes, approach.end, END)
+    legend_above(axes)
 
 
 def _zoom(axes: Axes, trace: Trace, approach: Approach, figures: Figures, band: float) -> None:
@@ -96,24 +100,42 @@ def _zoom(axes: Axes, trace: Trace, approach: Approach, figures: Figures, band: 
     if overshoot > 0:
         peak = (float(time[beyond.argmax()]) - approach.end) * 1e3
         axes.plot([peak], [overshoot], "o", color=BLUE, markersize=4.5, zorder=4)
-        axes.annotate(
+        note = axes.annotate(
             f"overshoot {overshoot:.2f} µm", (peak, overshoot), xytext=(10, 5), textcoords="offset points", va="bottom"
         )
-    if math.isfinite(settled) and settled > 0:
-        side = -1.0 if beyond[min(int(time.searchsorted(approach.end + settled / 1e3)), len(beyond) - 1)] < 0 else 1.0
-        axes.annotate(
-            f"last outside ±{band * 1e6:g} µm:\n{settled:.1f} ms",
-            (settled, side * band * 1e6),
-            xytext=(settled + 14, -0.62 * reach),
+        if beside(axes, note, peak, 10) == "right":
+            note.set(ha="right", x=-10)
+        keep_inside(note)
+    after = int(time.searchsorted(approach.end + settled / 1e3)) if math.isfinite(settled) else 0
+    _settling(axes, settled, band * 1e6, -1.0 if beyond[min(after, len(beyond) - 1)] < 0 else 1.0)
+    ordinate = "beyond the target [µm]" if approach.sense > 0 else "beyond the target, to minus [µm]"
+    heading(axes, "Distance beyond the target")
+    axes.set(xlabel="time after the end of the NC motion [ms]", ylabel=ordinate)
+    legend_above(axes)
+
+
+def _settling(axes: Axes, settled: float, band: float, side: float) -> None:
+    """Mark the last instant ``settled`` [ms] outside ``band`` [um], which is left on ``side`` (+-1)."""
+    (begin, end), (low, _) = axes.get_xlim(), axes.get_ylim()
+    within = f"±{band:g} µm"
+    if 0 < settled <= end:
+        right = settled > begin + 0.6 * (end - begin)
+        label = axes.annotate(
+            f"last outside {within}:\n{settled:.1f} ms",
+            (settled, side * band),
+            xytext=(settled + (-0.03 if right else 0.03) * (end - begin), 0.62 * low),
+            ha="right" if right else "left",
             va="center",
             color=INK,
             arrowprops={"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 1.1},
             zorder=5,
         )
-        axes.plot([settled], [side * band * 1e6], "o", color=VERMILLION, markersize=5, zorder=5)
-    ordinate = "beyond the target [µm]" if approach.sense > 0 else "beyond the target, to minus [µm]"
-    axes.set(title="Distance beyond the target", xlabel="time after the end of the NC motion [ms]", ylabel=ordinate)
-    axes.legend(loc="upper right")
+        keep_inside(label)
+        axes.plot([settled], [side * band], "o", color=VERMILLION, markersize=5, zorder=5)
+    elif settled > end or math.isnan(settled):
+        undetermined = "settling time\nnot determined"
+        text = undetermined if math.isnan(settled) else f"still outside {within}\nuntil {settled:.1f} ms"
+        keep_inside(axes.text(0.98, 0.06, text, transform=axes.transAxes, ha="right", va="bottom", color=INK))
 
 
 def _torque(axes: Axes, trace: Trace, approach: Approach, figures: Figures, sign: int) -> None:
@@ -125,34 +147,20 @@ def _torque(axes: Axes, trace: Trace, approach: Approach, figures: Figures, sign
         t, friction = thinned(part.time, sign * part[f"{axis}.M_fr"])
         axes.plot(t, friction, color=VERMILLION, linewidth=1.2, label=r"friction torque $M_{fr}$")
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
-    _end_of_motion(axes, approach.end, 0.06)
-    if approach.steady is not None and "plateau_torque" in figures and math.isfinite(figures["plateau_torque"].value):
-        level = sign * figures["plateau_torque"].value
-        axes.annotate(
-            f"mean at constant speed {level:.2f} N·m".replace("-", "−"),
-            ((approach.steady[0] + approach.steady[1]) / 2, level),
-            xytext=(0, 16 if level >= 0 else -16),
-            textcoords="offset points",
-            ha="center",
-            va="bottom" if level >= 0 else "top",
-        )
-    axes.set(
-        title=f"Driving torque of axis {axis}" + (" (sign reversed for display)" if sign < 0 else ""),
-        xlabel="time [s]",
-        ylabel="torque [N·m]",
-    )
+    heading(axes, f"Driving torque of axis {axis}" + (" (sign reversed for display)" if sign < 0 else ""))
+    axes.set(xlabel="time [s]", ylabel="torque [N·m]")
     axes.margins(x=0.01)
-    axes.legend(loc="upper right", ncols=2)
+    axes.autoscale_view()
+    mark_instant(axes, approach.end, END)
+    if approach.steady is not None and "plateau_torque" in figures and math.isfinite(figures["plateau_torque"].value):
+        _plateau(axes, approach.steady, sign * figures["plateau_torque"].value)
+    legend_above(axes)
 
 
-def _end_of_motion(axes: Axes, end: float, height: float) -> None:
-    axes.axvline(end, color=MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
-    axes.annotate(
-        "end of NC motion",
-        (end, height),
-        xycoords=("data", "axes fraction"),
-        xytext=(5, 0),
-        textcoords="offset points",
-        color=MUTED,
-        fontsize=9,
-    )
+def _plateau(axes: Axes, steady: tuple[float, float], level: float) -> None:
+    """Mean torque [N.m] at constant speed, with a label close to its line where no curve is."""
+    averaged = [steady[0] + share * (steady[1] - steady[0]) for share in PLATEAU]
+    axes.plot(averaged, [level, level], color=INK, linewidth=1.0, linestyle=(0, (1, 1.5)), zorder=4)
+    text = f"mean at constant speed {level:.2f} N·m".replace("-", "−")
+    label = axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center")
+    place_beside_level(axes, label, sum(averaged) / 2, level)

@@ -65,6 +65,7 @@ def drawing(width: float, height: float) -> Iterator[Drawing]:
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Drawing
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     settings: Any = {
         "font.family": "DejaVu Sans",
@@ -103,7 +104,7 @@ def drawing(width: float, height: float) -> Iterator[Drawing]:
         "svg.hashsalt": "feedsim",
     }
     with rc_context(settings):
-        figure = Drawing(figsize=(width, height), layout="constrained")
+        figure = Drawing(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06))
         FigureCanvasAgg(figure)
         yield figure
 

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from feedsim.analysis import Figure
 from feedsim.nc import Program
+from feedsim.report.provenance import Parameter, axis_parameters, input_files
 from feedsim.scenario import Scenario
 from feedsim.trace import Trace
 
@@ -37,6 +38,8 @@ class Run(Protocol):
     def wall_time(self) -> float: ...
     @property
     def units(self) -> Mapping[str, Mapping[str, str]]: ...
+    @property
+    def warnings(self) -> tuple[str, ...]: ...
 
 
 def software() -> dict[str, str]:
@@ -56,6 +59,7 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
     scenario, machine = run.scenario, run.scenario.machine
     return {
         "format": FORMAT,
+        "warnings": list(run.warnings),
         "figures": {
             name: {
                 "value": figure.value if math.isfinite(figure.value) else None,
@@ -68,6 +72,7 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
             "name": scenario.name,
             "file": scenario.file.name,
             "note": scenario.note,
+            "set": list(scenario.settings),
             "overrides": list(scenario.overrides),
             "duration": {"value": run.program.duration, "unit": "s"},
             "coupling": {"scheme": scenario.coupling.scheme, "substeps": scenario.coupling.substeps},
@@ -85,7 +90,9 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
             "name": machine.name,
             "note": machine.note,
             "pose": {a: {"value": x, "unit": "m"} for a, x in machine.pose.items()},
+            "axes": {name: _axis(axis_parameters(axis)) for name, axis in machine.axes.items()},
         },
+        "inputs": [{"role": f.role, "name": f.name, "sha256": f.sha256} for f in input_files(scenario)],
         "units": {name: dict(unit) for name, unit in run.units.items()},
         "coupling": {
             name: {"value": value, "unit": "J", "meaning": COUPLING[name.partition(".")[2]]}
@@ -98,6 +105,15 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
         },
         "files": list(files),
     }
+
+
+def _axis(groups: Mapping[str, Mapping[str, tuple[Parameter, str]]]) -> dict[str, Any]:
+    """pitch and M_0 of an axis, and its parameters by unit; words and switches stand alone, without a unit."""
+    plain = {
+        group: {name: {"value": value, "unit": unit} if unit else value for name, (value, unit) in values.items()}
+        for group, values in groups.items()
+    }
+    return plain.pop("axis") | plain
 
 
 def to_json(content: Mapping[str, Any]) -> str:

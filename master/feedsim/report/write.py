@@ -60,8 +60,7 @@ def write(run: Run, figures: Mapping[str, Figure], directory: Path | str) -> tup
         for picture in pictures:
             (fresh / FIGURES / f"{picture.stem}.png").write_bytes(picture.png)
         names = [*(f"{FIGURES}/{picture.stem}.png" for picture in pictures), RESULT, REPORT, SUMMARY]
-        warnings: Sequence[str] = getattr(run, "warnings", ())
-        texts = {REPORT: page(run, figures, pictures, warnings), SUMMARY: to_json(summary(run, figures, names))}
+        texts = {REPORT: page(run, figures, pictures), SUMMARY: to_json(summary(run, figures, names))}
         for name, text in texts.items():
             (fresh / name).write_text(text, encoding="utf-8", newline="\n")
         _move(fresh, directory, names, _stale(directory, names), Path(scratch) / "kept")

@@ -1,0 +1,87 @@
+"""Where the numbers come from: input files with their hashes, archives, parameters of the axes in SI."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from feedsim.scenario import Axis, Drive, Friction, MeasuredSetpoints, Scenario
+from feedsim.scenario.fields import Quantity
+
+Parameter = float | int | bool | str
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file that the run depends on: what it is, its name without folder, SHA-256 of its bytes.
+
+    The hash is taken when the results are written; None where the file cannot be read then.
+    """
+
+    role: str
+    name: str
+    sha256: str | None
+
+
+@dataclass(frozen=True)
+class ArchiveUse:
+    """A distinct archive and the instances that were made of it."""
+
+    name: str
+    version: str
+    guid: str
+    instances: tuple[str, ...]
+
+
+def input_files(scenario: Scenario) -> list[InputFile]:
+    """Scenario, machine and further YAML files, table of modes, recordings; each once."""
+    named = [(place or "scenario", path) for place, path in scenario.files]
+    named.append(("modes", scenario.machine.modes))
+    named += [
+        ("recorded setpoints", motion.file) for motion in scenario.motions if isinstance(motion, MeasuredSetpoints)
+    ]
+    once = {path.absolute(): (role, path) for role, path in reversed(named)}
+    return [InputFile(role, path.name, _sha256(path)) for role, path in reversed(once.values())]
+
+
+def archives(units: Mapping[str, Mapping[str, str]]) -> list[ArchiveUse]:
+    """Distinct archives of a run's units (instance -> GUID and version), in the order of their first use."""
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for instance, unit in units.items():
+        key = (unit.get("name", instance.partition("_")[0]), unit.get("version", "?"), unit.get("guid", "?"))
+        found.setdefault(key, []).append(instance)
+    return [ArchiveUse(*key, tuple(instances)) for key, instances in found.items()]
+
+
+def axis_parameters(axis: Axis) -> dict[str, dict[str, tuple[Parameter, str]]]:
+    """Group ("axis", "drive", "friction") -> name of the FMI unit -> SI value and unit ("" for words and switches)."""
+    mechanics: dict[str, tuple[Parameter, str]] = {"pitch": (axis.pitch, "m"), "M_0": (axis.M_0, "N.m")}
+    drive, friction = (_with_units(group) for group in (axis.drive, axis.friction))
+    return {"axis": mechanics, "drive": drive, "friction": friction}
+
+
+def _with_units(group: Drive | Friction) -> dict[str, tuple[Parameter, str]]:
+    units = dict(_units(type(group)))
+    return {name: (value, units.get(name, "")) for name, value in group.parameters().items()}
+
+
+def _units(model: Any) -> Iterator[tuple[str, str]]:
+    """Names of a group's quantities, nested groups' as group.name, with their SI units."""
+    for name, field in model.model_fields.items():
+        inner = [field.annotation, *get_args(field.annotation)]
+        nested = [part for part in inner if hasattr(part, "model_fields")]
+        if nested:
+            yield from ((f"{name}.{key}", unit) for key, unit in _units(nested[0]))
+            continue
+        notes: list[Any] = [*field.metadata, *(note for part in inner for note in getattr(part, "__metadata__", ()))]
+        yield from ((name, note.unit) for note in notes if isinstance(note, Quantity))
+
+
+def _sha256(path: Path) -> str | None:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return None

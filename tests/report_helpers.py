@@ -1,0 +1,68 @@
+"""A run as the report sees it, made of the plan alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feedsim.nc import Program, plan
+from feedsim.scenario import Circle, CircleTest, Dwell, Move, Positioning, Scenario
+from feedsim.trace import Trace
+from scenario_helpers import scenario
+
+
+@dataclass(frozen=True)
+class FakeRun:
+    """A run as the report sees it; its trace is the plan with a delay, a ring-down and a friction step."""
+
+    scenario: Scenario
+    program: Program
+    trace: Trace
+    coupling: Mapping[str, float] = field(default_factory=lambda: {"Z.residual": 1.4e-5})
+    wall_time: float = 0.5
+    units: Mapping[str, Mapping[str, str]] = field(
+        default_factory=lambda: {"plant": {"guid": "0011223344556677-8899aabbccddeeff", "version": "0.1.0"}}
+    )
+    warnings: tuple[str, ...] = ()
+
+
+def run_of(described: Scenario, **changes: Any) -> FakeRun:
+    program = plan(described)
+    t = program.time
+    columns: dict[str, Any] = {}
+    for axis, x_s in program.x_s.items():
+        n = program.n_ffw[axis]
+        friction = 2.0 * np.tanh(n)
+        ringing = 3e-6 * np.exp(-8 * t) * np.sin(130 * t)
+        columns |= {
+            f"{axis}.x_s": x_s,
+            f"{axis}.x_a": x_s + ringing,
+            f"{axis}.n_a": n,
+            f"{axis}.M_fr": friction,
+            f"{axis}.M_a": friction + 0.01 * np.gradient(n, t),
+            f"{axis}.x_e": -ringing,
+            f"tcp.x_{axis}": x_s + 1.2 * ringing,
+        }
+    return FakeRun(described, program, Trace(t, columns, dict.fromkeys(columns, "m")), **changes)
+
+
+def positioning_run(**changes: Any) -> FakeRun:
+    motions = (Move(by={"Z": 0.05}, feed=5 / 60), Dwell(duration=1.2))
+    return run_of(scenario(*motions, evaluate=(Positioning(axis="Z"),), **changes))
+
+
+def circle_run(**changes: Any) -> FakeRun:
+    motions = (Circle(plane=("X", "Z"), radius=0.015, feed=0.1, turns=3), Dwell(duration=0.25))
+    return run_of(scenario(*motions, evaluate=(CircleTest(),), **changes))
+
+
+def small_run(**changes: Any) -> FakeRun:
+    return run_of(scenario(Move(by={"X": 0.01}, feed=0.1)), **changes)
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    return {p.relative_to(directory).as_posix(): p.read_bytes() for p in sorted(directory.rglob("*")) if p.is_file()}

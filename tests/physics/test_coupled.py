@@ -27,8 +27,8 @@ motions:
   - {{kind: circle, plane: [X, Z], radius: 15 mm, feed: 3000 mm/min, turns: 1}}
   - {{kind: dwell, duration: 0.1 s}}
 """
-# Largest error of x_a [nm] that a scheme may have at 125 us, and its order. The errors stem from two prototypes of the
-# same equations over three turns (90, 32, 2.3, 0.9 nm); a third above them is allowed, but the default must keep 2 nm.
+# Largest error of x_a [nm] that a scheme may have at 125 us, and its order. The errors stem from two other
+# implementations over three turns (90, 32, 2.3, 0.9 nm); a third above them is allowed, but the default must keep 2 nm.
 SCHEMES = {
     "jacobi": (120.0, 1),
     "gauss_seidel": (43.0, 1),
@@ -78,7 +78,7 @@ def test_error_and_order(circle: Path, fmus: Path, scheme: str) -> None:
 
 def test_friction_torque(circle: Path, fmus: Path) -> None:
     result = run(circle, fmus)
-    # 0.65 mN.m in the prototypes; a third more
+    # 0.65 mN.m in those implementations; a third more
     assert error(result, reference(result), "M_fr") < 0.87e-3
 
 

@@ -1,7 +1,7 @@
 """The monolithic reference itself: known figures, closed forms, convergence, and a second integrator and controller.
 
-What "right" looks like was measured on two prototypes of the same synthetic machine that agreed within 1 %; the figures
-were printed with three or four digits, so 2 % is the tolerance where no other reason is given.
+What "right" looks like was measured on two implementations of the same synthetic machine that agreed within 1 %; the
+figures were printed with three or four digits, so 2 % is the tolerance where no other reason is given.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The shipped scenarios on the default machine, against figures that two independent prototypes agree on within 1 %.
+"""The shipped scenarios on the default machine, against figures that independent implementations agree on within 1 %.
 
-The prototypes were written from the equations alone, without these units. Each figure must be met within 2 %: their
-mutual 1 %, and as much again for the rounding of the machine's numbers (half a digit of the reference model's D moves
-the overshoot by 1.1 %). All numbers are of the synthetic default machine.
+These were written from the equations alone, without the units (one is tests/reference/monolithic). Each figure must be
+met within 2 %: their mutual 1 %, and as much again for the rounding of the machine's numbers (half a digit of the
+reference model's D moves the overshoot by 1.1 %). All numbers are of the synthetic default machine.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Derived figures from traces: positioning, circularity. Definitions: docs/figures.md."""
 
 from feedsim.analysis.circularity import Contour, Glitch, Turn, circularity, contour
-from feedsim.analysis.evaluate import CircleTask, PositioningTask, Task, check, evaluate, tasks
+from feedsim.analysis.evaluate import CircleTask, PositioningTask, Result, Task, check, evaluate, tasks
 from feedsim.analysis.figures import Figure, Figures
 from feedsim.analysis.positioning import Approach, deviation, positioning
 
@@ -13,6 +13,7 @@ __all__ = [
     "Figures",
     "Glitch",
     "PositioningTask",
+    "Result",
     "Task",
     "Turn",
     "check",

@@ -93,7 +93,8 @@ def _zoom(axes: Axes, trace: Trace, approach: Approach, figures: Figures, band: 
 
     overshoot, settled = figures["overshoot"].value, figures["settling_time"].value
     by_tool = figures["tool.overshoot"].value if "tool.overshoot" in figures else 0.0
-    reach = max(1.45 * max(overshoot, by_tool), 3.2 * band * 1e6)
+    determined = [each for each in (overshoot, by_tool) if math.isfinite(each)]  # neither, where the window is short
+    reach = 1.45 * max([*determined, 2.2 * band * 1e6])
     axes.set_ylim(-reach, reach)
     axes.set_xlim(-ZOOM_BEFORE * 1e3, min(ZOOM_AFTER, max(approach.until - approach.end, 0.05)) * 1e3)
     time, beyond = deviation(trace, approach, f"{approach.axis}.x_a")

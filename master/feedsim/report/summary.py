@@ -9,11 +9,8 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 
-from feedsim.analysis import Figure
-from feedsim.nc import Program
+from feedsim.analysis import Figure, Result
 from feedsim.report.provenance import Parameter, axis_parameters, input_files
-from feedsim.scenario import Scenario
-from feedsim.trace import Trace
 
 FORMAT = 1
 COUPLING = {
@@ -23,15 +20,9 @@ COUPLING = {
 }
 
 
-class Run(Protocol):
+class Run(Result, Protocol):
     """What a report needs of a run (feedsim.cosim.Run is one)."""
 
-    @property
-    def scenario(self) -> Scenario: ...
-    @property
-    def program(self) -> Program: ...
-    @property
-    def trace(self) -> Trace: ...
     @property
     def coupling(self) -> Mapping[str, float]: ...
     @property

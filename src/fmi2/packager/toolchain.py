@@ -41,7 +41,8 @@ def is_zig(command: Sequence[str]) -> bool:
 
 def run(command: Sequence[str], directory: Path) -> str:
     """Run a compiler command in `directory` and return its standard output; raises CompilerError with its messages."""
-    environment = {**os.environ, "LC_ALL": "C"}
+    # Messages in English; zig comes as a Python program, which must still find its way through a folder of any name.
+    environment = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "1"}
     try:
         done = subprocess.run(
             command, cwd=directory, env=environment, capture_output=True, encoding="utf-8", errors="replace"

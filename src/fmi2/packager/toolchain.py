@@ -41,8 +41,9 @@ def is_zig(command: Sequence[str]) -> bool:
 
 def run(command: Sequence[str], directory: Path) -> str:
     """Run a compiler command in `directory` and return its standard output; raises CompilerError with its messages."""
-    # Messages in English; zig comes as a Python program, which must still find its way through a folder of any name.
-    environment = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "1"}
+    # Messages in English. Not by LC_ALL=C: zig comes as a Python program, which could then not start from a folder with a
+    # non-ASCII name.
+    environment = {name: value for name, value in os.environ.items() if name != "LC_ALL"} | {"LC_MESSAGES": "C"}
     try:
         done = subprocess.run(
             command, cwd=directory, env=environment, capture_output=True, encoding="utf-8", errors="replace"

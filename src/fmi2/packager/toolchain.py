@@ -41,8 +41,8 @@ def is_zig(command: Sequence[str]) -> bool:
 
 def run(command: Sequence[str], directory: Path) -> str:
     """Run a compiler command in `directory` and return its standard output; raises CompilerError with its messages."""
-    # Messages in English. Not by LC_ALL=C: zig comes as a Python program, which could then not start from a folder with a
-    # non-ASCII name.
+    # Messages in English. Not by LC_ALL=C: zig comes as a Python program, which could then not start from a folder with
+    # a non-ASCII name.
     environment = {name: value for name, value in os.environ.items() if name != "LC_ALL"} | {"LC_MESSAGES": "C"}
     try:
         done = subprocess.run(

@@ -31,7 +31,7 @@ SCHEMES = {
         Scheme("gauss_seidel", torque_ramp=True, friction_ramp=False, stable_share=0.5, speed="end"),
         Scheme("jacobi", torque_ramp=True, friction_ramp=False, stable_share=0.28, speed="start"),
         Scheme("jacobi_extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.11, speed="extrapolated"),
-        Scheme("parallel", torque_ramp=False, friction_ramp=False, stable_share=0.11, speed="start"),
+        Scheme("parallel", torque_ramp=False, friction_ramp=False, stable_share=0.28, speed="start"),
     )
 }
 

@@ -2,6 +2,7 @@
 
 import io
 import re
+import shlex
 import subprocess
 import sys
 import zipfile
@@ -188,7 +189,7 @@ def test_newest_glibc_is_found() -> None:
 
 
 def test_compiler_may_be_several_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("CC", f"{sys.executable} -m ziglang cc")
+    monkeypatch.setenv("CC", f"{shlex.quote(sys.executable)} -m ziglang cc")
     assert toolchain.find_compiler() == (sys.executable, "-m", "ziglang", "cc")
     assert toolchain.is_zig(toolchain.find_compiler())
     assert not toolchain.is_zig(("gcc", "-O2"))

@@ -54,6 +54,28 @@ def test_recorded_circle_is_the_planned_one(tmp_path: Path, direction: str) -> N
     assert (found.begin, found.end) == pytest.approx((expected.begin, expected.end), abs=1.001e-3)
 
 
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("first", [0.0, 0.7])
+def test_recording_cut_in_motion_is_fitted_without_its_run_in(tmp_path: Path, sense: int, first: float) -> None:
+    """A circle at constant speed from the first row to the last: run-in and run-out are tangents, not circle."""
+    radius, feed, turns = 0.015, 0.05, 3
+    t = np.arange(0.0, turns * 2 * math.pi * radius / feed + 2e-3, 1e-3)
+    angle = first + sense * t * feed / radius
+    motion = recording(tmp_path / "c.csv", {"time": t, "X": radius * np.cos(angle), "Z": radius * np.sin(angle)})
+    motion = motion.model_copy(update={"relative": True})
+    described = scenario(motion, evaluate=(CircleTest(turn=1),))
+    program = plan(described)
+    (task,) = tasks(described, program)
+    assert isinstance(task, CircleTask)
+    assert task.turn.sense == sense
+    # a cubic spline through points 1 ms apart on a circle errs by 1e-14 m, rows are rounded to 1e-12 m
+    assert task.turn.radius == pytest.approx(radius, abs=1e-11)
+    lap = 2 * math.pi * radius / feed
+    assert task.turn.end - task.turn.begin == pytest.approx(lap, abs=1.001e-3)
+    # the first turn begins with the first row, which lies behind the run-in of two jerk phases (36.5 ms at 50 mm/s)
+    assert 0.02 < task.turn.begin < 0.05
+
+
 def test_what_is_given_is_not_fitted(tmp_path: Path) -> None:
     motion = recording(tmp_path / "c.csv", planned(Circle(plane=("X", "Z"), radius=0.015, feed=0.05)), digits=6)
     centre = {"X": 0.785002, "Z": 0.1}

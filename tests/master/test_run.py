@@ -188,3 +188,18 @@ def test_nothing_stays_behind(short: Path, fmus: Path, tmp_path: Path, monkeypat
         cosim.run(with_filter_beyond_nyquist(short), fmus=fmus)
     assert not list(scratch.iterdir())
     assert libraries() == 0
+
+
+def test_warnings_that_need_no_run_come_before_it(short: Path, fmus: Path) -> None:
+    def foreseen(*overrides: str) -> tuple[str, ...]:
+        loaded = scenario.load(short, list(overrides))
+        return cosim.check(loaded, nc.plan(loaded), fmus=fmus)
+
+    assert foreseen() == ()
+    (stability,) = foreseen("machine.axes.Z.friction.sigma_1=60 N.m.s/rad")
+    assert stability.startswith("axis Z: sigma_1 + sigma_2 = 60.01 N.m.s/rad is above 33.7")
+    (width,) = foreseen("machine.axes.X.friction.W=0.001 rad")
+    assert width.startswith("friction_X: parameter 'W'")
+    (load,) = foreseen("machine.axes.Y.constant_load=20 N.m")
+    assert load.startswith("axis Y: the constant load of 20 N.m is not carried at the start")
+    assert foreseen("machine.axes.Y.constant_load=20 N.m", "motions.0={kind: dwell, duration: 1 s}") == ()

@@ -10,7 +10,7 @@ import numpy as np
 
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
-from feedsim.nc import Circular, Program, Segment
+from feedsim.nc import Circular, Program, Recorded, Segment
 
 # How far setpoints may leave the circle [m]: compensations that a control adds to them are some micrometres, while a
 # lead-in or a wrong centre makes far more, and figures that have nothing to do with the machine.
@@ -28,11 +28,15 @@ def recorded_circle(
 ) -> Circular:
     """Circle of the recorded setpoints of ``segment`` in ``plane`` (first and second axis).
 
-    centre: axis -> position [m]; radius [m]; what is not given is fitted to all setpoints of the segment by least
-    squares. Full turns count from the first setpoint. Raises InputError: less than a full turn, or setpoints that leave
-    the circle by more than OFF_CIRCLE within the turns.
+    centre: axis -> position [m]; radius [m]; what is not given is fitted to all setpoints of the recording by least
+    squares, without its run-in and run-out. Full turns count from the first setpoint of the recording. Raises
+    InputError: less than a full turn, or setpoints that leave the circle by more than OFF_CIRCLE within the turns.
     """
-    rows = (program.time >= segment.start) & (program.time <= segment.end)
+    recording = segment.geometry
+    assert isinstance(recording, Recorded)
+    # Half a position cycle's rounding must not let a setpoint of the run-in in, which lies a whole cycle away.
+    rounding = 1e-6 * (program.time[1] - program.time[0])
+    rows = (program.time >= recording.begin - rounding) & (program.time <= recording.end + rounding)
     time, x, y = (program.time[rows], *(program.x_s[axis][rows] for axis in plane))
     c, r = _fit(x, y)
     if centre is not None:
@@ -52,7 +56,7 @@ def recorded_circle(
     if off > OFF_CIRCLE:
         raise InputError(
             f"{name} leave the circle of R {r * 1e3:.7g} mm {about} by up to {off * 1e6:.4g} um; "
-            f"allowed: {OFF_CIRCLE * 1e6:g} um. Give centre and radius, or take the circle alone with 'between'"
+            f"allowed: {OFF_CIRCLE * 1e6:g} um. Take the circle alone with 'between', or give its centre and radius"
         )
     instants = [float(time[min(int(np.searchsorted(turned, k)), len(time) - 1)]) for k in range(turns + 1)]
     return Circular(

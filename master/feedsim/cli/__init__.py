@@ -15,7 +15,7 @@ from pathlib import Path
 
 EPILOG = """exit codes:
   0 done    1 internal error    2 bad input or usage    3 a unit failed    4 results cannot be written
-  130 interrupted
+  130 interrupted (143, 129: by SIGTERM, SIGHUP)
 
 examples:
   feedsim run scenarios/z_positioning.yaml --out results/z
@@ -81,7 +81,7 @@ def _add_scenario(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--fmus", type=Path, metavar="DIR", help="folder of the archives (default: $FEEDSIM_FMUS, else fmus/)"
     )
-    command.add_argument("scenario", type=Path, metavar="SCENARIO.yaml")
+    command.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="scenario file (docs/scenarios.md)")
     command.add_argument(
         "--set",
         action="append",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
+from collections.abc import Iterable
 from pathlib import Path
 
 from feedsim.errors import InputError
@@ -31,10 +32,14 @@ def run(options: Namespace) -> None:
         result = cosim.run(plan, program=program, fmus=options.fmus, progress=progress)
     figures = analysis.evaluate(result)
     report.write(result, figures, directory)
-    for warning in result.warnings:
-        print(f"feedsim: warning: {warning}", file=sys.stderr)
+    _warn(result.warnings)
     if not options.quiet:
         print(f"{plan.name}: {report.summary_line(result, figures)} -> {directory}")
+
+
+def _warn(warnings: Iterable[str]) -> None:
+    for warning in warnings:
+        print(f"feedsim: warning: {warning}", file=sys.stderr)
 
 
 def validate(options: Namespace) -> None:
@@ -43,7 +48,7 @@ def validate(options: Namespace) -> None:
     checked = scenario.load(options.scenario, options.overrides)
     program = nc.plan(checked)
     analysis.check(checked, program)
-    cosim.check(checked, program, fmus=options.fmus)
+    _warn(cosim.check(checked, program, fmus=options.fmus))
     motions = f"{len(checked.motions)} motion{'s'[: len(checked.motions) != 1]}"
     print(f"{options.scenario}: valid; {motions}, {program.time[-1]:.4g} s on {checked.machine.name}")
 

@@ -101,17 +101,18 @@ def run(
                 name: {"guid": unit.archive.guid, "version": unit.archive.version}
                 for name, unit in system.units.items()
             },
-            warnings=(*system.warnings, *trust.warnings(scenario, modes, cycle, recording)),
+            warnings=(*system.warnings, *trust.foreseen(scenario, modes), *trust.found(scenario, cycle, recording)),
         )
 
 
-def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> None:
-    """Let the units judge their parameters, without a step.
+def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> tuple[str, ...]:
+    """Let the units judge their parameters, without a step; return the warnings that can be given before a run.
 
     Raises:
         InputError: what :func:`run` would refuse before its first step.
     """
     recorded_columns(scenario)
-    checked_modes(scenario.machine)
+    modes = checked_modes(scenario.machine)
     with System(scenario.machine, fmus or fmus_directory()) as system:
         system.initialise(program, stop=float(program.time[-1]))
+        return (*system.warnings, *trust.foreseen(scenario, modes))

@@ -6,14 +6,15 @@ import numpy as np
 
 from feedsim.cosim import wiring
 from feedsim.cosim.recording import Recording
-from feedsim.cosim.schedule import Cycle
+from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
-from feedsim.scenario import Scenario
+from feedsim.scenario import Dwell, Scenario
 from feedsim.structure import Modes
 
 # Of the friction work, and J (an axis at rest has no work to speak of). On the default machine the first-order schemes
 # lose up to 4e-5 of it, the second-order ones 2e-7; chatter loses 1e-3 and more.
 TRUSTED_SHARE, TRUSTED_ENERGY = 3e-4, 1e-3
+LOAD_TAKEN_UP = 1.0  # s; position and speed controller together settle in some tenths of it
 
 
 def energies(system: System, cycle: Cycle) -> dict[str, float]:
@@ -26,27 +27,43 @@ def energies(system: System, cycle: Cycle) -> dict[str, float]:
     return coupling
 
 
-def warnings(scenario: Scenario, modes: Modes, cycle: Cycle, recording: Recording) -> tuple[str, ...]:
-    """What a user should know before believing the result, a sentence each."""
-    return (
-        *_stability(scenario, modes, cycle),
-        *_energy(scenario, recording.system, cycle),
-        *_limits(recording),
-    )
+def foreseen(scenario: Scenario, modes: Modes) -> tuple[str, ...]:
+    """What the parameters alone tell a user to doubt, a sentence each."""
+    return (*_stability(scenario, modes), *_unbalanced_loads(scenario))
 
 
-def _stability(scenario: Scenario, modes: Modes, cycle: Cycle) -> list[str]:
+def found(scenario: Scenario, cycle: Cycle, recording: Recording) -> tuple[str, ...]:
+    """What the run itself tells a user to doubt, a sentence each."""
+    return (*_energy(scenario, recording.system, cycle), *_limits(recording))
+
+
+def _stability(scenario: Scenario, modes: Modes) -> list[str]:
     """Explicit exchange needs a friction slope well below 2 J_inf/h."""
+    scheme = SCHEMES[scenario.coupling.scheme]
+    step = scenario.machine.cycles.T_c / scenario.coupling.substeps
     warnings = []
     for name, axis in scenario.machine.axes.items():
-        slope, bound = axis.friction.sigma_1 + axis.friction.sigma_2, 2 * modes.J_inf(name) / cycle.step
-        if slope > cycle.scheme.stable_share * bound:
+        slope, bound = axis.friction.sigma_1 + axis.friction.sigma_2, 2 * modes.J_inf(name) / step
+        if slope > scheme.stable_share * bound:
             warnings.append(
                 f"axis {name}: sigma_1 + sigma_2 = {slope:.4g} N.m.s/rad is above "
-                f"{cycle.scheme.stable_share * bound:.4g}, where scheme {cycle.scheme.name} was found to become "
-                f"unstable ({cycle.scheme.stable_share:g} of 2 J_inf/h); use more coupling.substeps"
+                f"{scheme.stable_share * bound:.4g}, where scheme {scheme.name} was found to become "
+                f"unstable ({scheme.stable_share:g} of 2 J_inf/h); use more coupling.substeps"
             )
     return warnings
+
+
+def _unbalanced_loads(scenario: Scenario) -> list[str]:
+    """The drive's integrators start empty: an axis under load sags before it holds."""
+    first = scenario.motions[0]
+    if isinstance(first, Dwell) and first.duration >= LOAD_TAKEN_UP:
+        return []
+    return [
+        f"axis {name}: the constant load of {axis.M_0:g} N.m is not carried at the start, the axis sags while the "
+        f"drive takes it up; put a dwell of {LOAD_TAKEN_UP:g} s ahead of the first motion"
+        for name, axis in scenario.machine.axes.items()
+        if axis.M_0 != 0
+    ]
 
 
 def _energy(scenario: Scenario, system: System, cycle: Cycle) -> list[str]:

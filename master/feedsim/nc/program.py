@@ -199,7 +199,12 @@ def _append_recording(state: _Plan, scenario: Scenario, index: int, motion: Meas
             origin=origin,
             target=dict(state.position),
             axes=tuple(axis for axis, x in recording.x_s.items() if np.any(x != origin[axis])),
-            geometry=Recorded(motion.file, tuple(motion.columns)),
+            geometry=Recorded(
+                begin=start + recording.run_in,
+                end=start + recording.run_in + recording.length,
+                file=motion.file,
+                axes=tuple(motion.columns),
+            ),
         )
     )
     return problems

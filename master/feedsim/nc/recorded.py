@@ -26,11 +26,13 @@ Array = NDArray[np.float64]
 class Recording:
     """Recorded setpoints at the position cycle, with run-in and run-out.
 
-    run_in: time ahead of the first row [s]; duration: from the start of the run-in to the end of the run-out [s];
+    run_in: time ahead of the first row [s]; length: from the first row to the last [s]; duration: from the start of the
+    run-in to the end of the run-out [s];
     x_s, v_s: axis -> (N,) position [m] and its derivative [m/s], from 0 to the first instant at or after the end.
     """
 
     run_in: float
+    length: float
     duration: float
     x_s: Mapping[str, Array]
     v_s: Mapping[str, Array]
@@ -67,7 +69,7 @@ def recorded(motion: MeasuredSetpoints, start: Mapping[str, float], cycle: float
         left, v[behind] = out[axis].at(out[axis].duration - (time[behind] - length))
         x[behind] += out[axis].distance - left
         x_s[axis], v_s[axis] = origin + x, v
-    return Recording(before * cycle, duration, x_s, v_s)
+    return Recording(before * cycle, length, duration, x_s, v_s)
 
 
 def _change(speed: float, cycle: float, limits: PathLimits) -> SpeedChange:

@@ -55,8 +55,13 @@ class Circular:
 
 @dataclass(frozen=True)
 class Recorded:
-    """Recorded setpoints."""
+    """Recorded setpoints.
 
+    begin, end: instants [s] of the recording's first and last row; a run-in lies ahead, a run-out behind.
+    """
+
+    begin: float
+    end: float
     file: Path
     axes: tuple[str, ...]
     """Axes with a column of their own."""

@@ -28,7 +28,7 @@ export CC
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-sanitize test-sanitize-scenario test-valgrind fmus lint format reference check-reference bench lock clean
+.PHONY: help run test test-c test-python test-sanitize test-sanitize-scenario test-valgrind fmus lint format reference check-reference bench lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-16s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -55,6 +55,13 @@ $(VENV)/.compiler: $(VENV)/.run requirements-zig.lock
 	@echo "no C compiler found: installing zig from PyPI (requirements-zig.lock)"
 	$(PIP) install -r requirements-zig.lock
 	@touch $@
+
+$(VENV)/.ansys: $(VENV)/.run requirements-ansys.lock
+	@echo "installing the reader of ANSYS files (requirements-ansys.lock)"
+	$(PIP) install -r requirements-ansys.lock
+	@touch $@
+
+ansys: $(VENV)/.ansys ## install the optional reader of ANSYS .full files
 
 # --- the units -----------------------------------------------------------------------------------------------------
 
@@ -132,6 +139,7 @@ lock: ## resolve the dependencies of pyproject.toml anew
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group build -o requirements.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --group zig -o requirements-zig.lock
+	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra ansys -c requirements.lock -o requirements-ansys.lock
 
 clean: ## remove what was built, keep the environment
 	rm -rf $(BUILD) $(FMUS) $(RESULTS)

@@ -25,7 +25,7 @@ static bool axes_legal_name(CsvCell cell) {
             return false;
         }
     }
-    return !csv_equal(cell, "tool") && !csv_equal(cell, "tcp");
+    return !csv_equal(cell, "tool") && !csv_equal(cell, "tcp") && !csv_equal(cell, "pose");
 }
 
 /* The fault of a row, or NULL after it was entered as row `count`. */
@@ -37,8 +37,8 @@ static const char *axes_read_row(CsvRow row, AxisRow *rows, size_t count) {
     csv_next_cell(&row, &name);
     csv_next_cell(&row, &x_0);
     if (!axes_legal_name(name)) {
-        return "column 'axis': a name has letters, digits and _, at most 31, begins with no digit, and is neither tool "
-               "nor tcp";
+        return "column 'axis': a name has letters, digits and _, at most 31, begins with no digit, and is not tool, "
+               "tcp or pose";
     }
     for (size_t i = 0; i < count; i++) {
         if (csv_equal(name, rows[i].name)) {

@@ -204,3 +204,20 @@ double modal_acceleration(const Modal *modal, size_t port, size_t inputs, const 
     }
     return sum;
 }
+
+double modal_kinetic_energy(const Modal *modal, const double *v) {
+    double sum = 0;
+    for (size_t k = 0; k < modal->size; k++) {
+        sum += v[k] * v[k];
+    }
+    return sum / 2;
+}
+
+double modal_elastic_energy(const Modal *modal, const double *q) {
+    double sum = 0;
+    for (size_t k = 0; k < modal->size; k++) {
+        const double root = modal->omega[k] * q[k];
+        sum += root * root;
+    }
+    return sum / 2;
+}

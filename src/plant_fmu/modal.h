@@ -28,6 +28,8 @@
 #define modal_advance PREFIXED(modal_advance)
 #define modal_sum PREFIXED(modal_sum)
 #define modal_acceleration PREFIXED(modal_acceleration)
+#define modal_kinetic_energy PREFIXED(modal_kinetic_energy)
+#define modal_elastic_energy PREFIXED(modal_elastic_energy)
 
 #define MODAL_LANES 4
 
@@ -77,5 +79,9 @@ double modal_sum(const Modal *modal, size_t port, const double *q);
 /* Acceleration at a port under inputs u[inputs] at the first `inputs` ports. */
 double modal_acceleration(const Modal *modal, size_t port, size_t inputs, const double *u, const double *q,
                           const double *v);
+
+/* [J] */
+double modal_kinetic_energy(const Modal *modal, const double *v);
+double modal_elastic_energy(const Modal *modal, const double *q);
 
 #endif

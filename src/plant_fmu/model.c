@@ -8,7 +8,11 @@
  *   tcp.x_d  = tool.x_d + x_0 of the axis named d      tool centre point [m]
  *
  *   M_a motor torque, M_fr friction torque, M_0 constant load [N.m]; F_d force on the tool [N]; omega_k = 2 pi
- * frequency n_kA, x_kA, tcp_kd: mode shapes at the ports, columns of the mode table (modes.h)
+ * frequency; n_kA, x_kA, tcp_kd: mode shapes at the ports, columns of the mode table (modes.h)
+ *
+ * With poses (poses.h) these are the modes of the cell that the axes stand in. At the end of a step that takes an axis
+ * out of its cell, q and v are carried over into the next one, x_a unchanged; what is reported then belongs to the new
+ * cell, so that outputs, their derivatives and the start of the next step are those of one state.
  *
  * Source: M. Wiesauer, F. Bleicher, "Parameterization method for non-linear friction models of machine tool feed
  * drives", 18th CIRP Conference on Modeling of Machining Operations (2021), section 2.1. Method and limits: README.md.
@@ -16,252 +20,21 @@
  * Each mode is advanced exactly for inputs that are linear over the step (modal.h). The state is that of the modes; the
  * inputs at the end of the last step are kept with it, as the accelerations there need them. */
 #include <math.h>
-#include <stdint.h>
-#include <stdio.h>
 #include <string.h>
 
-#include "axes.h"
-#include "files.h"
-#include "hash.h"
-#include "modal.h"
-#include "modes.h"
-#include "resources.h"
-#include "unit.h"
-
-#define NO_AXIS ((size_t)-1)
-#define MESSAGE_SIZE (STRING_SIZE + 512) /* a message that names modes_file must not lose the fault behind it */
-
-static const double pi = 3.14159265358979323846;
-
-/* Derived data. Ports of the modal system: the axes' n, the tool's directions (inputs up to here), the axes' x. */
-typedef struct Plant {
-    size_t axes;
-    const char **axis_names;           /* [axes] */
-    size_t tool_axis[TOOL_DIRECTIONS]; /* axis named like the direction, or NO_AXIS */
-    double *archive;                   /* the archive's mode table, rows as modes_read() leaves them */
-    size_t archive_modes;
-    uint64_t archive_hash;
-
-    bool ready;              /* what follows is set */
-    char table[STRING_SIZE]; /* modes_file that the modal system was made from */
-    uint64_t table_hash;     /* of the table's bytes */
-    Modal modal;
-    double *memory; /* of the modal system and the scratch of a step */
-    double *u, *du; /* [inputs] */
-    double *end;    /* [state's doubles] a step's result, until it is known to be sound */
-    double *y;      /* [ports] */
-} Plant;
-
-/* State block: this head, then inputs at the end of the last step [inputs], q [modal.size], v [modal.size]. */
-typedef struct StateHead {
-    uint64_t table_hash; /* mode table that the state belongs to */
-} StateHead;
-
-static size_t plant_inputs(const Plant *plant) {
-    return plant->axes + TOOL_DIRECTIONS;
-}
-
-static size_t plant_ports(const Plant *plant) {
-    return plant->axes + TOOL_DIRECTIONS + plant->axes;
-}
-
-static size_t plant_state_doubles(const Plant *plant) {
-    return plant_inputs(plant) + 2 * plant->modal.size;
-}
-
-static double *plant_state(Unit *unit) {
-    return (double *)((StateHead *)unit_state(unit) + 1);
-}
-
-/* --- load and derive ---------------------------------------------------------------------------------------------- */
-
-static size_t plant_axis_named(const Plant *plant, const char *name) {
-    for (size_t i = 0; i < plant->axes; i++) {
-        if (strcmp(plant->axis_names[i], name) == 0) {
-            return i;
-        }
-    }
-    return NO_AXIS;
-}
-
-static bool plant_name_axes(Unit *unit, Plant *plant, const AxisRow *rows) {
-    plant->axis_names = unit_alloc(unit, plant->axes, sizeof *plant->axis_names);
-    if (plant->axis_names == NULL) {
-        return false;
-    }
-    for (size_t i = 0; i < plant->axes; i++) {
-        plant->axis_names[i] = rows[i].name;
-    }
-    if (!unit_set_axes(unit, plant->axes, plant->axis_names)) {
-        return false;
-    }
-    for (size_t i = 0; i < plant->axes; i++) {
-        plant->axis_names[i] = unit_axis_name(unit, i); /* the shell's copy, which lives on */
-        unit_axis(unit, i)->x_0 = rows[i].x_0;
-    }
-    plant->tool_axis[0] = plant_axis_named(plant, "X");
-    plant->tool_axis[1] = plant_axis_named(plant, "Y");
-    plant->tool_axis[2] = plant_axis_named(plant, "Z");
-    return true;
-}
-
-static bool plant_load_axes(Unit *unit, Plant *plant, const Resources *resources) {
-    char source[64], message[MESSAGE_SIZE];
-    snprintf(source, sizeof source, "%saxes.csv", resources->source);
-    AxisRow *rows = unit_alloc(unit, axes_capacity(resources->axes, resources->axes_size), sizeof *rows);
-    if (rows == NULL) {
-        return false;
-    }
-    const bool good =
-        axes_read(resources->axes, resources->axes_size, source, rows, &plant->axes, message, sizeof message)
-            ? plant_name_axes(unit, plant, rows)
-            : unit_fail(unit, "%s", message);
-    unit_free(unit, rows);
-    return good;
-}
-
-/* Mode table of a text as values (see modes.h), to be freed with unit_free(); NULL with the fault logged. */
-static double *plant_table(Unit *unit, const Plant *plant, const char *text, size_t size, const char *source,
-                           size_t *modes) {
-    char message[MESSAGE_SIZE];
-    double *values = unit_alloc(unit, modes_capacity(text, size) * modes_width(plant->axes), sizeof *values);
-    if (values != NULL &&
-        !modes_read(text, size, source, plant->axes, plant->axis_names, values, modes, message, sizeof message)) {
-        unit_fail(unit, "%s", message);
-        unit_free(unit, values);
-        values = NULL;
-    }
-    return values;
-}
-
-static bool plant_load(Unit *unit) {
-    Plant *plant = unit_alloc(unit, 1, sizeof *plant);
-    if (plant == NULL) {
-        return false;
-    }
-    unit_set_derived(unit, plant);
-    Resources resources;
-    if (!resources_load(unit, &resources)) {
-        return false;
-    }
-    if (plant_load_axes(unit, plant, &resources)) {
-        char source[64];
-        snprintf(source, sizeof source, "%smodes.csv", resources.source);
-        plant->archive_hash = hash_bytes(HASH_OF_NOTHING, resources.modes, resources.modes_size);
-        plant->archive = plant_table(unit, plant, resources.modes, resources.modes_size, source, &plant->archive_modes);
-    }
-    resources_free(unit, &resources);
-    return plant->archive != NULL;
-}
-
-/* The modal system of a mode table, and the scratch that its steps need. */
-static bool plant_build(Unit *unit, Plant *plant, const double *values, size_t modes) {
-    const size_t inputs = plant_inputs(plant), ports = plant_ports(plant), width = modes_width(plant->axes);
-    const size_t system = modal_memory(modes, ports);
-    const size_t scratch = 2 * inputs + ports + inputs + 2 * modal_padded(modes);
-    double *memory = unit_alloc(unit, system + scratch, sizeof *memory);
-    if (memory == NULL) {
-        return false;
-    }
-    unit_free(unit, plant->memory);
-    plant->memory = memory;
-    modal_place(&plant->modal, memory, modes, ports);
-    plant->u = memory + system;
-    plant->du = plant->u + inputs;
-    plant->y = plant->du + inputs;
-    plant->end = plant->y + ports;
-    for (size_t k = 0; k < modes; k++) {
-        const double *row = values + k * width;
-        modal_set_mode(&plant->modal, k, 2 * pi * row[MODES_FREQUENCY], row[MODES_DAMPING], row + MODES_SHAPES);
-    }
-    return true;
-}
-
-static bool plant_build_from_file(Unit *unit, Plant *plant, const char *path, uint64_t *hash) {
-    size_t size, modes;
-    char *text = file_read(unit, NULL, path, &size);
-    if (text == NULL) {
-        return unit_fail(unit, "parameter 'modes_file': %s cannot be read", path);
-    }
-    char source[STRING_SIZE + 32];
-    snprintf(source, sizeof source, "parameter 'modes_file': %s", path);
-    double *values = plant_table(unit, plant, text, size, source, &modes);
-    const bool good = values != NULL && plant_build(unit, plant, values, modes);
-    *hash = hash_bytes(HASH_OF_NOTHING, text, size);
-    unit_free(unit, values);
-    unit_free(unit, text);
-    return good;
-}
-
-/* A file is read once for an instance as long as modes_file keeps its value: a state that is restored must find the
- * table it was made with, whatever has become of the file. */
-static bool plant_derive(Unit *unit) {
-    Plant *plant = unit_derived(unit);
-    const char *path = unit_scalars(unit)->modes_file;
-    if (plant->ready && strcmp(plant->table, path) == 0) {
-        return true;
-    }
-    uint64_t hash = plant->archive_hash;
-    const bool good = path[0] == '\0' ? plant_build(unit, plant, plant->archive, plant->archive_modes)
-                                      : plant_build_from_file(unit, plant, path, &hash);
-    if (good) {
-        plant->ready = true;
-        plant->table_hash = hash;
-        snprintf(plant->table, sizeof plant->table, "%s", path);
-    }
-    return good;
-}
-
-/* Hash of the table that plant_derive() would take for this modes_file; false with the reason logged. */
-static bool plant_find_table(Unit *unit, const Plant *plant, const char *path, uint64_t *hash) {
-    if (path[0] == '\0' || (plant->ready && strcmp(plant->table, path) == 0)) {
-        *hash = path[0] == '\0' ? plant->archive_hash : plant->table_hash;
-        return true;
-    }
-    size_t size;
-    char *text = file_read(unit, NULL, path, &size);
-    if (text == NULL) {
-        return unit_fail(unit, "the state needs its mode table, parameter 'modes_file': %s cannot be read", path);
-    }
-    *hash = hash_bytes(HASH_OF_NOTHING, text, size);
-    unit_free(unit, text);
-    return true;
-}
-
-static bool plant_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size) {
-    StateHead head;
-    if (size < sizeof head) {
-        return unit_fail(unit, "the state holds %.0f bytes of model state, its head alone has %.0f", (double)size,
-                         (double)sizeof head);
-    }
-    memcpy(&head, state, sizeof head);
-    uint64_t found = 0;
-    if (!plant_find_table(unit, unit_derived(unit), scalars->modes_file, &found)) {
-        return false;
-    }
-    if (found != head.table_hash) {
-        char text[2][HASH_TEXT_SIZE];
-        return unit_fail(unit,
-                         "the state belongs to other contents of the mode table (modes_file '%s', hash %s) than this "
-                         "instance finds there (hash %s)",
-                         scalars->modes_file, hash_text(text[0], head.table_hash), hash_text(text[1], found));
-    }
-    return true;
-}
+#include "cells.h"
+#include "plant.h"
 
 static size_t plant_state_size(const Unit *unit) {
     return sizeof(StateHead) + plant_state_doubles(unit_derived(unit)) * sizeof(double);
 }
 
-static void plant_release(Unit *unit) {
-    Plant *plant = unit_derived(unit);
-    if (plant != NULL) {
-        unit_free(unit, plant->memory);
-        unit_free(unit, plant->archive);
-        unit_free(unit, plant->axis_names);
-        unit_free(unit, plant);
-        unit_set_derived(unit, NULL);
-    }
+static StateHead *plant_head(Unit *unit) {
+    return unit_state(unit);
+}
+
+static double *plant_state(Unit *unit) {
+    return (double *)(plant_head(unit) + 1);
 }
 
 /* --- start and step ----------------------------------------------------------------------------------------------- */
@@ -290,11 +63,11 @@ static void plant_gather(Unit *unit, double h, double *u, double *du) {
 }
 
 /* Speeds at the axes' rotors and displacements elsewhere, y[ports]; false where one is no finite number. */
-static bool plant_measure(const Plant *plant, const double *q, const double *v, double *y) {
+static bool plant_measure(const Plant *plant, const Modal *modal, const double *q, const double *v, double *y) {
     const size_t ports = plant_ports(plant);
     bool finite = true;
     for (size_t port = 0; port < ports; port++) {
-        y[port] = modal_sum(&plant->modal, port, port < plant->axes ? v : q);
+        y[port] = modal_sum(modal, port, port < plant->axes ? v : q);
         finite = finite && isfinite(y[port]);
     }
     return finite;
@@ -317,20 +90,69 @@ static void plant_show(Unit *unit, const Plant *plant, const double *y) {
     v->tcp_x_Z = plant_start_position(unit, plant, 2) + tool[2];
 }
 
+/* Positions x[axes] from displacements at the axes' scales. */
+static void plant_positions(Unit *unit, const Plant *plant, const double *displacement, double *x) {
+    for (size_t i = 0; i < plant->axes; i++) {
+        x[i] = unit_axis(unit, i)->x_0 + displacement[i];
+    }
+}
+
 static void plant_start(Unit *unit) {
     Plant *plant = unit_derived(unit);
-    double *u = plant_state(unit), *q = u + plant_inputs(plant), *v = q + plant->modal.size;
-    ((StateHead *)unit_state(unit))->table_hash = plant->table_hash;
+    double *u = plant_state(unit), *q = u + plant_inputs(plant), *v = q + plant->size;
+    StateHead *head = plant_head(unit);
+    Scalars *shown = unit_scalars(unit);
     plant_gather(unit, 0, u, plant->du);
-    plant_measure(plant, q, v, plant->y);
+    plant_measure(plant, &plant->modal[0], q, v, plant->y); /* at rest, whatever the cell */
+    plant_positions(unit, plant, plant->y + plant_inputs(plant), plant->x);
+    head->table_hash = plant->table_hash;
+    head->cell = plant->cells > 1 ? cells_find(&plant->poses, plant->x) : 0;
     plant_show(unit, plant, plant->y);
+    shown->pose_cell = (int)head->cell;
+    shown->pose_crossings = 0;
+    shown->pose_E_kin_lost = shown->pose_E_el_lost = 0;
+    shown->pose_held = shown->pose_jump_x_a = shown->pose_jump_n_a = shown->pose_jump_tool = 0;
+}
+
+static double plant_jump(const Plant *plant, size_t from, size_t to, double largest) {
+    for (size_t port = from; port < to; port++) {
+        largest = fmax(largest, fabs(plant->y[port] - plant->y_before[port]));
+    }
+    return largest;
+}
+
+/* Into the cell that the positions at the end of the step lie in, with the end's q and v and what is measured there. */
+static bool plant_follow(Unit *unit, Plant *plant, double *q, double *v) {
+    const size_t inputs = plant_inputs(plant), ports = plant_ports(plant);
+    Scalars *shown = unit_scalars(unit);
+    plant_positions(unit, plant, plant->y + inputs, plant->x);
+    const Passage passage =
+        cells_follow(&plant->poses, plant->modal, (size_t)plant_head(unit)->cell, plant->x, q, v, plant->carried);
+    if (passage.crossings == 0) {
+        return true;
+    }
+    memcpy(plant->y_before, plant->y, ports * sizeof *plant->y);
+    if (!plant_measure(plant, &plant->modal[passage.cell], q, v, plant->y)) {
+        return false;
+    }
+    plant_head(unit)->cell = passage.cell;
+    shown->pose_cell = (int)passage.cell;
+    shown->pose_crossings += (int)passage.crossings;
+    shown->pose_E_kin_lost += passage.kinetic_lost;
+    shown->pose_E_el_lost += passage.elastic_lost;
+    shown->pose_held = fmax(shown->pose_held, passage.held);
+    shown->pose_jump_x_a = plant_jump(plant, inputs, ports, shown->pose_jump_x_a);
+    shown->pose_jump_n_a = plant_jump(plant, 0, plant->axes, shown->pose_jump_n_a);
+    shown->pose_jump_tool = plant_jump(plant, plant->axes, inputs, shown->pose_jump_tool);
+    return true;
 }
 
 static bool plant_step(Unit *unit, double t, double h) {
     (void)t; /* the structure does not change with time */
     Plant *plant = unit_derived(unit);
-    const size_t inputs = plant_inputs(plant), size = plant->modal.size;
-    double *state = plant_state(unit), *end = plant->end;
+    Modal *modal = &plant->modal[plant_head(unit)->cell];
+    const size_t inputs = plant_inputs(plant), size = plant->size;
+    double *state = plant_state(unit), *end = plant->end, *q_end = end + inputs, *v_end = q_end + size;
     plant_gather(unit, h, plant->u, plant->du);
     size_t active = plant->axes; /* mostly, no force is on the tool: nothing to add then */
     for (size_t i = 0; i < inputs; i++) {
@@ -339,10 +161,10 @@ static bool plant_step(Unit *unit, double t, double h) {
             active = inputs;
         }
     }
-    modal_prepare(&plant->modal, h);
-    modal_advance(&plant->modal, active, plant->u, plant->du, state + inputs, state + inputs + size, end + inputs,
-                  end + inputs + size);
-    if (!plant_measure(plant, end + inputs, end + inputs + size, plant->y)) {
+    modal_prepare(modal, h);
+    modal_advance(modal, active, plant->u, plant->du, state + inputs, state + inputs + size, q_end, v_end);
+    if (!plant_measure(plant, modal, q_end, v_end, plant->y) ||
+        (plant->cells > 1 && !plant_follow(unit, plant, q_end, v_end))) {
         return unit_fail(unit, "an output would be no finite number at the end of the step");
     }
     memcpy(state, end, plant_state_doubles(plant) * sizeof *state);
@@ -354,18 +176,19 @@ static bool plant_step(Unit *unit, double t, double h) {
 
 static double plant_output_derivative(Unit *unit, unsigned vr) {
     const Plant *plant = unit_derived(unit);
+    const Modal *modal = &plant->modal[plant_head(unit)->cell];
     const size_t inputs = plant_inputs(plant);
-    const double *u = plant_state(unit), *q = u + inputs, *v = q + plant->modal.size;
+    const double *u = plant_state(unit), *q = u + inputs, *v = q + plant->size;
     switch (vr) {
     case VR_tool_x_X:
     case VR_tcp_x_X:
-        return modal_sum(&plant->modal, plant->axes, v);
+        return modal_sum(modal, plant->axes, v);
     case VR_tool_x_Y:
     case VR_tcp_x_Y:
-        return modal_sum(&plant->modal, plant->axes + 1, v);
+        return modal_sum(modal, plant->axes + 1, v);
     case VR_tool_x_Z:
     case VR_tcp_x_Z:
-        return modal_sum(&plant->modal, plant->axes + 2, v);
+        return modal_sum(modal, plant->axes + 2, v);
     default:
         break;
     }
@@ -376,9 +199,9 @@ static double plant_output_derivative(Unit *unit, unsigned vr) {
     switch ((vr - SCALAR_ROWS) % AXIS_ROWS) {
     case AXIS_VR_n_a:
     case AXIS_VR_n_fr:
-        return modal_acceleration(&plant->modal, axis, inputs, u, q, v);
+        return modal_acceleration(modal, axis, inputs, u, q, v);
     case AXIS_VR_x_a:
-        return modal_sum(&plant->modal, inputs + axis, v);
+        return modal_sum(modal, inputs + axis, v);
     default:
         return 0;
     }

@@ -8,6 +8,7 @@
 
 #define AXES_FILE "axes.csv"
 #define MODES_FILE "modes.csv"
+#define POSES_FILE "poses.bin"
 
 /* A copy of embedded bytes with a closing zero, as file_read() gives it. */
 static char *resources_copy(Unit *unit, const unsigned char *bytes, size_t size) {
@@ -48,26 +49,38 @@ static bool resources_read(Unit *unit, const char *directory, Resources *resourc
         return false;
     }
     resources->modes = resources_file(unit, directory, MODES_FILE, &resources->modes_size);
+    /* most machines have none; where one is missing, the hash tells */
+    resources->poses = file_read(unit, directory, POSES_FILE, &resources->poses_size);
     return resources->modes != NULL;
 }
 
 static bool resources_check(Unit *unit, const Resources *resources) {
     char found[HASH_TEXT_SIZE];
     uint64_t hash = hash_bytes(HASH_OF_NOTHING, resources->axes, resources->axes_size);
-    hash_text(found, hash_bytes(hash, resources->modes, resources->modes_size));
-    if (strcmp(found, unit_resource_hash(unit)) != 0) {
-        return unit_fail(unit,
-                         "%s" AXES_FILE " and %s" MODES_FILE
-                         " have hash %s, but the archive was packed with hash %s: the "
-                         "archive is stale or its files were changed; pack it anew",
-                         resources->source, resources->source, found, unit_resource_hash(unit));
+    hash = hash_bytes(hash, resources->modes, resources->modes_size);
+    if (resources->poses != NULL) {
+        hash = hash_bytes(hash, resources->poses, resources->poses_size);
     }
-    return true;
+    if (strcmp(hash_text(found, hash), unit_resource_hash(unit)) == 0) {
+        return true;
+    }
+    if (unit_resources(unit) == NULL) {
+        return unit_fail(unit,
+                         "the machine embedded in this unit has hash %s, but the archive was packed with hash %s: with "
+                         "another machine, or with poses (" POSES_FILE
+                         "), which are not embedded; the importer must give the resource location",
+                         found, unit_resource_hash(unit));
+    }
+    return unit_fail(unit,
+                     "resources/" AXES_FILE ", resources/" MODES_FILE "%s have hash %s, but the archive was packed "
+                     "with hash %s: the archive is stale or its files were changed or are missing; pack it anew",
+                     resources->poses != NULL ? " and resources/" POSES_FILE : " (no " POSES_FILE ")", found,
+                     unit_resource_hash(unit));
 }
 
 bool resources_load(Unit *unit, Resources *resources) {
     const char *directory = unit_resources(unit);
-    *resources = (Resources){NULL, NULL, NULL, 0, 0};
+    *resources = (Resources){.source = NULL};
     const bool read =
         directory != NULL ? resources_read(unit, directory, resources) : resources_embedded(unit, resources);
     if (read && resources_check(unit, resources)) {
@@ -80,6 +93,8 @@ bool resources_load(Unit *unit, Resources *resources) {
 void resources_free(Unit *unit, Resources *resources) {
     unit_free(unit, resources->axes);
     unit_free(unit, resources->modes);
+    unit_free(unit, resources->poses);
     resources->axes = NULL;
     resources->modes = NULL;
+    resources->poses = NULL;
 }

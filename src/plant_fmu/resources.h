@@ -1,5 +1,6 @@
-/* The machine data of the archive: axes.csv and modes.csv from the resources directory, or, where the importer gave
- * none, from the copy compiled into the unit. Checked against the hash in the instantiation GUID. */
+/* The machine data of the archive: axes.csv, modes.csv and, where there is one, poses.bin from the resources directory;
+ * or, where the importer gave none, axes.csv and modes.csv from the copy compiled into the unit. Checked against the
+ * hash in the instantiation GUID. */
 #ifndef FEEDSIM_RESOURCES_H
 #define FEEDSIM_RESOURCES_H
 
@@ -9,9 +10,9 @@
 #define resources_free PREFIXED(resources_free)
 
 typedef struct Resources {
-    const char *source; /* for messages: "resources/" or "embedded " */
-    char *axes, *modes; /* bytes of the two files, each closed by a zero that the size does not count */
-    size_t axes_size, modes_size;
+    const char *source;         /* for messages: "resources/" or "embedded " */
+    char *axes, *modes, *poses; /* bytes of the files, each closed by a zero that the size does not count */
+    size_t axes_size, modes_size, poses_size; /* poses NULL: the machine has one pose */
 } Resources;
 
 /* false, with the reason logged and nothing to free, where a file cannot be read or belongs to another archive. */

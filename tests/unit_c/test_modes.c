@@ -173,7 +173,7 @@ static void axis_tables(void) {
     refuse_axes("axis,x_0 [m]\nX,1,2\n", "line 2", "two cells");
     refuse_axes("axis,x_0 [m]\n1X,1\n", "line 2", "begins with no digit");
     refuse_axes("axis,x_0 [m]\nX.1,1\n", "line 2", "letters, digits and _");
-    refuse_axes("axis,x_0 [m]\ntool,1\n", "line 2", "neither tool nor tcp");
+    refuse_axes("axis,x_0 [m]\ntool,1\n", "line 2", "is not tool, tcp or pose");
     refuse_axes("axis,x_0 [m]\nan_axis_whose_name_is_far_too_long,1\n", "line 2", "at most 31");
 }
 

@@ -27,6 +27,8 @@ SOURCES_test_lugre := src/friction_fmu/lugre.c
 SOURCES_test_tem   := src/friction_fmu/tem.c
 
 SOURCES_test_modal := src/plant_fmu/modal.c
+SOURCES_test_cells := $(addprefix src/plant_fmu/,cells.c modal.c)
+SOURCES_test_poses := $(addprefix src/plant_fmu/,csv.c modes.c poses.c) src/fmi2/numbers.c src/fmi2/text.c
 SOURCES_test_modes := $(addprefix src/plant_fmu/,axes.c csv.c modes.c) src/fmi2/numbers.c src/fmi2/text.c
 
 SOURCES_test_controller_delay   := $(addprefix src/controller_fmu/,delay.c lag.c)

@@ -1,0 +1,155 @@
+/* Modal systems from the archive, one per cell of its poses, or a single one from the table that modes_file names; and
+ * which saved states belong to them. */
+#include <stdio.h>
+#include <string.h>
+
+#include "cells.h"
+#include "files.h"
+#include "hash.h"
+#include "plant.h"
+
+static const double pi = 3.14159265358979323846;
+
+/* Memory for `cells` modal systems of up to `modes` modes, and the scratch that their steps need. */
+static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
+    const size_t inputs = plant_inputs(plant), ports = plant_ports(plant), size = modal_padded(modes);
+    const size_t system = modal_memory(modes, ports);
+    const size_t crossing = cells_scratch(plant->axes, size);
+    const size_t scratch = 2 * inputs + 2 * ports + plant->axes + crossing + inputs + 2 * size;
+    Modal *modal = unit_alloc(unit, cells, sizeof *modal);
+    double *systems = modal != NULL ? unit_alloc(unit, cells, system * sizeof *systems) : NULL;
+    double *memory = systems != NULL ? unit_alloc(unit, scratch, sizeof *memory) : NULL;
+    if (memory == NULL) {
+        unit_free(unit, systems);
+        unit_free(unit, modal);
+        return false;
+    }
+    unit_free(unit, plant->modal);
+    unit_free(unit, plant->systems);
+    unit_free(unit, plant->memory);
+    plant->modal = modal;
+    plant->systems = systems;
+    plant->memory = memory;
+    plant->cells = cells;
+    plant->size = size;
+    for (size_t i = 0; i < cells; i++) {
+        modal_place(&modal[i], systems + i * system, modes, ports);
+    }
+    plant->u = memory;
+    plant->du = plant->u + inputs;
+    plant->y = plant->du + inputs;
+    plant->y_before = plant->y + ports;
+    plant->x = plant->y_before + ports;
+    plant->carried = plant->x + plant->axes;
+    plant->end = plant->carried + crossing;
+    return true;
+}
+
+static void plant_fill(const Plant *plant, Modal *modal, const double *values, size_t modes) {
+    for (size_t k = 0; k < modes; k++) {
+        const double *row = values + k * modes_width(plant->axes);
+        modal_set_mode(modal, k, 2 * pi * row[MODES_FREQUENCY], row[MODES_DAMPING], row + MODES_SHAPES);
+    }
+}
+
+static bool plant_build(Unit *unit, Plant *plant, const double *values, size_t modes) {
+    if (!plant_place(unit, plant, 1, modes)) {
+        return false;
+    }
+    plant_fill(plant, &plant->modal[0], values, modes);
+    return true;
+}
+
+static bool plant_build_from_archive(Unit *unit, Plant *plant) {
+    const Poses *poses = &plant->poses;
+    if (poses->cells == 0) {
+        return plant_build(unit, plant, plant->archive, plant->archive_modes);
+    }
+    if (!plant_place(unit, plant, poses->cells, poses->most_modes)) {
+        return false;
+    }
+    for (size_t i = 0; i < poses->cells; i++) {
+        plant_fill(plant, &plant->modal[i], poses->cell[i].values, poses->cell[i].modes);
+    }
+    return true;
+}
+
+static bool plant_build_from_file(Unit *unit, Plant *plant, const char *path, uint64_t *hash) {
+    size_t size, modes;
+    char *text = file_read(unit, NULL, path, &size);
+    if (text == NULL) {
+        return unit_fail(unit, "parameter 'modes_file': %s cannot be read", path);
+    }
+    char source[STRING_SIZE + 32];
+    snprintf(source, sizeof source, "parameter 'modes_file': %s", path);
+    double *values = plant_table(unit, plant, text, size, source, &modes);
+    const bool good = values != NULL && plant_build(unit, plant, values, modes);
+    *hash = hash_bytes(HASH_OF_NOTHING, text, size);
+    unit_free(unit, values);
+    unit_free(unit, text);
+    return good;
+}
+
+/* A file is read once for an instance as long as modes_file keeps its value: a state that is restored must find the
+ * table it was made with, whatever has become of the file. */
+bool plant_derive(Unit *unit) {
+    Plant *plant = unit_derived(unit);
+    const char *path = unit_scalars(unit)->modes_file;
+    if (plant->ready && strcmp(plant->table, path) == 0) {
+        return true;
+    }
+    uint64_t hash = plant->archive_hash;
+    const bool good =
+        path[0] == '\0' ? plant_build_from_archive(unit, plant) : plant_build_from_file(unit, plant, path, &hash);
+    if (good) {
+        plant->ready = true;
+        plant->table_hash = hash;
+        snprintf(plant->table, sizeof plant->table, "%s", path);
+    }
+    return good;
+}
+
+/* --- saved states ------------------------------------------------------------------------------------------------- */
+
+/* Hash of the table that plant_derive() would take for this modes_file; false with the reason logged. */
+static bool plant_find_table(Unit *unit, const Plant *plant, const char *path, uint64_t *hash) {
+    if (path[0] == '\0' || (plant->ready && strcmp(plant->table, path) == 0)) {
+        *hash = path[0] == '\0' ? plant->archive_hash : plant->table_hash;
+        return true;
+    }
+    size_t size;
+    char *text = file_read(unit, NULL, path, &size);
+    if (text == NULL) {
+        return unit_fail(unit, "the state needs its mode table, parameter 'modes_file': %s cannot be read", path);
+    }
+    *hash = hash_bytes(HASH_OF_NOTHING, text, size);
+    unit_free(unit, text);
+    return true;
+}
+
+bool plant_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size) {
+    const Plant *plant = unit_derived(unit);
+    StateHead head;
+    if (size < sizeof head) {
+        return unit_fail(unit, "the state holds %.0f bytes of model state, its head alone has %.0f", (double)size,
+                         (double)sizeof head);
+    }
+    memcpy(&head, state, sizeof head);
+    uint64_t found = 0;
+    if (!plant_find_table(unit, plant, scalars->modes_file, &found)) {
+        return false;
+    }
+    if (found != head.table_hash) {
+        char text[2][HASH_TEXT_SIZE];
+        return unit_fail(unit,
+                         "the state belongs to other contents of the mode table (modes_file '%s', hash %s) than this "
+                         "instance finds there (hash %s)",
+                         scalars->modes_file, hash_text(text[0], head.table_hash), hash_text(text[1], found));
+    }
+    const size_t cells = scalars->modes_file[0] == '\0' && plant->poses.cells > 0 ? plant->poses.cells : 1;
+    if (head.cell >= cells) {
+        return unit_fail(unit, "the state belongs to cell %.0f of the poses; allowed is less than %.0f",
+                         (double)head.cell, (double)cells);
+    }
+    return true;
+}

@@ -1,0 +1,76 @@
+/* What the rooms of the plant share: derived data and the layout of the state. */
+#ifndef FEEDSIM_PLANT_H
+#define FEEDSIM_PLANT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "modal.h"
+#include "modes.h"
+#include "poses.h"
+#include "unit.h"
+
+#define plant_load PREFIXED(plant_load)
+#define plant_release PREFIXED(plant_release)
+#define plant_table PREFIXED(plant_table)
+#define plant_derive PREFIXED(plant_derive)
+#define plant_accepts PREFIXED(plant_accepts)
+
+#define NO_AXIS ((size_t)-1)
+
+/* Derived data. Ports of the modal systems: the axes' n, the tool's directions (inputs up to here), the axes' x. */
+typedef struct Plant {
+    size_t axes;
+    const char **axis_names;           /* [axes] */
+    size_t tool_axis[TOOL_DIRECTIONS]; /* axis named like the direction, or NO_AXIS */
+    double *archive;                   /* the archive's mode table, rows as modes_read() leaves them */
+    size_t archive_modes;
+    uint64_t archive_hash;
+    Poses poses;          /* the archive's grid of poses; no cells where it has none */
+    double *pose_numbers; /* that it consists of */
+
+    bool ready;              /* what follows is set */
+    char table[STRING_SIZE]; /* modes_file that the modal systems were made from */
+    uint64_t table_hash;     /* of the table's bytes */
+    size_t cells;            /* modal systems; 1: one pose */
+    size_t size;             /* modes of each, padded, so that the state fits them all */
+    Modal *modal;            /* [cells] */
+    double *systems;         /* their memory */
+    double *memory;          /* of what follows: scratch of a step */
+    double *u, *du;          /* [inputs] */
+    double *end;             /* [state's doubles] a step's result, until it is known to be sound */
+    double *y, *y_before;    /* [ports] */
+    double *x;               /* [axes] positions */
+    double *carried;         /* [cells_scratch()] */
+} Plant;
+
+/* State block: this head, then inputs at the end of the last step [inputs], q [size], v [size]. */
+typedef struct StateHead {
+    uint64_t table_hash; /* mode table that the state belongs to */
+    uint64_t cell;       /* whose modes q and v belong to */
+} StateHead;
+
+static inline size_t plant_inputs(const Plant *plant) {
+    return plant->axes + TOOL_DIRECTIONS;
+}
+
+static inline size_t plant_ports(const Plant *plant) {
+    return plant->axes + TOOL_DIRECTIONS + plant->axes;
+}
+
+static inline size_t plant_state_doubles(const Plant *plant) {
+    return plant_inputs(plant) + 2 * plant->size;
+}
+
+/* --- load.c: the archive */
+bool plant_load(Unit *unit);
+void plant_release(Unit *unit);
+/* Mode table of a text as values (see modes.h), to be freed with unit_free(); NULL with the fault logged. */
+double *plant_table(Unit *unit, const Plant *plant, const char *text, size_t size, const char *source, size_t *modes);
+
+/* --- derive.c: modal systems from the archive or from modes_file */
+bool plant_derive(Unit *unit);
+bool plant_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size);
+
+#endif

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from fmu.toy_table import GOOD, HEAD, read, toy
-from packager import archive, build, cli, compile, documentation, resources, toolchain, variables
+from packager import archive, build, cli, compile, documentation, machine, resources, toolchain, variables
 from packager.errors import CompilerError, InputError, OutputError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -101,6 +101,8 @@ def test_bad_axes_are_refused(tmp_path: Path, axes: str, texts: list[str]) -> No
         (MODES.replace(",x_X", ",x_Z"), ["missing columns x_X", "appear twice: x_Z"]),
         (MODES.splitlines()[0] + "\n", ["no mode"]),
         (MODES + "1,-5,0,1,2,3,4,5,6,7\n", ["line 3: frequency [Hz] is -5, allowed is 0 or more"]),
+        (MODES.replace("0.0,0.0", "0.0,0.02"), ["line 2: damping ratio [1] is 0.02 at frequency 0 Hz; a rigid mode"]),
+        (MODES.replace("1,2,3,4", "1,0,3,0"), ["n_Z is 0 in every mode", "x_Z is 0 in every mode"]),
         (MODES + "1,5,-0.1,1,nan,3,4,5,6,7\n2,5\n", ["damping ratio [1] is -0.1", "n_Z is 'nan'", "line 4: 2 fields"]),
     ],
 )
@@ -139,11 +141,12 @@ def test_links_into_the_repository_become_text(tmp_path: Path, compiler: tuple[s
     pages = documentation.pages(
         found,
         variables.expand(found, None),
+        None,
         readme="See [theory](../../docs/theory.md), [FMI](https://fmi-standard.org/) & <b>.\n\n|a|b|\n|-|-|\n|1|2|\n",
         licence="Free.\n",
         standard_header="/* text\n   Copyright (C) somebody\n\n     Conditions\n*/",
         version="1.2",
-        default_machine=False,
+        machine=machine.Machine(),
     )
     text = pages["documentation/index.html"].decode()
     assert 'See theory, <a href="https://fmi-standard.org/">FMI</a> &amp; &lt;b&gt;.' in text
@@ -214,6 +217,17 @@ def test_no_compiler_at_all_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: P
         (["describe", "plant", "--modes", "nowhere.csv"], 2, "nowhere.csv"),
         (["describe", "friction", "--axes", str(ROOT / "src/plant_fmu/resources/axes.csv")], 2, "no rows per axis"),
         (["build", "plant", "friction", "--out", "x.fmu"], 2, "--out is for one unit"),
+        (["describe", "plant", "--poses", "nowhere.bin"], 2, "nowhere.bin: cannot be read"),
+        (
+            ["describe", "plant", "--name", "a\0b"],
+            2,
+            "the machine's name 'a\\x00b' has characters that cannot be printed",
+        ),
+        (
+            ["repack", "x.fmu", "--axes", "nowhere.csv", "--modes", "m.csv", "--out", "y.fmu"],
+            2,
+            "nowhere.csv: cannot be",
+        ),
     ],
 )
 def test_wrong_use_is_answered(arguments: list[str], code: int, text: str, capsys: pytest.CaptureFixture[str]) -> None:

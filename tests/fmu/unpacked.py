@@ -99,16 +99,16 @@ def declared(unit: str) -> Iterator[dict[str, str]]:
         )
 
 
-def axes() -> list[tuple[str, str]]:
-    lines = (ROOT / "src/plant_fmu/resources/axes.csv").read_text(encoding="utf-8").splitlines()
+def axes(path: Path = ROOT / "src/plant_fmu/resources/axes.csv") -> list[tuple[str, str]]:
+    lines = path.read_text(encoding="utf-8").splitlines()
     return [(name, x_0) for name, x_0 in (line.split(",") for line in lines[1:])]
 
 
-def expected_variables(unit: str) -> list[dict[str, str]]:
-    """All variables in the order of their value references."""
-    rows = list(declared(unit))
+def expected_variables(archive: Archive) -> list[dict[str, str]]:
+    """All variables in the order of their value references, for the axes that the archive holds."""
+    rows = list(declared(archive.unit))
     found = [row for row in rows if not row["axis"]]
-    for axis, x_0 in axes():
+    for axis, x_0 in axes(archive.folder / "resources" / "axes.csv") if archive.unit == "plant" else ():
         for row in (row for row in rows if row["axis"]):
             start = x_0 if row["name"] == "x_0" else row["start"]
             found.append(row | {"name": f"{axis}.{row['name']}", "start": start})

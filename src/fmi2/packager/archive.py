@@ -1,12 +1,13 @@
-"""Files -> a zip archive that depends on nothing but their names and contents, written whole or not at all."""
+"""Files <-> a zip archive, which depends on nothing but their names and contents and is written whole or not at all."""
 
 import io
 import os
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from packager.errors import OutputError
+from .errors import InputError, OutputError
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date a zip entry can have
 _UNIX = 3  # create_system; fixed, as zipfile takes the host's
@@ -23,6 +24,17 @@ def pack(files: Mapping[str, bytes]) -> bytes:
             entry.external_attr = (0o100755 if path.startswith("binaries/") else 0o100644) << 16
             archive.writestr(entry, files[path], compresslevel=9)
     return buffer.getvalue()
+
+
+def read(path: Path) -> dict[str, bytes]:
+    """Path -> content of every file in the archive at `path`; raises InputError where it is no readable archive."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return {entry.filename: archive.read(entry) for entry in archive.infolist() if not entry.is_dir()}
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+        raise InputError(f"{path}: not an archive, or damaged: {error}") from error
 
 
 def write(path: Path, content: bytes) -> None:

@@ -6,17 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from packager import archive, compile, description, documentation, resources, table, trial, variables
-from packager.errors import InputError
-from packager.resources import Resources
-from packager.table import Table
-from packager.variables import Variable
+from . import archive, carried, compile, description, documentation, resources, table, trial, variables
+from .errors import InputError
+from .machine import Machine, named
+from .resources import Resources
+from .table import Table
+from .variables import Variable
 
 SHELL = Path(__file__).resolve().parent.parent  # src/fmi2
 PROJECT = SHELL.parent.parent
 STANDARD = SHELL / "standard"
 DEFAULT_MODES = PROJECT / "scenarios" / "machines" / "test_centre" / "modes.csv"
 EMBEDDED = "embedded_resources.c"
+CARRIED = carried.PATH.removeprefix("sources/")
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class Unit:
     sources: dict[str, bytes]  # flat: name -> content
     guid: str
     version: str
-    default_machine: bool  # start values and resources are those of the synthetic default machine
+    machine: Machine
     warnings: tuple[str, ...]
 
     @property
@@ -41,7 +43,12 @@ class Unit:
     def description(self) -> bytes:
         """modelDescription.xml."""
         return description.describe(
-            self.table, self.variables, guid=self.guid, version=self.version, sources=self.c_files
+            self.table,
+            self.variables,
+            guid=self.guid,
+            version=self.version,
+            sources=self.c_files,
+            machine=self.machine,
         )
 
 
@@ -68,22 +75,33 @@ def unit_directory(name: str) -> Path:
     raise InputError(f"no unit '{name}' (units: {known}; or the path of a unit's folder)")
 
 
-def load(directory: Path, compiler: Sequence[str], *, axes: Path | None = None, modes: Path | None = None) -> Unit:
-    """Read and check a unit. `axes` and `modes` replace the default resources of a unit with rows per axis."""
+def load(
+    directory: Path,
+    compiler: Sequence[str],
+    *,
+    axes: Path | None = None,
+    modes: Path | None = None,
+    poses: Path | None = None,
+    name: str = "",
+    note: str = "",
+) -> Unit:
+    """Read and check a unit. `axes`, `modes` and `poses` replace the default resources of a unit with rows per axis;
+    `name` and `note` say what machine they are of."""
     rows = table.read(directory, (SHELL, STANDARD), compiler)
     given = None
-    if rows.axis_rows or axes or modes:
-        given = resources.read(axes or directory / "resources" / "axes.csv", modes or DEFAULT_MODES)
+    if rows.axis_rows or axes or modes or poses:
+        given = resources.read(axes or directory / "resources" / "axes.csv", modes or DEFAULT_MODES, poses)
     version, warnings = _version()
+    own = any((axes, modes, poses, name, note))
     return Unit(
         directory=directory,
         table=rows,
         resources=given,
         variables=variables.expand(rows, given),
-        sources=_sources(directory, given),
+        sources=_sources(directory, given) | {CARRIED: carried.dump(rows, version)},
         guid=variables.guid(rows, given),
         version=version,
-        default_machine=axes is None and modes is None,
+        machine=named(name, note) if own else Machine(default=True),
         warnings=warnings,
     )
 
@@ -134,7 +152,8 @@ def build(unit: Unit, out: Path, compiler: Sequence[str], build_directory: Path 
             name, sources, unit.c_files, stage / "binaries" / target.folder, compiler, target
         )
         if not library.instrumented:
-            _try(unit, stage, library)
+            packed = unit.resources.files() if unit.resources else {}
+            trial.check(stage / library.path, name, unit.guid, packed, stage)
     pages, warnings = _documentation(unit)
     content = archive.pack(
         {
@@ -149,16 +168,6 @@ def build(unit: Unit, out: Path, compiler: Sequence[str], build_directory: Path 
     return Result(out, len(content), unit.guid, target.folder, library.glibc, (*unit.warnings, *warnings))
 
 
-def _try(unit: Unit, stage: Path, library: compile.Library) -> None:
-    """Instantiate once; raises InputError with the unit's own words where it refuses."""
-    (stage / "resources").mkdir(exist_ok=True)
-    for path, content in (unit.resources.files() if unit.resources else {}).items():
-        (stage / path).write_bytes(content)
-    refusal = trial.instantiate(stage / library.path, unit.table.unit, unit.guid, stage / "resources")
-    if refusal is not None:
-        raise InputError(f"{unit.table.unit}: built, but cannot be instantiated", refusal.splitlines())
-
-
 def _documentation(unit: Unit) -> tuple[dict[str, bytes], list[str]]:
     warnings: list[str] = []
     texts: dict[str, str | None] = {}
@@ -169,10 +178,11 @@ def _documentation(unit: Unit) -> tuple[dict[str, bytes], list[str]]:
     pages = documentation.pages(
         unit.table,
         unit.variables,
+        unit.resources,
         readme=texts["readme"],
         licence=texts["licence"],
         standard_header=(STANDARD / "fmi2TypesPlatform.h").read_text(encoding="utf-8"),
         version=unit.version,
-        default_machine=unit.default_machine,
+        machine=unit.machine,
     )
     return pages, warnings

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from packager import toolchain
-from packager.errors import CompilerError
+from . import toolchain
+from .errors import CompilerError
 
 FLAGS = (
     *("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off"),

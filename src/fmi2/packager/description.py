@@ -4,10 +4,11 @@ import math
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree as ET
 
-from packager import units
-from packager.errors import InputError
-from packager.table import INITIAL, Row, Table
-from packager.variables import Variable
+from . import units
+from .errors import InputError
+from .machine import Machine
+from .table import INITIAL, Row, Table
+from .variables import Variable
 
 GENERATION_TOOL = "feedsim packager"
 DEFAULT_EXPERIMENT = {"startTime": 0.0, "stopTime": 1.0, "stepSize": 125e-6}  # s; stepSize is the drives' control cycle
@@ -45,6 +46,7 @@ TYPES = {
     "1/s": ("PositionGain", "VelocityGain"),
     "m/rad": ("Lead", "LengthPerAngle"),
     "N": ("Force", "Force"),
+    "J": ("Energy", "Energy"),
     "N.m": ("Torque", "Torque"),
     "N.m/rad": ("RotationalStiffness", "RotationalSpringConstant"),
     "N.m.s/rad": ("RotationalDamping", "RotationalDampingConstant"),
@@ -57,15 +59,24 @@ TYPES = {
 }
 
 
-def describe(table: Table, variables: Sequence[Variable], *, guid: str, version: str, sources: Iterable[str]) -> bytes:
-    """The file's content. `sources` are the C files to compile, by name. Deterministic: no date, no machine."""
+def describe(
+    table: Table,
+    variables: Sequence[Variable],
+    *,
+    guid: str,
+    version: str,
+    sources: Iterable[str],
+    machine: Machine,
+) -> bytes:
+    """The file's content. `sources` are the C files to compile, by name. Deterministic: no date, no computer."""
+    summary = ". ".join(text for text in (table.summary, machine.sentence()) if text)
     root = ET.Element(
         "fmiModelDescription",
         {
             "fmiVersion": "2.0",
             "modelName": table.unit,
             "guid": guid,
-            **({"description": table.summary} if table.summary else {}),
+            **({"description": summary} if summary else {}),
             "version": version,
             "license": "MIT",
             "generationTool": f"{GENERATION_TOOL} {version}",

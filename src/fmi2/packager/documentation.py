@@ -1,14 +1,24 @@
-"""documentation/ of an archive: index.html from the unit's README.md, its variables and the licence."""
+"""documentation/ of an archive: index.html from the unit's README.md, its variables and the licence.
+
+What belongs to the machine in the archive stands in parts of the page that are marked, so that a machine is packed
+without the sources that the rest of the page was made from.
+"""
 
 import html
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
-from markdown_it import MarkdownIt
-from markdown_it.token import Token
+from .errors import InputError
+from .machine import Machine
+from .resources import Resources
+from .table import Table
+from .variables import Variable
 
-from packager.table import Table
-from packager.variables import Variable
+if TYPE_CHECKING:  # renders the README; packing a machine does without it
+    from markdown_it.token import Token
+
+INDEX = "documentation/index.html"
 
 _STYLE = """\
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #1c2126; }
@@ -34,26 +44,68 @@ under a licence of their own: fmi-headers.txt.
 """
 
 
+_MARKS = {part: (f"<!-- {part} -->\n", f"<!-- end of {part} -->\n") for part in ("machine", "variables")}
+
+
 def pages(
     table: Table,
     variables: Sequence[Variable],
+    resources: Resources | None,
     *,
     readme: str | None,
     licence: str | None,
     standard_header: str,
     version: str,
-    default_machine: bool,
+    machine: Machine,
 ) -> dict[str, bytes]:
     """Archive path -> content. Without `readme` or `licence` that part is left out (the caller warns).
 
-    `default_machine`: the numbers are those of the synthetic default machine, and the page says so. `standard_header`
-    is a header of the FMI standard, whose opening comment holds the standard's licence.
+    `standard_header` is a header of the FMI standard, whose opening comment holds the standard's licence.
     """
-    found = {"documentation/index.html": _index(table, variables, readme, licence, version, default_machine).encode()}
+    body = _rendered(readme) if readme else f"<h1>{table.unit}</h1>\n<p>{html.escape(table.summary)}.</p>\n"
+    index = _index(table, body, _marked_parts(variables, resources, machine), licence, version)
+    found = {INDEX: index.encode()}
     if licence is not None:
         found["documentation/licenses/license.txt"] = (licence + _HEADERS).encode()
     found["documentation/licenses/fmi-headers.txt"] = _licence_of(standard_header).encode()
     return found
+
+
+def for_machine(
+    index: bytes, variables: Sequence[Variable], resources: Resources, machine: Machine, where: str
+) -> bytes:
+    """The page `index` of another archive of the same unit, with this machine in the place of the one there.
+
+    Raises:
+        InputError: the page has not the parts to replace; `where` names it.
+    """
+    text = index.decode("utf-8", errors="replace")
+    for part, content in _marked_parts(variables, resources, machine).items():
+        begin, end = _MARKS[part]
+        if text.count(begin) != 1 or text.count(end) != 1:
+            raise InputError(f"{where}: has no part '{part}' to put another machine into")
+        text = text.partition(begin)[0] + content + text.partition(end)[2]
+    return text.encode()
+
+
+def _marked_parts(variables: Sequence[Variable], resources: Resources | None, machine: Machine) -> dict[str, str]:
+    """What the page says of the machine, between its marks."""
+    parts = {
+        "machine": _about(resources, machine) if resources and not machine.default else "",
+        "variables": (_SYNTHETIC if machine.default else "") + _variable_table(variables),
+    }
+    return {part: text.join(_MARKS[part]) for part, text in parts.items()}
+
+
+def _about(resources: Resources, machine: Machine) -> str:
+    name = f"the machine <strong>{html.escape(machine.name)}</strong>" if machine.name else "a machine of its own"
+    note = f"<p>{html.escape(machine.note)}</p>\n" if machine.note else ""
+    axes = ", ".join(f"{axis.name} at {axis.x_0:.9g} m" for axis in resources.axes)
+    grid = " Its modes follow the axes by the grid of poses in resources/poses.bin." if resources.poses_bin else ""
+    return (
+        f"<p>This archive holds {name}. Its axes: {axes}.{grid} Numbers that the text below gives for the default "
+        f"machine are not this machine's.</p>\n{note}"
+    )
 
 
 def _licence_of(header: str) -> str:
@@ -64,23 +116,15 @@ def _licence_of(header: str) -> str:
     return "\n".join(line.removeprefix("   ").rstrip() for line in match[0].rstrip().splitlines()) + "\n"
 
 
-def _index(
-    table: Table,
-    variables: Sequence[Variable],
-    readme: str | None,
-    licence: str | None,
-    version: str,
-    default_machine: bool,
-) -> str:
-    body = _rendered(readme) if readme else f"<h1>{table.unit}</h1>\n<p>{html.escape(table.summary)}.</p>\n"
-    parts = [
+def _index(table: Table, body: str, parts: Mapping[str, str], licence: str | None, version: str) -> str:
+    texts = [
         "<!DOCTYPE html>\n",
         f'<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{table.unit} {html.escape(version)}</title>\n',
         f"<style>\n{_STYLE}</style>\n</head>\n<body>\n",
+        parts["machine"],
         body,
         "<h2>Variables</h2>\n",
-        _SYNTHETIC if default_machine else "",
-        _variable_table(variables),
+        parts["variables"],
         "<h2>Building from the sources</h2>\n",
         "<p>The folder <code>sources</code> is complete; the C files to compile are listed in modelDescription.xml, ",
         "nothing needs to be defined, and nothing but the C library and libm is needed:</p>\n",
@@ -89,12 +133,14 @@ def _index(
         f"<code>-DFMI2_FUNCTION_PREFIX={table.unit}_</code> (the unit's own name and an underscore).</p>\n",
     ]
     if licence is not None:
-        parts.append(f"<h2>Licence</h2>\n<pre>{html.escape(licence)}</pre>\n")
-    return "".join((*parts, "</body>\n</html>\n"))
+        texts.append(f"<h2>Licence</h2>\n<pre>{html.escape(licence)}</pre>\n")
+    return "".join((*texts, "</body>\n</html>\n"))
 
 
 def _rendered(text: str) -> str:
     """Markdown -> HTML. Links to files of the repository become plain text: the archive has no such files."""
+    from markdown_it import MarkdownIt
+
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     tokens = markdown.parse(text)
     for token in tokens:
@@ -104,7 +150,7 @@ def _rendered(text: str) -> str:
     return rendered
 
 
-def _without_relative_links(tokens: Sequence[Token]) -> list[Token]:
+def _without_relative_links(tokens: Sequence["Token"]) -> list["Token"]:
     kept: list[Token] = []
     relative = False  # links do not nest
     for token in tokens:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from packager import toolchain, units
-from packager.errors import InputError
+from . import toolchain, units
+from .errors import InputError
 
 KINDS = ("REAL", "INTEGER", "BOOLEAN", "STRING")
 

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from packager.errors import CompilerError
+from .errors import CompilerError
 
 CANDIDATES = ("cc", "gcc", "clang", "zig")
 

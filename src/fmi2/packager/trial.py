@@ -7,6 +7,7 @@ the packager with it and Windows lets go of the file afterwards. Exit code 1 wit
 import ctypes
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 _TIMEOUT = 60  # s; an instantiation takes milliseconds
@@ -40,6 +41,24 @@ def instantiate(library: Path, unit: str, guid: str, resources: Path) -> str | N
     if done.returncode == 0:
         return None
     return (done.stdout + done.stderr).strip() or f"the trial ended with exit code {done.returncode}"
+
+
+def check(library: Path, unit: str, guid: str, resources: Mapping[str, bytes], stage: Path) -> None:
+    """Instantiate once with these resources (archive path -> content), which are written into the folder `stage`.
+
+    Raises:
+        InputError: with the unit's own words where it refuses.
+    """
+    from .errors import InputError  # the program that this file is as well knows no package
+
+    (stage / "resources").mkdir(exist_ok=True)
+    for path in (stage / "resources").iterdir():
+        path.unlink()  # left from an earlier build
+    for name, content in resources.items():
+        (stage / name).write_bytes(content)
+    refusal = instantiate(library, unit, guid, stage / "resources")
+    if refusal is not None:
+        raise InputError(f"{unit}: packed, but cannot be instantiated", refusal.splitlines())
 
 
 def _main(library: str, unit: str, guid: str, resources: str) -> int:

@@ -3,9 +3,9 @@
 from collections import Counter
 from dataclasses import dataclass
 
-from packager.errors import InputError
-from packager.resources import Resources
-from packager.table import Row, Table
+from .errors import InputError
+from .resources import Resources
+from .table import Row, Table
 
 
 @dataclass(frozen=True)

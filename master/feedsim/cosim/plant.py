@@ -1,0 +1,78 @@
+"""Which archive is the plant of a machine: its own, the general one, or the general one packed anew for its axes."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from feedsim.cosim.unit import Archive
+from feedsim.errors import InputError
+from feedsim.scenario import Machine
+from feedsim.structure.pack import MODES_IN_ARCHIVE, pack
+
+_START = ".x_0"  # of every axis of a plant
+
+
+@dataclass(frozen=True)
+class Plant:
+    """The archive, and the table of modes that the unit is to read in place of the archive's; None where the archive's
+    own counts."""
+
+    archive: Archive
+    modes_file: Path | None
+
+
+def open_plant(machine: Machine, fmus: Path) -> Plant:
+    """The machine's plant archive, unpacked; the caller closes it.
+
+    A machine that names an archive under `plant` has that. Otherwise plant.fmu in the folder `fmus` serves with the
+    machine's table of modes; where it has other axes than the machine, the machine is packed into it first.
+
+    Raises:
+        InputError: no such archive, or it does not fit the machine.
+    """
+    if machine.plant is not None:
+        archive = Archive(machine.plant)
+        try:
+            _check_own(archive, machine)
+        except InputError:
+            archive.close()
+            raise
+        return Plant(archive, None)
+    general = Archive(fmus / "plant.fmu")
+    if set(axes_of(general)) == set(machine.axes):
+        return Plant(general, machine.modes)
+    general.close()
+    with tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True) as folder:
+        packed = Path(folder) / "plant.fmu"
+        pose = {axis: machine.pose[axis] for axis in machine.axes}
+        # Without a trial: the unit is instantiated next anyway.
+        pack(general.path, packed, modes=machine.modes, pose=pose, name=machine.name, note=machine.note, trial=False)
+        return Plant(Archive(packed), None)
+
+
+def axes_of(archive: Archive) -> tuple[str, ...]:
+    """Axes of a plant archive, in its order."""
+    return tuple(name.removesuffix(_START) for name in archive.variables if name.endswith(_START))
+
+
+def _check_own(archive: Archive, machine: Machine) -> None:
+    folder = machine.directory if (machine.directory / "machine.yaml").is_file() else "MACHINE"
+    pack_anew = f"pack it anew: feedsim machine pack {folder} --out {archive.path}"
+    axes = axes_of(archive)
+    if set(axes) != set(machine.axes):
+        raise InputError(
+            f"{archive.path}: a plant with the axes {', '.join(axes) or '(none)'}; the machine has "
+            f"{', '.join(machine.axes)}; {pack_anew}"
+        )
+    try:
+        inside = (archive.directory / MODES_IN_ARCHIVE).read_bytes()
+        outside = machine.modes.read_bytes()
+    except OSError as error:
+        raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
+    if inside != outside:
+        raise InputError(
+            f"{archive.path}: its table of modes is not the machine's, {machine.modes}: one of them has changed since "
+            f"it was packed; {pack_anew}"
+        )

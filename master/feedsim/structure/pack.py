@@ -1,0 +1,81 @@
+"""A machine's modes, pose and grid of poses -> a plant archive of its own. Sole user of the packager.
+
+No compiler is needed: the binaries of an archive do not depend on the machine. Which axes there are, where they stand
+and how the structure moves is data that the archive holds in resources/.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from feedsim.errors import InputError, OutputError
+from feedsim.structure.modes import Modes, write_modes
+
+MODES_IN_ARCHIVE = "resources/modes.csv"
+POSES_IN_ARCHIVE = "resources/poses.bin"
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A packed archive.
+
+    Attributes:
+        size: [bytes].
+        guid: of the units' table and, its second half, of the machine's data.
+        platforms: folders of the binaries in it, such as "linux64".
+    """
+
+    path: Path
+    size: int
+    guid: str
+    platforms: tuple[str, ...]
+
+
+def pack(
+    base: Path,
+    out: Path,
+    *,
+    modes: Modes | Path,
+    pose: Mapping[str, float],
+    poses: Path | None = None,
+    name: str = "",
+    note: str = "",
+    trial: bool = True,
+) -> Packed:
+    """Pack a machine into the plant archive `base`; write it to `out`, whole or not at all.
+
+    Args:
+        modes: modes at the pose, with the ports of all axes; of a file the bytes are packed as they are.
+        pose: axis -> position at the start [m]; the axes in the order that the archive shall have them.
+        poses: poses.bin, the modes of a grid of poses, for a plant that follows its axes.
+        name, note: what the archive's description and documentation say of the machine.
+        trial: instantiate the packed unit once, where the base has a binary for this platform.
+
+    Raises:
+        InputError: a file is not what it should be, or the unit refuses the machine.
+        OutputError: `out` cannot be written.
+    """
+    from feedsim_packager import errors, repack, resources
+    from feedsim_packager.machine import named
+
+    if isinstance(modes, Modes):
+        with tempfile.TemporaryDirectory(prefix="feedsim-") as folder:
+            written = Path(folder) / "modes.csv"
+            write_modes(written, modes)
+            return pack(base, out, modes=written, pose=pose, poses=poses, name=name, note=note, trial=trial)
+    File = resources.File
+    try:
+        given = resources.check(
+            File("axes.csv", resources.axes_csv(pose)),
+            File.at(modes),
+            File.at(poses) if poses is not None else None,
+        )
+        done = repack.repack(base, given, named(name, note), out, trial_run=trial)
+    except errors.OutputError as error:
+        raise OutputError(str(error)) from error
+    except errors.InputError as error:
+        raise InputError(str(error), error.problems) from error
+    return Packed(done.path, done.size, done.guid, done.platforms)

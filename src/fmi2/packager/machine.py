@@ -1,0 +1,31 @@
+"""What an archive says in words of the machine in it."""
+
+from dataclasses import dataclass
+
+from .errors import InputError
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Name and note of the machine, empty where there is none. `default`: it is the synthetic default machine."""
+
+    name: str = ""
+    note: str = ""
+    default: bool = False
+
+    def sentence(self) -> str:
+        """The machine as a description ends with it; empty without a name and a note."""
+        parts = [f"Machine: {self.name}" if self.name else "", self.note]
+        return ". ".join(part.rstrip(".") for part in parts if part)
+
+
+def named(name: str = "", note: str = "") -> Machine:
+    """A machine of the user's; white space counts as one space. Raises InputError for what no XML can hold."""
+    return Machine(_line("name", name), _line("note", note))
+
+
+def _line(what: str, text: str) -> str:
+    line = " ".join(text.split())
+    if not line.isprintable():
+        raise InputError(f"the machine's {what} {text!r} has characters that cannot be printed")
+    return line

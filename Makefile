@@ -24,11 +24,13 @@ CC := "$(CURDIR)/$(PY)" -m ziglang cc
 COMPILER := $(VENV)/.compiler
 endif
 export CC
+# Small matrices by the thousand: threads for linear algebra only wait for one another.
+export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-sanitize test-sanitize-scenario test-valgrind fmus lint format reference check-reference bench lock ansys clean
+.PHONY: help run test test-c test-python test-sanitize test-sanitize-scenario test-valgrind fmus lint format reference check-reference bench pose-study lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-16s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -40,10 +42,11 @@ $(VENV)/.created:
 	$(PYTHON) -m venv $(VENV)
 	@touch $@
 
-$(VENV)/.run: $(VENV)/.created requirements.lock pyproject.toml
+$(VENV)/.run: $(VENV)/.created requirements.lock pyproject.toml setup.py
 	@echo "installing the locked packages (requirements.lock)"
 	$(PIP) install -r requirements.lock
-	$(PIP) install --no-build-isolation --no-deps -e .
+	@# setuptools warns of what holds for every installation that is linked to its sources
+	PYTHONWARNINGS=ignore::UserWarning $(PIP) install --no-build-isolation --no-deps -e .
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.run requirements-dev.lock
@@ -58,7 +61,7 @@ $(VENV)/.compiler: $(VENV)/.run requirements-zig.lock
 
 $(VENV)/.ansys: $(VENV)/.run requirements-ansys.lock
 	@echo "installing the reader of ANSYS files (requirements-ansys.lock)"
-	$(PIP) install -r requirements-ansys.lock
+	$(PIP) install --no-deps -r requirements-ansys.lock
 	@touch $@
 
 ansys: $(VENV)/.ansys ## install the optional reader of ANSYS .full files
@@ -116,6 +119,9 @@ check-reference: fmus $(VENV)/.run ## compare the units' outputs with the pinned
 bench: fmus $(VENV)/.run ## measure the units and the master loop
 	$(PY) benchmarks/cycle.py
 
+pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full model (some minutes; docs/position-dependence.md)
+	$(PY) benchmarks/pose_grid.py
+
 # --- keep ----------------------------------------------------------------------------------------------------------
 
 C_FILES := $(foreach folder,src/fmi2 src/plant_fmu src/controller_fmu src/friction_fmu tests/unit_c tests/unit_c/toy_unit \
@@ -139,7 +145,7 @@ lock: ## resolve the dependencies of pyproject.toml anew
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group build -o requirements.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --group zig -o requirements-zig.lock
-	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra ansys -c requirements.lock -o requirements-ansys.lock
+	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --no-deps pyproject.toml --extra ansys -c requirements.lock -o requirements-ansys.lock
 
 clean: ## remove what was built, keep the environment
 	rm -rf $(BUILD) $(FMUS) $(RESULTS)

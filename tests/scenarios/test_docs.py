@@ -22,9 +22,8 @@ def test_example_loads(tmp_path: Path, block: str) -> None:
     (tmp_path / "recordings" / "z_setpoint.csv").write_text("")
     whole: dict[str, Any] = {"name": "s", "motions": [{"kind": "dwell", "duration": "1 s"}]}
     if data.keys() & MACHINE_KEYS:
-        data["modes"] = str(folder / data["modes"])
-        machine = yaml.safe_load((folder / "machine.yaml").read_text(encoding="utf-8"))
-        whole["machine"] = machine | data
+        machine = yaml.safe_load((folder / "machine.yaml").read_text(encoding="utf-8")) | data
+        whole["machine"] = machine | {key: str(folder / machine[key]) for key in ("modes", "structure")}
     else:
         whole |= data | {"machine": str(folder)}
     (tmp_path / "s.yaml").write_text(yaml.safe_dump(whole), encoding="utf-8")

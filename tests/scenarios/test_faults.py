@@ -206,9 +206,9 @@ def test_machine_file_and_line_are_named(tmp_path: Path, refused: Refused, old: 
         (
             "travel: [0 mm, 1770 mm]",
             "travel: [0 mm, 700 mm]",
-            "m.yaml:13: machine.pose.X: the pose of X, 0.8 m, is outside its travel, 0 to 0.7 m",
+            "m.yaml:14: machine.pose.X: the pose of X, 0.8 m, is outside its travel, 0 to 0.7 m",
         ),
-        ("pose: {X: 800 mm, ", "pose: {", "m.yaml:13: machine.pose: the pose lacks the position of axis X"),
+        ("pose: {X: 800 mm, ", "pose: {", "m.yaml:14: machine.pose: the pose lacks the position of axis X"),
         ("pose: {", "pose: {A: 0 m, ", "machine.pose.A: the machine has no axis 'A'; it has X, Y, Z"),
         ("modes.csv\n", "none.csv\n", "machine.modes: no such file: "),
     ],
@@ -220,6 +220,7 @@ def test_what_concerns_several_lines(tmp_path: Path, refused: Refused, old: str,
 def changed_machine(tmp_path: Path, old: str, new: str) -> tuple[Path, int]:
     """A copy of the default machine with the first `old` replaced, and the line of that."""
     text = MACHINE.read_text(encoding="utf-8").replace("modes: modes.csv", f"modes: {MACHINE.parent / 'modes.csv'}")
+    text = text.replace("structure: structure.yaml", f"structure: {MACHINE.parent / 'structure.yaml'}")
     path = tmp_path / "m.yaml"
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     return path, text[: text.index(old)].count("\n") + 1

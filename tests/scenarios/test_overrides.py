@@ -115,7 +115,9 @@ def test_another_machine_meets_the_scenarios_own_settings(tmp_path: Path) -> Non
     modes = SCENARIOS / "machines" / "test_centre" / "modes.csv"
     write(
         tmp_path / "other.yaml",
-        machine.replace("modes: modes.csv", f"modes: {modes}").replace("name: Test centre", "name: Other"),
+        machine.replace("modes: modes.csv", f"modes: {modes}")
+        .replace("structure: structure.yaml", f"structure: {modes.with_name('structure.yaml')}")
+        .replace("name: Test centre", "name: Other"),
     )
     path = write(
         tmp_path / "s.yaml",

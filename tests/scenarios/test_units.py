@@ -86,7 +86,7 @@ def test_hertz_is_never_silently_one_over_second_or_radian_per_second() -> None:
     [
         ("5000 mm", "m/s", "'5000 mm' is a length; a speed is expected, for example 5000 mm/min"),
         ("5000", "m/s", "5000 has no unit; a speed is expected, for example 5000 mm/min"),
-        ("5 kg.m^2", "N.m", "'5 kg.m^2' is a length^2*mass; a torque is expected, for example 2.1 N.m"),
+        ("5 kg.m^3", "N.m", "'5 kg.m^3' is a length^3*mass; a torque is expected, for example 2.1 N.m"),
         ("5,5 mm", "m", "write a decimal point, not a comma"),
         ("5 MM", "m", "unknown unit 'MM'; did you mean 'mm'?"),
         ("5 inch", "m", "unknown unit 'inch'; known are m, "),

@@ -1,11 +1,14 @@
 """Scenario and machine files: YAML with units, checked, as objects in SI."""
 
 from feedsim.scenario.checks import moved_axes
-from feedsim.scenario.load import load, load_machine
+from feedsim.scenario.described import Described, load_described
+from feedsim.scenario.load import load, load_machine, load_structure
 from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine, PathLimits
 from feedsim.scenario.model import CircleTest, Coupling, Evaluation, Positioning, Recording, Scenario
 from feedsim.scenario.motion import Arc, Circle, Column, Dwell, MeasuredSetpoints, Motion, Move
 from feedsim.scenario.schema import json_schema
+from feedsim.scenario.structure import Damping, DampingStep, Structure
+from feedsim.scenario.subject import Subject, load_subject
 
 __all__ = [
     "Arc",
@@ -16,6 +19,9 @@ __all__ = [
     "Coupling",
     "CurrentController",
     "Cycles",
+    "Damping",
+    "DampingStep",
+    "Described",
     "Drive",
     "Dwell",
     "Evaluation",
@@ -29,8 +35,13 @@ __all__ = [
     "Positioning",
     "Recording",
     "Scenario",
+    "Structure",
+    "Subject",
     "json_schema",
     "load",
+    "load_described",
     "load_machine",
+    "load_structure",
+    "load_subject",
     "moved_axes",
 ]

@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from feedsim import units
 from feedsim.errors import InputError
 
-RESERVED = ("time", "tool", "tcp")  # first parts of other column names
+RESERVED = ("time", "tool", "tcp", "pose")  # first parts of other column names
 
 
 @dataclass(frozen=True)

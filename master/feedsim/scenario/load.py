@@ -15,13 +15,16 @@ from feedsim.errors import InputError
 from feedsim.scenario import overrides as changes
 from feedsim.scenario import shape
 from feedsim.scenario.checks import contradictions
-from feedsim.scenario.fields import Quantity, Reading, brief, is_multiple
+from feedsim.scenario.fields import Quantity, Reading, brief, did_you_mean, is_multiple
 from feedsim.scenario.machine import Cycles, Machine
 from feedsim.scenario.model import Scenario
 from feedsim.scenario.problems import describe, explain, in_order
 from feedsim.scenario.source import Place, Source, read
+from feedsim.scenario.structure import Structure
+from feedsim.scenario.structure_kinds import KINDS, contradictions_of
 
 MACHINE_FILE = "machine.yaml"
+STRUCTURE_FILE = "structure.yaml"
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -34,7 +37,7 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     Raises InputError that lists every problem with file and line.
     """
     path = Path(path)
-    source = _read_group(path)
+    source = read_group(path)
     faults: list[str] = []
     options = []
     for text in overrides:
@@ -47,13 +50,13 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
             source.put(("machine",), value)
     own = list(_own_settings(source, faults))
     changed: list[tuple[Place, str]] = []
-    _fetch(source, Scenario, (), faults)
+    fetch(source, Scenario, (), faults)
     for key, value in (*own, *((key, value) for key, value in options if key != "machine")):
         with _collecting(faults):
             for place in changes.apply(source, Scenario, key, value):
                 changed.append((place, value.mark(()).where))
-                _fetch(source, Scenario, place, faults)
-    scenario = _check(source, Scenario, faults)
+                fetch(source, Scenario, place, faults)
+    scenario = check(source, Scenario, faults)
     if scenario is not None:
         faults += [describe(source, place, message) for place, message in contradictions(scenario)]
     if faults or scenario is None:
@@ -68,18 +71,51 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     return scenario
 
 
-def load_machine(path: str | Path) -> Machine:
-    """Read and check a machine: a machine file, or a folder with a machine.yaml. Raises InputError like load()."""
+def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
+    """Read and check a machine: a machine file, or a folder with a machine.yaml.
+
+    `overrides` as for load(), with the keys of the machine; "machine.axes.Z..." is the same as "axes.Z...". Raises
+    InputError like load().
+    """
     path = Path(path)
     path = path / MACHINE_FILE if path.is_dir() else path
-    source = _read_group(path)
+    source = read_group(path)
     faults: list[str] = []
-    _fetch(source, Machine, (), faults)
-    machine = _check(source, Machine, faults)
-    if machine is None:
+    fetch(source, Machine, (), faults)
+    for text in overrides:
+        with _collecting(faults):
+            key, value = changes.option(text, Path())
+            for place in changes.apply(source, Machine, key.removeprefix("machine."), value):
+                fetch(source, Machine, place, faults)
+    machine = check(source, Machine, faults)
+    if faults or machine is None:
         raise InputError.of(str(path), in_order(faults))
+    machine._files = tuple(_files(source, path))
     machine._directory = path.parent
     return machine
+
+
+def load_structure(path: str | Path) -> Structure:
+    """Read and check a structure: a structure file, or a folder with a structure.yaml, as the model its `kind` names.
+
+    Raises InputError like load().
+    """
+    path = Path(path)
+    path = path / STRUCTURE_FILE if path.is_dir() else path
+    source = read_group(path)
+    kind = source.data.get("kind")
+    if kind is None:
+        raise InputError(describe(source, ("kind",), f"missing key 'kind'; allowed: {', '.join(KINDS)}"))
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError(describe(source, ("kind",), f"unknown kind {brief(kind)}{did_you_mean(str(kind), [*KINDS])}"))
+    model, faults = KINDS[kind], list[str]()
+    fetch(source, model, (), faults)
+    structure = check(source, model, faults)
+    if structure is not None:
+        faults += [describe(source, place, message) for place, message in contradictions_of(structure)]
+    if faults or structure is None:
+        raise InputError.of(str(path), in_order(faults))
+    return structure
 
 
 def _text(value: Any) -> str:
@@ -98,7 +134,7 @@ def _files(source: Source, path: Path) -> Iterator[tuple[str, Path]]:
             yield ".".join(str(key) for key in place), Path(file)
 
 
-def _read_group(path: Path) -> Source:
+def read_group(path: Path) -> Source:
     source = read(path)
     if not isinstance(source.data, dict):
         raise InputError(f"{source.mark(()).where}: a file of 'key: value' lines is expected, not {brief(source.data)}")
@@ -118,7 +154,7 @@ def _own_settings(source: Source, faults: list[str]) -> Iterator[tuple[str, Sour
     source.forget(place)
 
 
-def _fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
+def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
     """Replace names of YAML files, where a group of keys is expected, by what the files hold; make other file names
     relative to the file that names them."""
     data: Any = source.data
@@ -138,25 +174,25 @@ def _fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
             named = folder / data
             file = named / MACHINE_FILE if annotation is Machine and named.is_dir() else named
             try:
-                source.put(place, _read_group(file))
+                source.put(place, read_group(file))
             except InputError as error:
                 inside = f"{file}:" in error.problems[0]
                 faults += error.problems if inside else [describe(source, place, str(error))]
                 source.put(place, Source(UNREAD, {(): source.mark(place)}))
                 return
-            _fetch(source, model, place, faults)
+            fetch(source, model, place, faults)
     elif isinstance(data, dict):
         for key in data:
-            _fetch(source, model, (*place, key), faults)
+            fetch(source, model, (*place, key), faults)
     elif isinstance(data, list):
         for i in range(len(data)):
-            _fetch(source, model, (*place, i), faults)
+            fetch(source, model, (*place, i), faults)
 
 
 UNREAD = "(not read)"  # stands for the content of a file whose problem is reported already
 
 
-def _check(source: Source, model: type[M], faults: list[str]) -> M | None:
+def check(source: Source, model: type[M], faults: list[str]) -> M | None:
     try:
         return model.model_validate(source.data, context=_reading(source.data))
     except ValidationError as error:

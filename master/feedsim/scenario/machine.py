@@ -127,7 +127,9 @@ class Drive(ParameterGroup):
         default=1.0, description="Weight of the speed feedforward"
     )
     T_dyn: Annotated[float, Quantity("s", minimum=0, maximum=1, example="1.326 ms")] = Field(
-        default=0.0, description="Dynamic matching: delay of position setpoint and feedforward alike"
+        default=0.0,
+        validate_default=False,  # it has no unit, being no text
+        description="Dynamic matching: delay of position setpoint and feedforward alike",
     )
     T_sym: Annotated[float, Quantity("s", minimum=0, maximum=1, example="3.528 ms")] = Field(
         description="Symmetry filter: delay of the position setpoint against the feedforward"
@@ -158,7 +160,9 @@ class Drive(ParameterGroup):
         default=None, description="Reference model: damping ratio"
     )
     T_ref: Annotated[float, Quantity("s", minimum=0, maximum=1, example="0 ms")] = Field(
-        default=0.0, description="Reference model: dead time"
+        default=0.0,
+        validate_default=False,  # it has no unit, being no text
+        description="Reference model: dead time",
     )
     M_max: Annotated[float, Quantity("N.m", minimum=0, example="80 N.m")] = Field(
         description="Limit of the torque setpoint, both directions"
@@ -292,6 +296,12 @@ class Machine(Model):
     name: StrictStr = Field(description="Name in reports")
     note: StrictStr = Field(default="", description="Remark shown wherever the machine's numbers are shown")
     modes: File = Field(description="Table of the structure's modes (CSV), relative to this file")
+    structure: File | None = Field(
+        default=None, description="Structure file that the modes were computed from (feedsim machine build)"
+    )
+    plant: File | None = Field(
+        default=None, description="Plant archive packed for this machine, in place of fmus/plant.fmu"
+    )
     pose: dict[AxisName, Annotated[float, Quantity("m", example="800 mm")]] = Field(
         description="Axis positions at the start, to which the modes belong"
     )
@@ -302,11 +312,18 @@ class Machine(Model):
     )
 
     _directory: Path = PrivateAttr(default=Path())
+    _files: tuple[tuple[str, Path], ...] = PrivateAttr(default=())
 
     @property
     def directory(self) -> Path:
         """Folder of the machine file."""
         return self._directory
+
+    @property
+    def files(self) -> tuple[tuple[str, Path], ...]:
+        """YAML files that it was read from, each with the first key that it gives; "" for the machine file. Empty where
+        it was read as part of a scenario, which has them."""
+        return self._files
 
     @field_validator("axes")
     @classmethod

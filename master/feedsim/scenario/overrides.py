@@ -39,7 +39,7 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
         return
     part, rest = parts[0], parts[1:]
     data = _at(source.data, place)
-    here = ".".join(str(item) for item in place) or "the scenario"
+    here = ".".join(str(item) for item in place) or f"the {model.__name__.lower()}"
     if part == "*" and isinstance(data, (dict, list)):
         for name in list(data) if isinstance(data, dict) else range(len(data)):
             yield from _places(source, model, (*place, name), rest, key, mark)

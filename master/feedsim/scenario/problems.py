@@ -58,7 +58,7 @@ def _message(source: Source, model: Any, detail: ErrorDetails, place: Place) -> 
         return (
             f"missing; {_wanted(source, model, place)}"
             if isinstance(place[-1], str)
-            else "the list is too short; two entries are needed"
+            else f"the list is too short; {_length(model, source, place)} entries are needed"
         )
     if kind == "union_tag_not_found":
         return f"missing key 'kind'; allowed: {', '.join(_words(model, source, place))}"
@@ -91,6 +91,12 @@ def _message(source: Source, model: Any, detail: ErrorDetails, place: Place) -> 
         "list_type": f"{value}; a list is expected",
     }
     return simple.get(kind, detail["msg"])
+
+
+def _length(model: Any, source: Source, place: Place) -> str:
+    """How many entries the list has that lacks the one at `place`."""
+    entries = get_args(shape.expected(model, source.data, place[:-1]))
+    return {2: "two", 3: "three"}.get(len(entries), str(len(entries)))
 
 
 def _entries(count: int) -> str:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def json_schema(kind: Literal["scenario", "machine"] = "scenario") -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of a scenario file or a machine file.
+def json_schema(kind: Literal["scenario", "machine", "structure"] = "scenario") -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a scenario file, a machine file or a structure file.
 
     It knows keys, words and the spelling of quantities; it cannot know limits of quantities nor what needs two places
     to be seen together. What it refuses, load() refuses too.
@@ -23,7 +23,10 @@ def json_schema(kind: Literal["scenario", "machine"] = "scenario") -> dict[str, 
     from feedsim.scenario.machine import Machine
     from feedsim.scenario.model import Scenario
 
-    schema = (Scenario if kind == "scenario" else Machine).model_json_schema()
+    if kind == "structure":
+        schema = _structure_schema()
+    else:
+        schema = (Scenario if kind == "scenario" else Machine).model_json_schema()
     definitions: dict[str, Any] = schema.pop("$defs")
     for group in (*definitions.values(), schema):
         _open_to_files(group, definitions)
@@ -42,6 +45,20 @@ def json_schema(kind: Literal["scenario", "machine"] = "scenario") -> dict[str, 
         **_without_titles(schema),
         "$defs": _without_titles(definitions),
     }
+
+
+def _structure_schema() -> dict[str, Any]:
+    """One of the kinds; which is for `kind` to say."""
+    from pydantic.json_schema import models_json_schema
+
+    from feedsim.scenario.structure_kinds import KINDS
+
+    references, schema = models_json_schema([(model, "validation") for model in KINDS.values()])
+    options = [references[model, "validation"] for model in KINDS.values()]
+    for option in options:
+        model = schema["$defs"][option["$ref"].rpartition("/")[2]]
+        model["required"] = ["kind", *model.get("required", [])]
+    return schema | {"type": "object", "oneOf": options}
 
 
 def quantity_schema(quantity: Quantity) -> dict[str, Any]:
@@ -93,7 +110,7 @@ def _without_titles(schema: Any) -> Any:
     if isinstance(schema, dict):
         return {
             key: _without_titles(value)
-            if key != "properties"
+            if key != "properties" or not isinstance(value, dict)
             else {name: _without_titles(part) for name, part in value.items()}
             for key, value in schema.items()
             if not (key == "title" and isinstance(value, str))

@@ -7,6 +7,7 @@ tcp_Y, tcp_Z (tool against workpiece: force in, displacement out). The format is
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.scenario import Machine
+from feedsim.trace.files import written_whole
 
 Floats = NDArray[np.float64]
 
@@ -104,6 +106,21 @@ def read_modes(file: Path, axes: Sequence[str]) -> Modes:
     if problems:
         raise InputError.of(f"{file}: not a usable table of modes", problems[:MOST_PROBLEMS])
     return Modes(file, columns[FREQUENCY], columns[DAMPING], {port: columns[port] for port in ports})
+
+
+def write_modes(path: Path, modes: Modes) -> None:
+    """Write a mode table: modes numbered from 0, numbers with the fewest digits that give them back exactly.
+
+    Raises:
+        OutputError: it cannot be written; an old file of that name is then as it was.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow((MODE, FREQUENCY, DAMPING, *modes.ports))
+    columns = [np.asarray(column).tolist() for column in (modes.frequency, modes.damping, *modes.ports.values())]
+    writer.writerows((number, *map(repr, row)) for number, row in enumerate(zip(*columns, strict=True)))
+    with written_whole(path) as file:
+        file.write(text.getvalue().encode())
 
 
 def _header_problems(file: Path, header: Sequence[str], needed: Sequence[str]) -> list[str]:

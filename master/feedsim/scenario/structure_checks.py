@@ -1,0 +1,325 @@
+"""What only shows when the parts of a machine written as geometry are seen together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import dist, hypot
+from typing import NamedTuple
+
+from feedsim.errors import InputError
+from feedsim.scenario.fields import did_you_mean, no_axis
+from feedsim.scenario.source import Place
+from feedsim.scenario.structure_fields import FRAME
+from feedsim.scenario.structure_geometry import Body, GeometryStructure
+from feedsim.scenario.structure_names import Node, held, nodes, position, rail
+
+Faults = Iterator[tuple[Place, str]]
+
+# Directions come from coordinates in decimal text: beyond rounding they are either equal or mistaken.
+ALIGNED = 1e-6
+# A nut this far off its screw [m] is a slip of the pen, not rounding.
+OFF_AXIS = 1e-6
+# A beam shorter than this [m] joins two nodes at one place.
+SHORTEST = 1e-9
+# `up` this near to the beam's own direction turns nothing.
+PARALLEL = 1e-6
+
+
+def contradictions(structure: GeometryStructure) -> Faults:
+    """Place and message of everything in a structure that cannot be or cannot go together."""
+    found = [*_materials(structure), *_motions(structure)]
+    for name, body in structure.bodies.items():
+        found += _body(structure, name, body)
+    for name in structure.axes:
+        found += _drive(structure, name)
+    found += _tool(structure)
+    yield from found
+    if not found:  # what can be asked only of names that are known
+        yield from _loose_nodes(structure)
+        for name in structure.axes:
+            yield from _along_screw(structure, name)
+
+
+def pose_faults(structure: GeometryStructure, pose: Mapping[str, float]) -> Iterator[str]:
+    """What is wrong with a pose: axes missing or unknown, positions out of travel."""
+    axes = structure.axes
+    for name in pose:
+        if name not in axes:
+            yield f"pose: {no_axis(name, axes)}"
+    for name, axis in axes.items():
+        low, high = axis.travel
+        if name not in pose:
+            yield f"pose: the position of axis {name} is missing; {low:.9g} to {high:.9g} m is its travel"
+        elif not low <= pose[name] <= high:
+            yield f"pose: {name} at {pose[name]:.9g} m is outside its travel, {low:.9g} to {high:.9g} m"
+
+
+def _materials(structure: GeometryStructure) -> Faults:
+    known = list(structure.materials)
+    for place, item in (
+        *((("sections", name, "material"), section) for name, section in structure.sections.items()),
+        *((("axes", name, "drive", "screw", "material"), axis.drive.screw) for name, axis in structure.axes.items()),
+    ):
+        if item.material is None and len(known) > 1:
+            yield place, f"missing; there are several materials: {', '.join(known)}"
+        elif item.material is not None and item.material not in known:
+            yield place, f"there is no material {item.material!r}{did_you_mean(item.material, known)}"
+
+
+def _motions(structure: GeometryStructure) -> Faults:
+    for name, body in structure.bodies.items():
+        for i, axis in enumerate(body.moves_with):
+            if axis not in structure.axes:
+                yield ("bodies", name, "moves_with", i), no_axis(axis, structure.axes)
+            elif axis in body.moves_with[:i]:
+                yield ("bodies", name, "moves_with", i), f"axis {axis} is listed twice"
+        if body.mounts and body.moves_with:
+            yield (
+                ("bodies", name, "mounts"),
+                f"{name} moves with {body.moves_with[0]}; a mount would hold it on the ground",
+            )
+    for axis in structure.axes:
+        if not any(axis in body.moves_with for body in structure.bodies.values()):
+            yield ("axes", axis), f"no body moves with axis {axis}; it belongs in the moves_with of those that do"
+
+
+def _body(structure: GeometryStructure, name: str, body: Body) -> Faults:
+    here: Place = ("bodies", name)
+    for key, group in body.nodes.items():
+        if group.section is not None and group.start is not None and group.end is not None:
+            yield from _section(structure, (*here, "nodes", key, "section"), group.section)
+            yield from _up((*here, "nodes", key, "up"), group.up, group.start, group.end)
+    for i, beams in enumerate(body.beams):
+        place: Place = (*here, "beams", i)
+        yield from _section(structure, (*place, "section"), beams.section)
+        stops: list[tuple[Node, ...]] = []
+        for k, text in enumerate(beams.through):
+            known, faults = _known(structure, name, (text,), (*place, "through", k))
+            yield from faults
+            if known and stops and len(known) != len(stops[-1]):
+                counts = f"{beams.through[k - 1]} has {len(stops[-1])} nodes and {text} has {len(known)}"
+                yield (*place, "through", k), f"{counts}; lines of equal count are joined node by node"
+            elif known and stops:
+                for first, second in zip(stops[-1], known, strict=True):
+                    yield from _length(structure, (*place, "through", k), first, second)
+                    yield from _up((*place, "up"), beams.up, position(structure, first), position(structure, second))
+            if known:
+                stops.append(known)
+    for place, texts in (
+        *(((*here, "masses", i, "nodes"), mass.nodes) for i, mass in enumerate(body.masses)),
+        *(((*here, "mounts", i, "nodes"), mount.nodes) for i, mount in enumerate(body.mounts)),
+    ):
+        known, faults = _known(structure, name, texts, place)
+        yield from faults
+        if twice := [entry for k, entry in enumerate(known) if entry in known[:k]]:
+            yield place, f"{twice[0]} is listed twice"
+    for i, carriage in enumerate(body.carriages):
+        place = (*here, "carriages", i)
+        known, faults = _known(structure, name, (carriage.node,), (*place, "node"))
+        yield from faults
+        if len(known) > 1:
+            yield (*place, "node"), f"{carriage.node!r} is a line of {len(known)} nodes; a carriage sits on one"
+        try:
+            line = rail(structure, carriage.rail)
+        except InputError as error:
+            yield (*place, "rail"), str(error)
+            continue
+        if line.body == name:
+            yield (*place, "rail"), f"{carriage.rail} is part of {name} itself; a carriage rides on another body"
+        for axis in _ways(structure, name) ^ _ways(structure, line.body):
+            for k, direction in enumerate(carriage.directions):
+                way = structure.axes[axis].direction if axis in structure.axes else (0.0, 0.0, 0.0)
+                if abs(sum(a * b for a, b in zip(direction, way, strict=True))) > ALIGNED:
+                    message = (
+                        f"{_shown(direction)} is not square to {_shown(way)}, along which axis {axis} moves {name}"
+                    )
+                    yield (*place, "directions", k), f"{message} past {line.body}; the carriage would hold the axis"
+
+
+def _section(structure: GeometryStructure, place: Place, name: str) -> Faults:
+    if name not in structure.sections:
+        hint = did_you_mean(name, list(structure.sections)) if structure.sections else ""
+        yield place, f"there is no section {name!r}{hint}"
+
+
+def _known(
+    structure: GeometryStructure, body: str, texts: Sequence[str], place: Place
+) -> tuple[tuple[Node, ...], list[tuple[Place, str]]]:
+    """Nodes of a body that are named, and what is wrong with the names."""
+    found: list[Node] = []
+    faults: list[tuple[Place, str]] = []
+    for text in texts:
+        try:
+            found += nodes(structure, body, text)
+        except InputError as error:
+            faults.append((place, str(error)))
+    return tuple(found), faults
+
+
+def _length(structure: GeometryStructure, place: Place, first: Node, second: Node) -> Faults:
+    if dist(position(structure, first), position(structure, second)) < SHORTEST:
+        what = "the same node" if first == second else "at the same point"
+        yield place, f"a beam from {first} to {second}, which are {what}; a beam has a length"
+
+
+def _up(place: Place, up: tuple[float, float, float] | None, start: Sequence[float], end: Sequence[float]) -> Faults:
+    length = dist(start, end)
+    if up is None or length < SHORTEST:
+        return
+    along = [(b - a) / length for a, b in zip(start, end, strict=True)]
+    if hypot(*_cross(along, up)) < PARALLEL:
+        yield place, "points along the beam itself, so it turns nothing; a direction across the beam is needed"
+
+
+class _Hold(NamedTuple):
+    """Something held at a point: its place in the file, by what, the body in whose frame the point is given (None: not
+    known), and the axis that it must move with (True) or must not (False)."""
+
+    place: Place
+    texts: Sequence[str]
+    frame: str | None = None
+    axis: str | None = None
+    moves: bool = False
+
+
+def _drive(structure: GeometryStructure, name: str) -> Faults:
+    axis = structure.axes[name]
+    drive, scale, here = axis.drive, axis.scale, ("axes", name, "drive")
+    screw, nut = drive.screw.body, drive.nut.body
+    yield from _frame(structure, (*here, "screw", "body"), screw, name, False)
+    yield from _frame(structure, (*here, "nut", "body"), nut, name, True)
+    yield from _frame(structure, ("axes", name, "scale", "body"), scale.body)
+    reads = scale.body in structure.bodies and name in structure.bodies[scale.body].moves_with
+    holds = [
+        _Hold((*here, "stator", "node"), (drive.stator.node,), screw, name, False),
+        *(
+            _Hold((*here, "bearings", i, "held_by"), it.held_by, screw, name, False)
+            for i, it in enumerate(drive.bearings)
+        ),
+        _Hold((*here, "nut", "held_by"), drive.nut.held_by, nut, name, True),
+        _Hold(("axes", name, "scale", "moving"), scale.moving, scale.body if reads else None, name, True),
+        _Hold(("axes", name, "scale", "against"), scale.against, None if reads else scale.body, name, False),
+    ]
+    if drive.nut.rotation_of is not None:
+        holds.append(_Hold((*here, "nut", "rotation_of"), drive.nut.rotation_of, nut, name, True))
+    for hold in holds:
+        yield from _held(structure, hold)
+
+
+def _tool(structure: GeometryStructure) -> Faults:
+    tool = structure.tool
+    yield from _frame(structure, ("tool", "body"), tool.body)
+    yield from _held(structure, _Hold(("tool", "held_by"), tool.held_by, tool.body))
+    yield from _held(structure, _Hold(("tool", "against"), tool.against))
+
+
+def _frame(structure: GeometryStructure, place: Place, body: str, axis: str = "", moves: bool = False) -> Faults:
+    """The body is there, and moves with the axis or does not."""
+    if body not in structure.bodies:
+        yield place, f"there is no body {body!r}{did_you_mean(body, list(structure.bodies))}"
+    elif axis and (axis in structure.bodies[body].moves_with) != moves:
+        yield place, f"{_moving(structure, body)}; it {'must' if moves else 'must not'} move with {axis}"
+
+
+def _held(structure: GeometryStructure, hold: _Hold) -> Faults:
+    """Names are known; nodes of one mean move alike, and as the point does that they hold."""
+    try:
+        found = held(structure, hold.texts)
+    except InputError as error:
+        yield hold.place, str(error)
+        return
+    ways = {body: _ways(structure, body) for body in found.bodies}
+    body = found.bodies[0]
+    if other := [name for name in ways if ways[name] != ways[body]]:
+        yield hold.place, f"{_moving(structure, body)}, {_moving(structure, other[0])}; nodes of a mean must move alike"
+    elif hold.axis is not None and (hold.axis in ways[body]) != hold.moves:
+        yield hold.place, f"{_moving(structure, body)}; it {'must' if hold.moves else 'must not'} move with {hold.axis}"
+    elif found.rail is None and hold.frame in structure.bodies and ways[body] != _ways(structure, hold.frame):
+        both = f"{_moving(structure, body)}, {_moving(structure, hold.frame)}"
+        yield hold.place, f"{both}; what holds a point must move as the body does in whose frame the point is given"
+
+
+def _moving(structure: GeometryStructure, body: str) -> str:
+    return f"{body} moves with {', '.join(structure.bodies[body].moves_with) or 'no axis'}"
+
+
+def _ways(structure: GeometryStructure, body: str | None) -> frozenset[str]:
+    return frozenset(structure.bodies[body].moves_with) if body is not None else frozenset()
+
+
+def _loose_nodes(structure: GeometryStructure) -> Faults:
+    """Nodes that no beam reaches and no mass gives inertia to: the mass matrix would be singular."""
+    for name, body in structure.bodies.items():
+        held_by = {item for beams in body.beams for text in beams.through for item in nodes(structure, name, text)}
+        massive = {
+            item
+            for mass in body.masses
+            if all(moment > 0 for moment in mass.inertia)
+            for text in mass.nodes
+            for item in nodes(structure, name, text)
+        }
+        for key, group in body.nodes.items():
+            if group.section is not None:
+                continue
+            for item in nodes(structure, name, key):
+                if item not in held_by and item not in massive:
+                    message = f"no beam reaches {item}; a node alone needs a mass with inertia about all three axes"
+                    yield ("bodies", name, "nodes", key), message
+
+
+def _along_screw(structure: GeometryStructure, name: str) -> Faults:
+    """The screw lies along the axis, the nut lies on it over the whole travel."""
+    axis = structure.axes[name]
+    screw, nut = axis.drive.screw, axis.drive.nut
+    length = dist(screw.start, screw.end)
+    place = ("axes", name, "drive")
+    if length < SHORTEST:
+        yield (*place, "screw"), "start and end are the same point; a screw has a length"
+        return
+    along = [(b - a) / length for a, b in zip(screw.start, screw.end, strict=True)]
+    if hypot(*_cross(along, axis.direction)) > ALIGNED:
+        shown = ", ".join(f"{part:.6g}" for part in along)
+        yield (*place, "screw"), f"the screw runs along [{shown}], axis {name} along {_shown(axis.direction)}"
+        return
+    for at in axis.travel:
+        pose = {other: content.travel[0] for other, content in structure.axes.items()} | {name: at}
+        way = [
+            a + b - c - d
+            for a, b, c, d in zip(
+                _origin(structure, nut.body, pose),
+                nut.at,
+                _origin(structure, screw.body, pose),
+                screw.start,
+                strict=True,
+            )
+        ]
+        reach = sum(a * b for a, b in zip(way, along, strict=True))
+        off = hypot(*_cross(along, way))
+        if off > OFF_AXIS:
+            yield (*place, "nut", "at"), f"the nut lies {off:.6g} m beside the screw"
+            return
+        if not -OFF_AXIS <= reach <= length + OFF_AXIS:
+            beyond = -reach if reach < 0 else reach - length
+            end = "start" if reach < 0 else "end"
+            message = f"with {name} at {at:.9g} m the nut is {beyond:.6g} m beyond the {end} of the screw"
+            yield (*place, "nut", "at"), message
+            return
+
+
+def _origin(structure: GeometryStructure, body: str, pose: Mapping[str, float]) -> list[float]:
+    found = list(structure.bodies[body].origin)
+    for axis in structure.bodies[body].moves_with:
+        found = [a + pose[axis] * b for a, b in zip(found, structure.axes[axis].direction, strict=True)]
+    return found
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _shown(direction: Iterable[float]) -> str:
+    vector = tuple(direction)
+    for letter, known in FRAME.items():
+        if vector == known:
+            return letter
+    return f"[{', '.join(f'{part:.6g}' for part in vector)}]"

@@ -1,0 +1,111 @@
+"""Ball-screw drive, linear scale and tool of a machine written as geometry."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Annotated, Literal
+
+from pydantic import Field, StrictInt, field_validator
+
+from feedsim.scenario.fields import Model, Quantity, fault
+from feedsim.scenario.structure_fields import BodyNode, Hold, Inertia, Name, Point, Stiffness, StiffnessOrNone
+
+End = Literal["start", "end"]
+MOST_NODES = 1000
+
+
+class Screw(Model):
+    """A ball screw: a rod that lies along the axis and moves with a body."""
+
+    body: Name = Field(description="Body in whose frame start and end are given, and with which the screw moves")
+    start: Point = Field(description="End at the motor")
+    end: Point = Field(description="Other end")
+    diameter: Annotated[float, Quantity("m", above=0, example="50 mm")] = Field(description="Diameter of the rod")
+    nodes: Annotated[StrictInt, Field(ge=2, le=MOST_NODES)] = Field(
+        default=13, description="Equally spaced nodes, both ends included"
+    )
+    material: Name | None = Field(default=None, description="Material; may be left out where there is only one")
+
+
+class Bearing(Model):
+    """A bearing at an end of the screw."""
+
+    at: End = Field(description="End of the screw: start (at the motor) or end")
+    held_by: Hold = Field(description="What carries it: a node, a list of nodes (their mean)")
+    axial: StiffnessOrNone = Field(default=0.0, description="Stiffness along the screw; 0 N/m is a floating bearing")
+    radial: StiffnessOrNone = Field(default=0.0, description="Stiffness across the screw, in every direction")
+
+
+class Nut(Model):
+    """The ball nut."""
+
+    body: Name = Field(description="Body in whose frame `at` is given, and with which the nut moves")
+    at: Point = Field(description="Where the nut sits on the screw")
+    held_by: Hold = Field(description="What carries it: a node, a list of nodes (their mean), or a rail")
+    rotation_of: Hold | None = Field(
+        default=None, description="What the nut turns with about the screw; what carries it where left out"
+    )
+    axial: Stiffness = Field(description="Stiffness along the screw")
+    radial: StiffnessOrNone = Field(default=0.0, description="Stiffness across the screw, in every direction")
+
+
+class Rotor(Model):
+    """The motor's rotor: it turns, and nothing else."""
+
+    inertia: Annotated[float, Quantity("kg.m^2", above=0)] = Field(description="Inertia, with half of the coupling")
+    coupling: Annotated[float, Quantity("N.m/rad", above=0)] = Field(
+        description="Torsional stiffness of the coupling to the screw's start"
+    )
+
+
+class Stator(Model):
+    """The motor's housing, at the start of the screw."""
+
+    node: BodyNode = Field(description="Node that carries it and takes the reaction of the motor's torque")
+    mass: Annotated[float, Quantity("kg", minimum=0)] = Field(default=0.0, description="Mass")
+    inertia: tuple[Inertia, Inertia, Inertia] = Field(
+        default=(0.0, 0.0, 0.0), description="Moments of inertia about its own centre, about X, Y, Z of the frame"
+    )
+
+
+class Drive(Model):
+    """Motor, screw, bearings and nut of an axis."""
+
+    pitch: Annotated[float, Quantity("m", above=0, example="20 mm")] = Field(
+        description="Travel of the axis per turn of the screw"
+    )
+    screw: Screw
+    bearings: tuple[Bearing, ...] = Field(description="Bearings of the screw")
+    nut: Nut
+    rotor: Rotor
+    stator: Stator
+
+    @property
+    def I_P(self) -> float:
+        """Lead [m/rad]: pitch / 2 pi."""
+        return self.pitch / (2 * pi)
+
+    @field_validator("bearings")
+    @classmethod
+    def _held(cls, bearings: tuple[Bearing, ...]) -> tuple[Bearing, ...]:
+        if not any(bearing.axial > 0 for bearing in bearings):
+            raise fault("no bearing holds the screw along its axis; at least one needs axial above 0 N/m")
+        return bearings
+
+
+class Scale(Model):
+    """The linear scale: travel of the axis as its position control sees it."""
+
+    body: Name = Field(description="Body in whose frame `at` is given, and with which the reading point moves")
+    at: Point = Field(description="Point where the scale is read")
+    moving: Hold = Field(description="What moves with the axis: a node, a list of nodes (their mean), or a rail")
+    against: Hold = Field(description="What the travel is measured against")
+
+
+class Tool(Model):
+    """The tool's point, and the workpiece that it works on."""
+
+    body: Name = Field(description="Body in whose frame `at` is given")
+    at: Point = Field(description="Tool centre point")
+    held_by: Hold = Field(description="What carries the tool")
+    against: Hold = Field(description="What carries the workpiece")

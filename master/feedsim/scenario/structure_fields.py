@@ -1,0 +1,121 @@
+"""Field types of a machine written as geometry: points, directions, names of nodes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import hypot, isfinite
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import core_schema
+
+from feedsim.scenario.fields import Quantity, brief, fault
+
+NAME = r"[A-Za-z][A-Za-z0-9_]*"
+NODE = rf"{NAME}(?:\.[0-9]+)?"
+NODES = rf"{NAME}(?:\.[0-9]+(?:\.\.[0-9]+)?)?"
+FRAME = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+
+Length = Annotated[float, Quantity("m")]
+Point = tuple[Length, Length, Length]
+Stiffness = Annotated[float, Quantity("N/m", above=0)]
+StiffnessOrNone = Annotated[float, Quantity("N/m", minimum=0)]
+Mass = Annotated[float, Quantity("kg", above=0)]
+Inertia = Annotated[float, Quantity("kg.m^2", minimum=0)]
+
+
+@dataclass(frozen=True)
+class _Text:
+    """Text of a pattern; `what` says what it is in messages and editors."""
+
+    pattern: str
+    what: str
+
+    def read(self, value: Any) -> str:
+        if not isinstance(value, str) or not re.fullmatch(self.pattern, value):
+            raise fault(f"{brief(value)} is no {self.what}")
+        return value
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(
+        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"type": "string", "pattern": f"^(?:{self.pattern})$"}
+
+
+@dataclass(frozen=True)
+class _Texts(_Text):
+    """One text of the pattern or a list of them; kept as a tuple."""
+
+    def read_all(self, value: Any) -> tuple[str, ...]:
+        if isinstance(value, (list, tuple)):
+            if not value:
+                raise fault(f"an empty list; a {self.what} is needed")
+            return tuple(self.read(item) for item in value)
+        return (self.read(value),)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read_all)
+
+    def __get_pydantic_json_schema__(
+        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        one = super().__get_pydantic_json_schema__(core, handler)
+        return {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
+
+
+class _Direction:
+    """A direction in the machine's frame: X, -X, ... or a list of three numbers; kept as a unit vector."""
+
+    def read(self, value: Any) -> tuple[float, float, float]:
+        shown = "a direction is expected: X, Y or Z of the frame, -X, -Y, -Z, or a list of three numbers"
+        if isinstance(value, str):
+            sign, letter = (-1.0, value[1:]) if value.startswith("-") else (1.0, value.removeprefix("+"))
+            if letter not in FRAME:
+                raise fault(f"{brief(value)}; {shown}")
+            x, y, z = (sign * part + 0.0 for part in FRAME[letter])
+            return x, y, z
+        if not isinstance(value, (list, tuple)) or len(value) != 3:
+            raise fault(f"{brief(value)}; {shown}")
+        if any(isinstance(part, bool) or not isinstance(part, (int, float)) for part in value):
+            raise fault(f"a direction takes plain numbers, for example [0, 0.6, 0.8]; {shown}")
+        length = hypot(*value)
+        if not isfinite(length) or length < 1e-12:
+            raise fault(f"[{', '.join(str(part) for part in value)}] points nowhere; {shown}")
+        x, y, z = (float(part) / length for part in value)
+        return x, y, z
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(
+        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        vector = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+        return {
+            "anyOf": [
+                {"type": "string", "enum": [sign + letter for sign in ("", "-", "+") for letter in FRAME]},
+                vector,
+            ]
+        }
+
+
+Direction = Annotated[tuple[float, float, float], _Direction()]
+Name = Annotated[str, _Text(NAME, "name: a letter, then letters, digits and _")]
+# Inside a body: one node; a node, a node of a line, some of its nodes, all of them.
+OwnNode = Annotated[str, _Text(NODE, "node of this body, such as top or post.3")]
+Nodes = Annotated[tuple[str, ...], _Texts(NODES, "node of this body, such as top, post.3, post.2..6 or post (all)")]
+NodeList = tuple[Annotated[str, _Text(NODES, "node of this body, such as top, post.3, post.2..6 or post (all)")], ...]
+# Anywhere: the body first.
+BodyNode = Annotated[str, _Text(rf"{NAME}\.{NODE}", "node, such as column.top or bed.rail.3")]
+Rail = Annotated[str, _Text(rf"{NAME}\.{NAME}", "line of nodes, such as bed.rail")]
+Hold = Annotated[
+    tuple[str, ...],
+    _Texts(
+        rf"{NAME}\.{NODE}|rail {NAME}\.{NAME}",
+        "place to hold on to: a node such as column.top or bed.rail.3, a list of nodes, or 'rail bed.rail'",
+    ),
+]

@@ -1,0 +1,152 @@
+"""Checks of a finite-element model before it is solved: whether it can be a machine, each fault with its own message.
+
+Cheap beside solving: products with the sparse matrices, no dense matrix, and factorisations of small parts only. What
+only the solution can tell stays with it: how many rigid modes there are, and negative stiffness too small to show here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from feedsim.errors import InputError
+from feedsim.structure.assembly import Assembly, Floats
+from feedsim.structure.checks_definite import mass_faults, stiffness_faults
+from feedsim.structure.checks_parts import part_faults
+from feedsim.structure.checks_units import unit_warnings
+from feedsim.structure.checks_words import few, listing
+
+# Round-off of an element's assembly is 1e-12 of an entry's scale and less; a matrix that is wrong is off by more.
+ASYMMETRY = 1e-9
+
+
+def check(assembly: Assembly) -> list[str]:
+    """Warnings about a model that can be solved.
+
+    Raises:
+        InputError: the model cannot be solved or cannot be a machine; lists what is wrong.
+    """
+    for faults in (_shapes(assembly), _finite(assembly), _symmetry(assembly)):
+        _refuse(assembly, faults)  # what follows needs each of these
+    faults, warnings = _empty(assembly), []
+    _refuse(assembly, faults)
+    for more_faults, more_warnings in (
+        mass_faults(assembly),
+        stiffness_faults(assembly),
+        _ports(assembly),
+    ):
+        faults += more_faults
+        warnings += more_warnings
+    if not faults:
+        more_faults, more_warnings = part_faults(assembly)
+        faults += more_faults
+        warnings += more_warnings
+    _refuse(assembly, faults)
+    return warnings + unit_warnings(assembly)
+
+
+def _refuse(assembly: Assembly, faults: Iterable[str]) -> None:
+    problems = [f"{assembly.name}: {fault}" for fault in faults]
+    if problems:
+        raise InputError.of(f"{assembly.name}: not a usable model", problems)
+
+
+def _shapes(assembly: Assembly) -> list[str]:
+    size = len(assembly.labels)
+    if size == 0:
+        return ["there is no degree of freedom in it"]
+    faults = [
+        f"the {what} matrix is {matrix.shape[0]} by {matrix.shape[1]}; {size} degrees of freedom need {size} by {size}"
+        for what, matrix in (("mass", assembly.mass), ("stiffness", assembly.stiffness))
+        if matrix.shape != (size, size)
+    ]
+    return faults + [
+        f"port {port}: a vector of shape {vector.shape}; {size} degrees of freedom need {size} coefficients"
+        for port, vector in assembly.ports.items()
+        if vector.shape != (size,)
+    ]
+
+
+def _finite(assembly: Assembly) -> list[str]:
+    faults = []
+    for what, matrix in (("mass", assembly.mass), ("stiffness", assembly.stiffness)):
+        bad = np.flatnonzero(~np.isfinite(matrix.data))
+        if len(bad):
+            row = int(matrix.indices[bad[0]])
+            column = int(np.searchsorted(matrix.indptr, bad[0], side="right")) - 1
+            faults.append(
+                f"{listing(len(bad), 'entry', 'entries')} of the {what} matrix not finite, the first "
+                f"{matrix.data[bad[0]]} at ({assembly.labels[row]}, {assembly.labels[column]})"
+            )
+    for port, vector in assembly.ports.items():
+        bad = np.flatnonzero(~np.isfinite(vector))
+        if len(bad):
+            faults.append(f"port {port}: the coefficient at {assembly.labels[bad[0]]} is {vector[bad[0]]}")
+    return faults
+
+
+def _symmetry(assembly: Assembly) -> list[str]:
+    faults = []
+    for what, matrix in (("mass", assembly.mass), ("stiffness", assembly.stiffness)):
+        difference = (matrix - matrix.T).tocoo()
+        if not difference.nnz:
+            continue
+        diagonal = np.sqrt(np.abs(matrix.diagonal()))
+        # Where a diagonal entry is 0, any other entry in the row is wrong: the largest of the matrix is the scale then.
+        scale = diagonal[difference.row] * diagonal[difference.col]
+        scale = np.where(scale > 0, scale, np.max(np.abs(matrix.data)))
+        far = np.abs(difference.data) / scale
+        worst = int(np.argmax(far))
+        if far[worst] <= ASYMMETRY:
+            continue
+        i, j = sorted((int(difference.row[worst]), int(difference.col[worst])))
+        a, b = matrix[i, j], matrix[j, i]
+        text = (
+            f"the {what} matrix is not symmetric: ({assembly.labels[i]}, {assembly.labels[j]}) is {a:.9g}, "
+            f"({assembly.labels[j]}, {assembly.labels[i]}) is {b:.9g}"
+        )
+        if _triangular(matrix):
+            text += "; only one triangle is filled: a Matrix Market file then says 'symmetric' in its first line and "
+            text += "holds the lower triangle"
+        faults.append(text)
+    return faults
+
+
+def _triangular(matrix: object) -> bool:
+    from scipy.sparse import tril, triu
+
+    return bool(tril(matrix, -1).nnz == 0 or triu(matrix, 1).nnz == 0)
+
+
+def _empty(assembly: Assembly) -> list[str]:
+    """Degrees of freedom with neither mass nor stiffness: nothing says how they move."""
+    used = _columns(assembly.mass) | _columns(assembly.stiffness)
+    empty = np.flatnonzero(~used)
+    if not len(empty):
+        return []
+    return [
+        f"{listing(len(empty), 'degree of freedom has', 'degrees of freedom have')} neither mass nor stiffness: "
+        f"{few(assembly.labels, empty)}; constrain them or leave them out"
+    ]
+
+
+def _columns(matrix: object) -> np.ndarray:
+    """(N,) which columns hold something other than zero."""
+    absolute: Floats = np.asarray(abs(matrix).sum(axis=0)).ravel()  # type: ignore[arg-type]
+    return absolute > 0
+
+
+def _ports(assembly: Assembly) -> tuple[list[str], list[str]]:
+    faults, warnings = [], []
+    for axis in assembly.axes:
+        for port in (f"n_{axis}", f"x_{axis}"):
+            vector = assembly.ports.get(port)
+            if vector is None:
+                faults.append(f"axis {axis} has no port {port}")
+            elif not np.any(vector):
+                faults.append(f"port {port} excites nothing: all its coefficients are 0")
+    idle = [port for port, vector in assembly.ports.items() if port.startswith("tcp_") and not np.any(vector)]
+    if idle:
+        warnings.append(f"ports {', '.join(idle)} excite nothing: forces there move nothing, displacements stay 0")
+    return faults, warnings

@@ -1,0 +1,253 @@
+"""Nodes, degrees of freedom and all that does not depend on the pose: beams and masses of the bodies, screws, rotors.
+
+Bodies travel, they do not turn, and each is meshed in its own frame: the mass matrix and the stiffness of the beams are
+the same wherever the axes are. Order of the nodes: those of the bodies as the file lists them, then for each axis the
+nodes of its screw and its rotor (one degree of freedom: the angle about the axis's direction).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.scenario.structure_geometry import GeometryStructure, NodeGroup
+from feedsim.scenario.structure_names import Held, Line, Node, nodes
+from feedsim.structure.geometry.beam import beam_matrices
+from feedsim.structure.geometry.points import Grip, Row, riding, rigid
+from feedsim.structure.geometry.sections import BeamProperties, beam_properties, rod
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+FRAME = np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """A beam element between two nodes, by their numbers."""
+
+    first: int
+    second: int
+    properties: BeamProperties
+    up: tuple[float, float, float] | None
+
+
+class Mesh:
+    """A structure as nodes and elements.
+
+    Attributes:
+        names: (K,) such as "bed.B1.3", "screw X.0", "rotor X".
+        bodies: (K,) such as "bed", "screw X", "rotor X".
+        carriers: (K,) body in whose frame a node rests, such as "bed" for a screw of the bed.
+        local: (K, 3) positions in the frame of the body that carries the node [m].
+        first_dof: (K,) its first degree of freedom; a rotor has one, all others six.
+        size: number of degrees of freedom.
+        labels: (size,) such as "bed.B1.3 ux".
+        beams: all beam elements.
+    """
+
+    def __init__(self, structure: GeometryStructure) -> None:
+        self.structure = structure
+        self.names: list[str] = []
+        self.bodies: list[str] = []
+        self.carriers: list[str] = []
+        # (body, node or line), ("screw X", ""), ("rotor X", ""): number of the first node
+        self._start: dict[tuple[str, str], int] = {}
+        positions: list[Floats] = []
+        for body, content in structure.bodies.items():
+            for name, group in content.nodes.items():
+                self._start[body, name] = len(self.names)
+                points = group_points(group)
+                positions.append(points)
+                labels = [name] if group.count is None else [f"{name}.{i}" for i in range(group.count)]
+                self._add(body, body, [f"{body}.{label}" for label in labels])
+        for axis, feed in structure.axes.items():
+            screw = feed.drive.screw
+            self._start[f"screw {axis}", ""] = len(self.names)
+            positions.append(np.linspace(screw.start, screw.end, screw.nodes))
+            self._add(f"screw {axis}", screw.body, [f"screw {axis}.{i}" for i in range(screw.nodes)])
+            self._start[f"rotor {axis}", ""] = len(self.names)
+            positions.append(np.array([screw.start]))
+            self._add(f"rotor {axis}", screw.body, [f"rotor {axis}"])
+        self.local = np.concatenate(positions)
+        rotors = {self._start[f"rotor {axis}", ""] for axis in structure.axes}
+        counts = np.array([1 if i in rotors else 6 for i in range(len(self.names))])
+        self.first_dof: Integers = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        self.size = int(counts.sum())
+        self.labels = tuple(
+            f"{name}{part}"
+            for i, name in enumerate(self.names)
+            for part in ([" angle"] if i in rotors else (" ux", " uy", " uz", " rx", " ry", " rz"))
+        )
+        self.beams = tuple(self._beams())
+
+    def number(self, node: Node) -> int:
+        """Number of a node."""
+        return self._start[node.body, node.name] + (node.number or 0)
+
+    def screw(self, axis: str) -> range:
+        """Numbers of the nodes of an axis's screw."""
+        start = self._start[f"screw {axis}", ""]
+        return range(start, start + self.structure.axes[axis].drive.screw.nodes)
+
+    def rotor(self, axis: str) -> int:
+        """Degree of freedom of an axis's rotor."""
+        return int(self.first_dof[self._start[f"rotor {axis}", ""]])
+
+    def origins(self, pose: Mapping[str, float]) -> dict[str, Floats]:
+        """Body -> (3,) origin of its frame in the machine's [m] at axis positions [m]."""
+        axes = self.structure.axes
+        return {
+            name: np.array(body.origin) + sum(pose[axis] * np.array(axes[axis].direction) for axis in body.moves_with)
+            for name, body in self.structure.bodies.items()
+        }
+
+    def positions(self, origins: Mapping[str, Floats]) -> Floats:
+        """(K, 3) positions of the nodes in the machine's frame [m]."""
+        shifts: Floats = np.array([origins[carrier] for carrier in self.carriers])
+        return self.local + shifts
+
+    def grip(self, point: Floats, held: Held, positions: Floats) -> Grip:
+        """How nodes hold a point of the machine's frame, nodes being at `positions`."""
+        if held.rail is not None:
+            return self.riding(point, self.rail(held.rail), positions)
+        numbers = [self.number(node) for node in held.nodes]
+        return rigid(point, positions[numbers], self.first_dof[numbers])
+
+    def riding(self, point: Floats, numbers: range, positions: Floats) -> Grip:
+        """How a line of nodes holds a point that rides on it."""
+        line = positions[numbers.start : numbers.stop]
+        return riding(point, line, int(self.first_dof[numbers.start]))
+
+    def rail(self, line: Line) -> range:
+        """Numbers of the nodes of a line."""
+        start = self._start[line]
+        return range(start, start + (self.structure.bodies[line.body].nodes[line.name].count or 1))
+
+    @cached_property
+    def stiffness(self) -> csc_array:
+        """(size, size) stiffness of the beams."""
+        return self._matrices[0]
+
+    @cached_property
+    def mass(self) -> csc_array:
+        """(size, size) mass of beams, point masses, screws, stators and rotors."""
+        return self._matrices[1]
+
+    @cached_property
+    def _matrices(self) -> tuple[csc_array, csc_array]:
+        from scipy.sparse import coo_array
+
+        numbers = np.array([[beam.first, beam.second] for beam in self.beams]).reshape(-1, 2)
+        elements = [
+            beam_matrices(beam.properties, self.local[beam.first], self.local[beam.second], beam.up)
+            for beam in self.beams
+        ]
+        dofs = (self.first_dof[numbers][:, :, None] + np.arange(6)).reshape(-1, 12)
+        at = (np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel())
+        shape = (self.size, self.size)
+        stiffness, mass = (
+            coo_array((np.array([pair[k] for pair in elements]).ravel(), at), shape=shape).tocsc() for k in (0, 1)
+        )
+        return symmetric(stiffness), symmetric(mass + weighted(list(self._inertias()), self.size))
+
+    def _add(self, body: str, carrier: str, names: list[str]) -> None:
+        self.names += names
+        self.bodies += [body] * len(names)
+        self.carriers += [carrier] * len(names)
+
+    def _beams(self) -> Iterator[Beam]:
+        structure = self.structure
+        sections = {
+            name: beam_properties(section, structure.material(section.material))
+            for name, section in structure.sections.items()
+        }
+        for body, content in structure.bodies.items():
+            for name, group in content.nodes.items():
+                if group.section is not None and group.count is not None:
+                    start = self._start[body, name]
+                    for i in range(start, start + group.count - 1):
+                        yield Beam(i, i + 1, sections[group.section], group.up)
+            for beams in content.beams:
+                stops = [[self.number(node) for node in nodes(structure, body, text)] for text in beams.through]
+                for one, other in pairwise(stops):
+                    for first, second in zip(one, other, strict=True):
+                        yield Beam(first, second, sections[beams.section], beams.up)
+        for axis, drive in ((axis, content.drive) for axis, content in structure.axes.items()):
+            bar = rod(drive.screw.diameter, structure.material(drive.screw.material))
+            for first, second in pairwise(self.screw(axis)):
+                yield Beam(first, second, bar, None)
+
+    def _inertias(self) -> Iterator[tuple[float, Row]]:
+        """Inertia and the row of the velocity that it goes with."""
+        for body, content in self.structure.bodies.items():
+            for item in content.masses:
+                for text in item.nodes:
+                    for node in nodes(self.structure, body, text):
+                        yield from self._rigid_mass(self.number(node), item.offset, item.mass, item.inertia)
+        still = self.origins(dict.fromkeys(self.structure.axes, 0.0))
+        positions = self.positions(still)
+        for axis, feed in self.structure.axes.items():
+            stator, rotor = feed.drive.stator, feed.drive.rotor
+            carrier = self.number(node_of(stator.node))
+            offset = positions[self.screw(axis)[0]] - positions[carrier]
+            yield from self._rigid_mass(carrier, offset, stator.mass, stator.inertia)
+            yield rotor.inertia, Row(np.array([self.rotor(axis)]), np.ones(1))
+
+    def _rigid_mass(
+        self, node: int, offset: Floats | tuple[float, ...], mass: float, inertia: tuple[float, ...]
+    ) -> Iterator[tuple[float, Row]]:
+        grip = rigid(np.asarray(offset), np.zeros((1, 3)), [int(self.first_dof[node])])
+        for direction, moment in zip(FRAME, inertia, strict=True):
+            yield mass, grip.displacement(direction)
+            yield moment, grip.rotation(direction)
+
+
+def group_points(group: NodeGroup) -> Floats:
+    """(n, 3) positions of a node, or of a line of nodes, in its body's frame [m]."""
+    if group.at is not None:
+        return np.array([group.at])
+    assert group.start is not None
+    assert group.end is not None
+    assert group.count is not None
+    return np.linspace(group.start, group.end, group.count)
+
+
+def node_of(text: str) -> Node:
+    """The node of "body.name" or "body.line.index", known to exist."""
+    body, name, *index = text.split(".")
+    return Node(body, name, int(index[0]) if index else None)
+
+
+def weighted(terms: list[tuple[float, Row]], size: int) -> csc_array:
+    """(size, size) sum of weight b b^T over rows b."""
+    from scipy.sparse import csr_array
+
+    lengths = [len(row.dofs) for _, row in terms]
+    rows = csr_array(
+        (
+            np.concatenate([row.coefficients for _, row in terms]),
+            np.concatenate([row.dofs for _, row in terms]),
+            np.concatenate([[0], np.cumsum(lengths)]),
+        ),
+        shape=(len(terms), size),
+    )
+    weights = np.repeat([weight for weight, _ in terms], lengths)
+    scaled = csr_array((rows.data * weights, rows.indices, rows.indptr), shape=rows.shape)
+    return (rows.T @ scaled).tocsc()
+
+
+def symmetric(matrix: csc_array) -> csc_array:
+    """The matrix without the rounding by which its halves differ, nor stored zeros."""
+    both = (0.5 * (matrix + matrix.T)).tocsc()
+    both.sum_duplicates()
+    both.eliminate_zeros()
+    return both

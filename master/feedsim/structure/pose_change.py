@@ -1,0 +1,254 @@
+"""How far a motion leaves the pose at which the plant was linearised, and how much the modes change over it.
+
+Modes of two poses of a machine of kind geometry are shapes of the same coordinates with the same mass matrix M, so that
+they can be compared: with mass-normalised shapes MAC_ij = (phi_i^T M phi_j)^2 is 1 for the same shape and 0 for
+orthogonal ones (R. J. Allemang, The modal assurance criterion, Sound and Vibration 37 (8), 2003, here weighted with M).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from feedsim.errors import FeedsimError
+from feedsim.scenario import Machine, load_structure
+from feedsim.structure.assembly import Assembly
+from feedsim.structure.factor import SparseFactor
+from feedsim.structure.modes import TOOL_PORTS
+from feedsim.structure.poses import movable
+from feedsim.structure.solve import Solution, solve
+
+Floats = NDArray[np.float64]
+
+# Closer to the pose nothing is calculated [m]: modes change by 0.1 % and less per millimetre.
+NEAR = 1e-3
+# Modes up to here are looked at [Hz]; drives have their control loops below. At other poses up to twice that.
+LOOKED_AT = 200.0
+# A mode is of interest where it holds this share of the static compliance of any port: who does not excite or see it
+# need not know that it moves.
+SEEN = 0.01
+# A shift beyond which the machine is another one. The resonance curve of a mode is 2 zeta wide at half its power, 4 to
+# 6 % with the usual 2 to 3 %: one that has moved by as much answers where it did not before, and filters miss it.
+LARGE = 0.05
+# The static displacement is found step by step, the error shrinking by shift/(omega^2 + shift) each time; of a mode at
+# 5 Hz to a seventh.
+SHIFT, STEPS = (2 * math.pi * 2.0) ** 2, 12
+
+
+@dataclass(frozen=True)
+class ModeChange:
+    """A mode at the pose and at both ends of the positions reached.
+
+    Attributes:
+        frequency: at the pose [Hz].
+        ends: at the lowest and the highest position [Hz].
+        change: that of the two which is larger, relative [1].
+        mac: the lower of the two [1]. Of modes close to one another it falls early: they mix.
+        moving: what moves in it, at the pose.
+    """
+
+    frequency: float
+    ends: tuple[float, float]
+    change: float
+    mac: float
+    moving: str
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """A static compliance [m/(N.m)] or [m/N] at the lowest position, the pose and the highest position."""
+
+    name: str
+    unit: str
+    values: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class AxisChange:
+    """An axis in a motion, and the modes over the positions it reaches, all other axes at the pose.
+
+    Attributes:
+        pose, low, high: position of the pose, lowest and highest one reached [m].
+        modes: none where the axis stays near the pose, or where other poses are not known.
+    """
+
+    axis: str
+    pose: float
+    low: float
+    high: float
+    modes: tuple[ModeChange, ...] = ()
+    compliances: tuple[Compliance, ...] = ()
+
+    @property
+    def distance(self) -> float:
+        """Largest distance from the pose [m]."""
+        return max(self.pose - self.low, self.high - self.pose)
+
+    @property
+    def largest(self) -> ModeChange | None:
+        """The mode whose frequency changes most."""
+        return max(self.modes, key=lambda mode: abs(mode.change), default=None)
+
+
+@dataclass(frozen=True)
+class PoseChange:
+    """All axes in a motion. `unknown` says why nothing is known of other poses; empty where it is."""
+
+    axes: tuple[AxisChange, ...]
+    unknown: str
+
+    @property
+    def distance(self) -> float:
+        """Largest distance of any axis from its pose [m]."""
+        return max((axis.distance for axis in self.axes), default=0.0)
+
+    @property
+    def large(self) -> tuple[AxisChange, ...]:
+        """The axes over whose positions a mode changes by more than LARGE."""
+        return tuple(axis for axis in self.axes if axis.largest is not None and abs(axis.largest.change) > LARGE)
+
+
+def pose_change(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> PoseChange:
+    """What the plant of one pose leaves out when axes move over `ranges`, axis -> (lowest, highest position) [m]."""
+    axes = tuple(
+        AxisChange(axis, machine.pose[axis], min(low, machine.pose[axis]), max(high, machine.pose[axis]))
+        for axis, (low, high) in ranges.items()
+    )
+    if all(axis.distance <= NEAR for axis in axes):
+        return PoseChange(axes, "")
+    if machine.structure is None:
+        return PoseChange(axes, "the machine file names no structure file to compute the modes of other poses from")
+    try:
+        stamp = machine.structure.stat().st_mtime_ns
+        return PoseChange(_changes(machine.structure, stamp, tuple(machine.pose.items()), axes), "")
+    except OSError as error:
+        return PoseChange(axes, f"{machine.structure}: cannot be read: {error.strerror}")
+    except FeedsimError as error:  # the run itself needs no structure: it goes on without
+        return PoseChange(axes, str(error).partition("\n")[0])
+
+
+def warnings(change: PoseChange) -> tuple[str, ...]:
+    """A sentence for each axis that moves far enough for the modes to be others."""
+    sentences = []
+    for axis in change.large:
+        mode = axis.largest
+        assert mode is not None
+        moving = mode.moving.partition(",")[0]
+        sentences.append(
+            f"axis {axis.axis} moves {axis.distance * 1e3:.4g} mm away from the pose that the modes belong to; there "
+            f"the mode at {mode.frequency:.4g} Hz ({moving}) has changed its frequency by {100 * mode.change:+.2g} %; "
+            f"for a plant that follows: feedsim machine pack ... --poses {axis.axis}=20mm"
+        )
+    return tuple(sentences)
+
+
+@lru_cache(maxsize=32)
+def _changes(
+    structure: Path, stamp: int, pose: tuple[tuple[str, float], ...], axes: tuple[AxisChange, ...]
+) -> tuple[AxisChange, ...]:
+    """The axes with their modes; `stamp` is the file's time, so that a changed file is read anew."""
+    description = load_structure(structure)
+    assembler = movable(description)
+    travels = assembler.structure.axes
+    here = {axis: position for axis, position in pose if axis in travels}
+
+    def at(axis: str, position: float) -> tuple[Assembly, Solution]:
+        # Beyond the structure's travel (a following error, a recording) its end counts.
+        low, high = travels[axis].travel
+        assembly = assembler.at({**here, axis: min(max(position, low), high)})
+        # The sparse way: a few modes of many.
+        cutoff = 2 * math.pi * 2 * LOOKED_AT
+        return assembly, solve(assembly, cutoff=cutoff, damping=description.damping, dense_limit=0)
+
+    moving = [axis for axis in axes if axis.distance > NEAR and axis.axis in travels]
+    if not moving:
+        return axes
+    middle = at(moving[0].axis, here[moving[0].axis])
+    found = {}
+    for axis in moving:
+        ends = [
+            middle if abs(position - axis.pose) <= NEAR else at(axis.axis, position)
+            for position in (axis.low, axis.high)
+        ]
+        found[axis.axis] = AxisChange(
+            axis.axis, axis.pose, axis.low, axis.high, _modes(middle, ends), _compliances(axis.axis, middle, ends)
+        )
+    return tuple(found.get(axis.axis, axis) for axis in axes)
+
+
+def _modes(middle: tuple[Assembly, Solution], ends: list[tuple[Assembly, Solution]]) -> tuple[ModeChange, ...]:
+    assembly, solution = middle
+    frequency = solution.modes.frequency
+    matches = [_matched(assembly, solution, end) for _, end in ends]
+    changes = []
+    for mode in np.flatnonzero(_seen(solution) & (frequency > 0) & (frequency <= LOOKED_AT)).tolist():
+        at_ends = [float(found[mode]) for found, _ in matches]
+        shifts = [f / float(frequency[mode]) - 1 for f in at_ends]
+        changes.append(
+            ModeChange(
+                frequency=float(frequency[mode]),
+                ends=(at_ends[0], at_ends[1]),
+                change=max(shifts, key=abs),
+                mac=min(float(mac[mode]) for _, mac in matches),
+                moving=str(solution.moving[mode]),
+            )
+        )
+    return tuple(changes)
+
+
+def _matched(assembly: Assembly, one: Solution, other: Solution) -> tuple[Floats, Floats]:
+    """Per mode of `one`, frequency [Hz] and MAC of the mode of `other` that it becomes; each is taken once."""
+    if other is one:
+        return one.modes.frequency, np.ones_like(one.modes.frequency)
+    mac = (one.shapes.T @ (assembly.mass @ other.shapes)) ** 2
+    rows, columns = linear_sum_assignment(-mac)
+    frequency, best = np.full(len(mac), np.nan), np.zeros(len(mac))
+    frequency[rows], best[rows] = other.modes.frequency[columns], mac[rows, columns]
+    return frequency, best
+
+
+def _seen(solution: Solution) -> NDArray[np.bool_]:
+    """(n,) modes that hold a share of the static compliance of a port."""
+    modes = solution.modes
+    stiffness = np.where(modes.rigid, np.inf, (2 * math.pi * modes.frequency) ** 2)
+    shares = np.array([port**2 / stiffness for port in modes.ports.values()])
+    total = shares.sum(axis=1, keepdims=True)
+    return np.asarray(np.any(shares > SEEN * total, axis=0))
+
+
+def _compliances(
+    axis: str, middle: tuple[Assembly, Solution], ends: list[tuple[Assembly, Solution]]
+) -> tuple[Compliance, ...]:
+    """Wind-up of the axis's drive per torque, and what the tool yields per force, of all modes of the model."""
+    columns = [_static(axis, *model) for model in (ends[0], middle, ends[1])]
+    names = [
+        (f"wind-up of drive {axis} (x_a less lead times motor angle) per torque", "m/(N.m)"),
+        *((f"tool against workpiece in {port[-1]} per force", "m/N") for port in TOOL_PORTS),
+    ]
+    return tuple(
+        Compliance(name, unit, (columns[0][i], columns[1][i], columns[2][i])) for i, (name, unit) in enumerate(names)
+    )
+
+
+def _static(axis: str, assembly: Assembly, solution: Solution) -> list[float]:
+    """Displacements under unit loads, less the rigid motion that they accelerate."""
+    rigid = solution.shapes[:, solution.modes.rigid]
+    moved = assembly.mass @ rigid
+    n, x = assembly.ports[f"n_{axis}"], assembly.ports[f"x_{axis}"]
+    lead = (x @ rigid) @ (n @ rigid) / ((n @ rigid) @ (n @ rigid))
+    loads = np.column_stack([n, *(assembly.ports[port] for port in TOOL_PORTS)])
+    seen = np.column_stack([x - lead * n, *(assembly.ports[port] for port in TOOL_PORTS)])
+    target = loads - moved @ (rigid.T @ loads)
+    factor = SparseFactor(assembly, -SHIFT)
+    u = np.zeros_like(loads)
+    for _ in range(STEPS):
+        u = u + factor.solve(target - assembly.stiffness @ u)
+        u -= rigid @ (moved.T @ u)
+    return [float(a @ b) for a, b in zip(seen.T, u.T, strict=True)]

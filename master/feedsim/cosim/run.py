@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from feedsim.cosim import trust
+from feedsim.cosim.pose import PoseUse, pose_use
 from feedsim.cosim.recording import Recording, recorded_columns
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
@@ -31,6 +32,7 @@ class Run:
         coupling: per axis, interface energy residual [J], its peak, and the friction work [J] to hold it against.
         wall_time: duration of the cycle loop [s].
         units: per instance, GUID and version of its archive.
+        pose: how far the motion leaves the plant's pose, or how the plant followed it.
         warnings: what a user should know before believing the result, a sentence each.
     """
 
@@ -40,6 +42,7 @@ class Run:
     coupling: Mapping[str, float]
     wall_time: float
     units: Mapping[str, Mapping[str, str]]
+    pose: PoseUse
     warnings: tuple[str, ...]
 
 
@@ -91,6 +94,7 @@ def run(
         if progress is not None:
             progress(total, total)
         wall_time = time.perf_counter() - begun
+        pose = pose_use(scenario.machine, program, system)
         return Run(
             scenario=scenario,
             program=program,
@@ -101,7 +105,13 @@ def run(
                 name: {"guid": unit.archive.guid, "version": unit.archive.version}
                 for name, unit in system.units.items()
             },
-            warnings=(*system.warnings, *trust.foreseen(scenario, modes), *trust.found(scenario, cycle, recording)),
+            pose=pose,
+            warnings=(
+                *system.warnings,
+                *trust.foreseen(scenario, modes),
+                *pose.warnings,
+                *trust.found(scenario, cycle, recording),
+            ),
         )
 
 
@@ -115,4 +125,5 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
     modes = checked_modes(scenario.machine)
     with System(scenario.machine, fmus or fmus_directory()) as system:
         system.initialise(program, stop=float(program.time[-1]))
-        return (*system.warnings, *trust.foreseen(scenario, modes))
+        pose = pose_use(scenario.machine, program, system)
+        return (*system.warnings, *trust.foreseen(scenario, modes), *pose.warnings)

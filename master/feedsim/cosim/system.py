@@ -9,11 +9,10 @@ from typing import Self
 import numpy as np
 
 from feedsim.cosim import wiring
+from feedsim.cosim.plant import axes_of, open_plant
 from feedsim.cosim.unit import Archive, Floats, Port, Unit
 from feedsim.nc import Program
 from feedsim.scenario import Axis, Machine
-
-UNITS = ("plant", "controller", "friction")
 
 
 @dataclass(frozen=True)
@@ -38,6 +37,8 @@ class Contact:
 class System:
     """All units of a machine (a context manager that frees them).
 
+    Without friction there are no friction units, and M_fr stays 0: a LuGre model cannot be parameterised away.
+
     Shared buffers, one entry per axis in the machine's order; an exchange step runs from its start to its end:
 
     ======================= ==============================================================================
@@ -49,8 +50,9 @@ class System:
     ======================= ==============================================================================
     """
 
-    def __init__(self, machine: Machine, fmus: Path) -> None:
+    def __init__(self, machine: Machine, fmus: Path, *, friction: bool = True) -> None:
         self.axes = tuple(machine.axes)
+        self.friction = friction
         self._open: list[Archive | Unit] = []
         try:
             self._build(machine, fmus)
@@ -59,23 +61,28 @@ class System:
             raise
 
     def _build(self, machine: Machine, fmus: Path) -> None:
-        archives: dict[str, Archive] = {}
-        for name in UNITS:
+        plant = open_plant(machine, fmus)
+        archives = {"plant": plant.archive}
+        self._open.append(plant.archive)
+        for name in ("controller", "friction") if self.friction else ("controller",):
             archives[name] = Archive(fmus / f"{name}.fmu")
             self._open.append(archives[name])
         self.archives = archives
         instances = {wiring.PLANT: archives["plant"]}
         for axis in self.axes:
             instances[wiring.controller(axis)] = archives["controller"]
-            instances[wiring.friction(axis)] = archives["friction"]
-        wiring.check(wiring.figure_2(self.axes), instances)
+            if self.friction:
+                instances[wiring.friction(axis)] = archives["friction"]
+        wiring.check(wiring.figure_2(self.axes, with_friction=self.friction), instances)
         self.units = {name: self._instantiate(archive, name) for name, archive in instances.items()}
         self.plant = self.units[wiring.PLANT]
+        self.plant_axes, self.plant_modes_file = axes_of(plant.archive), plant.modes_file
 
-        self.plant.set_parameters(plant_parameters(machine))
+        self.plant.set_parameters(plant_parameters(machine, plant.modes_file))
         for axis, described in machine.axes.items():
             self.units[wiring.controller(axis)].set_parameters(controller_parameters(machine, described))
-            self.units[wiring.friction(axis)].set_parameters(described.friction.parameters())
+            if self.friction:
+                self.units[wiring.friction(axis)].set_parameters(described.friction.parameters())
         self._share_buffers()
 
     def _instantiate(self, archive: Archive, name: str) -> Unit:
@@ -103,7 +110,7 @@ class System:
         self.contacts: list[Contact] = []
         for i, axis in enumerate(axes):
             own = slice(i, i + 1)
-            control, contact = self.units[wiring.controller(axis)], self.units[wiring.friction(axis)]
+            control = self.units[wiring.controller(axis)]
             self.controllers.append(
                 Control(
                     unit=control,
@@ -112,6 +119,9 @@ class System:
                     torque=Port(control, ["M_a"], self.M_a_end[own], self.M_a_slope[own]),
                 )
             )
+            if not self.friction:
+                continue
+            contact = self.units[wiring.friction(axis)]
             self.contacts.append(
                 Contact(
                     unit=contact,
@@ -164,9 +174,11 @@ class System:
         self.close()
 
 
-def plant_parameters(machine: Machine) -> dict[str, float | int | bool | str]:
-    """Parameters of the plant unit by FMU name."""
-    parameters: dict[str, float | int | bool | str] = {"modes_file": str(machine.modes)}
+def plant_parameters(machine: Machine, modes_file: Path | None) -> dict[str, float | int | bool | str]:
+    """Parameters of the plant unit by FMU name. `modes_file` None: the modes of the archive count."""
+    parameters: dict[str, float | int | bool | str] = {}
+    if modes_file is not None:
+        parameters["modes_file"] = str(modes_file)
     for name, axis in machine.axes.items():
         parameters[f"{name}.x_0"] = machine.pose[name]
         parameters[f"{name}.M_0"] = axis.M_0

@@ -187,6 +187,20 @@ class Unit:
             self._time = t
             self.fail(f"step of {h:.6g} s")
 
+    def value(self, name: str) -> float:
+        """A Real or Integer variable as it is now; for what is read once, ports and logs are faster.
+
+        Raises:
+            InputError: the unit has no such variable.
+        """
+        reference = self.references([name]).tolist()
+        kind = self.archive.variables[name].type
+        try:
+            values = self._fmu.getInteger(reference) if kind == "Integer" else self._fmu.getReal(reference)
+        except Exception:
+            self.fail(f"reading {name}")
+        return float(values[0])
+
     def close(self) -> None:
         """Free the instance; never raises, so that it can stand in a `finally`."""
         if self._component is not None:

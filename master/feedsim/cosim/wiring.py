@@ -10,7 +10,7 @@ from feedsim.cosim.unit import Archive
 from feedsim.errors import InputError
 
 NC = "nc"  # source of setpoints: x_s and n_ffw per axis
-ZERO = "zero"  # an input that this system leaves unused, held at 0 on purpose
+ZERO = "zero"  # an input that nothing drives, held at 0 on purpose; a measurement may excite it
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def friction(axis: str) -> str:
 PLANT = "plant"
 
 
-def figure_2(axes: Sequence[str]) -> list[Connection]:
+def figure_2(axes: Sequence[str], *, with_friction: bool = True) -> list[Connection]:
     """Connections of the paper's Fig. 2: NC -> control -> structure <-> friction, structure -> control."""
     connections = [Connection(Variable(PLANT, name), Variable(ZERO, name)) for name in TOOL_FORCES]
     for axis in axes:
@@ -60,9 +60,12 @@ def figure_2(axes: Sequence[str]) -> list[Connection]:
             Variable(control, "n_add"): Variable(ZERO, "n_add"),
             Variable(control, "M_add"): Variable(ZERO, "M_add"),
             Variable(PLANT, f"{axis}.M_a"): Variable(control, "M_a"),
-            Variable(PLANT, f"{axis}.M_fr"): Variable(contact, "M_fr"),
-            Variable(contact, "n_fr"): Variable(PLANT, f"{axis}.n_fr"),
         }
+        if with_friction:
+            drives[Variable(PLANT, f"{axis}.M_fr")] = Variable(contact, "M_fr")
+            drives[Variable(contact, "n_fr")] = Variable(PLANT, f"{axis}.n_fr")
+        else:
+            drives[Variable(PLANT, f"{axis}.M_fr")] = Variable(ZERO, "M_fr")
         connections += [Connection(target, source) for target, source in drives.items()]
     return connections
 

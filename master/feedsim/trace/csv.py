@@ -29,8 +29,8 @@ _SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
 
 
 @dataclass(frozen=True)
-class _Table:
-    """Cells of a file by column, all of one length, with the line of every row."""
+class Table:
+    """Cells of a file by column, all of one length, with the line of every row; `where` is the file's name."""
 
     where: str
     header_line: int
@@ -58,7 +58,7 @@ def read_csv(
     Units of columns stay as written; the time is converted to s. Raises InputError with file and line.
     """
     path = Path(path)
-    table = _table(path)
+    table = read_table(path)
     at = _time_index(table, time)
     wanted = (
         [i for i in range(len(table.names)) if i != at] if columns is None else [table.index(name) for name in columns]
@@ -91,22 +91,25 @@ def write_csv(path: str | Path, trace: Trace) -> None:
             raise OutputError(f"{path} is not written: {name} is {values[row]} at {trace.time[row]:.9g} s")
         unit = trace.unit(name)
         header.append(f"{name} [{unit}]" if unit else name)
-    text = [_cells(trace.time), *(_cells(values) for values in trace.columns.values())]
-    lines = chain([",".join(_quoted(cell) for cell in header)], map(",".join, zip(*text, strict=True)))
+    text = [shortest(trace.time), *(shortest(values) for values in trace.columns.values())]
+    lines = chain([",".join(quoted(cell) for cell in header)], map(",".join, zip(*text, strict=True)))
     with written_whole(path) as file:
         file.write("\n".join(lines).encode("utf-8"))
         file.write(b"\n")
 
 
-def _cells(values: Array) -> list[str]:
+def shortest(values: Array) -> list[str]:
+    """Every number in its shortest form that reads back the same."""
     return [text.removesuffix(".0") for text in map(repr, values.tolist())]
 
 
-def _quoted(cell: str) -> str:
+def quoted(cell: str) -> str:
+    """A cell as it stands in a file."""
     return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',;"') else cell
 
 
-def _table(path: Path) -> _Table:
+def read_table(path: Path) -> Table:
+    """Cells of a file under its header. InputError with file and line."""
     lines = io.StringIO(_text(path), newline="")
     first = lines.readline()
     separator = ""
@@ -144,7 +147,7 @@ def _table(path: Path) -> _Table:
             )
             raise InputError(f"{path}:{line}: {len(row)} values, the header has {len(header)} columns{hint}")
     cells = tuple(tuple(cell.strip() for cell in column) for column in zip(*body, strict=True))
-    return _Table(str(path), header_line, names, header_units, cells, tuple(body_lines), separator != ",")
+    return Table(str(path), header_line, names, header_units, cells, tuple(body_lines), separator != ",")
 
 
 def _text(path: Path) -> str:
@@ -171,7 +174,7 @@ def _separator(header: str, where: str) -> str:
         if separator in outside_quotes:
             return separator
     raise InputError(
-        f"{where}: the header has one column only; at least a time and a value are needed, separated by "
+        f"{where}: the header has one column only; at least two are needed, separated by "
         f"{', '.join(_SEPARATORS.values())}"
     )
 
@@ -199,7 +202,7 @@ def _header(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[st
     return tuple(names), tuple(found)
 
 
-def _time_index(table: _Table, name: str | None) -> int:
+def _time_index(table: Table, name: str | None) -> int:
     if name is not None:
         return table.index(name)
     for usual in ("time", "t"):
@@ -219,7 +222,7 @@ def _time_index(table: _Table, name: str | None) -> int:
     return 0
 
 
-def _seconds(table: _Table, at: int, values: Array, given: str | None) -> Array:
+def _seconds(table: Table, at: int, values: Array, given: str | None) -> Array:
     unit = table.units[at] or given or "s"
     try:
         factor = units.factor(unit, "s")

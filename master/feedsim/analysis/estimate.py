@@ -1,0 +1,237 @@
+"""Frequency responses and coherence from time series.
+
+With output y, input u and, in a closed loop, the excitation r that is independent of all disturbances, cross spectra
+S_ab = sum of A B* over blocks of the record (A, B: their discrete Fourier transforms):
+
+    joint    H = S_yr / S_ur     unbiased in closed loop, since disturbances are not correlated with r
+    H1       H = S_yu / S_uu     right where u is free of noise and feedback; in a loop, noise pulls it to -1/control
+    coherence of a with b: gamma^2 = |S_ab|^2 / (S_aa S_bb)
+
+Where u is r itself, both are the same. The coherence told with a joint estimate is the lower one of (y, r) and (u, r):
+a response is known only where the excitation reaches both ends of it.
+
+Periodic excitation: blocks are whole periods, the excited lines alone are evaluated, nothing leaks. Noise averages out
+over periods; what non-linearity makes of the excitation is the same in every period and averages out over realisations
+(other phases). Coherence needs two blocks at least; of m blocks, two unrelated signals show 1/m on average.
+
+Sources: J. Bendat, A. Piersol, Random Data, 4th ed., Wiley 2010, chapters 5, 6 and 9 (H1, coherence, their errors);
+P. Wellstead, Non-parametric methods of spectral analysis, Automatica 17 (1981) 55-69 (joint estimate); R. Pintelon,
+J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., Wiley 2012, chapters 2 and 4 (periodic).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import csd
+
+from feedsim.errors import InputError
+from feedsim.trace import Trace
+from feedsim.trace.response import FrequencyResponse, quotient_unit
+
+if TYPE_CHECKING:
+    from feedsim.cosim.excite import Measurement
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Method = Literal["joint", "H1"]
+Pair = tuple[str, str]  # columns of output and input
+
+EVEN = 1e-6  # of a step: rounding of recorded times
+SILENT = 1e-13  # of the largest value: lines below it are rounding, not response
+
+
+def measured(
+    measurements: Sequence[Measurement], pairs: Sequence[Pair], *, method: Method = "joint"
+) -> FrequencyResponse:
+    """Responses from one or several measurements of one machine with excitations of the same lines.
+
+    Raises:
+        InputError: as :func:`periodic`, and measurements that do not go together.
+    """
+    if not measurements:
+        raise InputError("no measurement to estimate a frequency response from")
+    first = measurements[0]
+    for other in measurements[1:]:
+        if other.reference != first.reference:
+            raise InputError(f"measurements excited at {first.reference} and at {other.reference} cannot be averaged")
+        if len(other.excitation.samples) != len(first.excitation.samples) or not np.array_equal(
+            other.excitation.lines, first.excitation.lines
+        ):
+            raise InputError("measurements with other excited lines cannot be averaged")
+    return periodic(
+        [measurement.trace for measurement in measurements],
+        pairs,
+        reference=first.reference,
+        rows=len(first.excitation.samples),
+        lines=first.excitation.lines,
+        method=method,
+    )
+
+
+def periodic(
+    traces: Sequence[Trace],
+    pairs: Sequence[Pair],
+    *,
+    reference: str,
+    rows: int,
+    lines: NDArray[np.int64],
+    method: Method = "joint",
+) -> FrequencyResponse:
+    """Responses at the excited lines of a periodic, steady record.
+
+    Args:
+        traces: realisations, each of whole periods at an even step.
+        pairs: output and input columns; the response is called "output/input".
+        reference: column of the excitation.
+        rows: of a period.
+        lines: (K,) excited harmonics of the period, ascending.
+        method: "joint" or "H1".
+
+    A trace's linear drift, such as the travel at an offset speed, is taken out: the change from the first period to the
+    last tells it exactly. It needs two periods.
+
+    Raises:
+        InputError: a column is missing, a trace holds no whole number of periods, lines beyond half the sampling rate,
+            an input that is not excited.
+    """
+    if method not in ("joint", "H1"):
+        raise InputError(f"method {method!r} of a frequency response; joint or H1 is expected")
+    if not traces or not pairs:
+        raise InputError("no trace or no pair of columns to estimate a frequency response from")
+    step = _step(traces[0])
+    for trace in traces:
+        if rows < 2 or len(trace) < rows or len(trace) % rows:
+            raise InputError(f"a trace of {len(trace)} rows does not hold whole periods of {rows} rows")
+        if abs(_step(trace) - step) > EVEN * step:
+            raise InputError(f"traces with steps of {step:.9g} s and {_step(trace):.9g} s cannot be averaged")
+    if not lines.size or lines[0] < 1 or 2 * lines[-1] >= rows or np.any(np.diff(lines) <= 0):
+        raise InputError(f"excited lines must increase, from 1 on to less than half the {rows} rows of a period")
+    names = dict.fromkeys((reference, *(name for pair in pairs for name in pair)))
+    # (blocks, K) of every column
+    spectra = {name: np.vstack([_spectra(trace[name], rows, lines) for trace in traces]) for name in names}
+    loud = {name: max(float(np.max(np.abs(trace[name]))) for trace in traces) for name in names}
+    frequency = lines / (rows * step)
+    for name in dict.fromkeys((reference, *(pair[1] for pair in pairs))):
+        strength = np.sqrt(np.mean(np.abs(spectra[name]) ** 2, axis=0))
+        if np.any(weak := strength <= SILENT * loud[name]):
+            silent = frequency[np.flatnonzero(weak)[0]]
+            raise InputError(f"column {name!r} is not excited at {silent:.6g} Hz; there is no response to it")
+
+    def cross(a: str, b: str) -> Complexes:
+        return np.asarray(np.sum(spectra[a] * spectra[b].conj(), axis=0))
+
+    blocks = len(spectra[reference])
+    return _responses(traces[0], pairs, frequency, reference if method == "joint" else None, cross, blocks)
+
+
+def welch(
+    trace: Trace,
+    pairs: Sequence[Pair],
+    *,
+    segment: float,
+    reference: str | None = None,
+    overlap: float = 0.5,
+    window: str = "hann",
+) -> FrequencyResponse:
+    """Responses from a record of any signals by Welch's averaged, windowed segments.
+
+    Args:
+        segment: duration of a segment [s]; the lines are 1/segment apart. Segments are detrended linearly.
+        reference: column of an independent excitation, for the joint estimate; None: H1.
+        overlap: share of a segment that the next one repeats.
+
+    A window has a bias of its own where the response changes within a few lines. The first line is left out: the window
+    spreads over it what detrending leaves of the mean.
+
+    Raises:
+        InputError: a column is missing, time that is not even, fewer than two segments in the record.
+    """
+    step = _step(trace)
+    count = round(segment / step) if np.isfinite(segment) else 0
+    if count < 8:
+        raise InputError(f"segments of {segment:.6g} s have {count} rows of {step:.6g} s; at least 8 are needed")
+    if not 0 <= overlap < 1:
+        raise InputError(f"overlap {overlap:.6g} of segments; 0 to below 1 is allowed")
+    shared = min(int(overlap * count), count - 1)
+    blocks = (len(trace) - shared) // (count - shared)
+    if blocks < 2:
+        raise InputError(
+            f"the record of {len(trace) * step:.6g} s holds {blocks} segments of {segment:.6g} s; at least 2 are needed"
+        )
+    frequency = np.fft.rfftfreq(count, step)
+    kept = slice(2, (count + 1) // 2)
+
+    def cross(a: str, b: str) -> Complexes:
+        # scipy's P_xy is the mean of X* Y
+        density = csd(trace[b], trace[a], fs=1 / step, window=window, nperseg=count, noverlap=shared, detrend="linear")[
+            1
+        ]
+        return np.asarray(density[kept], dtype=np.complex128)
+
+    return _responses(trace, pairs, np.asarray(frequency[kept], dtype=np.float64), reference, cross, blocks)
+
+
+def _responses(
+    trace: Trace,
+    pairs: Sequence[Pair],
+    frequency: Floats,
+    reference: str | None,
+    cross: Callable[[str, str], Complexes],
+    blocks: int,
+) -> FrequencyResponse:
+    columns, units, coherence = {}, {}, {}
+    for output, input in pairs:
+        name = f"{output}/{input}"
+        through = reference or input
+        with np.errstate(divide="ignore", invalid="ignore"):
+            columns[name] = cross(output, through) / cross(input, through)
+        units[name] = quotient_unit(trace.unit(output), trace.unit(input))
+        if not np.all(np.isfinite(columns[name])):
+            silent = frequency[np.flatnonzero(~np.isfinite(columns[name]))[0]]
+            raise InputError(f"column {input!r} is not excited at {silent:.6g} Hz; there is no response to it")
+        if blocks > 1:
+            ends = dict.fromkeys(end for end in (output, input) if end != through)
+            coherence[name] = np.ones(len(frequency))
+            for end in ends:
+                coherence[name] = np.minimum(coherence[name], _coherence(cross, end, through))
+    return FrequencyResponse(frequency, columns, units, coherence)
+
+
+def _coherence(cross: Callable[[str, str], Complexes], a: str, b: str) -> Floats:
+    power = cross(a, a).real * cross(b, b).real
+    shared = np.abs(cross(a, b)) ** 2
+    # a silent output has no power to share: its response, 0, is known
+    return np.asarray(np.minimum(np.divide(shared, power, out=np.ones_like(power), where=power > 0), 1.0))
+
+
+def _spectra(values: Floats, rows: int, lines: NDArray[np.int64]) -> Complexes:
+    """(periods, K) spectra of a column's periods, without its mean and drift."""
+    periods = values.reshape(-1, rows)
+    periods = periods - periods[0].mean()  # what is left keeps its digits
+    if len(periods) > 1:
+        drift = (periods[-1].mean() - periods[0].mean()) / ((len(periods) - 1) * rows)  # per row
+        periods = periods - drift * np.arange(periods.size, dtype=np.float64).reshape(periods.shape)
+    return np.asarray(np.fft.rfft(periods, axis=1)[:, lines])
+
+
+def _step(trace: Trace) -> float:
+    """Step of a trace at even times [s].
+
+    Raises:
+        InputError: too few rows, or times that are not even.
+    """
+    if len(trace) < 2:
+        raise InputError(f"a trace of {len(trace)} rows has no frequency response")
+    step = float(trace.time[-1] - trace.time[0]) / (len(trace) - 1)
+    grid = trace.time[0] + step * np.arange(len(trace))
+    off = np.abs(trace.time - grid)
+    if (worst := int(np.argmax(off))) and off[worst] > EVEN * step + 4 * np.spacing(abs(trace.time[-1])):
+        raise InputError(
+            f"a frequency response needs even times; {trace.time[worst]:.9g} s lies {off[worst]:.3g} s off the grid of "
+            f"{step:.9g} s"
+        )
+    return step

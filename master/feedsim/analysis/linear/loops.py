@@ -1,0 +1,84 @@
+"""The functions of frequency that a drive is judged by, each with its definition.
+
+"Other loops as they are" means: the other axes keep the loops that the given system has closed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.analysis.linear.system import LinearSystem
+from feedsim.errors import InputError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+def speed_controlled_system(system: LinearSystem, axis: str, frequency: Floats) -> Complexes:
+    """n_a/M_a [(rad/s)/(N.m)] as measured: both excited by M_add of the axis, its position loop open, other loops as
+    they are. What n_add instead of M_add finds is the same."""
+    return system.closing({axis: "speed"}).ratio(frequency, f"{axis}.n_a", f"{axis}.M_a", f"{axis}.M_add")
+
+
+def scale_response(system: LinearSystem, axis: str, frequency: Floats) -> Complexes:
+    """x_a/M_a [m/(N.m)], otherwise as :func:`speed_controlled_system`."""
+    return system.closing({axis: "speed"}).ratio(frequency, f"{axis}.x_a", f"{axis}.M_a", f"{axis}.M_add")
+
+
+def structure(system: LinearSystem, frequency: Floats, output: str, axis: str) -> Complexes:
+    """`output` over the motor torque of the axis, every other motor without torque: the structure alone, sampled."""
+    return system.closing("none").transfer(frequency, output, f"{axis}.M_a")
+
+
+def compliance(system: LinearSystem, direction: str, frequency: Floats) -> Complexes:
+    """Displacement of the tool per force on it, x_d/F_d [m/N], with the loops that the system has closed."""
+    return system.transfer(frequency, f"tool.x_{direction}", f"tool.F_{direction}")
+
+
+def speed_reference(system: LinearSystem, axis: str, frequency: Floats) -> Complexes:
+    """n_a/n_s [1]: reference frequency response of the speed controller, position loop of the axis open, other loops as
+    they are."""
+    return system.closing({axis: "speed"}).transfer(frequency, f"{axis}.n_a", f"{axis}.n_add")
+
+
+def position_reference(system: LinearSystem, axis: str, frequency: Floats, *, feedforward: bool = False) -> Complexes:
+    """x_a/x_s [1] of the closed position loop; with feedforward, n_ffw is the setpoint's derivative over the lead."""
+    closed, x_a = system.closing({axis: "position"}), f"{axis}.x_a"
+    result = closed.transfer(frequency, x_a, f"{axis}.x_s")
+    if feedforward:
+        speed = 2j * np.pi * np.asarray(frequency) / system.machine.axes[axis].I_P
+        result = result + speed * closed.transfer(frequency, x_a, f"{axis}.n_ffw")
+    return result
+
+
+def speed_gain(system: LinearSystem, axis: str, s: Complexes) -> Complexes:
+    """Open-loop gain of the speed loop at s (F,) [rad/s]: cut at n_a ahead of the speed controller; every position loop
+    open, the other axes' speed loops as they are. A gain margin is the factor that K_p stands."""
+    i = _index(system, axis)
+    cut = system.closing({axis: "none"})
+    drive = system.drives[i]
+    n_per_M = cut.speed_level(s)[:, i, 2 * len(system.axes) + i]
+    E, G_n = drive.torque(s)
+    return E * drive.from_speed(s) * n_per_M / (1 + G_n * n_per_M)
+
+
+def position_gain(system: LinearSystem, axis: str, s: Complexes) -> Complexes:
+    """Open-loop gain of the sampled position loop at s (F,) [rad/s], below 1/(2 T_pos): cut at x_a as the position
+    controller samples it; other loops as they are. A gain margin is the factor that K_v stands."""
+    i = _index(system, axis)
+    closed = system.closing({axis: "position"})
+    loop = closed.position_gains[:, None] * closed.position_level(s)
+    others = [j for j in range(len(system.axes)) if j != i]
+    result = loop[:, i, i]
+    if others:
+        inner = np.eye(len(others)) + loop[:, others][:, :, others]
+        answer = np.linalg.solve(inner, loop[:, others, i][:, :, None])[:, :, 0]
+        result = result - np.einsum("fj,fj->f", loop[:, i][:, others], answer)
+    return np.asarray(result)
+
+
+def _index(system: LinearSystem, axis: str) -> int:
+    if axis not in system.axes:
+        raise InputError(f"linear system: no axis '{axis}'; there are {', '.join(system.axes)}")
+    return system.axes.index(axis)

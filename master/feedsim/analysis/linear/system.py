@@ -1,0 +1,291 @@
+"""Structure and drives of all axes as one linear sampled system, friction off: its frequency responses in closed form.
+
+Two rates. At the control cycle T_c everything but the position controllers is linear and time-invariant; eliminating
+the motor torques leaves a matrix of the size of the axes. The position controllers see every m-th sample and answer
+with a sequence of m ticks: a periodic system, whose response to exp(s t) has components at s_l = s + 2 pi i l/T_pos,
+l = 0 ... m - 1. What a position controller samples is the sum of the components; what it gives has the component
+ramp(s_l) times its answer at s_l. Both together are a second elimination of the size of the axes. This is the response
+of the system lifted over one position cycle, without forming its states; reported is the component at s itself, which
+is what a spectral estimate at the excitation's frequency finds. At whole multiples of 1/(2 T_pos) components of a real
+sinusoid and of its mirror image meet; what is measured there depends on the phase against the position cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.analysis.linear.drive import LinearDrive, OperatingPoint
+from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Hold, ModalPlant
+from feedsim.errors import InputError
+from feedsim.scenario import Machine
+from feedsim.structure import Modes
+from feedsim.trace.response import FrequencyResponse
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Which loops of an axis are closed: position and speed; speed alone (K_v = k_ffw = 0); none (the torque is an input).
+Closed = Literal["position", "speed", "none"]
+
+UNITS = {"M_add": "N.m", "M_a": "N.m", "n_add": "rad/s", "n_a": "rad/s", "n_s": "rad/s", "n_ffw": "rad/s"}
+UNITS |= {"x_s": "m", "x_a": "m"} | {f"F_{d}": "N" for d in TOOL_DIRECTIONS} | {f"x_{d}": "m" for d in TOOL_DIRECTIONS}
+
+FAST_INPUTS = ("n_add", "M_add", "M_a")  # per axis, sampled every T_c
+SLOW_INPUTS = ("x_s", "n_ffw")  # per axis, sampled every T_pos
+OUTPUTS = ("n_a", "x_a", "M_a", "n_s")  # per axis
+# Integrators and rigid modes are infinite where a component lies at 0 Hz: such frequencies are moved by this share.
+ASIDE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSystem:
+    """The coupled drives and structure of a machine, linear.
+
+    Attributes:
+        machine: drives, leads and cycles.
+        modes: the structure.
+        closed: which loops are closed, for all axes or per axis.
+        tool_force: how the force on the tool runs: "linear" between control instants (as a unit with an input slope
+            has it), "held" over the control cycle, or "continuous".
+        operating: steady motion per axis about which the motor equations are linearised; at rest where not named.
+
+    Inputs: "A.n_add", "A.M_add" (every T_c), "A.x_s", "A.n_ffw" (every T_pos), "A.M_a" (the motor torque itself, of an
+    axis with closed "none"), "tool.F_d". Outputs, all at the control instants t_k: "A.n_a", "A.x_a", "A.M_a",
+    "A.n_s" (excitation included), "tool.x_d". The torque of a drive with the ideal current loop jumps at t_k and is
+    held: M_a is then the torque that begins at t_k.
+    """
+
+    machine: Machine
+    modes: Modes
+    closed: Closed | Mapping[str, Closed] = "position"
+    tool_force: Hold = "linear"
+    operating: Mapping[str, OperatingPoint] | None = None
+
+    def closing(self, closed: Closed | Mapping[str, Closed]) -> Self:
+        """The same system with other loops closed; axes that a mapping does not name stay as they are."""
+        if isinstance(closed, str):
+            loops = dict.fromkeys(self.axes, closed)
+        else:
+            loops = {axis: closed.get(axis, self.loops[axis]) for axis in self.axes}
+        key = tuple(loops.values())
+        if key not in self._closings:
+            other = replace(self, closed=loops)
+            # what does not depend on the loops is worked out once
+            other.__dict__.update(plant=self.plant, drives=self.drives, _closings=self._closings)
+            self._closings[key] = other
+        return self._closings[key]
+
+    @cached_property
+    def _closings(self) -> dict[tuple[Closed, ...], Self]:
+        return {}
+
+    @cached_property
+    def axes(self) -> tuple[str, ...]:
+        return tuple(self.machine.axes)
+
+    @cached_property
+    def loops(self) -> dict[str, Closed]:
+        """What is closed, per axis."""
+        if isinstance(self.closed, str):
+            return dict.fromkeys(self.axes, self.closed)
+        return {axis: self.closed.get(axis, "position") for axis in self.axes}
+
+    @cached_property
+    def plant(self) -> ModalPlant:
+        return ModalPlant.of(self.modes, self.axes)
+
+    @cached_property
+    def drives(self) -> tuple[LinearDrive, ...]:
+        operating = self.operating or {}
+        return tuple(
+            LinearDrive(axis.drive, self.machine.cycles, axis.I_P, operating.get(name, OperatingPoint()))
+            for name, axis in self.machine.axes.items()
+        )
+
+    @cached_property
+    def inputs(self) -> tuple[str, ...]:
+        fast = [f"{axis}.{name}" for name in FAST_INPUTS for axis in self.axes]
+        slow = [f"{axis}.{name}" for name in SLOW_INPUTS for axis in self.axes]
+        return (*fast, *(f"tool.F_{d}" for d in TOOL_DIRECTIONS), *slow)
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        n, x, M, n_s = ([f"{axis}.{name}" for axis in self.axes] for name in OUTPUTS)
+        return (*n, *x, *(f"tool.x_{d}" for d in TOOL_DIRECTIONS), *M, *n_s)
+
+    # --- responses ---------------------------------------------------------------------------------------------------
+
+    def response(self, frequency: Floats, inputs: Sequence[str], outputs: Sequence[str]) -> FrequencyResponse:
+        """Response of every output to every input alone, named "output/input".
+
+        Args:
+            frequency: (F,) [Hz], above 0 and up to 1/(2 T_c).
+
+        Raises:
+            InputError: an unknown name, a frequency out of range, the torque of an axis whose drive gives it as input.
+        """
+        matrix = self.at(self._s(frequency))
+        columns, units = {}, {}
+        for output in outputs:
+            i = self._index(output, self.outputs, "output")
+            for name in inputs:
+                columns[f"{output}/{name}"] = matrix[:, i, self._input(name)]
+                units[f"{output}/{name}"] = unit_of(output, name)
+        return FrequencyResponse(np.asarray(frequency, dtype=np.float64), columns, units)
+
+    def transfer(self, frequency: Floats, output: str, name: str) -> Complexes:
+        """(F,) response of one output to one input alone, at frequencies in any order. Raises as :meth:`response`."""
+        matrix = self.at(self._s(frequency))
+        return np.asarray(matrix[:, self._index(output, self.outputs, "output"), self._input(name)])
+
+    def ratio(self, frequency: Floats, numerator: str, denominator: str, excitation: str) -> Complexes:
+        """(F,) response of an output over that of another, both to one excitation: what H1 finds.
+
+        Raises as :meth:`response`.
+        """
+        matrix = self.at(self._s(frequency))[:, :, self._input(excitation)]
+        above, below = (self._index(name, self.outputs, "output") for name in (numerator, denominator))
+        return np.asarray(matrix[:, above] / matrix[:, below])
+
+    def at(self, s: Complexes) -> Complexes:
+        """(F, outputs, inputs) response matrix at s (F,) [rad/s], rows and columns as in `outputs`, `inputs`."""
+        axes = len(self.axes)
+        fast = self.speed_level(s, self.tool_force)
+        result = np.zeros((len(s), len(self.outputs), len(self.inputs)), dtype=np.complex128)
+        result[:, :, : fast.shape[2]] = fast
+        if all(loop != "position" for loop in self.loops.values()):
+            return result
+        slow = self.position_level(s)
+        # what the position controllers compute at their instants, per input
+        gains = self.position_gains
+        answers = np.zeros((len(s), axes, len(self.inputs)), dtype=np.complex128)
+        answers[:, :, : fast.shape[2]] = -gains[:, None] * fast[:, axes : 2 * axes]
+        for i, drive in enumerate(self.drives):
+            column = fast.shape[2] + i
+            answers[:, i, column] = gains[i] * drive.setpoint_delay(s)
+            if self.loops[self.axes[i]] == "position":
+                answers[:, i, column + axes] = drive.feedforward(s)
+        solved = np.linalg.solve(np.eye(axes) + gains[:, None] * slow, answers)
+        ramps = np.stack([drive.ramp(s) for drive in self.drives], axis=1)
+        result += fast[:, :, :axes] @ (ramps[:, :, None] * solved)
+        return result
+
+    # --- the two eliminations ----------------------------------------------------------------------------------------
+
+    def speed_level(self, s: Complexes, tool_force: Hold = "linear") -> Complexes:
+        """(F, outputs, 3 A + 3): responses with every position loop open, to n_add, M_add, M_a and tool forces."""
+        axes = len(self.axes)
+        ports = self.ports(s, tool_force)
+        E, back = self._torque_feedback(s)
+        S = np.stack([drive.from_setpoint(s) for drive in self.drives], axis=1)
+        given = np.zeros((len(s), axes, 3 * axes + len(TOOL_DIRECTIONS)), dtype=np.complex128)
+        each = np.arange(axes)
+        given[:, each, each] = E * S
+        given[:, each, axes + each] = E
+        given[:, each, 2 * axes + each] = ~self._controlled
+        forces = given.shape[2] - len(TOOL_DIRECTIONS)
+        given[:, :, forces:] = -back[:, :, None] * ports[:, :axes, axes:]
+        torques = np.linalg.solve(np.eye(axes) + back[:, :, None] * ports[:, :axes, :axes], given)
+        result = np.zeros((len(s), len(self.outputs), given.shape[2]), dtype=np.complex128)
+        mechanical = ports.shape[1]
+        result[:, :mechanical] = ports[:, :, :axes] @ torques
+        result[:, :mechanical, forces:] += ports[:, :, axes:]
+        result[:, mechanical : mechanical + axes] = torques
+        result[:, mechanical + axes + each, each] = 1.0
+        return result
+
+    def speed_feedback(self, s: Complexes) -> Complexes:
+        """(F, A) E C + G_n [N.m.s/rad]: M_a = E (S n_s + M_add) - (E C + G_n) n_a; 0 for axes without control."""
+        return self._torque_feedback(s)[1]
+
+    def _torque_feedback(self, s: Complexes) -> tuple[Complexes, Complexes]:
+        """(F, A) E and E C + G_n of the axes, 0 for axes without control."""
+        E, back = (np.zeros((len(s), len(self.axes)), dtype=np.complex128) for _ in range(2))
+        for i in np.flatnonzero(self._controlled):
+            E[:, i], G_n = self.drives[i].torque(s)
+            back[:, i] = E[:, i] * self.drives[i].from_speed(s) + G_n
+        return E, back
+
+    def position_level(self, s: Complexes) -> Complexes:
+        """(F, A, A): what the position controllers sample of x_a per setpoint that they give, position loops open.
+
+        The sum over all components that one answer of a controller has within the ticks of its cycle.
+        """
+        axes, ticks = len(self.axes), self.drives[0].ticks
+        components = (s[:, None] + 2j * np.pi * np.arange(ticks) / self.machine.cycles.T_pos).ravel()
+        x_a = self.speed_level(components)[:, axes : 2 * axes, :axes]
+        ramps = np.stack([drive.ramp(components) for drive in self.drives], axis=1)
+        return np.asarray((x_a * ramps[:, None, :]).reshape(len(s), ticks, axes, axes).sum(axis=1))
+
+    def ports(self, s: Complexes, tool_force: Hold = "linear") -> Complexes:
+        """(F, 2 A + 3, A + 3): port matrix of the structure with every input running as it does."""
+        axes, T_c = len(self.axes), self.machine.cycles.T_c
+        ports = self.plant.ports(s, T_c, "linear")
+        if self._ideal.any():
+            held = self.plant.ports(s, T_c, "held")
+            ports[:, :, :axes][:, :, self._ideal] = held[:, :, :axes][:, :, self._ideal]
+        if tool_force != "linear":
+            ports[:, :, axes:] = self.plant.ports(s, T_c, tool_force)[:, :, axes:]
+        return ports
+
+    @cached_property
+    def _ideal(self) -> NDArray[np.bool_]:
+        """(A,) whose torque is held: drives with the ideal current loop."""
+        return np.array([drive.drive.ideal_current_loop for drive in self.drives])
+
+    @cached_property
+    def _controlled(self) -> NDArray[np.bool_]:
+        return np.array([loop != "none" for loop in self.loops.values()])
+
+    @cached_property
+    def position_gains(self) -> Floats:
+        """(A,) K_v/I_P [rad/(s.m)] of the position loops, 0 where they are open."""
+        closed = np.array([loop == "position" for loop in self.loops.values()])
+        return np.where(closed, [drive.position_gain for drive in self.drives], 0.0)
+
+    # --- names -------------------------------------------------------------------------------------------------------
+
+    def _index(self, name: str, known: Sequence[str], kind: str) -> int:
+        if name not in known:
+            raise InputError(f"linear system: no {kind} '{name}'; there are {', '.join(known)}")
+        return known.index(name)
+
+    def _input(self, name: str) -> int:
+        index = self._index(name, self.inputs, "input")
+        axis, _, quantity = name.partition(".")
+        if axis in self.loops:
+            loop = self.loops[axis]
+            if (quantity == "M_a") != (loop == "none"):
+                what = "is given by its drive" if quantity == "M_a" else "belongs to a drive that is switched off"
+                raise InputError(f"linear system: '{name}' {what}: closed is '{loop}' for axis {axis}")
+        return index
+
+    def _s(self, frequency: Floats) -> Complexes:
+        f = np.asarray(frequency, dtype=np.float64)
+        cycles = self.machine.cycles
+        highest = 0.5 / cycles.T_c
+        wrong = f[~((f > 0) & (f <= highest * (1 + ASIDE)))]
+        if f.ndim != 1 or wrong.size:
+            found = f"{wrong[0]:.6g} Hz" if f.ndim == 1 else f"an array of shape {f.shape}"
+            raise InputError(f"linear system: frequency {found}; allowed are values above 0 up to {highest:.6g} Hz")
+        turns = f * cycles.T_pos
+        meets = np.abs(turns - np.round(turns)) < ASIDE * np.round(turns)
+        return np.asarray(2j * np.pi * np.where(meets, f * (1 - ASIDE), f))
+
+
+def unit_of(output: str, name: str) -> str:
+    """Unit of the response of `output` to `name`, such as "(rad/s)/(N.m)"; "1" where both have the same."""
+    above, below = (UNITS[each.partition(".")[2]] for each in (output, name))
+    if above == below:
+        return "1"
+
+    def quoted(unit: str) -> str:
+        return f"({unit})" if "/" in unit or "." in unit else unit
+
+    return f"{quoted(above)}/{quoted(below)}"

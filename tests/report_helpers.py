@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from feedsim.cosim import PoseUse
 from feedsim.nc import Program, plan
 from feedsim.scenario import Circle, CircleTest, Dwell, Move, Positioning, Scenario
 from feedsim.trace import Trace
@@ -27,6 +28,7 @@ class FakeRun:
     units: Mapping[str, Mapping[str, str]] = field(
         default_factory=lambda: {"plant": {"guid": "0011223344556677-8899aabbccddeeff", "version": "0.1.0"}}
     )
+    pose: PoseUse | None = None
     warnings: tuple[str, ...] = ()
 
 

@@ -19,6 +19,8 @@ SOLE_USERS = {
     "matplotlib": {"report"},
     "ruckig": {"nc"},
     "tqdm": {"cli"},
+    "pyuff": {"trace/uff.py"},
+    "feedsim_packager": {"structure/pack.py"},
 }
 
 

@@ -20,9 +20,10 @@ from feedsim.analysis import Figure, evaluate
 from feedsim.errors import OutputError
 from feedsim.report.page import tile
 from feedsim.report.provenance import archives, input_files
+from feedsim.report.run_tables import path, provenance
 from feedsim.report.style import PALETTE
 from feedsim.report.summary import HEADER, real_time_factor, summary
-from feedsim.report.tables import duration, path, provenance
+from feedsim.report.words import duration
 from feedsim.scenario import Arc, Dwell, Move, load
 from feedsim.trace import Trace, read_csv
 from report_helpers import FakeRun, circle_run, contents, positioning_run, run_of, small_run

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from feedsim.cli import frf, machine
+
 EPILOG = """exit codes:
   0 done    1 internal error    2 bad input or usage    3 a unit failed    4 results cannot be written
   130 interrupted (143, 129: by SIGTERM, SIGHUP)
@@ -21,6 +23,10 @@ examples:
   feedsim run scenarios/z_positioning.yaml --out results/z
   feedsim run scenarios/xz_circle.yaml --set "machine.axes.*.friction.W=0 rad"
   feedsim validate scenarios/xz_circle.yaml
+  feedsim machine info scenarios/machines/test_centre
+  feedsim machine show scenarios/machines/test_centre --mode 21Hz --animate --out results/structure
+  feedsim machine pack scenarios/machines/test_centre --out my_plant.fmu
+  feedsim frf scenarios/machines/test_centre --axes X,Z
 """
 
 
@@ -48,8 +54,13 @@ def parser() -> argparse.ArgumentParser:
     validate = commands.add_parser("validate", help="check a scenario, its machine and its motion without running it")
     _add_scenario(validate)
 
-    schema = commands.add_parser("schema", help="print the JSON Schema of scenario or machine files, for editors")
-    schema.add_argument("kind", nargs="?", choices=("scenario", "machine"), default="scenario")
+    machine.add_commands(commands)
+    frf.add_command(commands)
+
+    schema = commands.add_parser(
+        "schema", help="print the JSON Schema of scenario, machine or structure files, for editors"
+    )
+    schema.add_argument("kind", nargs="?", choices=("scenario", "machine", "structure"), default="scenario")
 
     convert = commands.add_parser(
         "convert",
@@ -101,7 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     _end_cleanly_on_signals()
     try:
-        getattr(commands, options.command)(options)
+        action = getattr(options, "action", None) or getattr(commands, options.command)
+        action(options)
         sys.stdout.flush()
     except FeedsimError as error:
         print(f"feedsim: {error}", file=sys.stderr)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -40,10 +40,17 @@ def input_files(scenario: Scenario) -> list[InputFile]:
     """Scenario, machine and further YAML files, table of modes, recordings; each once."""
     named = [(place or "scenario", path) for place, path in scenario.files]
     named.append(("modes", scenario.machine.modes))
+    if scenario.machine.plant is not None:
+        named.append(("plant archive", scenario.machine.plant))
     named += [
         ("recorded setpoints", motion.file) for motion in scenario.motions if isinstance(motion, MeasuredSetpoints)
     ]
-    once = {path.absolute(): (role, path) for role, path in reversed(named)}
+    return hashed(named)
+
+
+def hashed(files: Sequence[tuple[str, Path]]) -> list[InputFile]:
+    """Files with what they are, each once, under what it is first."""
+    once = {path.absolute(): (role, path) for role, path in reversed(files)}
     return [InputFile(role, path.name, _sha256(path)) for role, path in reversed(once.values())]
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import math
-import platform
 from collections.abc import Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 
 from feedsim.analysis import Figure, Result
-from feedsim.report.provenance import Parameter, axis_parameters, input_files
+from feedsim.cosim import PoseUse
+from feedsim.report.parts import figures_part, inputs_part, machine_part, software
+from feedsim.report.pose_section import pose_part
+from feedsim.report.provenance import input_files
 
 FORMAT = 1
 COUPLING = {
@@ -30,19 +29,9 @@ class Run(Result, Protocol):
     @property
     def units(self) -> Mapping[str, Mapping[str, str]]: ...
     @property
+    def pose(self) -> PoseUse | None: ...
+    @property
     def warnings(self) -> tuple[str, ...]: ...
-
-
-def software() -> dict[str, str]:
-    """Versions of the package, of what it calculates with, and the platform."""
-    names = ("feedsim", "numpy", "scipy", "ruckig", "fmpy")
-    found = {"python": platform.python_version(), "platform": platform.platform()}
-    for name in names:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed as a package"
-    return found
 
 
 def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> dict[str, Any]:
@@ -51,14 +40,7 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
     return {
         "format": FORMAT,
         "warnings": list(run.warnings),
-        "figures": {
-            name: {
-                "value": figure.value if math.isfinite(figure.value) else None,
-                "unit": figure.unit,
-                "meaning": figure.meaning,
-            }
-            for name, figure in figures.items()
-        },
+        "figures": figures_part(figures),
         "scenario": {
             "name": scenario.name,
             "file": scenario.file.name,
@@ -77,13 +59,9 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
                 for segment in run.program.segments
             ],
         },
-        "machine": {
-            "name": machine.name,
-            "note": machine.note,
-            "pose": {a: {"value": x, "unit": "m"} for a, x in machine.pose.items()},
-            "axes": {name: _axis(axis_parameters(axis)) for name, axis in machine.axes.items()},
-        },
-        "inputs": [{"role": f.role, "name": f.name, "sha256": f.sha256} for f in input_files(scenario)],
+        "machine": machine_part(machine),
+        "pose": pose_part(run.pose),
+        "inputs": inputs_part(input_files(scenario)),
         "units": {name: dict(unit) for name, unit in run.units.items()},
         "coupling": {
             name: {"value": value, "unit": "J", "meaning": COUPLING[name.partition(".")[2]]}
@@ -96,20 +74,6 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
         },
         "files": list(files),
     }
-
-
-def _axis(groups: Mapping[str, Mapping[str, tuple[Parameter, str]]]) -> dict[str, Any]:
-    """pitch and M_0 of an axis, and its parameters by unit; words and switches stand alone, without a unit."""
-    plain = {
-        group: {name: {"value": value, "unit": unit} if unit else value for name, (value, unit) in values.items()}
-        for group, values in groups.items()
-    }
-    return plain.pop("axis") | plain
-
-
-def to_json(content: Mapping[str, Any]) -> str:
-    """JSON text with shortest round-trip numbers; no NaN or infinity, which JSON has not."""
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def real_time_factor(run: Run) -> float | None:

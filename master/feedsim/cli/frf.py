@@ -1,0 +1,275 @@
+"""feedsim frf: frequency responses in closed form and measured on the units."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from feedsim.analysis.campaign import Plan, Progress
+    from feedsim.analysis.responses import Overlay
+    from feedsim.analysis.truncation import Truncation
+    from feedsim.scenario import Machine
+
+DESCRIPTION = """Frequency responses of a machine's feed drives: speed-controlled system n/M, reference frequency
+response of the speed controller, position loop, loop gains with their margins, x/M, and the compliance at the tool. In
+closed form and, friction off, measured on the units with a multisine or a binary sequence."""
+REALISATIONS_WITH_FRICTION = 4
+EPILOG = """examples:
+  feedsim frf scenarios/machines/test_centre --axes X,Z --out results/frf
+  feedsim frf scenarios/xz_circle.yaml --set "machine.axes.Z.drive.K_p=4 N.m.s/rad" --no-measure
+  feedsim frf scenarios/machines/test_centre --axes Z --friction --offset-speed "5 rad/s" --realisations 4
+  feedsim frf scenarios/machines/test_centre --axes Z --overlay measured.csv:Z.n_a/Z.n_s
+"""
+
+
+def add_command(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add ``frf`` to the commands."""
+    command = subparsers.add_parser(
+        "frf",
+        help="frequency responses of the drives, in closed form and measured; Bode plots",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_argument(
+        "subject", type=Path, metavar="SCENARIO-or-MACHINE", help="scenario file, machine file or machine folder"
+    )
+    command.add_argument(
+        "--out", type=Path, metavar="DIR", help="where the results go (default: results/frf_<name of the file>)"
+    )
+    command.add_argument("--axes", type=_names, metavar="X,Z", help="axes to look at (default: all)")
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="overrides",
+        metavar="KEY=VALUE",
+        help="override one entry, e.g. machine.axes.Z.drive.K_p='4 N.m.s/rad'; may be given several times",
+    )
+    command.add_argument(
+        "--fmus", type=Path, metavar="DIR", help="folder of the archives (default: $FEEDSIM_FMUS, else fmus/)"
+    )
+    command.add_argument(
+        "--band", default="1Hz..1000Hz", metavar="LOW..HIGH", help="frequencies looked at (default: 1Hz..1000Hz)"
+    )
+    command.add_argument(
+        "--tool", action=BooleanOptionalAction, default=True, help="with the compliance at the tool (default: yes)"
+    )
+    command.add_argument(
+        "--overlay",
+        action="append",
+        default=[],
+        dest="overlays",
+        metavar="FILE[:RESPONSE[=NAME]]",
+        help="lay a curve from a CSV or UFF58 file over, e.g. measured.csv:Z.n_a/Z.M_a; may be given several times",
+    )
+    command.add_argument(
+        "--full-model",
+        action=BooleanOptionalAction,
+        default=True,
+        help="where the machine names its structure: compare with all modes of the finite-element model (default: yes)",
+    )
+    command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    measuring = command.add_argument_group("measurement on the units")
+    measuring.add_argument("--no-measure", action="store_true", help="closed form only")
+    measuring.add_argument(
+        "--excitation", choices=("multisine", "prbs"), default="multisine", help="signal (default: multisine)"
+    )
+    measuring.add_argument(
+        "--inject",
+        choices=("n_add", "M_add"),
+        default="n_add",
+        help="where it is added: to the speed setpoint (finds n/M and n_a/n_s) or to the torque setpoint (finds n/M); "
+        "default: n_add",
+    )
+    measuring.add_argument(
+        "--amplitude", metavar="VALUE", help="RMS of the signal, e.g. '0.5 rad/s' (default: 5 %% of the torque limit)"
+    )
+    measuring.add_argument("--periods", type=int, default=2, metavar="N", help="recorded periods (default: 2)")
+    measuring.add_argument("--settle", type=int, default=2, metavar="N", help="periods ahead of those (default: 2)")
+    measuring.add_argument(
+        "--realisations",
+        type=int,
+        metavar="N",
+        help="signals with other phases, averaged (default: 1, with friction 4: only between realisations does the "
+        "coherence see what is not linear)",
+    )
+    measuring.add_argument("--seed", type=int, default=1, metavar="N", help="of the phases (default: 1)")
+    measuring.add_argument("--friction", action="store_true", help="with friction; the closed form knows none")
+    measuring.add_argument(
+        "--offset-speed", metavar="VALUE", help="motor speed at which the excited axis moves, e.g. '5 rad/s'"
+    )
+    command.set_defaults(action=frf)
+
+
+def frf(options: Namespace) -> None:
+    """Read, calculate, measure, write."""
+    from feedsim import report
+    from feedsim.analysis import linear, responses, truncation
+    from feedsim.analysis.campaign import run_campaign
+    from feedsim.scenario import load_subject
+    from feedsim.structure import checked_modes
+
+    subject = load_subject(options.subject, options.overrides)
+    machine = subject.machine
+    axes = _axes(options.axes, machine)
+    plan = _plan(options, machine)
+    named = options.subject.stem if options.subject.is_file() else options.subject.resolve().name
+    directory: Path = options.out or Path("results") / f"frf_{named}"
+    modes = checked_modes(machine)
+    frequency = responses.frequencies(machine, modes, plan.band)
+    wanted = responses.names(axes, tool=options.tool)
+    overlays, warnings = _overlays(options.overlays, wanted)
+    report.check_frf_writable(directory)
+
+    with _bar(options.quiet) as progress:
+        progress("closed form", 0, 1)
+        system = linear.LinearSystem(machine, modes)
+        result = linear.evaluate(system, axes)
+        closed = responses.closed_form(system, wanted, frequency)
+        progress("closed form", 1, 1)
+        if result.unstable_poles:
+            warnings.append(_unstable(result.unstable_poles))
+        full = _full_model(machine, progress) if options.full_model else None
+        campaign = None
+        if not (options.no_measure or result.unstable_poles):
+            campaign = run_campaign(machine, axes, plan, fmus=options.fmus, progress=progress)
+    figures = linear.figures(result)
+    if not options.tool:
+        figures = {name: figure for name, figure in figures.items() if not name.startswith("tool.")}
+    if full is not None:
+        figures |= truncation.figures(full, tuple(machine.axes), frequency)
+    if campaign is not None:
+        figures |= responses.agreement(system, campaign)
+        warnings += campaign.warnings
+    found = responses.Responses(
+        machine=machine,
+        modes=modes,
+        axes=axes,
+        band=plan.band,
+        result=result,
+        closed=closed,
+        campaign=campaign,
+        overlays=tuple(overlays),
+        truncation=full,
+        figures=figures,
+        warnings=tuple(warnings),
+    )
+    report.write_frf(subject, found, directory)
+    for warning in warnings:
+        print(f"feedsim: warning: {warning}", file=sys.stderr)
+    if not options.quiet:
+        print(f"{subject.name}: frequency responses -> {directory / 'report.html'}\n{report.frf_summary_line(found)}")
+
+
+def _full_model(machine: Machine, progress: Progress) -> Truncation | None:
+    """The machine's structure with all its modes, where a structure is named."""
+    from feedsim.analysis.truncation import truncation
+    from feedsim.scenario import load_structure
+
+    if machine.structure is None:
+        return None
+    progress("full model", 0, 1)
+    found = truncation(load_structure(machine.structure), machine.pose)
+    progress("full model", 1, 1)
+    return found
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names:
+        raise ArgumentTypeError("names of axes are needed, such as X,Z")
+    return names
+
+
+def _axes(chosen: Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
+    """The axes asked for, in the machine's order."""
+    from feedsim.errors import InputError
+
+    for name in chosen or ():
+        if name not in machine.axes:
+            raise InputError(f"--axes {','.join(chosen or ())}: no axis {name!r}; there is {', '.join(machine.axes)}")
+    return tuple(axis for axis in machine.axes if not chosen or axis in chosen)
+
+
+def _plan(options: Namespace, machine: Machine) -> Plan:
+    """What the options say about the measurement."""
+    from feedsim import units
+    from feedsim.analysis.campaign import Plan
+    from feedsim.errors import InputError
+
+    low, dots, high = options.band.partition("..")
+    if not dots:
+        raise InputError(f"--band {options.band}: LOW..HIGH is needed, such as 1Hz..1000Hz")
+    realisations = options.realisations
+    if realisations is None:
+        realisations = REALISATIONS_WITH_FRICTION if options.friction else 1
+    for name, number in (("periods", options.periods), ("realisations", realisations)):
+        if number < 1:
+            raise InputError(f"--{name} {number}: at least 1 is needed")
+
+    def quantity(option: str, text: str, unit: str, example: str) -> float:
+        try:
+            return units.parse(text, unit, example)
+        except InputError as error:
+            raise InputError(f"--{option} {text}: {error}") from None
+
+    unit, example = ("rad/s", "0.5 rad/s") if options.inject == "n_add" else ("N.m", "4 N.m")
+    amplitude, speed = options.amplitude, options.offset_speed
+    return Plan(
+        signal=options.excitation,
+        inject=options.inject,
+        rms=None if amplitude is None else quantity("amplitude", amplitude, unit, example),
+        band=(quantity("band", low, "Hz", "1 Hz"), quantity("band", high, "Hz", "1000 Hz")),
+        periods=options.periods,
+        settle=options.settle,
+        realisations=realisations,
+        seed=options.seed,
+        friction=options.friction,
+        offset_speed=None if speed is None else quantity("offset-speed", speed, "rad/s", "5 rad/s"),
+        tool=options.tool,
+    )
+
+
+def _overlays(texts: Sequence[str], known: Sequence[str]) -> tuple[list[Overlay], list[str]]:
+    from feedsim.analysis.responses import read_overlays
+
+    overlays: list[Overlay] = []
+    warnings: list[str] = []
+    for text in texts:
+        found, doubts = read_overlays(text, known)
+        overlays += found
+        warnings += doubts
+    return overlays, warnings
+
+
+def _unstable(poles: int) -> str:
+    return (
+        f"the control loops are unstable: {poles} growing solution(s) of the closed system. The figures of loops "
+        "presume stable ones, and nothing was measured"
+    )
+
+
+@contextmanager
+def _bar(quiet: bool) -> Iterator[Progress]:
+    """A progress bar that names what is being done."""
+    from tqdm import tqdm
+
+    said = ""
+    with tqdm(unit=" cycles", unit_scale=True, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
+
+        def progress(what: str, done: int, total: int) -> None:
+            nonlocal said
+            if what != said:
+                said = what
+                bar.reset(total)
+                bar.set_description(what)
+            bar.update(done - bar.n)
+
+        yield progress

@@ -1,0 +1,273 @@
+"""Bode plots of a machine's feed drives, one picture per quantity and a column per axis.
+
+Like Figs. 4 and 5 of Wiesauer, Bleicher, 18th CIRP CMMO (2021): the speed-controlled system n/M and the reference
+frequency response of the speed controller; besides these the loops around them, and what the structure does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from feedsim.analysis.linear.margins import Bandwidth, Margins
+from feedsim.analysis.linear.search import Pair
+from feedsim.report.bode import Column, Curve, Ordinate, Panels, at, bode, dot, level, note, phases, size, stretch
+from feedsim.report.labels import keep_inside
+from feedsim.report.style import INK, Picture, drawing, finish
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Columns = Mapping[str, Sequence[Curve]]  # by axis or direction
+Span = tuple[float, float] | None  # frequencies shown [Hz]; None: all
+
+MOST_COLUMNS = 3
+LABEL_ROOM = 0.4  # above the curves, in shares of their height
+LOWEST_GAIN_DB = -40.0  # of a loop: what is below says nothing about it
+LOWEST_CLOSED_DB = -45.0  # of a closed loop
+ALIKE = 1.01  # crossings closer than this ratio are one
+
+KINDS = (
+    "Lines: closed form. Points: measured on the units, faded where the coherence is below 0.99. Dashed: laid over. "
+)
+
+
+def speed_controlled_pictures(columns: Columns, span: Span) -> list[Picture]:
+    """n_a/M_a per axis, magnitude and phase (the paper's Fig. 4). Values [(rad/s)/(N.m)]."""
+    pictures = []
+    for part, stem in _parts(columns, "speed-controlled-system"):
+        shown = [Column(f"Axis {axis}", curves) for axis, curves in part.items()]
+        with drawing(*size(shown)) as figure:
+            bode(figure, shown, Ordinate("$|n_a/M_a|$ [dB re 1 (rad/s)/(N·m)]"), span=span)
+            pictures.append(
+                finish(
+                    figure,
+                    stem,
+                    f"Speed-controlled system n/M of {_axes(part)}",
+                    "Motor speed over motor torque, the position loop left out. At low frequencies the line falls as "
+                    f"1/(J ω) with the total inertia J; above, the structure shows. {_kinds(part)}",
+                )
+            )
+    return pictures
+
+
+def inertia_pictures(
+    columns: Columns, J_tot: Mapping[str, float], pairs: Mapping[str, Sequence[Pair]], span: Span
+) -> list[Picture]:
+    """|n_a/M_a| J_tot omega per axis: 0 dB where the machine is a rigid inertia.
+
+    J_tot: [kg.m2]; pairs: anti-resonances and resonances to be annotated.
+    """
+    pictures = []
+    for part, stem in _parts(columns, "inertia-view"):
+        shown = [
+            Column(f"Axis {axis}", [c.scaled(2 * np.pi * c.frequency * J_tot[axis]) for c in curves])
+            for axis, curves in part.items()
+        ]
+        width, height = size(shown, phase=False)
+        with drawing(width, height + 0.9) as figure:
+            ordinate = Ordinate("$|n_a/M_a| \\; J_{tot}\\, \\omega$ [dB]")
+            drawn = bode(figure, shown, ordinate, phase=False, span=span)
+            low, high = drawn[0].magnitude.get_ylim()  # shared by all columns
+            drawn[0].magnitude.set_ylim(low, high + LABEL_ROOM * (high - low))
+            for axis, panels, column in zip(part, drawn, shown, strict=True):
+                level(panels.magnitude, 0.0)
+                _annotate(panels.magnitude, column.curves[0], pairs.get(axis, ()))
+            pictures.append(
+                finish(
+                    figure,
+                    stem,
+                    f"Speed-controlled system of {_axes(part)} against a rigid inertia",
+                    "The speed-controlled system multiplied by the total inertia and the angular frequency: 0 dB where "
+                    "the machine moves as one rigid mass, more where the motor feels less inertia. Annotated: the most "
+                    f"marked pairs of anti-resonance (hollow) and resonance (full), in Hz. {_kinds(part)}",
+                )
+            )
+    return pictures
+
+
+def speed_reference_pictures(columns: Columns, bandwidths: Mapping[str, Bandwidth], span: Span) -> list[Picture]:
+    """n_a/n_s per axis with its -3 dB line and crossings (the paper's Fig. 5)."""
+    what = "Reference frequency response of the speed controller n_a/n_s"
+    about = "Motor speed over speed setpoint, the position loop open. "
+    return _closed_loops(columns, bandwidths, "speed-reference", "$|n_a/n_s|$ [dB]", what, about, span)
+
+
+def position_reference_pictures(columns: Columns, bandwidths: Mapping[str, Bandwidth], span: Span) -> list[Picture]:
+    """x_a/x_s per axis with its -3 dB line and crossings."""
+    what = "Reference frequency response of the position controller x_a/x_s"
+    about = "Position at the linear scale over position setpoint, the speed feedforward left out. "
+    return _closed_loops(columns, bandwidths, "position-reference", "$|x_a/x_s|$ [dB]", what, about, span)
+
+
+def loop_pictures(
+    columns: Columns, margins: Mapping[str, Margins], loop: Literal["speed", "position"], span: Span
+) -> list[Picture]:
+    """Open-loop gain of the speed or the position loop per axis, its margins marked."""
+    cut = {
+        "speed": "cut at the motor speed, the position loop open; the gain margin is the factor that K_p stands",
+        "position": "cut at the scale's position as the controller samples it; the gain margin is the factor that K_v "
+        "stands",
+    }[loop]
+    pictures = []
+    for part, stem in _parts(columns, f"{loop}-loop"):
+        shown = [Column(f"Axis {axis}", curves) for axis, curves in part.items()]
+        with drawing(*size(shown)) as figure:
+            drawn = bode(figure, shown, Ordinate("open-loop gain [dB]"), floor=LOWEST_GAIN_DB, span=span)
+            for axis, panels, column in zip(part, drawn, shown, strict=True):
+                if axis in margins:
+                    _margins(panels, column.curves[0], margins[axis])
+            pictures.append(
+                finish(
+                    figure,
+                    stem,
+                    f"Open-loop gain of the {loop} loop of {_axes(part)}",
+                    f"Loop gain {cut}. Marked: the gain margin (vertical line from the curve to 0 dB) and the phase "
+                    f"margin (from the curve to ±180°, where a loop of gain 1 would be at its limit). {_kinds(part)}",
+                )
+            )
+    return pictures
+
+
+def scale_pictures(columns: Columns, span: Span) -> list[Picture]:
+    """x_a/M_a per axis. Values [m/(N.m)], shown in um/(N.m)."""
+    pictures = []
+    for part, stem in _parts(columns, "scale-response"):
+        shown = [Column(f"Axis {axis}", curves) for axis, curves in part.items()]
+        with drawing(*size(shown)) as figure:
+            bode(figure, shown, Ordinate("$|x_a/M_a|$ [µm/(N·m)]", decibel=False, scale=1e6), span=span)
+            pictures.append(
+                finish(
+                    figure,
+                    stem,
+                    f"From motor torque to linear scale, x/M of {_axes(part)}",
+                    "Position at the linear scale over motor torque, the position loop left out: what the drive train "
+                    f"and the structure put between motor and scale. {_kinds(part)}",
+                )
+            )
+    return pictures
+
+
+def compliance_pictures(columns: Columns, span: Span) -> list[Picture]:
+    """Tool compliance per direction. Values [m/N], shown in um/N."""
+    pictures = []
+    for part, stem in _parts(columns, "tool-compliance"):
+        shown = [Column(f"Direction {direction}", curves) for direction, curves in part.items()]
+        with drawing(*size(shown)) as figure:
+            bode(figure, shown, Ordinate("$|x_{tool}/F|$ [µm/N]", decibel=False, scale=1e6), span=span)
+            pictures.append(
+                finish(
+                    figure,
+                    stem,
+                    "Dynamic compliance at the tool",
+                    "Displacement of the tool against the workpiece over the force between them, all loops closed. "
+                    f"{_kinds(part)}",
+                )
+            )
+    return pictures
+
+
+def _closed_loops(
+    columns: Columns,
+    bandwidths: Mapping[str, Bandwidth],
+    stem: str,
+    ordinate: str,
+    what: str,
+    about: str,
+    span: Span,
+) -> list[Picture]:
+    pictures = []
+    for part, name in _parts(columns, stem):
+        shown = [Column(f"Axis {axis}", curves) for axis, curves in part.items()]
+        with drawing(*size(shown)) as figure:
+            drawn = bode(figure, shown, Ordinate(ordinate), floor=LOWEST_CLOSED_DB, span=span)
+            for axis, panels in zip(part, drawn, strict=True):
+                level(panels.magnitude, -3.0)
+                if axis in bandwidths:
+                    _bandwidth(panels.magnitude, bandwidths[axis])
+            pictures.append(
+                finish(
+                    figure,
+                    name,
+                    f"{what} of {_axes(part)}",
+                    f"{about}Dashed line: -3 dB. A curve with an anti-resonance can fall through it, return and fall "
+                    "again: full marker, first crossing; hollow marker, last crossing. ".replace("-3", "−3")
+                    + _kinds(part),
+                )
+            )
+    return pictures
+
+
+def _bandwidth(axes: Axes, bandwidth: Bandwidth) -> None:
+    if not math.isfinite(bandwidth.first):
+        return note(axes, "stays above −3 dB")
+    dot(axes, bandwidth.first, -3.0)
+    if bandwidth.last < bandwidth.first * ALIKE:
+        return note(axes, f"−3 dB at {_hertz(bandwidth.first)}")
+    dot(axes, bandwidth.last, -3.0, hollow=True)
+    return note(axes, f"−3 dB, first {_hertz(bandwidth.first)}\n−3 dB, last {_hertz(bandwidth.last)}")
+
+
+def _margins(panels: Panels, curve: Curve, margins: Margins) -> None:
+    lines = []
+    level(panels.magnitude, 0.0)
+    phase = panels.phase
+    low, high = curve.frequency[0], curve.frequency[-1]
+    crossing, gain = margins.phase_margin, margins.gain_margin
+    if math.isfinite(crossing.frequency):
+        lines.append(f"phase margin {crossing.margin:.0f}° at {_hertz(crossing.frequency)}".replace("-", "−"))
+        dot(panels.magnitude, crossing.frequency, 0.0)
+        if phase is not None:
+            turned = float(np.interp(np.log(crossing.frequency), np.log(curve.frequency), phases(curve, None)))
+            stretch(phase, crossing.frequency, turned, turned - crossing.margin)
+            dot(phase, crossing.frequency, turned)
+            level(phase, turned - crossing.margin)
+    if math.isfinite(gain.frequency) and low <= gain.frequency <= high:
+        decibel = 20 * math.log10(gain.factor)
+        lines.append(f"gain margin {decibel:.1f} dB at {_hertz(gain.frequency)}")
+        stretch(panels.magnitude, gain.frequency, -decibel, 0.0)
+        dot(panels.magnitude, gain.frequency, -decibel)
+    if lines:
+        note(panels.magnitude, "\n".join(lines))
+
+
+def _annotate(axes: Axes, curve: Curve, pairs: Sequence[Pair]) -> None:
+    """Mark resonances by a dot, anti-resonances by a hollow one; their frequencies stand above the resonance."""
+    for pair in pairs:
+        peak, dip = pair.resonance.frequency, pair.antiresonance.frequency
+        top = 20 * math.log10(abs(at(curve, peak)))
+        dot(axes, peak, top)
+        dot(axes, dip, 20 * math.log10(abs(at(curve, dip))), hollow=True)
+        label = axes.annotate(
+            f"{dip:.1f} / {peak:.1f}", (peak, top), xytext=(0, 8), textcoords="offset points", ha="center", va="bottom",
+            fontsize=8.5, color=INK, rotation=90, zorder=8,
+        )  # fmt: skip
+        keep_inside(label)
+
+
+def _parts(columns: Columns, stem: str) -> list[tuple[dict[str, Sequence[Curve]], str]]:
+    """Groups of at most MOST_COLUMNS columns with curves, and the stem of each group's picture."""
+    names = [name for name, curves in columns.items() if curves]
+    groups = [names[k : k + MOST_COLUMNS] for k in range(0, len(names), MOST_COLUMNS)]
+    return [
+        ({name: columns[name] for name in group}, stem if len(groups) == 1 else f"{stem}-{'-'.join(group)}")
+        for group in groups
+    ]
+
+
+def _axes(part: Mapping[str, object]) -> str:
+    names = list(part)
+    return f"axis {names[0]}" if len(names) == 1 else f"axes {', '.join(names[:-1])} and {names[-1]}"
+
+
+def _kinds(part: Columns) -> str:
+    """What the styles mean, where there is more than one."""
+    there = {curve.kind for curves in part.values() for curve in curves}
+    return KINDS if len(there) > 1 else ""
+
+
+def _hertz(frequency: float) -> str:
+    return f"{frequency:.3g} Hz" if frequency < 100 else f"{frequency:.0f} Hz"

@@ -1,0 +1,67 @@
+"""Parts of every summary.json: figures with unit and meaning, the machine, versions of the software."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Iterable, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from feedsim.analysis import Figure
+from feedsim.report.provenance import InputFile, Parameter, axis_parameters
+from feedsim.scenario import Machine
+
+
+def software() -> dict[str, str]:
+    """Versions of the package, of what it calculates with, and the platform."""
+    names = ("feedsim", "numpy", "scipy", "ruckig", "fmpy")
+    found = {"python": platform.python_version(), "platform": platform.platform()}
+    for name in names:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed as a package"
+    return found
+
+
+def figures_part(figures: Mapping[str, Figure]) -> dict[str, Any]:
+    """Figures by name; one that could not be determined has the value null."""
+    return {
+        name: {
+            "value": figure.value if math.isfinite(figure.value) else None,
+            "unit": figure.unit,
+            "meaning": figure.meaning,
+        }
+        for name, figure in figures.items()
+    }
+
+
+def machine_part(machine: Machine) -> dict[str, Any]:
+    """A machine's pose and the parameters of its axes in SI."""
+    return {
+        "name": machine.name,
+        "note": machine.note,
+        "pose": {a: {"value": x, "unit": "m"} for a, x in machine.pose.items()},
+        "axes": {name: _axis(axis_parameters(axis)) for name, axis in machine.axes.items()},
+    }
+
+
+def inputs_part(files: Iterable[InputFile]) -> list[dict[str, str | None]]:
+    """Input files with their hashes."""
+    return [{"role": f.role, "name": f.name, "sha256": f.sha256} for f in files]
+
+
+def to_json(content: Mapping[str, Any]) -> str:
+    """JSON text with shortest round-trip numbers; no NaN or infinity, which JSON has not."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _axis(groups: Mapping[str, Mapping[str, tuple[Parameter, str]]]) -> dict[str, Any]:
+    """pitch and M_0 of an axis, and its parameters by unit; words and switches stand alone, without a unit."""
+    plain = {
+        group: {name: {"value": value, "unit": unit} if unit else value for name, (value, unit) in values.items()}
+        for group, values in groups.items()
+    }
+    return plain.pop("axis") | plain

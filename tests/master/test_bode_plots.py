@@ -1,0 +1,280 @@
+"""Bode plots: scales, phases, what is marked, and that every label can be read."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feedsim.analysis.linear import Bandwidth, Extreme, GainCrossing, Margins, Pair, PhaseCrossing, grid
+from feedsim.analysis.responses import Overlay
+from feedsim.analysis.truncation import deviations, structure_responses
+from feedsim.report import bode_plots, truncation_plots
+from feedsim.report.bode import Column, Curve, Ordinate, at, bode, phases, size
+from feedsim.report.bode_plots import loop_pictures, scale_pictures, speed_reference_pictures
+from feedsim.report.frf_plots import curves_of, most_marked, pictures_of
+from feedsim.report.style import drawing, finish
+from feedsim.report.truncation_plots import truncation_pictures
+from feedsim.structure import Modes, checked_modes
+from feedsim.trace.response import FrequencyResponse
+from frf_helpers import responses
+from scenario_helpers import default_machine
+
+F = np.geomspace(1.0, 1000.0, 400)
+DELAYED = np.exp(-2j * np.pi * F * 4e-3)  # phase to -1440 deg
+
+
+def closed(values: Any, frequency: Any = F) -> Curve:
+    return Curve("closed form", "closed form", frequency, np.asarray(values, dtype=complex))
+
+
+def drawn(curves: list[Curve], ordinate: Ordinate | None = None, **options: Any) -> Any:
+    with drawing(9.0, 6.0) as figure:
+        (panels,) = bode(figure, [Column("Axis Z", curves)], ordinate or Ordinate("dB"), **options)
+        figure.draw_without_rendering()
+    return panels
+
+
+# -- curves ------------------------------------------------------------------------------------------------------------
+
+
+def test_magnitude_is_in_decibel_or_in_a_unit_of_its_own() -> None:
+    assert Ordinate("x").of(np.array([1.0, 10.0, 1j])) == pytest.approx([0, 20, 0])
+    assert Ordinate("x", decibel=False, scale=1e6).of(np.array([2e-6j])) == pytest.approx([2.0])
+    assert Ordinate("x").of(np.array([0.0])) == pytest.approx([-400.0])
+
+
+def test_phase_of_points_follows_the_branch_of_the_line() -> None:
+    line = closed(DELAYED)
+    rows = slice(3, None, 40)
+    points = Curve("measured", "measured", F[rows], DELAYED[rows])
+    assert phases(line, None)[-1] == pytest.approx(-1440, abs=1e-6)
+    assert phases(points, line) == pytest.approx(-360 * F[rows] * 4e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize(("start", "shown"), [(-180.0, 180.0), (-170.0, -170.0), (190.0, -170.0), (180.0, 180.0)])
+def test_phase_begins_between_plus_and_minus_180(start: float, shown: float) -> None:
+    values = np.exp(1j * np.radians([start, start - 1.0]))
+    assert phases(closed(values, np.array([1.0, 2.0])), None)[0] == pytest.approx(shown, abs=1e-9)
+
+
+def test_values_between_samples() -> None:
+    curve = closed((2j * np.pi * F) ** -1.0)
+    assert at(curve, 33.3) == pytest.approx(1 / (2j * np.pi * 33.3), rel=1e-9)
+
+
+def test_points_of_low_coherence_are_faded_and_do_not_set_the_scale() -> None:
+    coherence = np.where(F < 10, 0.5, 0.999)
+    values = np.where(F < 10, 1e6, 1.0)
+    panels = drawn([Curve("measured", "measured", F, values + 0j, coherence)])
+    sure, faded = panels.magnitude.lines
+    assert (sure.get_alpha(), len(sure.get_xdata())) == (None, int((F >= 10).sum()))
+    assert faded.get_alpha() < 0.5
+    assert len(faded.get_xdata()) == int((F < 10).sum())
+    assert panels.magnitude.get_ylim()[1] < 20
+    assert panels.coherence.get_ylim()[1] > 1
+
+
+def test_each_kind_has_its_own_look() -> None:
+    kinds = [closed(DELAYED), Curve("measured", "m", F, DELAYED), *(Curve("overlaid", n, F, DELAYED) for n in "ab")]
+    lines = drawn(kinds).magnitude.lines
+    assert len({(line.get_color(), line.get_linestyle(), line.get_marker()) for line in lines}) == 4
+    assert [line.get_marker() == "None" for line in lines] == [True, False, True, True]
+
+
+def test_phase_ends_where_the_magnitude_falls_below_the_floor_for_good() -> None:
+    values = 1 / (1 + (F / 10) ** 4) + 0j
+    panels = drawn([closed(values)], floor=-40.0)
+    phase = panels.phase.lines[0].get_ydata()
+    assert np.array_equal(np.isfinite(phase), 20 * np.log10(np.abs(values)) >= -40)
+    assert panels.magnitude.get_ylim()[0] > -50
+
+
+def test_only_what_is_asked_for_is_shown() -> None:
+    panels = drawn([closed(DELAYED), Curve("overlaid", "far", F + 5000, DELAYED)], span=(2.0, 50.0))
+    (line,) = panels.magnitude.lines
+    assert line.get_xdata().min() >= 2.0
+    assert line.get_xdata().max() <= 50.0
+    assert panels.magnitude.get_xlim() == (2.0, 50.0)
+    # ticks of the phase that is seen, not of the 1440 degrees that are not
+    assert np.diff(panels.phase.get_yticks())[0] <= 15
+
+
+@pytest.mark.parametrize("delay", [0.0, 1e-4, 1e-3, 1e-2, 5e-2])
+def test_phase_ticks_are_round_angles_and_few(delay: float) -> None:
+    axes = drawn([closed(np.exp(-2j * np.pi * F * delay))]).phase
+    low, high = axes.get_ylim()
+    ticks = [tick for tick in axes.get_yticks() if low <= tick <= high]
+    assert 1 <= len(ticks) <= 10
+    assert all(tick % 15 == 0 for tick in ticks)
+
+
+# -- marks -------------------------------------------------------------------------------------------------------------
+
+
+def looked_at(monkeypatch: pytest.MonkeyPatch, module: Any) -> list[Any]:
+    figures = []
+
+    def look(figure: Any, *rest: str) -> Any:
+        figure.draw_without_rendering()
+        figures.append(figure)
+        return finish(figure, *rest)
+
+    monkeypatch.setattr(module, "finish", look)
+    return figures
+
+
+def words(figure: Any) -> str:
+    return "\n".join(text.get_text() for axes in figure.axes for text in axes.texts)
+
+
+def test_first_and_last_crossing_are_marked_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    figures = looked_at(monkeypatch, bode_plots)
+    curve = closed(1 / (1 + 1j * F / 20))
+    speed_reference_pictures({"Z": [curve]}, {"Z": Bandwidth(21.0, 427.0)}, None)
+    speed_reference_pictures({"Z": [curve]}, {"Z": Bandwidth(21.0, 21.0)}, None)
+    speed_reference_pictures({"Z": [curve]}, {"Z": Bandwidth(math.nan, math.nan)}, None)
+    assert "first 21 Hz" in words(figures[0])
+    assert "last 427 Hz" in words(figures[0])
+    dots = [line.get_xydata()[0].tolist() for line in figures[0].axes[0].lines if line.get_marker() == "o"]
+    assert dots == [[21.0, -3.0], [427.0, -3.0]]
+    assert words(figures[1]) == "−3 dB at 21 Hz"
+    assert words(figures[2]) == "stays above −3 dB"
+
+
+def test_margins_are_drawn_from_the_curve_to_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An integrator with a delay T: crosses 1 at 10 Hz, -180 deg at 1/(4 T)."""
+    T = 2e-3
+    gain = (10 / (1j * F)) * np.exp(-2j * np.pi * F * T)
+    margin = 90 - 360 * 10 * T
+    margins = Margins((GainCrossing(125.0, 12.5),), (PhaseCrossing(10.0, margin),))
+    figures = looked_at(monkeypatch, bode_plots)
+    loop_pictures({"Z": [closed(gain)]}, {"Z": margins}, "speed", None)
+    magnitude, phase = figures[0].axes
+    assert f"phase margin {margin:.0f}° at 10 Hz" in words(figures[0])
+    assert "gain margin 21.9 dB at 125 Hz" in words(figures[0])
+    (stretch,) = [line for line in magnitude.lines if len(line.get_xdata()) == 2 and line.get_xdata()[0] == 125.0]
+    assert stretch.get_ydata() == pytest.approx([-21.94, 0.0], abs=0.01)
+    (stretch,) = [line for line in phase.lines if len(line.get_xdata()) == 2 and line.get_xdata()[0] == 10.0]
+    assert stretch.get_ydata() == pytest.approx([-180 + margin, -180.0], abs=0.05)  # interpolated between samples
+
+
+def test_pairs_annotated_are_the_first_and_the_most_marked_within_the_band() -> None:
+    def pair(low: float, high: float, rise: float) -> Pair:
+        return Pair(Extreme(low, 0.0), Extreme(high, rise))
+
+    pairs = [
+        pair(5, 6, 50),
+        pair(20, 22, 1),
+        pair(40, 41, 2),
+        pair(119, 132, 25),
+        pair(135, 140, 20),
+        pair(175, 188, 18),
+    ]
+    chosen = most_marked([*pairs, pair(400, 500, 30), pair(800, 1100, 40)], (10.0, 1000.0))
+    assert [p.resonance.frequency for p in chosen] == [22, 500, 132, 188]
+
+
+# -- pictures ----------------------------------------------------------------------------------------------------------
+
+
+def test_all_pictures_of_a_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    figures = looked_at(monkeypatch, bode_plots)
+    pictures = pictures_of(responses(("X", "Z"), tool=True))
+    assert [p.stem for p in pictures] == [
+        "speed-controlled-system", "inertia-view", "speed-reference", "speed-loop", "position-reference",
+        "position-loop", "scale-response", "tool-compliance",
+    ]  # fmt: skip
+    for figure, picture in zip(figures, pictures, strict=True):
+        assert picture.caption
+        for axes in figure.axes:
+            assert axes.get_xscale() == "log"
+            room = axes.get_window_extent()
+            for text in axes.texts:
+                extent = text.get_window_extent()
+                inside = extent.x0 >= room.x0 - 1 and extent.y0 >= room.y0 - 1 and extent.y1 <= room.y1 + 1
+                assert inside, f"{picture.stem}: {text.get_text()!r} leaves its axes"
+            labels = [label for label in axes.get_yticklabels() if label.get_text() and label.get_visible()]
+            boxes = [label.get_window_extent() for label in labels]
+            visible = sorted((box for box in boxes if room.y0 <= (box.y0 + box.y1) / 2 <= room.y1), key=lambda b: b.y0)
+            for below, above in pairwise(visible):
+                assert below.y1 <= above.y0 + 1, f"{picture.stem}: tick labels touch"
+    # one column per axis or direction: labelled ordinates stand on the left
+    assert figures[0].axes[0].get_ylabel()
+    assert figures[-1].axes[0].get_ylabel() == "$|x_{tool}/F|$ [µm/N]"
+
+
+def test_a_machine_of_five_axes_gets_two_pictures_per_quantity() -> None:
+    columns = {axis: [closed(1e-6 / F)] for axis in "XYZBC"}
+    assert [p.stem for p in scale_pictures(columns, None)] == ["scale-response-X-Y-Z", "scale-response-B-C"]
+    assert size([Column("", [])] * 3)[0] > size([Column("", [])] * 1)[0]
+
+
+def test_closed_form_alone_has_no_panel_of_coherence() -> None:
+    both, alone = (pictures_of(responses(measured=m))[0] for m in (True, False))
+    assert "Points: measured" in both.caption
+    assert "Points" not in alone.caption
+    assert len(curves_of(responses(), "Z.n_a/Z.M_a")) == 2
+    assert len(curves_of(responses(measured=False), "Z.n_a/Z.M_a")) == 1
+
+
+def test_a_curve_laid_over_belongs_to_its_response() -> None:
+    own = FrequencyResponse(F, {"Z.n_a/Z.n_s": DELAYED}, {"Z.n_a/Z.n_s": "1"})
+    with_overlay = responses(overlays=(Overlay("Z.n_a/Z.n_s", Path("folder") / "bench.csv", own),))
+    kinds = [(curve.kind, curve.label) for curve in curves_of(with_overlay, "Z.n_a/Z.n_s")]
+    assert kinds == [("closed form", "closed form"), ("measured", "measured"), ("overlaid", "bench.csv")]
+    assert all(curve.kind != "overlaid" for curve in curves_of(with_overlay, "Z.n_a/Z.M_a"))
+
+
+# -- full and reduced models -------------------------------------------------------------------------------------------
+
+
+def reduced(modes: Modes, cutoff: float) -> Modes:
+    kept = modes.frequency < cutoff
+    ports = {name: values[kept] for name, values in modes.ports.items()}
+    return Modes(modes.file, modes.frequency[kept], modes.damping[kept], ports)
+
+
+def test_structure_responses_are_the_modal_sum() -> None:
+    modes = checked_modes(default_machine())
+    f = np.array([3.0, 120.0, 700.0])
+    found = structure_responses(modes, ("X", "Y", "Z"), f)
+    s = 2j * np.pi * f[:, None]
+    omega, zeta = 2 * np.pi * modes.frequency, modes.damping
+    modal = 1 / (s**2 + 2 * zeta * omega * s + omega**2)
+    n, x, tcp = (modes.ports[port] for port in ("n_Z", "x_Z", "tcp_X"))
+    assert found["Z.n_a/Z.M_a"] == pytest.approx((s * modal) @ (n * n), rel=1e-9)
+    # at 700 Hz large terms cancel to a small sum
+    assert found["Z.x_a/Z.M_a"] == pytest.approx(modal @ (n * x), rel=1e-9)
+    assert found["tool.x_X/tool.F_X"] == pytest.approx(modal @ (tcp * tcp), rel=1e-9)
+
+
+def test_deviations_tell_what_was_dropped() -> None:
+    modes = checked_modes(default_machine())
+    f = grid(modes, 1.0, 600.0)
+    full, part = (structure_responses(m, ("X", "Y", "Z"), f) for m in (modes, reduced(modes, 600.0)))
+    figures = deviations({"reduced": part, "the same": full}, full, 600.0)
+    assert figures["Z.n_a/Z.M_a the same.to_cutoff"].value == 0
+    below, whole = (figures[f"X.x_a/X.M_a reduced.{key}"].value for key in ("below", "to_cutoff"))
+    assert 0 < below < whole
+    ratio = np.abs(20 * np.log10(np.abs(part["X.x_a/X.M_a"] / full["X.x_a/X.M_a"])))
+    assert whole == pytest.approx(ratio.max(), rel=1e-12)
+    assert below == pytest.approx(ratio[f <= 540].max(), rel=1e-12)
+
+
+def test_pictures_of_full_and_reduced_models(monkeypatch: pytest.MonkeyPatch) -> None:
+    figures = looked_at(monkeypatch, truncation_plots)
+    modes = checked_modes(default_machine())
+    tables = {"full": modes, "reduced": reduced(modes, 600.0), "with static correction": modes}
+    pictures = truncation_pictures(tables, ("X", "Y", "Z"), np.geomspace(1, 900, 300), 600.0)
+    assert [p.stem for p in pictures] == ["truncation-n_M", "truncation-x_M", "truncation-tool"]
+    for figure in figures:
+        above, below = figure.axes[0], figure.axes[3]
+        assert [line.get_label() for line in above.lines][:3] == ["full", "reduced", "with static correction"]
+        assert below.get_yscale() == "log"
+        labels = above.get_legend().get_window_extent()
+        assert labels.x1 <= figure.axes[1].get_window_extent().x0, "legend runs into the next column"

@@ -1,0 +1,314 @@
+"""feedsim frf as a user meets it: what it writes, that it agrees with itself, messages and exit codes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_report import Page
+
+from feedsim import report
+from feedsim.analysis import Figure
+from feedsim.analysis.campaign import Plan, signal_of
+from feedsim.analysis.responses import Responses, frequencies, names, one, read_overlays, unit_of
+from feedsim.errors import InputError, OutputError
+from feedsim.report import frf_write
+from feedsim.report.bode_plots import speed_controlled_pictures
+from feedsim.report.frf_page import page
+from feedsim.report.frf_plots import curves_of
+from feedsim.report.style import Picture
+from feedsim.scenario import load_machine, load_subject
+from feedsim.structure import checked_modes
+from feedsim.trace.response import FrequencyResponse
+from feedsim.trace.response_csv import read_response_csv, write_response
+from frf_helpers import responses, subject
+from report_helpers import contents
+from scenario_helpers import MACHINE, default_machine
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENARIO = ROOT / "scenarios" / "z_positioning.yaml"
+
+
+def feedsim(*words: str | Path, fmus: Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from feedsim.cli import entry; entry()", *map(str, words)]
+    environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master"), "PYTHONUTF8": "1"}
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, encoding="utf-8", check=False)
+
+
+@pytest.fixture(scope="module")
+def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[subprocess.CompletedProcess[str], Path]:
+    """One run from a scenario with a setting, measured, with a curve laid over."""
+    folder = tmp_path_factory.mktemp("frf")
+    f = np.array([20.0, 60.0, 180.0])
+    bench = FrequencyResponse(f, {"bench": 1e3 / (1j * f)}, {"bench": "rpm/(N.m)"})
+    write_response(folder / "bench.csv", bench)
+    words = [
+        "--axes",
+        "Z",
+        "--no-tool",
+        "--band",
+        "2Hz..600Hz",
+        "--settle",
+        "1",
+        "--set",
+        "machine.axes.Z.drive.K_v=50 1/s",
+    ]
+    overlay = ["--overlay", "bench.csv:Z.n_a/Z.M_a"]
+    return feedsim("frf", SCENARIO, "--out", "out", *words, *overlay, fmus=fmus, cwd=folder), folder
+
+
+def summary_of(folder: Path) -> dict[str, Any]:
+    text = (folder / "out" / "summary.json").read_text(encoding="utf-8")
+    content: dict[str, Any] = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    return content
+
+
+def test_everything_is_written_and_told(done: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+    process, folder = done
+    assert (process.returncode, process.stderr) == (0, "")
+    first, of_axis = process.stdout.splitlines()
+    assert first.endswith(f"frequency responses -> {Path('out') / 'report.html'}")
+    assert of_axis.startswith("  Z: speed loop -3 dB first 71.7 Hz, last 208 Hz, margins 64 deg, ")
+    files = set(contents(folder / "out"))
+    assert {"frf.csv", "frf_measured.csv", "summary.json", "report.html", "figures/speed-reference.png"} <= files
+    assert set(summary_of(folder)["files"]) == files
+
+
+def test_curves_can_be_read_back(done: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+    folder = done[1] / "out"
+    closed, measured = (read_response_csv(folder / name) for name in ("frf.csv", "frf_measured.csv"))
+    assert closed.names == names(("Z",), tool=False)
+    assert measured.names == ("Z.n_a/Z.M_a", "Z.x_a/Z.M_a", "Z.n_a/Z.n_s")
+    assert 2.0 <= measured.frequency[0] < 2.5
+    assert 599 < measured.frequency[-1] <= 600
+    assert closed.frequency[-1] == pytest.approx(1200.0)
+    assert all(measured.coherence[name].min() > 0.99 for name in measured)
+    # From one grid to the other: interpolated over lg f in steps h of a third of the damping ratio. Midway at a peak or
+    # dip of ratio zeta, where lg of the magnitude bends by 1/zeta^2, that is off by (h/zeta)^2/8: 0.12 dB.
+    limit = 20 / np.log(10) / 9 / 8
+    at = closed.select(["Z.n_a/Z.M_a"]).at(measured.frequency)["Z.n_a/Z.M_a"]
+    assert np.max(np.abs(20 * np.log10(np.abs(at / measured["Z.n_a/Z.M_a"])))) < limit
+
+
+def test_summary_tells_figures_inputs_and_excitation(done: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+    summary = summary_of(done[1])
+    figures = summary["figures"]
+    assert figures["Z.speed.bandwidth_first"]["unit"] == "Hz"
+    # exact against exact: what is left is rounding, seen through 60 dB of response
+    assert figures["Z.n_M.measured_magnitude"]["value"] < 1e-3
+    assert figures["Z.n_n.measured_phase"]["value"] < 1e-2
+    assert figures["Z.n_M.measured_share"]["value"] == 100
+    assert "5 to 500 Hz" in figures["Z.n_M.measured_magnitude"]["meaning"]
+    assert not any(name.startswith(("X.", "Y.", "tool.")) for name in figures)
+    assert summary["subject"]["overrides"] == ["machine.axes.Z.drive.K_v=50 1/s"]
+    assert summary["machine"]["axes"]["Z"]["drive"]["K_v"]["value"] == 50
+    assert summary["measurement"]["excited"]["Z.n_add"]["rms"]["unit"] == "rad/s"
+    assert summary["measurement"]["friction"] is False
+    assert summary["units"]["plant"]["guid"]
+    assert {"python", "numpy", "feedsim"} <= set(summary["software"])
+    files = {item["role"]: (item["name"], item["sha256"]) for item in summary["inputs"]}
+    assert list(files) == ["scenario", "machine", "modes", "overlay"]
+    digest = hashlib.sha256((done[1] / "bench.csv").read_bytes()).hexdigest()
+    assert files["overlay"] == ("bench.csv", digest)
+    assert summary["overlays"] == [{"response": "Z.n_a/Z.M_a", "file": "bench.csv", "unit": "(rad/s)/(N.m)"}]
+    assert str(done[1]) not in json.dumps(summary)
+
+
+def test_page_is_self_contained_and_says_that_numbers_are_synthetic(
+    done: tuple[subprocess.CompletedProcess[str], Path],
+) -> None:
+    text = (done[1] / "out" / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert "script" not in page.tags
+    assert all(r.startswith(("#", "data:image/png;base64,")) for r in page.references)
+    assert len(page.ids) == len(set(page.ids))
+    words = " ".join(page.words)
+    assert "Synthetic machine" in words
+    assert "Measured against closed form" in words
+    assert "multisine into n_add" in words
+    assert "bench.csv" in words
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--axes", "X,Q"], ["no axis 'Q'", "X, Y, Z"]),
+        (["--band", "5"], ["--band 5", "1Hz..1000Hz"]),
+        (["--band", "0Hz..100Hz"], ["band 0 to 100 Hz", "above 0"]),
+        (["--band", "1Hz..9kHz"], ["9000 Hz", "half the sampling rate"]),
+        (["--band", "1Hz..2mm"], ["--band 2mm", "length"]),
+        (["--amplitude", "3 N.m"], ["--amplitude 3 N.m", "torque"]),
+        (["--offset-speed", "5"], ["--offset-speed 5", "no unit"]),
+        (["--periods", "0"], ["--periods 0", "at least 1"]),
+        (["--set", "axes.Z.drive.K_q=3"], ["unknown key 'K_q'", "axes.Z.drive"]),
+        (["--set", "machine.axes.Z.drive.K_v=-1 1/s"], ["K_v", "-1 1/s", "at least 0"]),
+        (["--overlay", "none.csv"], ["none.csv"]),
+    ],
+)
+def test_wrong_input_ends_with_2_and_nothing_written(
+    words: list[str], told: list[str], fmus: Path, tmp_path: Path
+) -> None:
+    process = feedsim("frf", MACHINE, "--out", "out", *words, fmus=fmus, cwd=tmp_path)
+    assert process.returncode == 2, process.stderr
+    assert "Traceback" not in process.stderr
+    for word in told:
+        assert word in process.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_written_is_found_before_the_work(fmus: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    process = feedsim("frf", MACHINE, "--out", "out", fmus=fmus, cwd=tmp_path)
+    assert process.returncode == 4, process.stderr
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_friction_at_standstill_is_warned_of(fmus: Path, tmp_path: Path) -> None:
+    words = ["--axes", "Z", "--no-tool", "--friction", "--realisations", "1", "--settle", "1", "--band", "20Hz..200Hz"]
+    process = feedsim("frf", MACHINE, "--out", "out", *words, "--quiet", fmus=fmus, cwd=tmp_path)
+    assert (process.returncode, process.stdout) == (0, "")
+    assert "warning: axis Z stands still with friction on" in process.stderr
+    assert "stands still with friction on" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_unstable_loops_are_told_and_not_measured(fmus: Path, tmp_path: Path) -> None:
+    words = ["--axes", "Z", "--no-tool", "--set", "axes.Z.drive.K_v=700 1/s", "--out", "out"]
+    process = feedsim("frf", MACHINE, *words, fmus=fmus, cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    assert "warning: the control loops are unstable" in process.stderr
+    assert "UNSTABLE" in process.stdout
+    assert not (tmp_path / "out" / "frf_measured.csv").exists()
+
+
+# -- parts -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_machine_is_told_from_a_scenario_by_its_keys() -> None:
+    by_folder, by_file = load_subject(MACHINE), load_subject(MACHINE / "machine.yaml")
+    assert by_folder.kind == by_file.kind == "machine"
+    assert [role for role, _ in by_file.files] == ["machine", "modes"]
+    by_scenario = load_subject(SCENARIO, ["machine.axes.Z.drive.K_p=5 N.m.s/rad"])
+    assert (by_scenario.kind, by_scenario.name) == ("scenario", "Z positioning")
+    assert by_scenario.machine.axes["Z"].drive.K_p == 5
+    assert [role for role, _ in by_scenario.files] == ["scenario", "machine", "modes"]
+
+
+def test_settings_of_a_machine_file() -> None:
+    for key in ("axes.*.drive.K_v", "machine.axes.*.drive.K_v"):
+        machine = load_machine(MACHINE, [f"{key}=10 1/s"])
+        assert {axis.drive.K_v for axis in machine.axes.values()} == {10.0}
+    with pytest.raises(InputError, match=r"2 problems[\s\S]*unknown key 'axis' in the machine[\s\S]*KEY=VALUE"):
+        load_machine(MACHINE, ["axis.Z=1", "nothing"])
+
+
+def test_names_of_responses() -> None:
+    machine = default_machine()
+    modes = checked_modes(machine)
+    assert frequencies(machine, modes, (1.0, 1000.0))[[0, -1]] == pytest.approx([1, 2000])
+    assert frequencies(machine, modes, (1.0, 3000.0))[-1] == pytest.approx(3996)
+    assert unit_of("Z.x_a/Z.M_a") == "m/(N.m)"
+    assert unit_of("tool.x_X/tool.F_X") == "m/N"
+    assert unit_of("Z.speed_loop") == "1"
+    with pytest.raises(InputError, match=r"no frequency response 'Z\.n_a'; there are X\.n_a/X\.M_a"):
+        one(responses_system(), "Z.n_a", np.array([1.0]))
+
+
+def responses_system() -> Any:
+    from feedsim.analysis import linear
+
+    machine = default_machine()
+    return linear.LinearSystem(machine, checked_modes(machine))
+
+
+def test_a_binary_sequence_covers_the_band() -> None:
+    machine = default_machine()
+    signal = signal_of(machine, Plan(signal="prbs", band=(1.0, 1000.0)), 2.0, 1)
+    assert signal.frequency[0] <= 1.5
+    assert 998 < signal.frequency[-1] <= 1000
+    assert np.max(np.diff(signal.frequency)) < 2
+    assert signal.rms == pytest.approx(2.0)
+
+
+def test_curves_laid_over_are_converted_or_taken_as_they_are(tmp_path: Path) -> None:
+    known = names(("Z",), tool=True)
+    f = np.array([1.0, 10.0])
+    write_response(tmp_path / "c.csv", FrequencyResponse(f, {"a": [2.0, 4.0]}, {"a": "um/N"}))
+    (overlay,), warnings = read_overlays(f"{tmp_path / 'c.csv'}:tool.x_X/tool.F_X", known)
+    assert overlay.response["tool.x_X/tool.F_X"] == pytest.approx([2e-6, 4e-6])
+    assert (overlay.file, warnings) == (tmp_path / "c.csv", [])
+    write_response(tmp_path / "d.csv", FrequencyResponse(f, {"Z.x_a/Z.M_a": [2.0, 4.0], "other": [1.0, 1.0]}))
+    (overlay,), (warning,) = read_overlays(str(tmp_path / "d.csv"), known)
+    assert overlay.name == "Z.x_a/Z.M_a"
+    assert "has no unit in the file; it is taken to be in m/(N.m)" in warning
+    with pytest.raises(InputError, match=r"holds none of the responses shown, but a\. Say which it is"):
+        read_overlays(str(tmp_path / "c.csv"), known)
+    with pytest.raises(InputError, match="um/N"):
+        read_overlays(f"{tmp_path / 'c.csv'}:Z.n_a/Z.M_a", known)
+
+
+@pytest.fixture
+def one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing is slow, and what is drawn does not matter."""
+
+    def only(found: Responses) -> list[Picture]:
+        return speed_controlled_pictures({"Z": curves_of(found, "Z.n_a/Z.M_a")}, None)
+
+    monkeypatch.setattr(frf_write, "pictures_of", only)
+
+
+@pytest.mark.usefixtures("one_picture")
+def test_a_report_is_replaced_whole(tmp_path: Path) -> None:
+    report.write_frf(subject(), responses(), tmp_path)
+    first = contents(tmp_path)
+    assert "frf_measured.csv" in first
+    (tmp_path / "notes.txt").write_text("mine")
+    report.write_frf(subject(), responses(measured=False), tmp_path)
+    second = contents(tmp_path)
+    assert "frf_measured.csv" not in second, "the curves of an earlier measurement are left"
+    assert set(first) - set(second) == {"frf_measured.csv"}
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    report.write_frf(subject(), responses(measured=False), tmp_path)
+    assert contents(tmp_path) == second
+
+
+@pytest.mark.usefixtures("one_picture")
+def test_nothing_is_left_when_a_picture_cannot_be_moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    report.write_frf(subject(), responses(), tmp_path)
+    before = contents(tmp_path)
+    move = Path.replace
+
+    def failing(self: Path, target: Path) -> Path:
+        if self.name == "report.html" and "fresh" in self.parts:
+            raise OSError(28, "No space left on device")
+        return move(self, target)
+
+    monkeypatch.setattr(Path, "replace", failing)
+    with pytest.raises(OutputError, match="No space left on device"):
+        report.write_frf(subject(), responses(measured=False), tmp_path)
+    assert contents(tmp_path) == before
+
+
+def test_names_and_warnings_cannot_break_the_page() -> None:
+    odd = replace(subject(), name='<script>"&', notes=("a < b",))
+    text = page(odd, responses(warnings=("gain < 1",)), [])
+    parsed = Page(text)
+    assert "script" not in parsed.tags
+    assert text.index("gain &lt; 1") < text.index("a &lt; b") < text.index('class="keys"')
+
+
+@pytest.mark.usefixtures("one_picture")
+def test_figures_that_are_not_determined_are_null_and_said(tmp_path: Path) -> None:
+    found = responses(figures={"Z.speed.bandwidth_first": Figure(float("nan"), "Hz", "m")})
+    report.write_frf(subject(), found, tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["figures"]["Z.speed.bandwidth_first"]["value"] is None
+    assert "not determined" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "-3 dB first - Hz" in report.frf_summary_line(found)

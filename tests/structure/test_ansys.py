@@ -15,6 +15,7 @@ import yaml
 from fe_models import dense_modes
 from scipy import sparse
 
+from feedsim.cli import main
 from feedsim.errors import InputError
 from feedsim.scenario.load import load_structure
 from feedsim.structure.checks import check
@@ -188,3 +189,16 @@ def test_what_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         raise NotImplementedError("Unable to read a lumped mass matrix")
 
     assert "Unable to read a lumped mass matrix; LUMPM,OFF" in fault([1, 2, 3], load_km=lumped)
+
+
+@needs_reader
+def test_the_bundled_file_as_the_documentation_uses_it(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A structure without axes goes through the command."""
+    (model / "structure.yaml").write_text(
+        "kind: ansys\ndamping: {ratio: 2 %}\ncutoff: 6000 Hz\nunits: {length: mm, mass: t}\nfull: file.full\n"
+    )
+    assert main(["machine", "build", str(model), "--out", str(model / "out")]) == 0
+    rows = (model / "out" / "modes.csv").read_text().splitlines()[1:]
+    # the known frequencies have three decimals
+    assert [float(row.split(",")[1]) for row in rows] == pytest.approx([1283.200, 1283.200, 5781.975], abs=1e-3)
+    assert "0 rigid and 3 elastic modes" in capsys.readouterr().out

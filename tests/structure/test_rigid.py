@@ -216,3 +216,17 @@ def test_a_part_that_hangs_loose() -> None:
     )
     with pytest.raises(InputError, match=r"in which no rotor turns; what moves: cover 100 %"):
         solved(wrong)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_structure_without_axes_has_no_rigid_modes(method: str) -> None:
+    model = given()
+    for axis in model.axes:
+        model = stiffened(model, 1e4, model.ports[f"n_{axis}"])
+    without = replace(model, axes=(), ports={port: b for port, b in model.ports.items() if port.startswith("tcp")})
+    frequency = solved(without, method).modes.frequency
+    assert frequency.min() > 0
+    values = np.linalg.eigvals(np.linalg.solve(model.mass.toarray(), model.stiffness.toarray())).real
+    lowest = np.sqrt(np.sort(values)[:20]) / (2 * math.pi)
+    # the general eigensolver's error: rounding of the largest eigenvalue, 1e15, seen at the smallest, 1e4
+    assert frequency[:20] == pytest.approx(lowest, rel=1e-4)

@@ -57,7 +57,7 @@ def check_count(assembly: Assembly, rigid: Floats, elastic: Floats, values: Floa
     Raises:
         InputError: names what moves in each surplus mode, which axis is blocked, and the frequencies.
     """
-    rotors = np.array([assembly.ports[f"n_{axis}"] for axis in assembly.axes])
+    rotors = rotor_rows(assembly.ports, assembly.axes)
     problems = []
     turns = np.array([_turning(rotor, rigid, elastic) for rotor in rotors])
     blocked = [axis for axis, row in zip(assembly.axes, turns, strict=True) if row @ row <= BLOCKED]
@@ -155,4 +155,5 @@ def definite_signs(shapes: Floats, mass_diagonal: Floats) -> Floats:
 
 def rotor_rows(ports: Mapping[str, Floats], axes: tuple[str, ...]) -> Floats:
     """(A, N) port vectors of the rotors, in the order of the axes."""
-    return np.array([ports[f"n_{axis}"] for axis in axes])
+    size = len(next(iter(ports.values())))
+    return np.array([ports[f"n_{axis}"] for axis in axes]).reshape(len(axes), size)

@@ -6,6 +6,7 @@ Functions are called as their header has it, response over reference: "12:+Z/7:+
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim import units
 from feedsim.errors import InputError
 from feedsim.trace.response import FrequencyResponse, quotient_unit
 
@@ -114,7 +116,19 @@ def _frequencies(path: Path, name: str, function: Mapping[str, Any]) -> Floats:
         raise InputError(f"{path}: function {name!r} has {len(data)} values; its header tells {count}")
     if not (np.all(np.isfinite(x)) and np.all(np.isfinite(data))):
         raise InputError(f"{path}: function {name!r} holds a value that is not finite")
-    return x
+    return x * _hertz(path, name, str(function.get("abscissa_axis_units_lab") or "").strip())
+
+
+def _hertz(path: Path, name: str, label: str) -> float:
+    """Factor from the unit that the label of the abscissa names to Hz; without a label it is Hz."""
+    if label.upper() in NONE:
+        return 1.0
+    try:
+        return units.parse(f"1 {label}", "rad/s", "1 Hz") / (2 * math.pi)
+    except InputError:
+        raise InputError(
+            f"{path}: function {name!r} is over a frequency in {label!r}, which is no unit known here; Hz is expected"
+        ) from None
 
 
 def _check_same(path: Path, name: str, frequency: Floats, first: Floats) -> None:

@@ -20,7 +20,7 @@ from feedsim.structure.matrices.raw import DIRECTIONS, Raw
 from feedsim.structure.matrices.sparse import from_triangle
 
 READER = "ansys.mapdl.reader"
-INSTALL = "pip install 'feedsim[ansys]' (or, without its pictures: pip install --no-deps ansys-mapdl-reader)"
+INSTALL = "make ansys (outside a checkout: pip install --no-deps ansys-mapdl-reader)"
 # ANSYS numbers its degrees of freedom UX, UY, UZ, ROTX, ROTY, ROTZ from 1.
 MECHANICAL = range(1, len(DIRECTIONS) + 1)
 

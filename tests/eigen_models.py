@@ -18,6 +18,7 @@ from feedsim.structure.assembly import Assembly
 
 Floats = NDArray[np.float64]
 DATA = Path(__file__).resolve().parent / "structure" / "data" / "test_centre"
+MATRICES = Path(__file__).resolve().parents[1] / "scenarios" / "structures" / "matrix_market"
 TWO_PERCENT = Damping(ratio=0.02)
 # As in the default machine's structure file.
 DEFAULT_DAMPING = Damping.model_validate({"ratio": 0.02, "steps": [{"below": "30 Hz", "ratio": "6 %"}]})
@@ -27,7 +28,7 @@ TOOL = ("tcp_X", "tcp_Y", "tcp_Z")
 @cache
 def given() -> Assembly:
     """The default machine's matrices as another program made them, without geometry."""
-    mass, stiffness = (csc_array(mmread(DATA / f"{name}.mtx")) for name in ("mass", "stiffness"))
+    mass, stiffness = (csc_array(mmread(MATRICES / f"{name}.mtx")) for name in ("mass", "stiffness"))
     size = mass.shape[0]
     ports: dict[str, Floats] = {}
     with (DATA / "port_vectors.csv").open(encoding="utf-8", newline="") as stream:

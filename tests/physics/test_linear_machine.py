@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from pathlib import Path
 
 import numpy as np
@@ -163,13 +162,6 @@ def test_drives_without_control_have_no_loops(machine: Machine, modes: Modes) ->
     assert result.axes["X"].position is None
     assert result.axes["Z"].position is None
     assert "Z.position.crossover" not in linear.figures(result)
-
-
-def test_fast(machine: Machine, modes: Modes) -> None:
-    system = LinearSystem(machine, modes)
-    begun = time.perf_counter()
-    system.at(2j * np.pi * np.geomspace(1.0, 999.0, 400))
-    assert time.perf_counter() - begun < 2.0  # 0.04 s on an idle core
 
 
 # --- the units -------------------------------------------------------------------------------------------------------

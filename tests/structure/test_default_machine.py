@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +19,13 @@ from structure_helpers import GIVEN_POSE, MACHINES, default_structure, dense_mod
 
 Floats = NDArray[np.float64]
 DATA = Path(__file__).resolve().parent / "data" / "test_centre"
+MATRICES = MACHINES.parent / "structures" / "matrix_market"
+# What the given data is must not change with what is computed from it.
+GIVEN = {
+    MATRICES / "mass.mtx": "4506ccbc7ec22ad4ba90f8199a45806bf5ba910d796797d2a3f7d0fd3248db12",
+    MATRICES / "stiffness.mtx": "1e47b8a5c54058edfc6f51f35ab72edfae762dd5eb7b155b001673ffb6574a2a",
+    MACHINES / "test_centre" / "modes.csv": "c556bba2bcbc2a8976c6bb1b51db9412ee3a55b0f37bfbaa824717361aab928e",
+}
 AXES = ("X", "Y", "Z")
 
 
@@ -33,12 +41,17 @@ def modes() -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("name", ["mass", "stiffness"])
 def test_matrices_entry_by_entry(name: str) -> None:
-    given = mmread(DATA / f"{name}.mtx").toarray()
+    given = mmread(MATRICES / f"{name}.mtx").toarray()
     found = getattr(machine(), name)
     assert found.shape == (615, 615)
     assert abs(found - found.T).max() == 0
     # The same sums in another order: rounding of the largest entry.
     assert np.abs(found.toarray() - given).max() <= 1e-14 * np.abs(given).max()
+
+
+def test_the_given_data_is_what_it_was() -> None:
+    for file, digest in GIVEN.items():
+        assert hashlib.sha256(file.read_bytes()).hexdigest() == digest, file
 
 
 def test_port_vectors() -> None:

@@ -18,7 +18,7 @@ from feedsim.structure.assembly import Assembly
 from feedsim.structure.checks import check
 from feedsim.structure.matrices import Imported, assemble, import_model
 
-REFERENCE = Path(__file__).resolve().parent / "data" / "test_centre" / "modes.csv"
+REFERENCE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre" / "modes.csv"
 SHIPPED = STRUCTURES / "matrix_market"
 PORTS = [f"{quantity}_{axis}" for quantity in ("n", "x", "tcp") for axis in "XYZ"]
 

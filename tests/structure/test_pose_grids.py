@@ -218,3 +218,8 @@ def test_a_mass_matrix_that_depends_on_the_pose_is_refused() -> None:
         check_common(assembly, replace(assembly, mass=heavier))
     with pytest.raises(InputError, match="degrees of freedom depend on the pose"):
         check_common(assembly, replace(assembly, labels=("another", *assembly.labels[1:])))
+
+
+def test_reach_of_a_grid_is_the_range_asked_for() -> None:
+    assert grid_axis("Z", 0.06, 0.24, 0.06).reach == (pytest.approx(0.06), pytest.approx(0.24))
+    assert grid_axis("Z", 0.06, 0.24, 1.0).reach == (-math.inf, math.inf)

@@ -99,7 +99,7 @@ def sheet_picture(info: MachineInfo, built: Built, of: Model, scale: float = 1.0
             axes.set_title(f"{k}: {frequency(info, k)}", fontsize=10, pad=16)
             axes.text(0, 1.0, _short(info.moving[k]), transform=axes.transAxes, fontsize=7.5, color=MUTED, va="bottom")
         figure.set_dpi(PNG_DPI)
-        remark(figure, info)
+        remark(figure, info, below=True)
         figure.suptitle(f"{info.title}: the first elastic modes", x=0.015, ha="left", fontsize=12, fontweight="bold")
         caption = (
             "Deflections exaggerated, over the structure at rest in grey; below the frequency the body that has the "
@@ -156,9 +156,10 @@ def mode_heading(figure: Drawing, info: MachineInfo, of: Model, k: int) -> None:
     words.set_in_layout(False)
 
 
-def remark(figure: Drawing, info: MachineInfo) -> None:
-    """What the machine's numbers are worth, in the upper right corner: a picture travels without its page."""
-    words = figure.text(0.99, 0.985, _wrapped(info.note), fontsize=7.5, color=MUTED, ha="right", va="top")
+def remark(figure: Drawing, info: MachineInfo, *, below: bool = False) -> None:
+    """What the machine's numbers are worth, in a corner on the right: a picture travels without its page."""
+    y, side = (0.012, "bottom") if below else (0.985, "top")
+    words = figure.text(0.99, y, _wrapped(info.note), fontsize=7.5, color=MUTED, ha="right", va=side)
     words.set_in_layout(False)
 
 

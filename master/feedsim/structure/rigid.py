@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 # matrices rounding leaves 1e-16, in matrices written as text with 13 digits 1e-13; a mode at 20 Hz of a machine of
 # beams has 1e-5, the first bending of a free rod of 300 elements 1e-9.
 CANCELLED = 1e-12
+# Whatever is slower than this [rad/s], a turn of seventeen minutes, is held by nothing: rounding of large models.
+AT_REST = 2 * math.pi * 1e-3
 # More than the axes have, and the six of a machine that is not held, is not worth looking at one by one.
 LOOKED_AT = 30
 # An axis is blocked where this part or less of its rotor's motion is rigid (an inertia that many times the rotor's).
@@ -44,7 +46,7 @@ def rigid_count(assembly: Assembly, pairs: Eigenpairs) -> int:
     parts = np.einsum("ij,ij->j", abs(shapes), abs(assembly.stiffness) @ abs(shapes))
     if np.any(energy < -CANCELLED * parts):
         raise not_definite(assembly)
-    return int(np.count_nonzero(energy <= CANCELLED * parts))
+    return int(np.count_nonzero((energy <= CANCELLED * parts) | (energy <= AT_REST**2)))
 
 
 def check_count(assembly: Assembly, rigid: Floats, elastic: Floats, values: Floats) -> None:

@@ -258,8 +258,8 @@ def test_deviations_tell_what_was_dropped() -> None:
     f = grid(modes, 1.0, 600.0)
     full, part = (structure_responses(m, ("X", "Y", "Z"), f) for m in (modes, reduced(modes, 600.0)))
     figures = deviations({"reduced": part, "the same": full}, full, 600.0)
-    assert figures["Z.n_a/Z.M_a the same.to_cutoff"].value == 0
-    below, whole = (figures[f"X.x_a/X.M_a reduced.{key}"].value for key in ("below", "to_cutoff"))
+    assert figures["Z.n_M.truncation_the_same"].value == 0
+    below, whole = (figures[f"X.x_M.{key}"].value for key in ("truncation_below", "truncation"))
     assert 0 < below < whole
     ratio = np.abs(20 * np.log10(np.abs(part["X.x_a/X.M_a"] / full["X.x_a/X.M_a"])))
     assert whole == pytest.approx(ratio.max(), rel=1e-12)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.nc.excitation import Excitation, binary_sequence, distinct_lines, multisine
@@ -111,6 +114,25 @@ def test_binary_sequence() -> None:
     amplitudes = np.abs(np.fft.rfft(once))[1:]
     np.testing.assert_allclose(amplitudes, amplitudes.mean(), rtol=1e-10)
     assert np.all(signal.lines % 8 == 0)
+
+
+@pytest.mark.parametrize(("stages", "seeds"), [(6, range(6)), (9, range(1, 9)), (11, (1, 2, 175))])
+def test_binary_sequences_of_other_seeds_are_not_the_same_one_shifted(stages: int, seeds: Iterable[int]) -> None:
+    def once(seed: int) -> NDArray[np.float64]:
+        return binary_sequence(CYCLES, 1.0, stages=stages, seed=seed, band=(0, 3999)).samples[: 2**stages - 1]
+
+    def largest(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+        """Of the cyclic cross-correlation, 1 where one is the other shifted."""
+        return float(np.fft.irfft(np.fft.rfft(a) * np.fft.rfft(b).conj(), len(a)).max()) / len(a)
+
+    signals = [once(seed) for seed in seeds]
+    for signal in signals:
+        assert largest(np.roll(signal, 5), signal) == pytest.approx(1.0)
+        # the spectrum of each is flat still: another sequence of greatest length
+        amplitudes = np.abs(np.fft.rfft(signal))[1:]
+        np.testing.assert_allclose(amplitudes, amplitudes.mean(), rtol=1e-10)
+    for first, second in combinations(signals, 2):
+        assert largest(first, second) < 0.9
 
 
 def test_held_binary_sequence_leaves_out_the_zeros_of_the_hold() -> None:

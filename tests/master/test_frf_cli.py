@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -122,6 +123,55 @@ def test_summary_tells_figures_inputs_and_excitation(done: tuple[subprocess.Comp
     assert str(done[1]) not in json.dumps(summary)
 
 
+def test_truncation_is_told_of_what_is_shown_alone(done: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+    summary = summary_of(done[1])
+    told = {name for name in summary["figures"] if "truncation" in name}
+    ends = ("truncation_below", "truncation", "truncation_below_corrected", "truncation_corrected")
+    assert told == {f"Z.{quantity}.{end}" for quantity in ("n_M", "x_M") for end in ends}
+    pictures = {name for name in summary["files"] if "truncation" in name and name.endswith(".png")}
+    assert pictures == {"figures/truncation-n_M.png", "figures/truncation-x_M.png"}
+    n_M = {end: summary["figures"][f"Z.n_M.{end}"]["value"] for end in ends}
+    assert n_M["truncation_below_corrected"] < n_M["truncation_below"] <= n_M["truncation"]
+
+
+def machine_folder(tmp_path: Path, **replaced: str) -> Path:
+    """A copy of the default machine, the values of some keys of its file replaced."""
+    folder = tmp_path / "machine"
+    shutil.copytree(MACHINE, folder)
+    file = folder / "machine.yaml"
+    lines = file.read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines if line.partition(":")[0] not in replaced]
+    text = [*kept, *(f"{key}: {value}" for key, value in replaced.items())]
+    file.write_text("\n".join(text) + "\n", encoding="utf-8")
+    return folder
+
+
+def test_a_faulty_structure_costs_the_comparison_alone(fmus: Path, tmp_path: Path) -> None:
+    folder = machine_folder(tmp_path, structure="structure.yaml")
+    (folder / "structure.yaml").write_text("bodies: 3\n", encoding="utf-8")
+    words = ["--axes", "Z", "--no-tool", "--no-measure", "--out", "out"]
+    process = feedsim("frf", folder, *words, fmus=fmus, cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    assert "warning: no comparison with the full model: " in process.stderr
+    assert not any("truncation" in name for name in summary_of(tmp_path)["figures"])
+
+
+def test_a_plant_that_follows_the_pose_agrees_with_the_closed_form(fmus: Path, tmp_path: Path) -> None:
+    plant = tmp_path / "machine" / "plant.fmu"
+    folder = machine_folder(tmp_path, plant="plant.fmu")
+    words = ["machine", "pack", MACHINE, "--poses", "Z=60mm..240mm/60mm", "--out", plant]
+    process = feedsim(*words, fmus=fmus, cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    words = ["--axes", "Z", "--no-tool", "--no-full-model", "--settle", "1", "--periods", "1", "--out", "out"]
+    process = feedsim("frf", folder, *words, fmus=fmus, cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    assert "the modes are those of the archive's cell about Z 0.09 m; pose: Z 0.1 m" in process.stderr
+    figures = summary_of(tmp_path)["figures"]
+    # By the table of modes at 100 mm it would be 1.8 dB; what is left is what has not settled.
+    assert figures["Z.n_M.measured_share"]["value"] == 100
+    assert figures["Z.n_M.measured_magnitude"]["value"] < 1e-3
+
+
 def test_page_is_self_contained_and_says_that_numbers_are_synthetic(
     done: tuple[subprocess.CompletedProcess[str], Path],
 ) -> None:
@@ -176,6 +226,7 @@ def test_friction_at_standstill_is_warned_of(fmus: Path, tmp_path: Path) -> None
     process = feedsim("frf", MACHINE, "--out", "out", *words, "--quiet", fmus=fmus, cwd=tmp_path)
     assert (process.returncode, process.stdout) == (0, "")
     assert "warning: axis Z stands still with friction on" in process.stderr
+    assert "the coherence says nothing of what is not linear" in process.stderr
     assert "stands still with friction on" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 

@@ -182,7 +182,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     assert isinstance(part["crossings"], dict)
     assert part["crossings"]["count"] == 2
     far = cosim.run(scenario(Move(to={"Z": 0.4}, feed=0.5), machine=machine))
-    assert "axis Z leaves the plant's grid of poses (0.09 m to 0.21 m) by 190 mm" in "\n".join(far.warnings)
+    assert "axis Z leaves the plant's grid of poses (60 mm to 240 mm) by 160 mm" in "\n".join(far.warnings)
 
 
 # --- the command ------------------------------------------------------------------------------------------------------

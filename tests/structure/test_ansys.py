@@ -118,7 +118,7 @@ def test_without_the_reader_the_message_says_what_to_install(tmp_path: Path, mon
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     for name in [name for name in sys.modules if name.startswith("ansys")]:
         monkeypatch.delitem(sys.modules, name)
-    with pytest.raises(InputError, match=r"ansys-mapdl-reader, which is not installed: pip install 'feedsim\[ansys\]'"):
+    with pytest.raises(InputError, match=r"ansys-mapdl-reader, which is not installed: make ansys"):
         structure(tmp_path)
 
 

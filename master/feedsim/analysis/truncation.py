@@ -5,19 +5,20 @@ The structure alone, continuous: motors give their torque whatever the speed, no
 
 from __future__ import annotations
 
+import glob
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.figures import Figure
 from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, ModalPlant
+from feedsim.errors import InputError
 from feedsim.scenario import Structure
 from feedsim.structure import Modes
 from feedsim.structure.build import assemble
-from feedsim.structure.solve import FULL as LARGEST
 from feedsim.structure.solve import solve
 from feedsim.trace.response import FrequencyResponse
 
@@ -27,6 +28,10 @@ Floats = NDArray[np.float64]
 TRUSTED = 0.9
 
 FULL, REDUCED, CORRECTED = "full", "reduced", "with static correction"
+# All modes of a model are full matrices: 2000 degrees of freedom take some seconds, which a comparison may cost.
+LARGEST = 2000
+QUANTITIES = {"n_M": "{0}.n_a/{0}.M_a", "x_M": "{0}.x_a/{0}.M_a"}  # of an axis: part of a figure's name -> response
+COMPLIANCE = "tool.x_{0}/tool.F_{0}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,23 +50,44 @@ class Truncation:
 def truncation(structure: Structure, pose: Mapping[str, float]) -> Truncation | None:
     """A structure's modes at a pose (axis -> position [m]): all, up to the cut-off, and with static correction.
 
-    None where the model is too large for all of its modes, or has none above the cut-off.
+    None where the model has no modes above the cut-off.
+
+    Raises:
+        InputError: more than LARGEST degrees of freedom, and what build.assemble and solve.solve refuse.
+        FeedsimError: as solve.solve.
     """
     assembly, _ = assemble(structure, pose)
-    if assembly.mass.shape[0] > LARGEST:
-        return None
-    reduced = solve(assembly, cutoff=structure.cutoff, damping=structure.damping)
-    if not reduced.dropped:
-        return None
+    size = assembly.mass.shape[0]
+    if size > LARGEST:
+        raise InputError(
+            f"{assembly.name}: all modes of {size} degrees of freedom would be needed; it is done up to {LARGEST}"
+        )
     corrected = solve(assembly, cutoff=structure.cutoff, damping=structure.damping, static_correction=True)
+    if not corrected.dropped:
+        return None
     full = solve(assembly, cutoff=math.inf, damping=structure.damping)
-    tables = {FULL: full.modes, REDUCED: reduced.modes, CORRECTED: corrected.modes}
+    kept = len(corrected.modes.frequency) - corrected.corrections  # the pseudo-modes come last
+    tables = {FULL: full.modes, REDUCED: _first(corrected.modes, kept), CORRECTED: corrected.modes}
     return Truncation(tables, structure.cutoff / (2 * math.pi))
 
 
-def figures(found: Truncation, axes: Sequence[str], frequency: Floats) -> dict[str, Figure]:
-    """Largest deviations of the reduced tables from the full one over `frequency` (F,) [Hz]; see deviations()."""
-    responses = {name: structure_responses(modes, axes, frequency) for name, modes in found.tables.items()}
+def figures(
+    found: Truncation, axes: Sequence[str], frequency: Floats, *, shown: Sequence[str] | None = None, tool: bool = True
+) -> dict[str, Figure]:
+    """Largest deviations of the reduced tables from the full one over `frequency` (F,) [Hz]; see deviations().
+
+    Args:
+        axes: of the machine, in its order.
+        shown: those of them that are reported; None: all.
+        tool: with the compliance at the tool.
+    """
+    chosen = [response.format(axis) for axis in shown or axes for response in QUANTITIES.values()]
+    if tool:
+        chosen += [COMPLIANCE.format(direction) for direction in TOOL_DIRECTIONS]
+    responses = {
+        name: structure_responses(modes, axes, frequency).select([glob.escape(each) for each in chosen])
+        for name, modes in found.tables.items()
+    }
     full = responses.pop(FULL)
     return deviations(responses, full, found.cutoff)
 
@@ -91,16 +117,37 @@ def deviation(response: FrequencyResponse, full: FrequencyResponse, name: str) -
 def deviations(responses: Mapping[str, FrequencyResponse], full: FrequencyResponse, cutoff: float) -> dict[str, Figure]:
     """Largest deviations from the full model in dB, below TRUSTED of the cut-off [Hz] and up to it.
 
-    Names are "RESPONSE MODEL.below" and "RESPONSE MODEL.to_cutoff", such as "Z.n_a/Z.M_a reduced.below".
+    Names are "Z.n_M.truncation_below" and "Z.n_M.truncation" of the reduced table, "Z.n_M.truncation_below_corrected"
+    and "Z.n_M.truncation_corrected" of that with static correction, "tool.compliance_X.truncation" at the tool.
     """
     found = {}
     for model, response in responses.items():
         for name in full:
             size = np.abs(deviation(response, full, name))
-            for key, limit in (("below", TRUSTED * cutoff), ("to_cutoff", cutoff)):
+            for key, limit in (("truncation_below", TRUSTED * cutoff), ("truncation", cutoff)):
                 within = full.frequency <= limit
                 largest = float(size[within].max()) if within.any() else np.nan
-                found[f"{name} {model}.{key}"] = Figure(
+                found[f"{_key(name)}.{key}{_suffix(model)}"] = Figure(
                     largest, "dB", f"largest deviation of {name}, {model}, from the full model up to {limit:g} Hz"
                 )
     return found
+
+
+def _key(name: str) -> str:
+    """First part of a figure's name for a response: "Z.n_M", "tool.compliance_X"."""
+    axis = name.partition(".")[0]
+    for key, response in QUANTITIES.items():
+        if name == response.format(axis):
+            return f"{axis}.{key}"
+    return f"tool.compliance_{name[-1]}"
+
+
+def _suffix(model: str) -> str:
+    known = {REDUCED: "", CORRECTED: "_corrected"}
+    return known.get(model, f"_{model.replace(' ', '_')}")
+
+
+def _first(modes: Modes, count: int) -> Modes:
+    """The first `count` modes of a table."""
+    ports = {port: shape[:count] for port, shape in modes.ports.items()}
+    return replace(modes, frequency=modes.frequency[:count], damping=modes.damping[:count], ports=ports)

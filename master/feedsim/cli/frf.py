@@ -20,6 +20,10 @@ DESCRIPTION = """Frequency responses of a machine's feed drives: speed-controlle
 response of the speed controller, position loop, loop gains with their margins, x/M, and the compliance at the tool. In
 closed form and, friction off, measured on the units with a multisine or a binary sequence."""
 REALISATIONS_WITH_FRICTION = 4
+ONE_REALISATION = (
+    "measured with friction and one realisation: every period is alike, so that the coherence says nothing of what is "
+    "not linear; take more realisations"
+)
 EPILOG = """examples:
   feedsim frf scenarios/machines/test_centre --axes X,Z --out results/frf
   feedsim frf scenarios/xz_circle.yaml --set "machine.axes.Z.drive.K_p=4 N.m.s/rad" --no-measure
@@ -113,8 +117,9 @@ def frf(options: Namespace) -> None:
     from feedsim import report
     from feedsim.analysis import linear, responses, truncation
     from feedsim.analysis.campaign import run_campaign
+    from feedsim.cosim.plant_modes import plant_modes
     from feedsim.scenario import load_subject
-    from feedsim.structure import checked_modes
+    from feedsim.structure.doubt import table_doubt
 
     subject = load_subject(options.subject, options.overrides)
     machine = subject.machine
@@ -122,10 +127,11 @@ def frf(options: Namespace) -> None:
     plan = _plan(options, machine)
     named = options.subject.stem if options.subject.is_file() else options.subject.resolve().name
     directory: Path = options.out or Path("results") / f"frf_{named}"
-    modes = checked_modes(machine)
+    modes, doubts = plant_modes(machine)
     frequency = responses.frequencies(machine, modes, plan.band)
     wanted = responses.names(axes, tool=options.tool)
     overlays, warnings = _overlays(options.overlays, wanted)
+    warnings += doubts
     report.check_frf_writable(directory)
 
     with _bar(options.quiet) as progress:
@@ -134,9 +140,11 @@ def frf(options: Namespace) -> None:
         result = linear.evaluate(system, axes)
         closed = responses.closed_form(system, wanted, frequency)
         progress("closed form", 1, 1)
+        if (doubt := table_doubt(machine)) is not None:
+            warnings.append(doubt)
         if result.unstable_poles:
             warnings.append(_unstable(result.unstable_poles))
-        full = _full_model(machine, progress) if options.full_model else None
+        full = _full_model(machine, progress, warnings) if options.full_model else None
         campaign = None
         if not (options.no_measure or result.unstable_poles):
             campaign = run_campaign(machine, axes, plan, fmus=options.fmus, progress=progress)
@@ -144,10 +152,12 @@ def frf(options: Namespace) -> None:
     if not options.tool:
         figures = {name: figure for name, figure in figures.items() if not name.startswith("tool.")}
     if full is not None:
-        figures |= truncation.figures(full, tuple(machine.axes), frequency)
+        figures |= truncation.figures(full, tuple(machine.axes), frequency, shown=axes, tool=options.tool)
     if campaign is not None:
         figures |= responses.agreement(system, campaign)
         warnings += campaign.warnings
+        if plan.friction and plan.realisations == 1:
+            warnings.append(ONE_REALISATION)
     found = responses.Responses(
         machine=machine,
         modes=modes,
@@ -168,15 +178,23 @@ def frf(options: Namespace) -> None:
         print(f"{subject.name}: frequency responses -> {directory / 'report.html'}\n{report.frf_summary_line(found)}")
 
 
-def _full_model(machine: Machine, progress: Progress) -> Truncation | None:
-    """The machine's structure with all its modes, where a structure is named."""
+def _full_model(machine: Machine, progress: Progress, warnings: list[str]) -> Truncation | None:
+    """The machine's structure with all its modes, where a structure is named; adds to the warnings why there is none.
+
+    The comparison comes on top of what was asked for: where it cannot be had, the rest is still wanted.
+    """
     from feedsim.analysis.truncation import truncation
+    from feedsim.errors import FeedsimError
     from feedsim.scenario import load_structure
 
     if machine.structure is None:
         return None
     progress("full model", 0, 1)
-    found = truncation(load_structure(machine.structure), machine.pose)
+    found = None
+    try:
+        found = truncation(load_structure(machine.structure), machine.pose)
+    except FeedsimError as error:
+        warnings.append(f"no comparison with the full model: {error}")
     progress("full model", 1, 1)
     return found
 

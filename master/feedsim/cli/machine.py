@@ -12,7 +12,7 @@ from feedsim.cli.machine_info import add_info
 from feedsim.cli.machine_poses import add_poses, write_grid
 from feedsim.cli.machine_show import add_show
 from feedsim.cli.machine_source import Commands, positions
-from feedsim.errors import InputError
+from feedsim.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from feedsim.scenario import Machine
@@ -70,18 +70,23 @@ def pack_machine(options: argparse.Namespace) -> None:
 
     from feedsim import cosim, scenario
     from feedsim.structure import checked_modes
+    from feedsim.structure.doubt import table_doubt
     from feedsim.structure.pack import pack
 
+    if options.out.is_dir():
+        raise OutputError(f"cannot write {options.out}: Is a directory; name the archive, e.g. --out machine.fmu")
     machine = scenario.load_machine(options.machine)
     base = options.base or cosim.fmus_directory() / "plant.fmu"
     pose = pose_of(machine, options.at)
     with tempfile.TemporaryDirectory(prefix="feedsim-") as folder:
         modes = modes_at(machine, pose, Path(folder) / "modes.csv") if options.at else machine.modes
         checked_modes(machine.model_copy(update={"modes": modes}))  # what a run would refuse should not be packed
+        if not options.at and (doubt := table_doubt(machine)) is not None:
+            raise InputError(f"{doubt}, or let the modes be computed: --at")
         poses, follows = None, ""
         if options.poses:
             poses = Path(folder) / "poses.bin"
-            follows = f"; {write_grid(machine, pose, options, poses)}"
+            follows = f"; {write_grid(machine, pose, modes, options, poses)}"
         packed = pack(
             base,
             options.out,

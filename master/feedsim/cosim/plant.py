@@ -9,7 +9,8 @@ from pathlib import Path
 from feedsim.cosim.unit import Archive
 from feedsim.errors import InputError
 from feedsim.scenario import Machine
-from feedsim.structure.pack import MODES_IN_ARCHIVE, pack
+from feedsim.structure.build import SAME_POSITION
+from feedsim.structure.pack import AXES_IN_ARCHIVE, MODES_IN_ARCHIVE, pack
 
 _START = ".x_0"  # of every axis of a plant
 
@@ -57,6 +58,15 @@ def axes_of(archive: Archive) -> tuple[str, ...]:
     return tuple(name.removesuffix(_START) for name in archive.variables if name.endswith(_START))
 
 
+def _packed_pose(archive: Archive) -> dict[str, float]:
+    """Axis -> position [m] that the archive was packed with; empty where that cannot be read: the unit will say."""
+    try:
+        rows = (archive.directory / AXES_IN_ARCHIVE).read_text(encoding="utf-8").splitlines()[1:]
+        return {name: float(position) for name, _, position in (row.partition(",") for row in rows)}
+    except (OSError, ValueError):
+        return {}
+
+
 def _check_own(archive: Archive, machine: Machine) -> None:
     folder = machine.directory if (machine.directory / "machine.yaml").is_file() else "MACHINE"
     pack_anew = f"pack it anew: feedsim machine pack {folder} --out {archive.path}"
@@ -72,6 +82,18 @@ def _check_own(archive: Archive, machine: Machine) -> None:
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
     if inside != outside:
+        packed = _packed_pose(archive)
+        if any(abs(packed.get(axis, position) - position) > SAME_POSITION for axis, position in machine.pose.items()):
+            there, here = (
+                ", ".join(f"{axis} {pose[axis] * 1e3:.9g} mm" for axis in machine.axes if axis in pose)
+                for pose in (packed, machine.pose)
+            )
+            raise InputError(
+                f"{archive.path}: its table of modes is not the machine's, {machine.modes}: it was packed at another "
+                f"pose, {there}, with the modes there; the machine stands at {here}. Give the machine file that pose "
+                f"and the table of modes that belongs to it (feedsim machine build {folder} --at ... --out DIR), or "
+                f"{pack_anew}"
+            )
         raise InputError(
             f"{archive.path}: its table of modes is not the machine's, {machine.modes}: one of them has changed since "
             f"it was packed; {pack_anew}"

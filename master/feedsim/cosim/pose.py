@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from feedsim import units
 from feedsim.cosim.system import System
 from feedsim.nc import Program
 from feedsim.scenario import Machine
+from feedsim.structure.doubt import table_doubt
 from feedsim.structure.pack import POSES_IN_ARCHIVE
-from feedsim.structure.pose_change import PoseChange, pose_change, warnings
+from feedsim.structure.pose_change import NEAR, PoseChange, pose_change, warnings
 from feedsim.structure.poses import GridAxis
 from feedsim.structure.poses_file import read_grid
 
@@ -61,7 +61,9 @@ def pose_use(machine: Machine, program: Program, system: System) -> PoseUse:
     left = tuple(
         sentence for axis in grid if axis.axis in ranges for sentence in _left(axis, ranges[axis.axis], machine)
     )
-    return PoseUse(change, grid, _crossings(system) if grid else None, (*left, *warnings(change)))
+    doubt = table_doubt(machine)
+    doubts = () if doubt is None else (doubt,)
+    return PoseUse(change, grid, _crossings(system) if grid else None, (*doubts, *left, *warnings(change)))
 
 
 def _grid(system: System) -> tuple[GridAxis, ...]:
@@ -74,12 +76,12 @@ def _grid(system: System) -> tuple[GridAxis, ...]:
 def _left(axis: GridAxis, reached: tuple[float, float], machine: Machine) -> list[str]:
     """The outermost cells reach on without end, but their modes are those of their centres."""
     travel = machine.axes[axis.axis].travel
-    first, last = axis.limits
+    first, last = axis.reach
     beyond = max(first - max(reached[0], travel[0]), min(reached[1], travel[1]) - last)
-    if beyond <= axis.width:
+    if beyond <= NEAR:
         return []
     return [
-        f"axis {axis.axis} leaves the plant's grid of poses ({units.show(first, 'm')} to {units.show(last, 'm')}) by "
+        f"axis {axis.axis} leaves the plant's grid of poses ({first * 1e3:.6g} mm to {last * 1e3:.6g} mm) by "
         f"{beyond * 1e3:.4g} mm: the modes there are those of the last cell; pack a wider grid"
     ]
 

@@ -35,6 +35,7 @@ MOST_SAMPLES = 8_000_000  # of a period: 1000 s at 125 us
 FEWEST_STAGES, MOST_STAGES = 3, 20  # of the shift register
 # Lines of a held sequence weaker than this share of its strongest say little: those about a zero of the hold.
 WEAKEST_LINE = 0.1
+MOST_DECIMATIONS = 256  # sequences of a length to choose from
 ROUNDING = 1e-9
 
 
@@ -174,7 +175,9 @@ def binary_sequence(
         band: lines within are told as excited [Hz]; the signal itself has lines beyond.
         stages: of the shift register, 3 to 20.
         hold: chip length in control cycles; the spectrum has its first zero at 1/(hold T_c).
-        seed: of the register's start, hence of the phases.
+        seed: of the sequence and of its start. Seeds that follow one another, up to as many as there are sequences of
+            that length (2 of 3 stages, 176 of 11; here at most MOST_DECIMATIONS), have different polynomials: none is
+            another one shifted.
 
     Raises:
         InputError: an argument out of range, no line in the band.
@@ -197,7 +200,11 @@ def binary_sequence(
     state = np.zeros(stages, dtype=np.int8)
     while not state.any():
         state = random.integers(0, 2, stages, dtype=np.int8)
-    chips = max_len_seq(stages, state=state)[0].astype(np.float64) * 2 - 1
+    sequence = max_len_seq(stages, state=state)[0]
+    # Shifts of one sequence are one signal to the machine, and what is not linear would look alike to all of them.
+    every = _decimations(stages)
+    sequence = sequence[np.arange(len(sequence)) * every[seed % len(every)] % len(sequence)]
+    chips = sequence.astype(np.float64) * 2 - 1
     once = np.repeat(chips - chips.mean(), hold)
     once *= rms / np.sqrt(np.mean(once**2))
     strength = np.abs(np.fft.rfft(once))
@@ -211,6 +218,23 @@ def binary_sequence(
             f"{1 / (length * cycles.T_c):.6g} Hz apart; take more stages"
         )
     return Excitation("binary", _frozen(np.tile(once, repeats)), cycles.T_c, lines.astype(np.int64), seed)
+
+
+def _decimations(stages: int) -> list[int]:
+    """Every how many chips of a maximum-length sequence to take so that other such sequences arise, the first 1.
+
+    Taking every q-th chip, q without a common divisor with the length, gives the sequence of another primitive
+    polynomial, and the same one shifted where q' = 2^i q modulo the length (S. W. Golomb, Shift Register Sequences,
+    Holden-Day 1967): q is the smallest of its class here. At most MOST_DECIMATIONS.
+    """
+    length = 2**stages - 1
+    found: list[int] = []
+    for q in range(1, length, 2):
+        if math.gcd(q, length) == 1 and q == min((q << i) % length for i in range(stages)):
+            found.append(q)
+            if len(found) == MOST_DECIMATIONS:
+                break
+    return found
 
 
 def _compressed(count: int, lines: Integers, random: np.random.Generator) -> Floats:

@@ -51,4 +51,5 @@ def _truncation_pictures(responses: Responses, truncation: Truncation) -> list[P
     frequency = responses.closed.frequency
     within = frequency[(frequency >= low) & (frequency <= max(high, 1.2 * truncation.cutoff))]
     axes = tuple(responses.machine.axes)
-    return truncation_pictures(truncation.tables, axes, within, truncation.cutoff)
+    tool = any(name.startswith("tool.") for name in responses.closed)
+    return truncation_pictures(truncation.tables, axes, within, truncation.cutoff, shown=responses.axes, tool=tool)

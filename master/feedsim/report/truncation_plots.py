@@ -31,7 +31,13 @@ QUANTITIES = (  # stem, title, what is drawn per axis, ordinate
 
 
 def truncation_pictures(
-    tables: Mapping[str, Modes], axes: Sequence[str], frequency: Array, cutoff: float
+    tables: Mapping[str, Modes],
+    axes: Sequence[str],
+    frequency: Array,
+    cutoff: float,
+    *,
+    shown: Sequence[str] | None = None,
+    tool: bool = True,
 ) -> list[Picture]:
     """n/M, x/M and the compliance at the tool of every mode table, and their deviations from the full model.
 
@@ -40,11 +46,16 @@ def truncation_pictures(
         axes: of the machine, in its order.
         frequency: (F,) [Hz].
         cutoff: frequency [Hz] above which modes were dropped, for a mark.
+        shown: axes that are drawn; None: all.
+        tool: with the compliance at the tool.
     """
     responses = {name: structure_responses(modes, axes, frequency) for name, modes in tables.items()}
     pictures = []
     for stem, what, response, ordinate in QUANTITIES:
-        names = list(TOOL_DIRECTIONS) if response.startswith("tool") else list(axes)
+        at_tool = response.startswith("tool")
+        if at_tool and not tool:
+            continue
+        names = list(TOOL_DIRECTIONS) if at_tool else list(shown or axes)
         for k in range(0, len(names), MOST_COLUMNS):
             part = names[k : k + MOST_COLUMNS]
             suffix = "" if len(names) <= MOST_COLUMNS else f"-{'-'.join(part)}"

@@ -81,7 +81,10 @@ def axis_infos(
 
 
 def total_mass(assembly: Assembly) -> float:
-    """Mass of everything [kg], as a translation along X meets it; NaN without geometry."""
+    """Mass of everything [kg], as a translation along X meets it; NaN without geometry.
+
+    A rotor that stands as a mass on a displacement (docs/fe-import.md) counts as the mass that it is in the model.
+    """
     if assembly.geometry is None:
         return math.nan
     dofs = assembly.geometry.dofs[:, 0]
@@ -190,22 +193,29 @@ def info_of_table(
     )
 
 
-def stale(table: Modes, built: Modes) -> str:
+def stale(table: Modes, built: Modes, tolerance: float = SAME) -> str:
     """In words where a table of modes is not what the structure gives at the pose that it belongs to; "" where it is.
 
-    Compared are what the drives see of it: frequencies of modes and inertias of axes.
+    Compared are what the drives see of it: frequencies of modes and inertias of axes. A table may have been cut off
+    elsewhere, and may end in pseudo-modes of a static correction: then the modes that both have count.
+
+    built: modes without pseudo-modes. tolerance: relative [1].
     """
-    if len(table.frequency) != len(built.frequency):
-        return f"it has {len(table.frequency)} modes; the structure gives {len(built.frequency)}"
-    off = np.abs(table.frequency - built.frequency) > SAME * built.frequency
-    if off.any():
-        k = int(np.argmax(off))
-        return f"mode {k} has {table.frequency[k]:.6g} Hz; the structure gives {built.frequency[k]:.6g} Hz"
+    count = min(len(table.frequency), len(built.frequency))
+    whole = len(table.frequency) == len(built.frequency)
+    here, there = table.frequency[:count], built.frequency[:count]
+    off = np.flatnonzero(np.abs(here - there) > tolerance * there)
+    if len(off):
+        k = int(off[0])
+        # At most one pseudo-mode per port, after the modes; one elastic mode at least has to agree for that.
+        corrected = len(table.frequency) - k <= len(table.ports) and bool(np.any(there[:k] > 0))
+        if whole or not corrected:
+            return f"mode {k} has {here[k]:.6g} Hz; the structure gives {there[k]:.6g} Hz"
     for axis in (port.removeprefix("n_") for port in built.ports if port.startswith("n_")):
-        for what, here, there in (
-            ("J_tot", table.J_tot(axis), built.J_tot(axis)),
-            ("J_inf", table.J_inf(axis), built.J_inf(axis)),
-        ):
-            if abs(here - there) > SAME * there:
-                return f"{what} of {axis} is {here:.6g} kg.m2 by it; the structure gives {there:.6g} kg.m2"
+        inertias = [("J_tot", table.J_tot(axis), built.J_tot(axis))]
+        if whole:  # it is a sum over all modes
+            inertias.append(("J_inf", table.J_inf(axis), built.J_inf(axis)))
+        for what, own, other in inertias:
+            if abs(own - other) > tolerance * other:
+                return f"{what} of {axis} is {own:.6g} kg.m2 by it; the structure gives {other:.6g} kg.m2"
     return ""

@@ -14,6 +14,7 @@ from pathlib import Path
 from feedsim.errors import InputError, OutputError
 from feedsim.structure.modes import Modes, write_modes
 
+AXES_IN_ARCHIVE = "resources/axes.csv"
 MODES_IN_ARCHIVE = "resources/modes.csv"
 POSES_IN_ARCHIVE = "resources/poses.bin"
 

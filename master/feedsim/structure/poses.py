@@ -67,6 +67,14 @@ class GridAxis:
         """First and last centre [m]."""
         return float(self.centres[0]), float(self.centres[-1])
 
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Where the first and the last cell end, were they as wide as asked for; of a single cell unlimited [m]."""
+        if len(self.centres) == 1:
+            return -math.inf, math.inf
+        first, last = self.limits
+        return 2 * first - float(self.boundaries[0]), 2 * last - float(self.boundaries[-1])
+
 
 @dataclass(frozen=True, eq=False)
 class Cell:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
-from feedsim.structure.modes import TOOL_PORTS
+from feedsim.structure.modes import TOOL_PORTS, Modes
 from feedsim.structure.poses import Cell, GridAxis, PoseGrid
 from feedsim.trace.files import written_whole
 
@@ -41,19 +41,60 @@ def read_grid(path: Path, axes: Sequence[str]) -> tuple[GridAxis, ...]:
         InputError: it is no such file.
     """
     try:
-        content = path.read_bytes()
-        if not content.startswith(MARK):
-            raise ValueError(f"it does not begin with {MARK.decode()}")
-        numbers = np.frombuffer(content, "<f8", offset=len(MARK))
-        grid, at = [], 3
-        for _ in range(int(numbers[1])):
-            axis, count, hysteresis = int(numbers[at]), int(numbers[at + 1]), float(numbers[at + 2])
-            centres, boundaries = np.split(numbers[at + 3 : at + 3 + 2 * count - 1], [count])
-            grid.append(GridAxis(axes[axis], centres.copy(), boundaries.copy(), hysteresis))
-            at += 3 + 2 * count - 1
+        return _grid(_content(path), axes)[0]
     except (OSError, ValueError, IndexError) as error:
         raise InputError(f"{path}: cannot be read as a grid of poses: {error}") from error
-    return tuple(grid)
+
+
+def read_cell(path: Path, axes: Sequence[str], pose: Mapping[str, float]) -> tuple[Modes, dict[str, float]]:
+    """Modes of the cell that a pose (axis -> position [m]) lies in, and the cell's centre (grid axis -> position [m]).
+
+    It is the cell that the plant starts in: a boundary belongs to the cell below it, the outermost ones have no end.
+
+    Raises:
+        InputError: it is no such file.
+    """
+    try:
+        numbers = _content(path)
+        grid, at = _grid(numbers, axes)
+        cell, centre = 0, {}
+        for axis in grid:
+            k = int(np.searchsorted(axis.boundaries, pose[axis.axis], side="left"))
+            cell = cell * len(axis.centres) + k
+            centre[axis.axis] = float(axis.centres[k])
+        ports = _ports(axes)
+        width = 2 + len(ports)
+        for _ in range(cell):
+            at += 1 + int(numbers[at]) * width
+        count = int(numbers[at])
+        rows = numbers[at + 1 : at + 1 + count * width].reshape(count, width)
+    except (OSError, ValueError, IndexError) as error:
+        raise InputError(f"{path}: cannot be read as a grid of poses: {error}") from error
+    shapes = {port: rows[:, 2 + i].copy() for i, port in enumerate(ports)}
+    return Modes(path, rows[:, 0].copy(), rows[:, 1].copy(), shapes), centre
+
+
+def _content(path: Path) -> Floats:
+    """The numbers of a file."""
+    content = path.read_bytes()
+    if not content.startswith(MARK):
+        raise ValueError(f"it does not begin with {MARK.decode()}")
+    return np.frombuffer(content, "<f8", offset=len(MARK))
+
+
+def _grid(numbers: Floats, axes: Sequence[str]) -> tuple[tuple[GridAxis, ...], int]:
+    """The grid axes, and where the first cell begins."""
+    grid, at = [], 3
+    for _ in range(int(numbers[1])):
+        axis, count, hysteresis = int(numbers[at]), int(numbers[at + 1]), float(numbers[at + 2])
+        centres, boundaries = np.split(numbers[at + 3 : at + 3 + 2 * count - 1], [count])
+        grid.append(GridAxis(axes[axis], centres.copy(), boundaries.copy(), hysteresis))
+        at += 3 + 2 * count - 1
+    return tuple(grid), at
+
+
+def _ports(axes: Sequence[str]) -> list[str]:
+    return [f"n_{axis}" for axis in axes] + list(TOOL_PORTS) + [f"x_{axis}" for axis in axes]
 
 
 def _numbers(poses: PoseGrid) -> Iterator[Floats]:
@@ -75,5 +116,4 @@ def _numbers(poses: PoseGrid) -> Iterator[Floats]:
 def _rows(poses: PoseGrid, cell: Cell) -> Floats:
     """(modes, 2 + 2 A + 3): frequency [Hz], damping ratio, n of all axes, tcp_X, tcp_Y, tcp_Z, x of all axes."""
     modes = cell.modes
-    ports = [f"n_{axis}" for axis in poses.axes] + list(TOOL_PORTS) + [f"x_{axis}" for axis in poses.axes]
-    return np.column_stack([modes.frequency, modes.damping, *(modes.ports[port] for port in ports)])
+    return np.column_stack([modes.frequency, modes.damping, *(modes.ports[port] for port in _ports(poses.axes))])

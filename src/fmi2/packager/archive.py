@@ -39,6 +39,8 @@ def read(path: Path) -> dict[str, bytes]:
 
 def write(path: Path, content: bytes) -> None:
     """Write `content` to `path` in one go: readers see the old file or the new one, never a part."""
+    if path.is_dir():
+        raise OutputError(f"cannot write {path}: Is a directory")
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from feedsim import cosim, scenario
 from feedsim.cosim.unit import Archive, Log, Port, Unit
 from feedsim.scenario import Machine, Scenario, load_structure
-from feedsim.scenario.structure_geometry import GeometryStructure
+from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.modes import TOOL_PORTS, Modes, read_modes
 from feedsim.structure.pack import pack
 from feedsim.structure.poses import PoseGrid, grid_axis, pose_grid

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from feedsim.scenario import load_structure
-from feedsim.scenario.structure_geometry import GeometryStructure
+from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.assembly import Assembly
 
 Floats = NDArray[np.float64]

@@ -16,7 +16,7 @@ from feedsim.analysis.truncation import deviations, structure_responses
 from feedsim.report import bode_plots, truncation_plots
 from feedsim.report.bode import Column, Curve, Ordinate, at, bode, phases, size
 from feedsim.report.bode_plots import loop_pictures, scale_pictures, speed_reference_pictures
-from feedsim.report.frf_plots import curves_of, most_marked, pictures_of
+from feedsim.report.frf.plots import curves_of, most_marked, pictures_of
 from feedsim.report.style import drawing, finish
 from feedsim.report.truncation_plots import truncation_pictures
 from feedsim.structure import Modes, checked_modes

@@ -21,10 +21,10 @@ from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Plan, signal_of
 from feedsim.analysis.responses import Responses, frequencies, names, one, read_overlays, unit_of
 from feedsim.errors import InputError, OutputError
-from feedsim.report import frf_write
 from feedsim.report.bode_plots import speed_controlled_pictures
-from feedsim.report.frf_page import page
-from feedsim.report.frf_plots import curves_of
+from feedsim.report.frf import write as frf_write
+from feedsim.report.frf.page import page
+from feedsim.report.frf.plots import curves_of
 from feedsim.report.style import Picture
 from feedsim.scenario import load_machine, load_subject
 from feedsim.structure import checked_modes

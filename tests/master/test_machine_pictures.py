@@ -17,9 +17,9 @@ from PIL import Image
 
 from feedsim import cli
 from feedsim.errors import InputError
-from feedsim.report.machine_animation import FRAMES
-from feedsim.report.machine_model import LARGEST, Model, model, motion, solids, turned
-from feedsim.report.machine_pictures import telling_view
+from feedsim.report.machine.animation import FRAMES
+from feedsim.report.machine.model import LARGEST, Model, model, motion, solids, turned
+from feedsim.report.machine.pictures import telling_view
 from feedsim.report.view import FRONT, OBLIQUE, SIDE, TOP, view
 from feedsim.scenario import Structure, load_structure
 from feedsim.structure.build import Built, build

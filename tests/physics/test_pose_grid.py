@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from feedsim import cosim
 from feedsim.scenario import Machine, load_structure
-from feedsim.scenario.structure_geometry import GeometryStructure
+from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.poses import grid_axis, pose_grid
 from fmi_helpers import Archive, Instance
 

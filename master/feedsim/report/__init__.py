@@ -1,8 +1,8 @@
 """Results as a person wants them: curves as CSV, summary.json, report.html and figures/*.png."""
 
-from feedsim.report.frf_summary import summary_line as frf_summary_line
-from feedsim.report.frf_write import check_frf_writable, write_frf
-from feedsim.report.machine_write import check_machine_writable, write_machine
+from feedsim.report.frf.summary import summary_line as frf_summary_line
+from feedsim.report.frf.write import check_frf_writable, write_frf
+from feedsim.report.machine.write import check_machine_writable, write_machine
 from feedsim.report.summary import Run, summary_line
 from feedsim.report.write import check_writable, write
 

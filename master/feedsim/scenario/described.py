@@ -16,8 +16,8 @@ from feedsim.scenario.machine import Machine
 from feedsim.scenario.problems import dotted, in_order
 from feedsim.scenario.source import Place, Source
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure_geometry import GeometryStructure
-from feedsim.scenario.structure_matrices import FiniteElements
+from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.matrices import FiniteElements
 
 # Lengths that are typed twice are the same where they differ by less [m].
 SAME_LENGTH = 1e-9

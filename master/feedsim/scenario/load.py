@@ -21,7 +21,7 @@ from feedsim.scenario.model import Scenario
 from feedsim.scenario.problems import describe, explain, in_order
 from feedsim.scenario.source import Place, Source, read
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure_kinds import KINDS, contradictions_of
+from feedsim.scenario.structure.kinds import KINDS, contradictions_of
 
 MACHINE_FILE = "machine.yaml"
 STRUCTURE_FILE = "structure.yaml"

@@ -51,7 +51,7 @@ def _structure_schema() -> dict[str, Any]:
     """One of the kinds; which is for `kind` to say."""
     from pydantic.json_schema import models_json_schema
 
-    from feedsim.scenario.structure_kinds import KINDS
+    from feedsim.scenario.structure.kinds import KINDS
 
     references, schema = models_json_schema([(model, "validation") for model in KINDS.values()])
     options = [references[model, "validation"] for model in KINDS.values()]

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.scenario import Structure
-from feedsim.scenario.structure_geometry import GeometryStructure
-from feedsim.scenario.structure_matrices import FiniteElements
+from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.matrices import FiniteElements
 from feedsim.structure import matrices
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.checks import check
-from feedsim.structure.checks_units import frequency_warnings
+from feedsim.structure.checks.units import frequency_warnings
 from feedsim.structure.geometry import assemble as assemble_geometry
 from feedsim.structure.solve import Solution, solve
 

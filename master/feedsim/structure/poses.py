@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.scenario import Structure
-from feedsim.scenario.structure_geometry import GeometryStructure
+from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.geometry import Assembler
 from feedsim.structure.modes import Modes

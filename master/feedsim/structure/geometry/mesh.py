@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.scenario.structure_geometry import GeometryStructure, NodeGroup
-from feedsim.scenario.structure_names import Held, Line, Node, nodes
+from feedsim.scenario.structure.geometry import GeometryStructure, NodeGroup
+from feedsim.scenario.structure.names import Held, Line, Node, nodes
 from feedsim.structure.geometry.beam import beam_matrices
 from feedsim.structure.geometry.points import Grip, Row, riding, rigid
 from feedsim.structure.geometry.sections import BeamProperties, beam_properties, rod

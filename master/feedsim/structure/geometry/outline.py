@@ -9,9 +9,9 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.scenario.structure_geometry import GeometryStructure
-from feedsim.scenario.structure_names import held, nodes, rail
-from feedsim.scenario.structure_sections import Section
+from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.names import held, nodes, rail
+from feedsim.scenario.structure.sections import Section
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.geometry.beam import beam_axes
 from feedsim.structure.geometry.mesh import Mesh

@@ -7,7 +7,7 @@ from math import pi
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from feedsim.scenario.structure_sections import Material, Section
+    from feedsim.scenario.structure.sections import Material, Section
 
 
 @dataclass(frozen=True)

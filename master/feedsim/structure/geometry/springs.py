@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.scenario.structure_drive import Drive
-from feedsim.scenario.structure_names import held, node, nodes, rail
+from feedsim.scenario.structure.drive import Drive
+from feedsim.scenario.structure.names import held, node, nodes, rail
 from feedsim.structure.geometry.mesh import FRAME, Mesh
 from feedsim.structure.geometry.points import Row, rigid
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from feedsim.scenario.structure_matrices import (
+from feedsim.scenario.structure.matrices import (
     AnsysStructure,
     CalculixStructure,
     FiniteElements,

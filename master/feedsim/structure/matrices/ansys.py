@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from feedsim.errors import InputError
-from feedsim.scenario.structure_matrices import AnsysStructure
-from feedsim.structure.checks_words import DEGREES, listing
+from feedsim.scenario.structure.matrices import AnsysStructure
+from feedsim.structure.checks.words import DEGREES, listing
 from feedsim.structure.matrices.nodes import read_points
 from feedsim.structure.matrices.raw import DIRECTIONS, Raw
 from feedsim.structure.matrices.sparse import from_triangle

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim.errors import InputError
-from feedsim.scenario.structure_matrices import FiniteElements, UnitSystem
+from feedsim.scenario.structure.matrices import FiniteElements, UnitSystem
 from feedsim.structure.assembly import Assembly, Floats, Geometry, Integers
-from feedsim.structure.checks_words import few
+from feedsim.structure.checks.words import few
 from feedsim.structure.matrices import units
 from feedsim.structure.matrices.ports import read_ports
 from feedsim.structure.matrices.raw import DIRECTIONS, Points, Raw

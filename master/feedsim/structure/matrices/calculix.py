@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from feedsim.errors import InputError
-from feedsim.scenario.structure_matrices import CalculixStructure
+from feedsim.scenario.structure.matrices import CalculixStructure
 from feedsim.structure.assembly import Integers
 from feedsim.structure.matrices.calculix_mesh import read_mesh
 from feedsim.structure.matrices.nodes import read_points

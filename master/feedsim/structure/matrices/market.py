@@ -8,8 +8,8 @@ import numpy as np
 from scipy import io, sparse
 
 from feedsim.errors import InputError
-from feedsim.scenario.structure_matrices import MatrixMarketStructure
-from feedsim.structure.checks_words import DEGREES, listing
+from feedsim.scenario.structure.matrices import MatrixMarketStructure
+from feedsim.structure.checks.words import DEGREES, listing
 from feedsim.structure.matrices.nodes import NodeTable, read_nodes
 from feedsim.structure.matrices.raw import Raw
 from feedsim.structure.matrices.sparse import from_both, from_triangle

@@ -9,7 +9,7 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.structure.assembly import Floats
-from feedsim.structure.checks_words import few
+from feedsim.structure.checks.words import few
 from feedsim.structure.matrices import tables
 from feedsim.structure.matrices.raw import DIRECTIONS, Raw
 from feedsim.structure.modes import TOOL_PORTS

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from feedsim import units
-from feedsim.scenario.structure_matrices import UnitSystem
+from feedsim.scenario.structure.matrices import UnitSystem
 from feedsim.structure.assembly import Floats
 from feedsim.structure.matrices.sparse import without_zeros
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 from feedsim.errors import InputError
 from feedsim.scenario.fields import did_you_mean, no_axis
 from feedsim.scenario.source import Place
-from feedsim.scenario.structure_fields import FRAME
-from feedsim.scenario.structure_geometry import Body, GeometryStructure
-from feedsim.scenario.structure_names import Node, held, nodes, position, rail
+from feedsim.scenario.structure.fields import FRAME
+from feedsim.scenario.structure.geometry import Body, GeometryStructure
+from feedsim.scenario.structure.names import Node, held, nodes, position, rail
 
 Faults = Iterator[tuple[Place, str]]
 

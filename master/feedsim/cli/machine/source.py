@@ -118,7 +118,7 @@ def _info_of_structure(options: argparse.Namespace, described: Described, h: flo
 
 
 def _check_complete(structure: Structure, pose: Mapping[str, float]) -> None:
-    from feedsim.scenario.structure_geometry import GeometryStructure
+    from feedsim.scenario.structure.geometry import GeometryStructure
 
     if not isinstance(structure, GeometryStructure):
         return

@@ -12,10 +12,10 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.structure.assembly import Assembly, Floats
-from feedsim.structure.checks_definite import mass_faults, stiffness_faults
-from feedsim.structure.checks_parts import part_faults
-from feedsim.structure.checks_units import unit_warnings
-from feedsim.structure.checks_words import few, listing
+from feedsim.structure.checks.definite import mass_faults, stiffness_faults
+from feedsim.structure.checks.parts import part_faults
+from feedsim.structure.checks.units import unit_warnings
+from feedsim.structure.checks.words import few, listing
 
 # Round-off of an element's assembly is 1e-12 of an entry's scale and less; a matrix that is wrong is off by more.
 ASYMMETRY = 1e-9

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from feedsim.errors import InputError
 from feedsim.scenario.fields import did_you_mean
-from feedsim.scenario.structure_geometry import GeometryStructure
+from feedsim.scenario.structure.geometry import GeometryStructure
 
 
 class Node(NamedTuple):

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 
 from feedsim.report.frame import Tile, frame, picture_section
-from feedsim.report.machine_record import MEANINGS, USUAL_EXCHANGE, exchange
+from feedsim.report.machine.record import MEANINGS, USUAL_EXCHANGE, exchange
 from feedsim.report.parts import software
 from feedsim.report.provenance import hashed
 from feedsim.report.style import Picture

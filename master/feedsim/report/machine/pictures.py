@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feedsim.report.machine_model import Model, Motion, extent, motion, rotor_disc, solids
+from feedsim.report.machine.model import Model, Motion, extent, motion, rotor_disc, solids
 from feedsim.report.style import INK, MUTED, PAPER, PNG_DPI, VERMILLION, Picture, drawing, finish
 from feedsim.report.view import FRONT, OBLIQUE, SIDE, TOP, Faces, View, draw_faces, draw_lines, frame_limits
 from feedsim.report.words import minus

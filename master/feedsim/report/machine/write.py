@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from feedsim.report.machine_animation import mode_gif
-from feedsim.report.machine_model import model
-from feedsim.report.machine_page import page
-from feedsim.report.machine_pictures import mode_picture, mode_title, sheet_picture, structure_picture
-from feedsim.report.machine_record import record
+from feedsim.report.machine.animation import mode_gif
+from feedsim.report.machine.model import model
+from feedsim.report.machine.page import page
+from feedsim.report.machine.pictures import mode_picture, mode_title, sheet_picture, structure_picture
+from feedsim.report.machine.record import record
 from feedsim.report.parts import to_json
 from feedsim.report.results import FIGURES, REPORT, SUMMARY, check_place, write_results, write_text
 from feedsim.report.style import PALETTE, PAPER, Picture

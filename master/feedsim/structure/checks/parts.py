@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from feedsim.structure.assembly import Assembly, Integers
-from feedsim.structure.checks_words import DEGREES, SHOWN, few, listing
+from feedsim.structure.checks.words import DEGREES, SHOWN, few, listing
 
 # Round-off makes rigid modes of large stiff models mHz; a machine's or a mount's lowest mode is above 1 Hz.
 RIGID = (2 * math.pi * 0.1) ** 2

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.report.machine_model import Model, motion
-from feedsim.report.machine_pictures import draw_mode, mode_heading, mode_panels, remark
+from feedsim.report.machine.model import Model, motion
+from feedsim.report.machine.pictures import draw_mode, mode_heading, mode_panels, remark
 from feedsim.report.style import drawing
 from feedsim.structure.build import Built
 from feedsim.structure.info import MachineInfo

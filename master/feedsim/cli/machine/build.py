@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.machine_source import Commands, add_source, info
+from feedsim.cli.machine.source import Commands, add_source, info
 from feedsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ def add_build(own: Commands[argparse.ArgumentParser]) -> None:
 
 def build_machine(options: argparse.Namespace) -> None:
     """Write modes.csv and build.json."""
-    from feedsim.report import machine_record, results
+    from feedsim.report import results
+    from feedsim.report.machine import record as machine_record
     from feedsim.report.parts import to_json
     from feedsim.scenario import load_described
     from feedsim.structure.modes import write_modes

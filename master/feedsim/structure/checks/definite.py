@@ -15,7 +15,7 @@ from scipy.linalg import eigh_tridiagonal
 from scipy.sparse.linalg import splu
 
 from feedsim.structure.assembly import Assembly, Floats
-from feedsim.structure.checks_words import few, listing
+from feedsim.structure.checks.words import few, listing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

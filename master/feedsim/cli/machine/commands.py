@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.machine_build import add_build
-from feedsim.cli.machine_info import add_info
-from feedsim.cli.machine_poses import add_poses, write_grid
-from feedsim.cli.machine_show import add_show
-from feedsim.cli.machine_source import Commands, positions
+from feedsim.cli.machine.build import add_build
+from feedsim.cli.machine.info import add_info
+from feedsim.cli.machine.poses import add_poses, write_grid
+from feedsim.cli.machine.show import add_show
+from feedsim.cli.machine.source import Commands, positions
 from feedsim.errors import InputError, OutputError
 
 if TYPE_CHECKING:

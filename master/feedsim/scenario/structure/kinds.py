@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from feedsim.scenario import structure_checks
 from feedsim.scenario.source import Place
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure_geometry import GeometryStructure
-from feedsim.scenario.structure_matrices import AnsysStructure, CalculixStructure, MatrixMarketStructure
+from feedsim.scenario.structure import checks as structure_checks
+from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.matrices import AnsysStructure, CalculixStructure, MatrixMarketStructure
 
 KINDS: dict[str, type[Structure]] = {
     "geometry": GeometryStructure,

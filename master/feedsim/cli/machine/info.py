@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from feedsim.cli.machine_source import Commands, add_source, add_step, info
+from feedsim.cli.machine.source import Commands, add_source, add_step, info
 from feedsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def add_info(own: Commands[argparse.ArgumentParser]) -> None:
 
 def print_info(options: argparse.Namespace) -> None:
     """Print the figures to standard output."""
-    from feedsim.report import machine_record
+    from feedsim.report.machine import record as machine_record
     from feedsim.report.parts import to_json
     from feedsim.scenario import load_described
 

@@ -11,7 +11,7 @@ from feedsim.errors import InputError
 from feedsim.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, Array
 from feedsim.report.view import Faces, tube
 from feedsim.scenario import Structure
-from feedsim.scenario.structure_geometry import GeometryStructure
+from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.assembly import Assembly, Geometry
 from feedsim.structure.build import Built
 from feedsim.structure.deflection import deflection, node_motion

@@ -10,7 +10,7 @@ from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.responses import Responses
 from feedsim.report.frame import Tile, frame, picture_section, tile_value
-from feedsim.report.frf_summary import input_files
+from feedsim.report.frf.summary import input_files
 from feedsim.report.parts import software
 from feedsim.report.style import Picture
 from feedsim.report.tables import archives_table, figures_table, files_table, pairs_table, parameters_table, table

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, StrictInt, field_validator
 
 from feedsim.scenario.fields import Model, Quantity, fault
-from feedsim.scenario.structure_fields import BodyNode, Hold, Inertia, Name, Point, Stiffness, StiffnessOrNone
+from feedsim.scenario.structure.fields import BodyNode, Hold, Inertia, Name, Point, Stiffness, StiffnessOrNone
 
 End = Literal["start", "end"]
 MOST_NODES = 1000

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from feedsim.analysis.responses import Responses
 from feedsim.analysis.truncation import Truncation
-from feedsim.report.frf_page import page
-from feedsim.report.frf_plots import pictures_of
-from feedsim.report.frf_summary import summary
+from feedsim.report.frf.page import page
+from feedsim.report.frf.plots import pictures_of
+from feedsim.report.frf.summary import summary
 from feedsim.report.parts import to_json
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, write_text
 from feedsim.report.style import Picture

@@ -8,8 +8,8 @@ from pydantic import Field, StrictInt, field_validator, model_validator
 
 from feedsim.scenario.fields import AxisName, Model, Quantity, fault
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure_drive import Drive, Scale, Tool
-from feedsim.scenario.structure_fields import (
+from feedsim.scenario.structure.drive import Drive, Scale, Tool
+from feedsim.scenario.structure.fields import (
     Direction,
     Inertia,
     Mass,
@@ -21,7 +21,7 @@ from feedsim.scenario.structure_fields import (
     Rail,
     Stiffness,
 )
-from feedsim.scenario.structure_sections import Material, Section
+from feedsim.scenario.structure.sections import Material, Section
 
 MOST_NODES = 10_000
 

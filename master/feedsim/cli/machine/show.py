@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.machine_source import Commands, add_source, add_step, info
+from feedsim.cli.machine.source import Commands, add_source, add_step, info
 from feedsim.errors import InputError
 
 if TYPE_CHECKING:

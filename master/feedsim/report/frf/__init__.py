@@ -1,0 +1,1 @@
+"""Frequency responses: curves, figures, the page that holds them."""

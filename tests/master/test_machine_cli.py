@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 from pathlib import Path
@@ -14,6 +15,7 @@ import yaml
 from feedsim import cli, cosim, scenario
 from feedsim.analysis import evaluate
 from feedsim.structure import read_modes
+from feedsim.structure.doubt import table_doubt
 
 ROOT = Path(__file__).resolve().parents[2]
 TEST_CENTRE, ONE_AXIS = (ROOT / "scenarios" / "machines" / name for name in ("test_centre", "one_axis"))
@@ -54,6 +56,13 @@ def test_build_as_documented(tmp_path: Path, capsys: Capture) -> None:
     axes = ["X", "Y", "Z"]
     built, shipped = read_modes(out / "modes.csv", axes), read_modes(TEST_CENTRE / "modes.csv", axes)
     assert built.frequency == pytest.approx(shipped.frequency, rel=1e-6)
+    elastic = shipped.frequency > 0
+    for first, second in itertools.combinations_with_replacement(shipped.ports, 2):
+        products, given = ((modes.ports[first] * modes.ports[second]) for modes in (built, shipped))
+        size = np.abs(given[elastic]).max()
+        # of the largest product of the pair; a rigid basis is arbitrary, its sum is not
+        assert products[elastic] == pytest.approx(given[elastic], abs=1e-6 * size, rel=0)
+        assert products[~elastic].sum() == pytest.approx(given[~elastic].sum(), abs=1e-6 * max(size, 1e-12))
     assert (out / "modes.csv").read_text().splitlines()[0] == (TEST_CENTRE / "modes.csv").read_text().splitlines()[0]
     record = json.loads((out / "build.json").read_text(encoding="utf-8"))
     assert record["total_mass"]["value"] == pytest.approx(9061.64, abs=0.005)
@@ -269,3 +278,41 @@ def test_one_axis_machine_runs(fmus: Path) -> None:
     assert figures["X.settling_time"].unit == "ms"
     assert figures["X.settling_time"].value < 200
     assert result.trace["X.x_a"][-1] == pytest.approx(0.4, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("poses", "words"),
+    [
+        ("Z=1m", "1 cell does not follow"),
+        ("Z=300mm..400mm/20mm", "the machine stands at Z 100 mm, outside of the grid, 300 mm to 400 mm"),
+        ("Z=0.1mm", "6850 cells of about 93 modes"),
+    ],
+)
+def test_grids_that_would_not_follow_are_refused(tmp_path: Path, capsys: Capture, poses: str, words: str) -> None:
+    assert run("pack", TEST_CENTRE, "--poses", poses, "--out", tmp_path / "a.fmu") == 2
+    assert words in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_archive_needs_a_name(tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("pack", TEST_CENTRE, "--out", ".") == 4
+    assert "name the archive" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_table_of_another_pose_is_not_packed_and_warned_of(tmp_path: Path, capsys: Capture) -> None:
+    folder = tmp_path / "moved"
+    shutil.copytree(TEST_CENTRE, folder)
+    change(folder / "machine.yaml", "Z: 100 mm}", "Z: 400 mm}")
+    assert run("pack", folder, "--out", tmp_path / "a.fmu") == 2
+    said = capsys.readouterr().err
+    assert "is not that of the pose X 0.8 m, Y 0.327 m, Z 0.4 m" in said
+    assert "--at X=800mm Y=327mm Z=400mm" in said
+    assert table_doubt(scenario.load_machine(folder)) is not None
+    assert table_doubt(scenario.load_machine(TEST_CENTRE)) is None
+    # A table with static correction, of that pose, is as good.
+    out = tmp_path / "corrected"
+    assert run("build", folder, "--at", "Z=400mm", "--static-correction", "--out", out) == 0
+    shutil.copy(out / "modes.csv", folder / "modes.csv")
+    assert table_doubt(scenario.load_machine(folder)) is None

@@ -11,6 +11,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -46,6 +47,10 @@ PNG_DPI = 160
 LARGEST_SVG = 400_000
 # Points per curve that a figure some 1500 pixels wide can show: least and largest value of every bin are kept.
 MOST_POINTS = 6000
+
+
+# What stands in small print in every figure that is finished inside remarked().
+_REMARK: ContextVar[str] = ContextVar("remark", default="")
 
 
 @dataclass(frozen=True)
@@ -109,8 +114,24 @@ def drawing(width: float, height: float) -> Iterator[Drawing]:
         yield figure
 
 
+@contextmanager
+def remarked(text: str) -> Iterator[None]:
+    """Figures finished inside say `text` in their upper right corner: a picture travels without its page."""
+    token = _REMARK.set(text)
+    try:
+        yield
+    finally:
+        _REMARK.reset(token)
+
+
 def finish(figure: Drawing, stem: str, title: str, caption: str) -> Picture:
     """Render ``figure``; call inside its ``drawing``. The result depends on nothing but what was drawn."""
+    if remark := _REMARK.get():
+        words = figure.text(0.995, 0.995, remark, fontsize=6.5, color=MUTED, ha="right", va="top")
+        words.set_in_layout(False)
+        room = 0.13 * (1 + remark.count("\n")) / figure.get_figheight()  # inches to a share of the height
+        layout: Any = figure.get_layout_engine()
+        layout.set(rect=(0, 0, 1, 1 - room))
     png = io.BytesIO()
     figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
     figure.patch.set_visible(False)

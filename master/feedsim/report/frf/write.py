@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from feedsim.report.frf.plots import pictures_of
 from feedsim.report.frf.summary import summary
 from feedsim.report.parts import to_json
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, write_text
-from feedsim.report.style import Picture
+from feedsim.report.style import Picture, remarked
 from feedsim.report.truncation_plots import truncation_pictures
 from feedsim.scenario import Subject
 from feedsim.trace.response_csv import write_response
@@ -30,9 +31,10 @@ def write_frf(subject: Subject, responses: Responses, directory: Path | str) -> 
 
     Returns the paths. Files of an earlier run are replaced. Raises OutputError.
     """
-    pictures = pictures_of(responses)
-    if responses.truncation is not None:
-        pictures += _truncation_pictures(responses, responses.truncation)
+    with remarked(_remark(responses)):
+        pictures = pictures_of(responses)
+        if responses.truncation is not None:
+            pictures += _truncation_pictures(responses, responses.truncation)
     campaign = responses.campaign
 
     def fill(fresh: Path, names: Sequence[str]) -> None:
@@ -53,3 +55,10 @@ def _truncation_pictures(responses: Responses, truncation: Truncation) -> list[P
     axes = tuple(responses.machine.axes)
     tool = any(name.startswith("tool.") for name in responses.closed)
     return truncation_pictures(truncation.tables, axes, within, truncation.cutoff, shown=responses.axes, tool=tool)
+
+
+def _remark(responses: Responses) -> str:
+    """Machine, pose, and what its numbers are worth."""
+    machine = responses.machine
+    pose = ", ".join(f"{axis} {position * 1e3:.6g} mm" for axis, position in machine.pose.items())
+    return "\n".join(textwrap.wrap(f"{machine.name} at {pose}. {machine.note}".strip(), 150)[:2])

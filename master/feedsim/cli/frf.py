@@ -140,7 +140,7 @@ def frf(options: Namespace) -> None:
         result = linear.evaluate(system, axes)
         closed = responses.closed_form(system, wanted, frequency)
         progress("closed form", 1, 1)
-        if (doubt := table_doubt(machine)) is not None:
+        if not doubts and (doubt := table_doubt(machine)) is not None:
             warnings.append(doubt)
         if result.unstable_poles:
             warnings.append(_unstable(result.unstable_poles))

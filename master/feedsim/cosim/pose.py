@@ -61,7 +61,7 @@ def pose_use(machine: Machine, program: Program, system: System) -> PoseUse:
     left = tuple(
         sentence for axis in grid if axis.axis in ranges for sentence in _left(axis, ranges[axis.axis], machine)
     )
-    doubt = table_doubt(machine)
+    doubt = None if grid else table_doubt(machine)  # a plant that follows has modes of its own
     doubts = () if doubt is None else (doubt,)
     return PoseUse(change, grid, _crossings(system) if grid else None, (*doubts, *left, *warnings(change)))
 

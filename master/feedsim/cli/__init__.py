@@ -14,6 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from feedsim.cli import frf, machine
+from feedsim.cli.options import add_fmus, add_overrides
 
 EPILOG = """exit codes:
   0 done    1 internal error    2 bad input or usage    3 a unit failed    4 results cannot be written
@@ -89,18 +90,9 @@ def _version() -> str:
 
 
 def _add_scenario(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--fmus", type=Path, metavar="DIR", help="folder of the archives (default: $FEEDSIM_FMUS, else fmus/)"
-    )
+    add_fmus(command)
     command.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="scenario file (docs/scenarios.md)")
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="overrides",
-        metavar="KEY=VALUE",
-        help="override one entry, e.g. machine.axes.Z.friction.F_C='1.8 N.m'; may be given several times",
-    )
+    add_overrides(command, "machine.axes.Z.friction.F_C='1.8 N.m'")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

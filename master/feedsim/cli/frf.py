@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from feedsim.cli.options import add_fmus, add_overrides
+
 if TYPE_CHECKING:
     from feedsim.analysis.campaign import Plan, Progress
     from feedsim.analysis.responses import Overlay
@@ -48,17 +50,8 @@ def add_command(subparsers: argparse._SubParsersAction[argparse.ArgumentParser])
         "--out", type=Path, metavar="DIR", help="where the results go (default: results/frf_<name of the file>)"
     )
     command.add_argument("--axes", type=_names, metavar="X,Z", help="axes to look at (default: all)")
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="overrides",
-        metavar="KEY=VALUE",
-        help="override one entry, e.g. machine.axes.Z.drive.K_p='4 N.m.s/rad'; may be given several times",
-    )
-    command.add_argument(
-        "--fmus", type=Path, metavar="DIR", help="folder of the archives (default: $FEEDSIM_FMUS, else fmus/)"
-    )
+    add_overrides(command, "machine.axes.Z.drive.K_p='4 N.m.s/rad'")
+    add_fmus(command)
     command.add_argument(
         "--band", default="1Hz..1000Hz", metavar="LOW..HIGH", help="frequencies looked at (default: 1Hz..1000Hz)"
     )

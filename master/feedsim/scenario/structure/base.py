@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, StrictStr
 
 from feedsim.scenario.fields import Model, Quantity
-
-StructureKind = Literal["geometry", "matrices", "ansys", "calculix"]
 
 
 class DampingStep(Model):

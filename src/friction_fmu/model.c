@@ -15,39 +15,24 @@
  * Source: M. Wiesauer, F. Bleicher, "Parameterization method for non-linear friction models of machine tool feed
  * drives", 18th CIRP Conference on Modeling of Machining Operations (2021). What its print has wrong: README.md.
  *
- * A step takes n as linear in time and is split where n crosses zero; each part advances z by the exact solution at the
- * part's mean speed (second order, stable for any step) and c exactly. */
+ * A step takes n as linear in time: contact.h. */
 #include <math.h>
 
-#include "lugre.h"
+#include "contact.h"
 #include "numbers.h"
-#include "tem.h"
+#include "parameters.h"
 #include "unit.h"
 
 typedef struct State {
-    double z;          /* [rad] */
-    double c;          /* [rad] */
+    ContactState contact;
     double n;          /* speed that M_fr belongs to: at the end of the last step [rad/s] */
     double M_fr_slope; /* change of M_fr over the last step, per second [N.m/s] */
 } State;
 
-static Lugre friction_lugre(const Scalars *v) {
-    return (Lugre){.sigma_0 = v->sigma_0,
-                   .sigma_1 = v->sigma_1,
-                   .sigma_2 = v->sigma_2,
-                   .F_C = v->F_C,
-                   .F_S = v->F_S,
-                   .v_s = v->v_s,
-                   .beta = v->beta,
-                   .F_log = v->F_log,
-                   .v_log = v->v_log,
-                   .asymmetry = v->asymmetry};
-}
-
 static bool friction_derive(Unit *unit) {
     const Scalars *v = unit_scalars(unit);
     char text[2][NUMBER_TEXT_SIZE];
-    if (v->F_S < v->F_C) {
+    if (!parameters_agree(v)) {
         return unit_fail(
             unit,
             "parameter 'F_S' is %s N.m and 'F_C' is %s N.m; the static friction torque F_S must not be below "
@@ -70,42 +55,29 @@ static size_t friction_state_size(const Unit *unit) {
 }
 
 /* Outputs and locals that go with z, c and n. */
-static void friction_show(Scalars *v, const Lugre *p, const State *state) {
-    v->z = state->z;
-    v->c = state->c;
-    v->lambda = tem_engagement(state->z, state->c, v->W);
-    v->k = tem_share(v->lambda, v->gamma);
-    v->M_fr = lugre_torque(p, v->k, state->z, state->n);
+static void friction_show(Scalars *v, const Contact *p, const State *state) {
+    v->z = state->contact.z;
+    v->c = state->contact.c;
+    v->lambda = contact_engagement(p, state->contact);
+    v->M_fr = contact_torque(p, state->contact, state->n, &v->k);
 }
 
 static void friction_start(Unit *unit) {
     Scalars *v = unit_scalars(unit);
     State *state = unit_state(unit);
-    const Lugre p = friction_lugre(v);
+    const Contact p = parameters_contact(v);
     state->n = v->n_fr;
     friction_show(v, &p, state);
-}
-
-/* One part of a step: mean speed n, which does not change its sign, over h. */
-static void friction_part(const Lugre *p, double W, State *state, double n, double h) {
-    state->z = lugre_advance(p, state->z, n, h);
-    state->c = tem_advance(state->c, n * h, W);
 }
 
 static bool friction_step(Unit *unit, double t, double h) {
     (void)t; /* the law does not change with time */
     Scalars *v = unit_scalars(unit);
     State *state = unit_state(unit);
-    const Lugre p = friction_lugre(v);
+    const Contact p = parameters_contact(v);
     const double n_start = v->n_fr, n_end = n_start + unit_slope(unit, VR_n_fr) * h;
     State next = *state;
-    if ((n_start < 0 && n_end > 0) || (n_start > 0 && n_end < 0)) {
-        const double crossing = h * (n_start / (n_start - n_end));
-        friction_part(&p, v->W, &next, n_start / 2, crossing);
-        friction_part(&p, v->W, &next, n_end / 2, h - crossing);
-    } else {
-        friction_part(&p, v->W, &next, n_start + (n_end - n_start) / 2, h);
-    }
+    next.contact = contact_advance(&p, state->contact, n_start, n_end, h);
     next.n = n_end;
     Scalars shown = *v;
     friction_show(&shown, &p, &next);
@@ -132,8 +104,8 @@ static double friction_partial(Unit *unit, unsigned output, unsigned input, bool
         return 0;
     }
     const State *state = unit_state(unit);
-    const Lugre p = friction_lugre(unit_scalars(unit));
-    return lugre_torque_by_speed(&p, state->z, state->n);
+    const Contact p = parameters_contact(unit_scalars(unit));
+    return lugre_torque_by_speed(&p.lugre, state->contact.z, state->n);
 }
 
 const Model MODEL = {

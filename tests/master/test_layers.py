@@ -10,10 +10,10 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[2] / "master" / "feedsim"
 # A room may import the rooms below it.
-ORDER = ["cli", "report", "analysis", "cosim", "structure", "nc", "scenario", "trace", "units", "errors"]
+ORDER = ["cli", "report", "identify", "analysis", "cosim", "structure", "nc", "scenario", "trace", "units", "errors"]
 SOLE_USERS = {
     "fmpy": {"cosim/unit.py"},
-    "ctypes": {"cosim/unit.py"},
+    "ctypes": {"cosim/unit.py", "cosim/friction_law.py"},
     "yaml": {"scenario"},
     "pint": {"units.py", "units"},
     "matplotlib": {"report"},

@@ -136,6 +136,12 @@ class Unit:
         except Exception:
             self.fail(action)
 
+    @property
+    def library(self) -> ctypes.CDLL:
+        """The unit's shared library, loaded for as long as this instance is open."""
+        library: ctypes.CDLL = self._fmu.dll
+        return library
+
     def set_parameters(self, parameters: Mapping[str, float | int | bool | str]) -> None:
         """Set start values by name, before initialisation.
 

@@ -1,0 +1,177 @@
+"""The friction torque along a given speed, in one call of the friction unit's library: no FMI, no instance per run."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from pathlib import Path
+from threading import Lock
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from feedsim.cosim.run import fmus_directory
+from feedsim.cosim.unit import Archive, Floats, Unit
+from feedsim.errors import InputError, SimulationError
+
+FUNCTION = "friction_response"  # src/friction_fmu/response.h
+
+_RESPONSE = ctypes.CFUNCTYPE(
+    ctypes.c_size_t,
+    *(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double, ctypes.c_size_t, ctypes.c_size_t),
+    *(ctypes.c_double, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p),
+)
+
+
+class FrictionLaw:
+    """The law of ``friction.fmu`` as a function, for as long as this object is open (a context manager).
+
+    The numbers are those of stepping the unit with the slope of its speed. Calls are independent of each other and may
+    come from several threads; the interpreter is free for others while one runs. Not to be closed while one runs.
+
+    Attributes:
+        names: the unit's parameters, in the order that the library takes them.
+        start_values: start value of each, in the unit's own units.
+    """
+
+    def __init__(self, fmus: Path | None = None) -> None:
+        """Open friction.fmu in the folder `fmus` (default: :func:`~feedsim.cosim.run.fmus_directory`).
+
+        Raises:
+            InputError: no usable archive, or one without the function.
+        """
+        self._archive = Archive((fmus or fmus_directory()) / "friction.fmu")
+        self._refusing = Lock()
+        self._unit: Unit | None = None
+        try:
+            # The instance holds the library, and its GUID stands for the order of the parameters in it.
+            self._unit = Unit(self._archive, "friction")
+            try:
+                self._response = _RESPONSE((FUNCTION, self._unit.library))
+            except AttributeError:
+                raise InputError(
+                    f"{self._archive.path}: its library has no function {FUNCTION}; it was built from older sources, "
+                    "`make fmus` builds it anew"
+                ) from None
+        except BaseException:
+            self.close()
+            raise
+        parameters = [each for each in self._archive.description.modelVariables if each.causality == "parameter"]
+        self.start_values: Mapping[str, float] = {each.name: float(each.start) for each in parameters}
+        self.names = tuple(self.start_values)
+        self._defaults = tuple(self.start_values.items())
+        self._values = ctypes.c_double * len(self.names)
+
+    def close(self) -> None:
+        if self._unit is not None:
+            self._unit.close()
+            self._unit = None
+        self._archive.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __call__(
+        self,
+        parameters: Mapping[str, float],
+        n: ArrayLike,
+        h: float,
+        *,
+        z: float = 0.0,
+        c: float = 0.0,
+        substeps: int = 1,
+        every: int = 1,
+    ) -> Floats:
+        """M_fr (N // every + 1,) [N.m] at the instants 0, every, 2 every .. of the N + 1 instants of `n`.
+
+        Args:
+            parameters: by the unit's names and in its units; those left out have their start values.
+            n: (N + 1,) speed [rad/s] at instants h apart, linear between them.
+            h: time between two instants [s].
+            z, c: state at the first instant [rad]; a `c` beyond the engaging zone is put to its end.
+            substeps: equal steps from one instant to the next; the solution is of second order in h/substeps.
+            every: which of the instants are wanted.
+
+        Raises:
+            InputError: parameters that the unit refuses, with its own words, or arguments out of range.
+            SimulationError: M_fr would be no finite number.
+        """
+        (M_fr,) = self._respond(parameters, n, h, z, c, substeps, every, states=False)
+        return M_fr
+
+    def states(
+        self,
+        parameters: Mapping[str, float],
+        n: ArrayLike,
+        h: float,
+        *,
+        z: float = 0.0,
+        c: float = 0.0,
+        substeps: int = 1,
+        every: int = 1,
+    ) -> tuple[Floats, Floats, Floats]:
+        """M_fr [N.m], z and c [rad], each (N // every + 1,): as the call itself, with the states."""
+        M_fr, z_out, c_out = self._respond(parameters, n, h, z, c, substeps, every, states=True)
+        return M_fr, z_out, c_out
+
+    def _respond(
+        self,
+        parameters: Mapping[str, float],
+        n: ArrayLike,
+        h: float,
+        z: float,
+        c: float,
+        substeps: int,
+        every: int,
+        *,
+        states: bool,
+    ) -> tuple[Floats, ...]:
+        """M_fr and, with `states`, z and c."""
+        if self._unit is None:
+            raise ValueError("this friction law is closed")
+        speeds = np.ascontiguousarray(n, dtype=np.float64)
+        if speeds.ndim != 1 or not speeds.size:
+            raise InputError(f"speeds: shape {speeds.shape}; a row of at least one is needed")
+        if not 0.0 < h < np.inf:
+            raise InputError(f"time between speeds: {h} s; it must be finite and greater than 0")
+        if substeps < 1 or every < 1:
+            raise InputError(f"substeps = {substeps}, every = {every}; both must be at least 1")
+        values = self._ordered(parameters)
+        rows = (speeds.size - 1) // every + 1
+        table = np.empty((3 if states else 1, rows))
+        first, width = table.ctypes.data, table.strides[0]
+        others = (first + width, first + 2 * width) if states else (None, None)
+        done = self._response(values, speeds.ctypes.data, speeds.size - 1, h, substeps, every, z, c, first, *others)
+        if done == rows:
+            return tuple(table)
+        if done == 0:
+            self._let_unit_refuse(parameters)
+        raise SimulationError(
+            f"{self._archive.path.name}: M_fr would be no finite number at {done * every * h:.9g} s; speeds are "
+            f"{speeds.min():.6g} to {speeds.max():.6g} rad/s, z and c at the start {z:.6g} and {c:.6g} rad"
+        )
+
+    def _ordered(self, parameters: Mapping[str, float]) -> ctypes.Array[ctypes.c_double]:
+        if not parameters.keys() <= self.start_values.keys():
+            unknown = next(name for name in parameters if name not in self.start_values)
+            raise InputError(f"{self._archive.path.name}: no parameter '{unknown}'; there are {', '.join(self.names)}")
+        try:
+            return self._values(*[parameters.get(name, start) for name, start in self._defaults])
+        except TypeError:
+            wrong = next(name for name, value in parameters.items() if not hasattr(value, "__float__"))
+            raise InputError(f"parameter '{wrong}' is {parameters[wrong]!r}; a number is needed") from None
+
+    def _let_unit_refuse(self, parameters: Mapping[str, float]) -> None:
+        """Raise InputError with the unit's words where it refuses `parameters`."""
+        with self._refusing:  # loading a library changes the working directory for a moment
+            unit = Unit(self._archive, "friction")
+            try:
+                unit.set_parameters(parameters)
+                unit.enter_initialisation(0.0, 1.0)
+                unit.check_parameters()
+            finally:
+                unit.close()

@@ -1,0 +1,168 @@
+"""What identification finds: estimates with their uncertainty, and what they were found from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import nan
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+Status = Literal["estimated", "held", "given", "undetermined"]
+NORMAL_95 = 1.959964  # standard deviations on either side that hold 95 % of a normal distribution
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter.
+
+    Attributes:
+        value: SI, in `unit`.
+        sigma: standard deviation; nan where it was held, given or could not be determined.
+        status: estimated; held at a usual value; given by the user; undetermined: the data do not tell.
+        reason: why it is held or undetermined.
+    """
+
+    name: str
+    value: float
+    unit: str
+    meaning: str
+    sigma: float = nan
+    status: Status = "estimated"
+    reason: str = ""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Confidence interval of 95 %, from the linearised model."""
+        return self.value - NORMAL_95 * self.sigma, self.value + NORMAL_95 * self.sigma
+
+
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """Correlation matrix (P, P) of the estimated parameters `names`."""
+
+    names: tuple[str, ...]
+    matrix: Array
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """A stretch at constant speed.
+
+    Attributes:
+        record: name of the record; begin, end [s].
+        speed: mean [rad/s], signed.
+        torque: mean motor torque less inertia and known load [N.m], signed.
+        sigma: standard deviation of that mean [N.m], from the scatter within the plateau (its correlation included).
+        rows: number of samples.
+    """
+
+    record: str
+    begin: float
+    end: float
+    speed: float
+    torque: float
+    sigma: float
+    rows: int
+
+
+@dataclass(frozen=True, eq=False)
+class Stationary:
+    """Stage 1: friction at constant speed (Eq. 7 plus sigma_2), constant load apart.
+
+    Attributes:
+        estimates: F_C, F_S, v_s, beta, F_log, v_log, sigma_2, asymmetry, M_0.
+        covariance: of the estimated ones, in the order of correlation.names.
+        speeds (K,), torque (K,), sigma (K,): the curve |M_fr| over |n| without asymmetry, and its standard deviation.
+        range: lowest and highest speed of the plateaus [rad/s].
+        rms: residual of the plateaus [N.m].
+        worst_curve: largest relative deviation of a plateau's friction from the curve.
+    """
+
+    plateaus: tuple[Plateau, ...]
+    estimates: Mapping[str, Estimate]
+    correlation: Correlation
+    covariance: Array
+    speeds: Array
+    torque: Array
+    sigma: Array
+    range: tuple[float, float]
+    rms: float
+    worst_curve: float
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A stretch of motion that stage 2 was fitted to.
+
+    Attributes:
+        kind: "sine" (amplitude [m at the scale, rad at the motor] and frequency are known) or "motion".
+        time [s], angle [rad], speed [rad/s], measured: torque less inertia and load [N.m], model: friction law [N.m].
+        amplitude: half the range of the motor angle [rad]; frequency [Hz], nan where it is no sine.
+        weight: standard deviation that the residuals were divided by [N.m].
+    """
+
+    record: str
+    kind: Literal["sine", "motion"]
+    time: Array
+    angle: Array
+    speed: Array
+    measured: Array
+    model: Array
+    amplitude: float
+    frequency: float
+    weight: float
+
+    @property
+    def rms(self) -> float:
+        """Of the residual [N.m]."""
+        return float(np.sqrt(np.mean((self.measured - self.model) ** 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Dynamic:
+    """Stage 2: pre-sliding and transition, by output error.
+
+    Attributes:
+        estimates: sigma_0, sigma_1, W, gamma; delay of the torque channel [s]; J [kg.m2]; and what was re-estimated of
+            stage 1.
+        covariance: of the estimated ones, in the order of correlation.names.
+        without_delay: standard deviations there would be were the delay known, per name.
+        advice: which moves are missing for which parameter, a sentence each.
+    """
+
+    stretches: tuple[Stretch, ...]
+    estimates: Mapping[str, Estimate]
+    correlation: Correlation
+    covariance: Array
+    rms: float
+    without_delay: Mapping[str, float] = field(default_factory=dict)
+    advice: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """All of it, for one axis.
+
+    Attributes:
+        I_P: lead [m/rad], for values at the slide.
+        estimates: the final set, by name: every friction parameter, M_0, J, delay.
+        correlation: of all estimated together.
+        seconds: wall time per step ("read", "stage 1", "stage 2").
+    """
+
+    axis: str
+    I_P: float
+    estimates: Mapping[str, Estimate]
+    correlation: Correlation
+    stationary: Stationary | None
+    dynamic: Dynamic | None
+    warnings: tuple[str, ...]
+    advice: tuple[str, ...]
+    seconds: Mapping[str, float]

@@ -1,0 +1,31 @@
+#include "contact.h"
+
+#include <stddef.h>
+
+#include "tem.h"
+
+/* One part of a step: mean speed n, which does not change its sign, over h. */
+static ContactState contact_part(const Contact *p, ContactState state, double n, double h) {
+    return (ContactState){.z = lugre_advance(&p->lugre, state.z, n, h), .c = tem_advance(state.c, n * h, p->W)};
+}
+
+ContactState contact_advance(const Contact *p, ContactState state, double n_start, double n_end, double h) {
+    if ((n_start < 0 && n_end > 0) || (n_start > 0 && n_end < 0)) {
+        const double crossing = h * (n_start / (n_start - n_end));
+        state = contact_part(p, state, n_start / 2, crossing);
+        return contact_part(p, state, n_end / 2, h - crossing);
+    }
+    return contact_part(p, state, n_start + (n_end - n_start) / 2, h);
+}
+
+double contact_engagement(const Contact *p, ContactState state) {
+    return tem_engagement(state.z, state.c, p->W);
+}
+
+double contact_torque(const Contact *p, ContactState state, double n, double *share) {
+    const double k = tem_share(contact_engagement(p, state), p->gamma);
+    if (share != NULL) {
+        *share = k;
+    }
+    return lugre_torque(&p->lugre, k, state.z, n);
+}

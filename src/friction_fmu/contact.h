@@ -1,0 +1,37 @@
+/* The friction contact over time: LuGre (lugre.h) with the transmission engaging model (tem.h), advanced in steps over
+ * which the speed is linear.
+ *
+ * A step is split where the speed crosses zero; each part advances z by the exact solution at the part's mean speed
+ * (second order, stable for any step) and c exactly. Pure functions: no memory, no FMI. */
+#ifndef FEEDSIM_CONTACT_H
+#define FEEDSIM_CONTACT_H
+
+#include "lugre.h"
+#include "prefix.h"
+
+#define contact_advance PREFIXED(contact_advance)
+#define contact_engagement PREFIXED(contact_engagement)
+#define contact_torque PREFIXED(contact_torque)
+
+typedef struct Contact {
+    Lugre lugre;
+    double W;     /* width of the engaging zone [rad], >= 0; 0: engaging model off */
+    double gamma; /* share of the bristle stiffness engaged at once [1], 0 to 1 */
+} Contact;
+
+typedef struct ContactState {
+    double z; /* mean bristle deflection [rad] */
+    double c; /* position in the engaging zone [rad], -W/2 to +W/2 */
+} ContactState;
+
+/* State after h [s], over which the speed goes in a straight line from n_start to n_end [rad/s]. */
+ContactState contact_advance(const Contact *p, ContactState state, double n_start, double n_end, double h);
+
+/* lambda [1], Eq. 3. */
+double contact_engagement(const Contact *p, ContactState state);
+
+/* M_fr [N.m], Eq. 1, at speed n [rad/s], with the share k [1] of the bristle stiffness that goes with lambda (Eq. 2);
+ * k is written to *share unless that is NULL. */
+double contact_torque(const Contact *p, ContactState state, double n, double *share);
+
+#endif

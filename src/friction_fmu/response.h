@@ -1,0 +1,42 @@
+/* The whole response of the friction contact to a given speed in one call: what the unit computes when it is stepped
+ * with the slope of n_fr, without the FMI in between. For fits, which need it by the thousand.
+ *
+ * The one function of the library that is not of the FMI. It keeps nothing between calls, so calls from several threads
+ * do not know of each other. */
+#ifndef FEEDSIM_RESPONSE_H
+#define FEEDSIM_RESPONSE_H
+
+#include <stddef.h>
+
+#include "prefix.h"
+
+/* As for the functions of the FMI (fmi2Functions.h): exported from a shared library, not where units are linked into
+ * one program. */
+#if defined FMI2_FUNCTION_PREFIX
+#define RESPONSE_EXPORT
+#elif defined _WIN32 || defined __CYGWIN__
+#define RESPONSE_EXPORT __declspec(dllexport)
+#elif defined __GNUC__
+#define RESPONSE_EXPORT __attribute__((visibility("default")))
+#else
+#define RESPONSE_EXPORT
+#endif
+
+#define response PREFIXED(response) /* friction_response */
+
+/* Torque and state at the instants 0, every, 2 every .. of the instants 0 .. steps, h [s] apart.
+ *
+ *   parameters  every parameter of the unit, in the order of variables.def (and of modelDescription.xml)
+ *   n           (steps + 1) speed [rad/s], linear between the instants
+ *   substeps    >= 1 equal steps from one instant to the next: the solution is of second order in h/substeps
+ *   every       >= 1
+ *   z, c        state at the first instant [rad]; a c beyond the engaging zone is put to its end
+ *   M_fr, z_out, c_out  (steps/every + 1) [N.m], [rad], [rad]; z_out and c_out may be NULL
+ *
+ * Returns how many instants were written: all steps/every + 1 of them where it went well; fewer where M_fr is no finite
+ * number at the next one; 0, besides, where the parameters are refused as the unit refuses them, where substeps or
+ * every is 0, or where h is not finite and above 0. */
+RESPONSE_EXPORT size_t response(const double parameters[], const double n[], size_t steps, double h, size_t substeps,
+                                size_t every, double z, double c, double M_fr[], double z_out[], double c_out[]);
+
+#endif

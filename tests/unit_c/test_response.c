@@ -1,0 +1,150 @@
+/* The response in one call (src/friction_fmu/response.c) against the contact stepped by hand. */
+#include "check.h"
+#include "contact.h"
+#include "response.h"
+
+enum { STEPS = 240, PARAMETERS = 12 };
+
+/* in the order of variables.def: sigma_0 .. 2, F_C, F_S, v_s, beta, F_log, v_log, asymmetry, W, gamma */
+static const double VALUES[PARAMETERS] = {300, 0.8, 0.006, 1.6, 2.1, 0.6, 1.5, 0.4, 3, 0.1, 0.04, 0.35};
+static const Contact CONTACT = {.lugre = {.sigma_0 = 300,
+                                          .sigma_1 = 0.8,
+                                          .sigma_2 = 0.006,
+                                          .F_C = 1.6,
+                                          .F_S = 2.1,
+                                          .v_s = 0.6,
+                                          .beta = 1.5,
+                                          .F_log = 0.4,
+                                          .v_log = 3,
+                                          .asymmetry = 0.1},
+                                .W = 0.04,
+                                .gamma = 0.35};
+static const double H = 1e-3;
+
+static double speeds[STEPS + 1], M_fr[STEPS + 2], z[STEPS + 2], c[STEPS + 2];
+
+/* A sine with reversals within steps and, at the end, standstill. */
+static void prepare(void) {
+    for (int i = 0; i <= STEPS; i++) {
+        speeds[i] = i < 200 ? 1.3 * sin(0.05 * i + 0.7) : 0;
+    }
+}
+
+/* What is behind the last value must stay as it is. */
+static void mark(size_t at) {
+    M_fr[at] = z[at] = c[at] = 77;
+}
+
+static void check_mark(size_t at) {
+    CHECK(M_fr[at] == 77 && z[at] == 77 && c[at] == 77);
+}
+
+static void equals_steps_of_the_contact(void) {
+    ContactState state = {.z = 1e-3, .c = -0.01};
+    mark(STEPS + 1);
+    CHECK(response(VALUES, speeds, STEPS, H, 1, 1, state.z, state.c, M_fr, z, c) == STEPS + 1);
+    check_mark(STEPS + 1);
+    for (int i = 0; i <= STEPS; i++) {
+        if (i > 0) {
+            state = contact_advance(&CONTACT, state, speeds[i - 1], speeds[i], H);
+        }
+        CHECK_EQUAL(M_fr[i], contact_torque(&CONTACT, state, speeds[i], NULL));
+        CHECK_EQUAL(z[i], state.z);
+        CHECK_EQUAL(c[i], state.c);
+    }
+}
+
+static void every_leaves_out_what_lies_between(void) {
+    static double all[STEPS + 1];
+    CHECK(response(VALUES, speeds, STEPS, H, 2, 1, 0, 0, all, NULL, NULL) == STEPS + 1);
+    const size_t every[] = {1, 2, 7, STEPS - 1, STEPS, STEPS + 1, (size_t)-1};
+    for (size_t i = 0; i < sizeof every / sizeof every[0]; i++) {
+        const size_t expected = STEPS / every[i] + 1;
+        mark(expected);
+        CHECK(response(VALUES, speeds, STEPS, H, 2, every[i], 0, 0, M_fr, z, c) == expected);
+        check_mark(expected);
+        for (size_t k = 0; k < expected; k++) {
+            CHECK_EQUAL(M_fr[k], all[k * every[i]]);
+        }
+    }
+    CHECK(response(VALUES, speeds, 0, H, 1, 1, 1e-3, 0, M_fr, z, c) == 1); /* an instant alone */
+    CHECK_EQUAL(z[0], 1e-3);
+}
+
+/* Greatest difference of M_fr to a fine solution. */
+static double error_with(size_t substeps) {
+    static double fine[STEPS + 1];
+    CHECK(response(VALUES, speeds, STEPS, H, 512, 1, 0, 0, fine, NULL, NULL) == STEPS + 1);
+    CHECK(response(VALUES, speeds, STEPS, H, substeps, 1, 0, 0, M_fr, NULL, NULL) == STEPS + 1);
+    double error = 0;
+    for (int i = 0; i <= STEPS; i++) {
+        error = fmax(error, fabs(M_fr[i] - fine[i]));
+    }
+    return error;
+}
+
+static void substeps_are_of_second_order(void) {
+    /* |n| h/g is 0.25 at most; (4/512)^2 of the coarser error is missing from the fine solution */
+    const double ratio = error_with(1) / error_with(4);
+    CHECK(ratio > 14 && ratio < 18);
+    /* substeps of an interval are steps of its length over their number */
+    const double ends[] = {-0.5, 0.25}, between[] = {-0.5, -0.3125, -0.125, 0.0625, 0.25};
+    CHECK(response(VALUES, ends, 1, 0.0078125, 4, 1, 0, 0, M_fr, NULL, NULL) == 2);
+    const double torque = M_fr[1];
+    CHECK(response(VALUES, between, 4, 0.0078125 / 4, 1, 4, 0, 0, M_fr, NULL, NULL) == 2);
+    CHECK_EQUAL(M_fr[1], torque);
+}
+
+static void start_beyond_the_zone_is_put_to_its_end(void) {
+    CHECK(response(VALUES, speeds, 1, H, 1, 1, 0, -3, M_fr, z, c) == 2);
+    CHECK_EQUAL(c[0], -0.02);
+}
+
+static size_t count_with(int parameter, double value) {
+    double values[PARAMETERS];
+    memcpy(values, VALUES, sizeof values);
+    values[parameter] = value;
+    return response(values, speeds, STEPS, H, 1, 1, 0, 0, M_fr, z, c);
+}
+
+static void refusals(void) {
+    static const double below[PARAMETERS] = {0, -1e-9, -1, 0, 1.59, 0, 0.09, -1, 0, -0.91, -1, -0.01};
+    for (int i = 0; i < PARAMETERS; i++) {
+        CHECK(count_with(i, VALUES[i]) == STEPS + 1);
+        mark(0);
+        CHECK(count_with(i, below[i]) == 0);
+        CHECK(count_with(i, NAN) == 0);
+        CHECK(count_with(i, INFINITY) == 0);
+        check_mark(0);
+    }
+    CHECK(count_with(3, 2.1) == STEPS + 1); /* F_C = F_S */
+    CHECK(count_with(3, 2.11) == 0);
+    CHECK(count_with(6, 10.1) == 0);
+    CHECK(count_with(9, 0.91) == 0);
+    CHECK(count_with(11, 1.01) == 0);
+    CHECK(response(VALUES, speeds, STEPS, H, 0, 1, 0, 0, M_fr, z, c) == 0);
+    CHECK(response(VALUES, speeds, STEPS, H, 1, 0, 0, 0, M_fr, z, c) == 0);
+    CHECK(response(VALUES, speeds, STEPS, 0, 1, 1, 0, 0, M_fr, z, c) == 0);
+    CHECK(response(VALUES, speeds, STEPS, -H, 1, 1, 0, 0, M_fr, z, c) == 0);
+    CHECK(response(VALUES, speeds, STEPS, NAN, 1, 1, 0, 0, M_fr, z, c) == 0);
+}
+
+static void stops_where_the_torque_is_no_number(void) {
+    const double wild[] = {0, 1, NAN, 1}, far[] = {0, 1, INFINITY, 1};
+    mark(2);
+    CHECK(response(VALUES, wild, 3, H, 1, 1, 0, 0, M_fr, z, c) == 2);
+    CHECK(response(VALUES, far, 3, H, 1, 1, 0, 0, M_fr, z, c) == 2);
+    check_mark(2);
+    CHECK(response(VALUES, wild, 3, H, 1, 1, NAN, 0, M_fr, z, c) == 0);
+}
+
+int main(void) {
+    prepare();
+    equals_steps_of_the_contact();
+    every_leaves_out_what_lies_between();
+    substeps_are_of_second_order();
+    start_beyond_the_zone_is_put_to_its_end();
+    refusals();
+    stops_where_the_torque_is_no_number();
+    return CHECK_RESULT;
+}

@@ -2,8 +2,21 @@
 
 from feedsim.trace.csv import read_csv, write_csv
 from feedsim.trace.files import written_whole
-from feedsim.trace.mat import convert_mat
+from feedsim.trace.mat import convert_mat, read_mat
+from feedsim.trace.recording import Recording, read_recording
 from feedsim.trace.setpoints import read_setpoints
 from feedsim.trace.trace import Array, Trace, matching
 
-__all__ = ["Array", "Trace", "convert_mat", "matching", "read_csv", "read_setpoints", "write_csv", "written_whole"]
+__all__ = [
+    "Array",
+    "Recording",
+    "Trace",
+    "convert_mat",
+    "matching",
+    "read_csv",
+    "read_mat",
+    "read_recording",
+    "read_setpoints",
+    "write_csv",
+    "written_whole",
+]

@@ -1,8 +1,9 @@
-"""MAT files (up to version 7) -> CSV traces."""
+"""MAT files (up to version 7): their variables, and CSV traces made of them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,61 @@ from feedsim import units
 from feedsim.errors import InputError
 from feedsim.trace.csv import write_csv
 from feedsim.trace.trace import Array, Trace, suggest
+
+
+@dataclass(frozen=True, eq=False)
+class Variables:
+    """Variables of a MAT file; a field inside a structure is "structure.field".
+
+    Attributes:
+        path: the file.
+        vectors: names of the vectors of real numbers, rows and columns alike.
+        scalars: single real numbers.
+        kinds: everything else, in words ("'map' (float64 of shape (3, 4))").
+    """
+
+    path: Path
+    vectors: tuple[str, ...]
+    scalars: Mapping[str, float]
+    kinds: Mapping[str, str]
+    content: Mapping[str, Any]
+
+    def vector(self, name: str) -> Array:
+        """Values of a vector. InputError: no vector of finite real numbers, with the element."""
+        return _vector(self.path, self.content, name)
+
+
+def read_mat(path: str | Path) -> Variables:
+    """Read the variables of a MAT file of version 4 to 7.
+
+    Raises InputError: the file is not there or is none; one of version 7.3, which is HDF5.
+    """
+    path = Path(path)
+    content = _load(path)
+    vectors: list[str] = []
+    scalars: dict[str, float] = {}
+    kinds: dict[str, str] = {}
+    for name, value in _flat(content):
+        array = np.asarray(value)
+        if array.dtype.kind in "fiu" and array.ndim == 1 and array.size > 1:
+            vectors.append(name)
+        elif array.dtype.kind in "fiu" and array.size == 1:
+            scalars[name] = float(array.item())
+        elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
+            kinds[name] = "an object such as a table or timetable, which only MATLAB reads: save its columns as vectors"
+        else:
+            kinds[name] = f"{name!r} ({array.dtype} of shape {array.shape})"
+    return Variables(path, tuple(vectors), scalars, kinds, content)
+
+
+def _flat(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Variables, those inside structures too, each with its name."""
+    for name, value in content.items():
+        fields = getattr(value, "_fieldnames", None)
+        if fields is None:
+            yield prefix + name, value
+        else:
+            yield from _flat({each: getattr(value, each) for each in fields}, f"{prefix}{name}.")
 
 
 def convert_mat(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:

@@ -1,0 +1,272 @@
+"""Recorded drive traces -> records of one axis, motor side and SI."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import pi
+from pathlib import Path
+
+import numpy as np
+
+from feedsim.errors import InputError
+from feedsim.identify.grid import stretches
+from feedsim.identify.record import Array, Record
+from feedsim.identify.signals import Channel, Chosen, choose
+from feedsim.scenario import Columns, Machine
+from feedsim.scenario.fields import no_axis
+from feedsim.trace import Recording, read_recording
+
+# Values given twice are the same up to the rounding of what people write.
+SAME = 1e-9
+# Share by which a recorded speed may differ from the slope of the position before it is worth a word: a wrong pitch,
+# gear or unit is far off; what the screw gives between motor and scale is about 1 % in small motions.
+SLOPE = 0.05
+# Correlation of torque and speed below which the torque brakes; friction makes it positive, noise and delays of
+# channels at small motions spread it around 0.
+AGAINST = 0.1
+# Share of the kinetic energy that a record may lose from its first to its last row to be asked that question.
+BRAKED = 0.1
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where records come from, and what was taken for granted.
+
+    Attributes:
+        file, sha256: the trace.
+        mapping: mapping file; None where columns were found by their names.
+        axis: "" where nothing tells it.
+        name, note: of the mapping.
+        position_at: "scale" or "motor", where the position is measured; "" without a position.
+        columns: role -> column used (position, speed, torque, current, force, load, setpoint, time).
+        pitch: [m]; torque_constant: [N.m/A]; None where not needed and not given.
+        inertia: [kg.m^2] on the motor's side, where the mapping gives it or a mass.
+        torque_delay: by how much the torque is logged later than the position [s], as the mapping gives it. It is not
+            taken out of the records.
+        warnings: what a user should know.
+    """
+
+    file: Path
+    sha256: str
+    axis: str
+    columns: Mapping[str, str]
+    position_at: str = ""
+    mapping: Path | None = None
+    name: str = ""
+    note: str = ""
+    pitch: float | None = None
+    torque_constant: float | None = None
+    inertia: float | None = None
+    torque_delay: float = 0.0
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Records of a file, one per stretch without a gap, and where they come from."""
+
+    records: tuple[Record, ...]
+    provenance: Provenance
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """What turns lengths, forces and currents into the motor's angles and torques."""
+
+    pitch: float | None
+    torque_constant: float | None
+    warnings: tuple[str, ...] = field(default=())
+
+
+def read_records(
+    path: str | Path, mapping: Columns | None = None, axis: str | None = None, machine: Machine | None = None
+) -> Recorded:
+    """Read a CSV or MAT file.
+
+    mapping: which columns are what; None: by their names (feedsim's own, else those of docs/traces.md).
+    axis: default that of the mapping, else the machine's only one, else the only one of feedsim's own names.
+    machine: gives pitch and torque constant of the axis. A mapping may give them too; a torque constant of its own
+        counts (with a warning), since currents are logged in different amplitudes; a pitch that differs is refused.
+
+    The motor's angle is position/I_P with I_P = pitch/(2 pi), the torque K_t i_q or F I_P. Records are pieces without
+    gaps; nothing is resampled (see grid.stretches).
+
+    Raises InputError with file and line: what cannot be read, columns that are missing or not clear, units, time that
+    is not even, pitch or torque constant that is needed and not given.
+    """
+    path = Path(path)
+    recording = read_recording(path)
+    named = _axis(mapping, axis, machine)
+    chosen = choose(recording, mapping, named, machine.axes if machine else ())
+    if machine is not None and chosen.axis and chosen.axis not in machine.axes:
+        raise InputError(f"{path}: {no_axis(chosen.axis, machine.axes)}")
+    drive = _drive(recording, chosen, mapping, machine)
+    values = recording.read(channel.column for channel in chosen.channels.values())
+    signals = {role: values[channel.column] * channel.scale for role, channel in chosen.channels.items()}
+    columns = {role: channel.column for role, channel in chosen.channels.items()}
+    if chosen.interval is None:
+        time = signals.pop("time")
+    else:
+        time = np.asarray(np.arange(len(next(iter(values.values())))) * chosen.interval, dtype=np.float64)
+    pieces, gaps = stretches(time, recording.row)
+    motor = _motor_side(chosen.channels, signals, drive)
+    records = tuple(
+        Record(
+            name=path.name if len(pieces) == 1 else f"{path.name}, {piece.time[0]:.6g} to {piece.time[-1]:.6g} s",
+            time=piece.time,
+            columns=columns,
+            **{role: whole[piece.first : piece.last] for role, whole in motor.items()},
+        )
+        for piece in pieces
+    )
+    warnings = (*chosen.notes, *drive.warnings, *gaps, *_doubts(path, records))
+    return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings))
+
+
+def _axis(mapping: Columns | None, axis: str | None, machine: Machine | None) -> str:
+    if axis and mapping is not None and mapping.axis and axis != mapping.axis:
+        raise InputError(f"{mapping.where('axis')}: {mapping.axis}, but axis {axis} is asked for")
+    named = axis or (mapping.axis if mapping is not None else None) or ""
+    if machine is None:
+        return named
+    if named:
+        if named not in machine.axes:
+            raise InputError(no_axis(named, machine.axes))
+        return named
+    return next(iter(machine.axes)) if len(machine.axes) == 1 else ""
+
+
+def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machine: Machine | None) -> _Drive:
+    """Pitch and torque constant; InputError where one is needed and not given, or the pitch is given twice."""
+    own = machine.axes.get(chosen.axis) if machine is not None else None
+    pitch = mapping.pitch if mapping is not None else None
+    constant = mapping.torque_constant if mapping is not None else None
+    warnings: list[str] = []
+    if own is not None and machine is not None:
+        if mapping is not None and pitch is not None and abs(pitch - own.pitch) > SAME * own.pitch:
+            raise InputError(
+                f"{mapping.where('pitch')}: {1e3 * pitch:.9g} mm; axis {chosen.axis} of machine {machine.name} "
+                f"({machine.directory}) has {1e3 * own.pitch:.9g} mm"
+            )
+        K_t = own.drive.K_t
+        if mapping is not None and constant is not None and abs(constant - K_t) > SAME * K_t:
+            warnings.append(
+                f"{mapping.where('torque_constant')}: {constant:.9g} N.m/A counts, not the {K_t:.9g} N.m/A of axis "
+                f"{chosen.axis} of machine {machine.name}"
+            )
+        pitch, constant = own.pitch if pitch is None else pitch, K_t if constant is None else constant
+    for role, channel in chosen.channels.items():
+        if pitch is None and channel.target in ("m", "m/s", "N"):
+            raise InputError(
+                f"{recording.header}: {role} {channel.column!r} counts on the slide; its pitch is needed: pitch: 20 mm "
+                "in the mapping, or a machine with that axis" + _which(chosen, machine)
+            )
+        if role == "current" and constant is None:
+            raise InputError(
+                f"{recording.header}: {channel.column!r} is a current; its torque constant is needed: "
+                "torque_constant: 2 N.m/A in the mapping, or a machine with that axis" + _which(chosen, machine)
+            )
+        if channel.rms and (mapping is None or mapping.torque_constant is None):
+            warnings.append(
+                f"{recording.header}: {channel.column!r} is an effective value; the machine's torque constant of "
+                f"{constant:.9g} N.m/A must count for it (for a peak value it is smaller by the square root of 2)"
+            )
+    if mapping is not None and mapping.mass is not None and pitch is None:
+        raise InputError(f"{mapping.where('mass')}: the pitch is needed with it; give pitch: 20 mm, or an inertia")
+    return _Drive(pitch, constant, tuple(warnings))
+
+
+def _which(chosen: Chosen, machine: Machine | None) -> str:
+    if machine is not None and not chosen.axis:
+        return f"; which axis of {machine.name} is it: {', '.join(machine.axes)}?"
+    return ""
+
+
+def _motor_side(channels: Mapping[str, Channel], signals: Mapping[str, Array], drive: _Drive) -> dict[str, Array]:
+    """Fields of Record from values in SI."""
+
+    def turned(role: str) -> Array:
+        if channels[role].target in ("m", "m/s"):
+            assert drive.pitch is not None
+            return signals[role] * (2 * pi / drive.pitch)
+        if channels[role].target == "N":
+            assert drive.pitch is not None
+            return signals[role] * (drive.pitch / (2 * pi))
+        if channels[role].target == "A":
+            assert drive.torque_constant is not None
+            return signals[role] * drive.torque_constant
+        return signals[role]
+
+    names = {"position": "angle", "current": "torque", "force": "torque"}
+    return {names.get(role, role): turned(role) for role in channels if role != "time"}
+
+
+def _doubts(path: Path, records: tuple[Record, ...]) -> Iterator[str]:
+    """What is worth a look: a speed that is not the position's, a torque that does not drive."""
+    slopes = [(record, _slope(record)) for record in records if len(record) > 2]
+    if both := [(a, b) for _, (a, b) in slopes if b > 0]:
+        ratio = sum(a for a, _ in both) / sum(b for _, b in both)
+        if abs(ratio - 1) > SLOPE:
+            yield (
+                f"{path}: the recorded speed is {ratio:.4g} times the slope of the position; sign, unit, pitch or gear "
+                "of one of both is not right"
+            )
+    power = size = 0.0
+    for record in records:
+        speed = record.speed
+        if speed is None:
+            assert record.angle is not None
+            speed = np.gradient(record.angle, record.interval)
+        energy = speed**2
+        if energy[-1] < energy[0] - BRAKED * np.max(energy):
+            continue  # a motion that is cut off while it was braked
+        net = record.torque if record.load is None else record.torque - record.load
+        net, speed = net - np.mean(net), speed - np.mean(speed)
+        power += float(np.dot(net, speed))
+        size += float(np.sqrt(np.dot(net, net) * np.dot(speed, speed)))
+    if power < -AGAINST * size:
+        yield f"{path}: the torque is against the motion on average; its sign, or that of the motion, is not right"
+
+
+def _slope(record: Record) -> tuple[float, float]:
+    """Sums whose ratio is recorded speed over slope of the position (least squares); the second 0 where one lacks.
+
+    Means over intervals are compared, in which an encoder's noise is least.
+    """
+    if record.angle is None or record.speed is None:
+        return 0.0, 0.0
+    count = max(1, len(record) // 200)
+    steps = (record.angle[count:] - record.angle[:-count]) / (count * record.interval)
+    sums = np.concatenate([[0.0], np.cumsum((record.speed[1:] + record.speed[:-1]) / 2)])
+    means = (sums[count:] - sums[:-count]) / count
+    return float(np.dot(means, steps)), float(np.dot(steps, steps))
+
+
+def _provenance(
+    path: Path,
+    mapping: Columns | None,
+    chosen: Chosen,
+    columns: Mapping[str, str],
+    drive: _Drive,
+    warnings: tuple[str, ...],
+) -> Provenance:
+    inertia = mapping.inertia if mapping is not None else None
+    if mapping is not None and mapping.mass is not None and drive.pitch is not None:
+        inertia = mapping.mass * (drive.pitch / (2 * pi)) ** 2
+    return Provenance(
+        file=path,
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        axis=chosen.axis,
+        columns=columns,
+        position_at=chosen.channels["position"].at if "position" in chosen.channels else "",
+        mapping=mapping.file if mapping is not None else None,
+        name=mapping.name if mapping is not None else "",
+        note=mapping.note if mapping is not None else "",
+        pitch=drive.pitch,
+        torque_constant=drive.torque_constant,
+        inertia=inertia,
+        torque_delay=mapping.delay.torque if mapping is not None else 0.0,
+        warnings=warnings,
+    )

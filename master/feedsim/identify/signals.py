@@ -1,0 +1,229 @@
+"""Which columns of a recording are what: by a mapping, else by feedsim's own names, else by those of drive traces."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from feedsim import units
+from feedsim.errors import InputError
+from feedsim.identify.aliases import alias_of
+from feedsim.scenario.columns import (
+    DIMENSIONS,
+    DRIVING,
+    Columns,
+    MotionSignal,
+    Signal,
+    is_rms,
+    known_unit,
+    resulting,
+    target_of,
+)
+from feedsim.trace import Recording
+
+# feedsim's own signals of an axis -> role. The torque is taken before the current: it needs no torque constant.
+OWN = {"x_a": "position", "n_a": "speed", "M_a": "torque", "i_q": "current", "x_s": "setpoint"}
+_OWN = re.compile(rf"([A-Za-z][A-Za-z0-9_]*)\.({'|'.join(OWN)})")
+_EXAMPLE = {"time": "ms", "position": "mm", "speed": "rpm", "torque": "N.m", "current": "A", "setpoint": "mm"}
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A column on its way to SI.
+
+    Attributes:
+        role: of DIMENSIONS.
+        column: name in the file.
+        target: SI unit that the values get.
+        scale: what the column's numbers are multiplied with, sign included.
+        rms: the unit says that it is an effective value.
+        at: "scale" or "motor", where a motion is measured; "" where nothing tells it.
+    """
+
+    role: str
+    column: str
+    target: str
+    scale: float
+    rms: bool = False
+    at: str = ""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Columns to use; of the time either the column or the interval [s]."""
+
+    axis: str
+    channels: Mapping[str, Channel]
+    interval: float | None
+    notes: tuple[str, ...]
+
+
+def choose(recording: Recording, mapping: Columns | None, axis: str, axes: Iterable[str]) -> Chosen:
+    """Columns of an axis.
+
+    axis: "" where it is not known; then feedsim's own names tell it if there is one only. axes: of the machine.
+
+    Raises InputError: a column that the mapping names is not there; names that do not tell which column is meant, or
+    none that is known (with what there is, and the line of a mapping to write); a unit missing or of a wrong dimension.
+    """
+    if mapping is not None:
+        return _mapped(recording, mapping, axis)
+    return _by_name(recording, axis, tuple(axes))
+
+
+def _mapped(recording: Recording, mapping: Columns, axis: str) -> Chosen:
+    faults: list[str] = []
+    channels: dict[str, Channel] = {}
+    for role in DIMENSIONS:
+        signal = _time(recording, mapping) if role == "time" else mapping.signal(role)
+        if signal is None:
+            continue
+        if signal.column not in recording.names:
+            missing = f"{recording.header} has no column {signal.column!r}; there is {_listed(recording.names)}"
+            faults.append(f"{mapping.where(role)}: {missing}")
+            continue
+        try:
+            channels[role] = _channel(recording, role, signal)
+        except InputError as error:
+            faults.append(f"{mapping.where(role)}: {error}")
+    if faults:
+        raise InputError.of(f"{recording.path} by {mapping.file or 'its mapping'}", faults)
+    return Chosen(axis, channels, mapping.time.interval, ())
+
+
+def _time(recording: Recording, mapping: Columns) -> Signal | None:
+    clock = mapping.time
+    if clock.interval is not None:
+        return None
+    if clock.column is not None:
+        # What is not told is s, as everywhere in traces; but a counter is nothing before its factor.
+        unit = clock.unit or (None if clock.factor or recording.units.get(clock.column) else "s")
+        return Signal(column=clock.column, unit=unit, factor=clock.factor)
+    found = _named_time(recording, mapping.axis or "")
+    return Signal(column=found, unit=clock.unit or (None if recording.units[found] else "s"))
+
+
+def _by_name(recording: Recording, axis: str, axes: tuple[str, ...]) -> Chosen:
+    own: dict[str, dict[str, str]] = {}
+    for name in recording.names:
+        if match := _OWN.fullmatch(name):
+            own.setdefault(match[1], {})[OWN[match[2]]] = name
+    if own and not axis:
+        if len(own) > 1:
+            raise InputError(f"{recording.header}: the axes {', '.join(own)} are in the file; which one is meant?")
+        axis = next(iter(own))
+    notes: list[str] = []
+    if own:
+        if axis not in own:
+            raise InputError(f"{recording.header}: nothing of axis {axis!r}; there is {', '.join(own)}")
+        names = dict(own[axis])
+    else:
+        names = _aliases(recording, axis, axes)
+    driving = [role for role in DRIVING if role in names]
+    for role in driving[1:]:
+        left = names.pop(role)
+        notes.append(f"{recording.path}: {left!r} is not used; the {driving[0]} {names[driving[0]]!r} is")
+    missing = [] if driving else ["torque or current"]
+    missing += [] if "position" in names or "speed" in names else ["position or speed"]
+    if missing:
+        known = f" known are {', '.join(names.values())};" if names else ""
+        raise InputError(
+            f"{recording.header}: no column is called like a {' nor a '.join(missing)} of "
+            f"{f'axis {axis}' if axis else 'a drive trace'};{known} there is {_listed(recording.names)}; name the "
+            f"columns in a mapping file: {'; '.join(_line(part.split()[0], recording) for part in missing)}"
+        )
+    names["time"] = _named_time(recording, axis)
+    faults: list[str] = []
+    channels: dict[str, Channel] = {}
+    for role, name in names.items():
+        try:
+            unit = "s" if role == "time" and not recording.units[name] else None
+            alias = alias_of(name, axis, axes)
+            at = alias.at if alias else None
+            channels[role] = _channel(recording, role, MotionSignal(column=name, unit=unit, at=at))
+        except InputError as error:
+            faults.append(f"{recording.header}: {error}; mapping: {_line(role, recording, name)}")
+    if faults:
+        raise InputError.of(str(recording.path), faults)
+    return Chosen(axis, channels, None, tuple(notes))
+
+
+def _aliases(recording: Recording, axis: str, axes: tuple[str, ...]) -> dict[str, str]:
+    """Role -> column, by the names of drive traces."""
+    found: dict[str, list[str]] = {}
+    for name in recording.names:
+        if (alias := alias_of(name, axis, axes)) and alias.role != "time":
+            found.setdefault(alias.role, []).append(name)
+    faults = [
+        f"{recording.header}: {len(names)} columns may be the {role}: {', '.join(names)}; say which in a mapping "
+        f"file: {_line(role, recording, names[0])}"
+        for role, names in found.items()
+        if len(names) > 1
+    ]
+    if faults:
+        raise InputError.of(str(recording.path), faults)
+    return {role: names[0] for role, names in found.items()}
+
+
+def _named_time(recording: Recording, axis: str) -> str:
+    for usual in ("time", "t", "Zeit"):
+        if usual in recording.names:
+            return usual
+    found = [name for name in recording.names if (alias := alias_of(name, axis)) and alias.role == "time"]
+    if len(found) > 1:
+        raise InputError(
+            f"{recording.header}: {len(found)} columns may be the time: {', '.join(found)}; say which in a mapping "
+            f"file: {_line('time', recording, found[0])}"
+        )
+    if found:
+        return found[0]
+    first = recording.names[0]
+    if known_unit(recording.units[first]) and units.unit(recording.units[first] or "1").dimension == "time":
+        return first
+    raise InputError(
+        f"{recording.header}: no column of time; there is {_listed(recording.names)}; name it in a mapping file: "
+        "time: {column: ..., unit: s}, or give time: {interval: 2 ms} where there is none"
+    )
+
+
+def _channel(recording: Recording, role: str, signal: Signal) -> Channel:
+    """Unit, factor and sign of a column. InputError: no unit, a wrong one, or one that contradicts the header."""
+    column, header, factor = signal.column, recording.units[signal.column], signal.factor
+    known = header if header and known_unit(header) else ""
+    if signal.unit and known and resulting(signal.unit, "1").factor != resulting(known, "1").factor:
+        raise InputError(f"column {column!r} is in {header} by its header, in {signal.unit} by the mapping")
+    unit = signal.unit or known
+    if not unit and factor is None:
+        text = f"{header!r}, the unit of column {column!r}, is not known here" if header else ""
+        raise InputError(f"{text or f'column {column!r} has no unit'}; give it: unit: {_EXAMPLE.get(role, 'N.m')}")
+    scale = 1.0
+    if factor is not None:
+        assert factor.value is not None or factor.variable is not None
+        scale = float(factor.value) if factor.value is not None else recording.scalar(str(factor.variable))
+        if scale == 0:
+            raise InputError(f"the factor {factor.variable!r} is 0")
+    try:
+        given = resulting(unit or "1", factor.unit if factor else "1")
+        target = target_of(role, given)
+    except InputError as error:
+        raise InputError(f"column {column!r} in {unit or 'no unit'}{_times(signal)}: {error}") from None
+    scale *= signal.sign * float(given.factor / units.unit(target).factor)
+    at = getattr(signal, "at", None) or {"m": "scale", "m/s": "scale", "rad": "motor", "rad/s": "motor"}.get(target, "")
+    return Channel(role, column, target, scale, is_rms(unit), at)
+
+
+def _times(signal: Signal) -> str:
+    return f" times a factor in {signal.factor.unit}" if signal.factor else ""
+
+
+def _line(role: str, recording: Recording, column: str = "...") -> str:
+    """The line of a mapping file that names a column."""
+    told = column in recording.units and known_unit(recording.units[column]) and recording.units[column]
+    name = column if re.fullmatch(r"[\w.]+", column) else f'"{column}"'
+    return f"{role}: {{column: {name}}}" if told else f"{role}: {{column: {name}, unit: {_EXAMPLE.get(role, 'N.m')}}}"
+
+
+def _listed(names: Iterable[str]) -> str:
+    every = list(names)
+    return ", ".join(every[:20]) + (f" and {len(every) - 20} more" if len(every) > 20 else "")

@@ -1,0 +1,296 @@
+"""Mapping files: which columns of a recorded drive trace are what, in which unit and with which sign."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PrivateAttr, StrictFloat, StrictInt, StrictStr, ValidationInfo, field_validator
+from pydantic import model_validator as whole
+
+from feedsim import units
+from feedsim.errors import InputError
+from feedsim.scenario.fields import AxisName, Model, Quantity, fault
+from feedsim.scenario.load import check, fetch, read_group
+from feedsim.scenario.problems import describe, in_order
+from feedsim.scenario.source import Place
+
+# What drives write that is no unit of its own: a whole unit -> the unit, and what to know about it.
+SPELLINGS: dict[str, str] = {
+    "increment": "1", "increments": "1", "inc": "1", "incs": "1", "count": "1", "counts": "1", "digits": "1",
+    "turn": "rev", "turns": "rev", "revs": "rev", "revolutions": "rev",
+    "r/min": "rpm", "u/min": "rpm", "upm": "rpm", "1/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
+    "a rms": "A", "arms": "A", "a(rms)": "A", "a_rms": "A", "aeff": "A", "a eff": "A",
+}  # fmt: skip
+RMS = ("a rms", "arms", "a(rms)", "a_rms", "aeff", "a eff")
+# role -> units of the dimensions that its values may have, the usual one first
+DIMENSIONS: dict[str, tuple[str, ...]] = {
+    "time": ("s",),
+    "position": ("m", "rad"),
+    "speed": ("rad/s", "m/s"),
+    "torque": ("N.m",),
+    "current": ("A",),
+    "force": ("N",),
+    "load": ("N.m", "N"),
+    "setpoint": ("m", "rad"),
+}
+DRIVING = ("torque", "current", "force")
+
+
+def spelled(unit: str) -> str:
+    """A unit as drives write it in the spelling of feedsim.units: "U/min" is rpm, "increments" a plain number."""
+    return SPELLINGS.get(" ".join(unit.split()).lower(), unit)
+
+
+def is_rms(unit: str) -> bool:
+    """Whether a unit says that a current is an effective value."""
+    return " ".join(unit.split()).lower() in RMS
+
+
+def known_unit(unit: str) -> bool:
+    """Whether text is a unit at all."""
+    try:
+        units.unit(spelled(unit))
+    except InputError:
+        return False
+    return True
+
+
+def resulting(unit: str, factor_unit: str) -> units.Unit:
+    """Unit of a column's values times the factor. InputError: not known."""
+    plain = spelled(unit)
+    return units.unit(plain if factor_unit == "1" else factor_unit if plain == "1" else f"({plain})*({factor_unit})")
+
+
+def target_of(role: str, given: units.Unit) -> str:
+    """SI unit that a role's values in unit `given` are converted to. InputError: it is no unit of that role."""
+    for target in DIMENSIONS[role]:
+        if units.unit(target).dimension == given.dimension:
+            return target
+    kinds = " or ".join(units.article(units.unit(text).kind) for text in DIMENSIONS[role])
+    raise InputError(
+        f"the values are {units.article(given.kind)}; {kinds} is expected here, in {' or '.join(DIMENSIONS[role])} "
+        "for example"
+    )
+
+
+class Factor(Model):
+    """What a column is multiplied with: a number with a unit, or a number of the file; in short "35.15 N/V"."""
+
+    value: StrictFloat | StrictInt | None = Field(default=None, description="The number")
+    variable: StrictStr | None = Field(
+        default=None, min_length=1, description="Variable of the file (MAT) that holds the number"
+    )
+    unit: StrictStr = Field(default="1", description="Unit of the factor")
+
+    @whole(mode="before")
+    @classmethod
+    def _in_short(cls, value: Any) -> Any:
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            return {"value": value}
+        if not isinstance(value, str):
+            return value
+        match = re.fullmatch(rf"\s*({units.NUMBER})(.*)", value, re.DOTALL)
+        if not match:
+            raise fault(
+                f"{value!r} is no factor; a number with a unit is expected, for example 35.15 N/V, or "
+                "{variable: gtau, unit: N/V}"
+            )
+        return {"value": float(match[1]), "unit": match[2].strip() or "1"}
+
+    @field_validator("variable")
+    @classmethod
+    def _one_of_both(cls, variable: str | None, info: ValidationInfo) -> str | None:
+        if "value" in info.data and (variable is None) == (info.data["value"] is None):
+            raise fault("a factor needs either 'value' or 'variable'")
+        return variable
+
+    @field_validator("value")
+    @classmethod
+    def _usable(cls, value: float | None) -> float | None:
+        if value is not None and not 0 < abs(value) < 1e300:
+            raise fault(f"{value} is outside the allowed range: any number but 0")
+        return value
+
+    @field_validator("unit")
+    @classmethod
+    def _known(cls, unit: str) -> str:
+        return _checked(unit)
+
+    model_config = Model.model_config | {"validate_default": True}
+
+
+class Signal(Model):
+    """A column of the trace."""
+
+    column: StrictStr = Field(min_length=1, description="Name in the header without the unit, or variable of the file")
+    unit: StrictStr | None = Field(
+        default=None, description="Unit of the column, where the header does not tell it; increments for plain counts"
+    )
+    factor: Factor | None = Field(
+        default=None, description="What the values are multiplied with, for example 35.15 N/V"
+    )
+    sign: Literal[1, -1] = Field(
+        default=1, description="-1 where the column counts against the positive direction of the axis"
+    )
+
+    @field_validator("unit")
+    @classmethod
+    def _known(cls, unit: str | None) -> str | None:
+        return None if unit is None else _checked(unit)
+
+
+class MotionSignal(Signal):
+    """A column of motion, on the scale or on the motor."""
+
+    at: Literal["scale", "motor"] | None = Field(
+        default=None, description="Where it is measured; without it lengths are those of the scale, angles of the motor"
+    )
+
+
+class Clock(Model):
+    """The time: a column, or the interval of a trace without one."""
+
+    column: StrictStr | None = Field(default=None, min_length=1, description="Name of the time's column")
+    unit: StrictStr | None = Field(default=None, description="Unit of the column, where the header does not tell it")
+    factor: Factor | None = Field(default=None, description="What a counter of cycles is multiplied with: 2 ms")
+    interval: Annotated[float, Quantity("s", above=0, example="2 ms")] | None = Field(
+        default=None, description="Time between rows, where the trace has no column of time"
+    )
+
+    @field_validator("unit")
+    @classmethod
+    def _known(cls, unit: str | None) -> str | None:
+        return None if unit is None else _checked(unit)
+
+
+class Delay(Model):
+    """Known delays between channels."""
+
+    torque: Annotated[float, Quantity("s", minimum=0, maximum=1, example="0.5 ms")] = Field(
+        default=0.0,
+        validate_default=False,
+        description="By how much torque or current is logged later than the position",
+    )
+
+
+class Columns(Model):
+    """A mapping file."""
+
+    name: StrictStr = Field(default="", description="Name in reports")
+    note: StrictStr = Field(default="", description="Remark shown wherever the record's numbers are shown")
+    axis: AxisName | None = Field(default=None, description="Axis that the trace is of")
+    time: Clock = Field(default=Clock(column=None), description="Column of the time; without it found by its name")
+    position: MotionSignal | None = Field(default=None, description="Measured position: a length, or the motor's angle")
+    speed: MotionSignal | None = Field(default=None, description="Measured speed: the motor's, or of the slide")
+    torque: Signal | None = Field(default=None, description="Motor torque")
+    current: Signal | None = Field(default=None, description="Torque-generating current")
+    force: Signal | None = Field(default=None, description="Driving force on the slide")
+    load: Signal | None = Field(
+        default=None, description="Known disturbance, force or torque, counted against the motor"
+    )
+    setpoint: MotionSignal | None = Field(default=None, description="Position setpoint")
+    pitch: Annotated[float, Quantity("m", minimum=1e-8, example="20 mm")] | None = Field(
+        default=None, description="Travel per motor turn"
+    )
+    torque_constant: Annotated[float, Quantity("N.m/A", minimum=1e-9)] | None = Field(
+        default=None, description="Torque per current, in the amplitude (peak or rms) that the current is logged in"
+    )
+    inertia: Annotated[float, Quantity("kg.m^2", above=0, example="0.015 kg.m^2")] | None = Field(
+        default=None, description="All that the motor accelerates, as seen by the motor"
+    )
+    mass: Annotated[float, Quantity("kg", above=0)] | None = Field(
+        default=None, description="In place of the inertia: all that is accelerated, as seen by the slide"
+    )
+    delay: Delay = Field(default=Delay(), description="Known delays between channels")
+
+    _file: Path | None = PrivateAttr(default=None)
+    _origins: dict[Place, str] = PrivateAttr(default_factory=dict)
+
+    @property
+    def file(self) -> Path | None:
+        """The mapping file; None where it was made in Python."""
+        return self._file
+
+    def where(self, *place: str | int) -> str:
+        """Where a key stands, for messages: "z.yaml:12: position"."""
+        name = ".".join(str(key) for key in place)
+        at = place
+        while at not in self._origins and at:
+            at = at[:-1]
+        return f"{self._origins[at]}: {name}" if at in self._origins else f"mapping: {name}"
+
+    def signal(self, role: str) -> Signal | None:
+        """Column of a role of DIMENSIONS other than the time."""
+        signal = getattr(self, role)
+        assert signal is None or isinstance(signal, Signal)
+        return signal
+
+
+def load_columns(path: str | Path) -> Columns:
+    """Read and check a mapping file. InputError lists every problem with file and line."""
+    path = Path(path)
+    source = read_group(path)
+    faults: list[str] = []
+    fetch(source, Columns, (), faults)
+    columns = check(source, Columns, faults)
+    if columns is not None:
+        faults += [describe(source, place, message) for place, message in contradictions(columns)]
+    if faults or columns is None:
+        raise InputError.of(str(path), in_order(faults))
+    columns._file = path
+    columns._origins = {place: mark.where for place, mark in source.marks.items()}
+    return columns
+
+
+def contradictions(columns: Columns) -> Iterator[tuple[Place, str]]:
+    """Place and message of what cannot go together."""
+    clock = columns.time
+    if clock.interval is not None and (clock.column, clock.unit, clock.factor) != (None, None, None):
+        yield ("time",), "'interval' is for traces without a column of time; give either the interval or the column"
+    if clock.column is None and clock.factor is not None:
+        yield ("time",), "'factor' needs the 'column' that it belongs to"
+    given = [role for role in DRIVING if columns.signal(role) is not None]
+    if not given:
+        yield (), f"missing: one of {', '.join(DRIVING)}, for example current: {{column: i_q, unit: A}}"
+    for role in given[1:]:
+        yield (role,), f"stands beside {given[0]}; one of both is enough, and they could contradict one another"
+    if columns.position is None and columns.speed is None:
+        yield (), "missing: position or speed, for example position: {column: x, unit: mm}"
+    if columns.mass is not None and columns.inertia is not None:
+        yield ("mass",), "stands beside inertia; give one of both"
+    if columns.torque_constant is not None and columns.current is None and given:
+        yield ("torque_constant",), f"is of no use: the trace's {given[0]} is taken, not a current"
+    for role in DIMENSIONS:
+        yield from _of_signal(role, clock if role == "time" else columns.signal(role))
+
+
+def _of_signal(role: str, signal: Signal | Clock | None) -> Iterator[tuple[Place, str]]:
+    """Unit and factor of a column, as far as they can be checked without the trace."""
+    if signal is None or (signal.unit is None and signal.factor is None):
+        return
+    factor = "1" if signal.factor is None else signal.factor.unit
+    if signal.unit is None:
+        return  # the trace's header may tell it
+    try:
+        given = resulting(signal.unit, factor)
+        target = target_of(role, given)
+    except InputError as error:
+        text = f"{signal.unit} times {factor}: " if signal.factor is not None else f"{signal.unit}: "
+        hint = ""
+        if units.unit(spelled(signal.unit)).dimension == units.unit("1").dimension:
+            hint = f"; give the factor of one unit, for example factor: 0.001 {DIMENSIONS[role][0]}"
+        yield (role, "unit"), f"{text}{error}{hint}"
+        return
+    if getattr(signal, "at", None) == "scale" and target.startswith("rad"):
+        yield (role, "at"), "the values are angles, which are the motor's; a scale measures lengths"
+
+
+def _checked(unit: str) -> str:
+    try:
+        units.unit(spelled(unit))
+    except InputError as error:
+        raise fault(str(error)) from None
+    return unit

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedsim.analysis.figures import Array, Figure, column, window
 from feedsim.errors import InputError
@@ -102,8 +103,13 @@ def least_squares_deviation(angle: Array, deviation: Array, radius: float) -> fl
     return float(np.ptp(np.hypot(x - centre[0], y - centre[1])))
 
 
+def quadrant(angle: Array, crossing: float) -> NDArray[np.bool_]:
+    """Which of ``angle`` (N,) lie within +-45 deg of the crossing [rad]."""
+    return np.asarray(np.abs((angle - crossing + math.pi) % (2 * math.pi) - math.pi) <= QUARTER / 2)
+
+
 def _glitch(turn: Turn, quarter: int, angle: Array, deviation: Array, median: float) -> Glitch:
-    near = np.abs((angle - quarter * QUARTER + math.pi) % (2 * math.pi) - math.pi) <= QUARTER / 2
+    near = quadrant(angle, quarter * QUARTER)
     peak = int(np.flatnonzero(near)[np.argmax(deviation[near])])
     axis = turn.axes[quarter % 2]
     return Glitch(

@@ -1,0 +1,324 @@
+"""Friction compensation judged by a circle: the contour without and with it, and what an error in it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from feedsim.analysis.circularity import Contour, Turn, circularity, contour, quadrant
+from feedsim.analysis.evaluate import CircleTask, tasks
+from feedsim.analysis.figures import Array, Figure
+from feedsim.cosim.feedforward import Lag, Law, friction_feedforward, lag_of
+from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.cosim.run import Run, run
+from feedsim.errors import InputError
+from feedsim.nc import Program
+from feedsim.scenario import CircleTest, Friction, Recording, Scenario
+from feedsim.trace import Trace
+from feedsim.trace.trace import suggest
+
+Progress = Callable[[str, int, int], None]
+
+DELAY_ERRORS = (-1e-3, -0.5e-3, -0.2e-3, 0.2e-3, 0.5e-3, 1e-3)  # s
+# Parameters that are wrong together: a static torque below the Coulomb torque is none.
+VARIED = (("F_C", "F_S"), ("sigma_0",), ("W",), ("gamma",), ("sigma_1",), ("v_s",))
+SHARE = 0.1
+RESTING = 1e-9  # m; what an axis that is held may move by, from rounding
+OF_ENGAGING = ("W", "gamma")  # of no effect where W is 0
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What is left on the evaluated turn, by the scales.
+
+    G: range of the radius deviation [m]. peak, dip: axis that reverses -> largest and smallest radius deviation within
+    +-45 deg of its reversals, less the turn's median [m]. Too little compensation leaves peaks, too much leaves dips.
+    """
+
+    G: float
+    peak: Mapping[str, float]
+    dip: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A compensation with an error. what: "delay" or names of parameters; change in unit ("ms", "%"), of all axes."""
+
+    what: str
+    change: float
+    unit: str
+    quality: Quality
+
+
+@dataclass(frozen=True, eq=False)
+class Compensation:
+    """A circle without and with friction compensation.
+
+    Attributes:
+        task: the evaluated turn.
+        frictions: axis -> parameters that the compensation uses; the axes are those that move.
+        lags: axis -> lags of the drive; without an entry where a delay was given.
+        delays: axis -> delay of the feedforward behind the speed setpoint n_ffw [s].
+        feedforward: A.M_ff [N.m] per axis at the control cycle.
+        before, after: the runs without and with compensation.
+        figures: "before.G", "after.glitch_X" ... as of a circle test, "before.dip_X" ..., "X.delay" ...
+        table: what errors cost; empty where it was not asked for.
+        warnings: what a user should know before believing the result, a sentence each.
+    """
+
+    task: CircleTask
+    frictions: Mapping[str, Friction]
+    lags: Mapping[str, Lag]
+    delays: Mapping[str, float]
+    feedforward: Trace
+    before: Run
+    after: Run
+    figures: Mapping[str, Figure]
+    table: tuple[Variation, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def scenario(self) -> Scenario:
+        return self.after.scenario
+
+    @property
+    def turn(self) -> Turn:
+        return self.task.turn
+
+
+def circle_task(scenario: Scenario, program: Program) -> CircleTask:
+    """The first circle test that the scenario asks for, or else that of its last circle.
+
+    Raises InputError where there is no circle.
+    """
+    asked = [task for task in tasks(scenario, program) if isinstance(task, CircleTask)]
+    if asked:
+        return asked[0]
+    try:
+        (task,) = tasks(scenario.model_copy(update={"evaluate": (CircleTest(),)}), program)
+    except InputError:
+        raise InputError(
+            f"{scenario.file}: there is no circle; friction compensation is judged by the reversals of a circle test: "
+            "a motion of kind circle is needed, or recorded setpoints of one with a circle test under evaluate"
+        ) from None
+    assert isinstance(task, CircleTask)
+    return task
+
+
+def moving_axes(program: Program) -> tuple[str, ...]:
+    """Axes that the program moves."""
+    return tuple(axis for axis, x in program.x_s.items() if np.ptp(x) > RESTING)
+
+
+def compensate(
+    scenario: Scenario,
+    program: Program,
+    *,
+    frictions: Mapping[str, Friction] | None = None,
+    delays: Mapping[str, float] | None = None,
+    table: bool = True,
+    fmus: Path | None = None,
+    progress: Progress | None = None,
+) -> Compensation:
+    """Run `scenario` without and with friction compensation of every axis that moves.
+
+    Args:
+        frictions: axis -> parameters for the compensation; the machine's own for the other axes. The machine keeps its
+            friction.
+        delays: axis -> delay [s] of the feedforward; by :func:`feedsim.cosim.feedforward.lag_of` for the other axes.
+        table: with the runs that show what errors cost.
+        fmus: folder of the archives.
+        progress: called with (what is done, cycles done, cycles in all).
+
+    Raises:
+        InputError: no circle, an unknown or resting axis, a drive whose lag is not known.
+        SimulationError: a unit failed.
+    """
+    task = circle_task(scenario, program)
+    turn = task.turn
+    axes = moving_axes(program)
+    for what, named in (("friction", frictions), ("delay", delays)):
+        for axis in named or ():
+            if axis not in axes:
+                known = f"no axis {axis!r}{suggest(axis, axes)}" if axis not in program.n_ffw else f"{axis} rests"
+                raise InputError(f"{what} of axis {axis}: {known}; the axes that move are {', '.join(axes)}")
+    machine = scenario.machine
+    used = {axis: (frictions or {}).get(axis, machine.axes[axis].friction) for axis in axes}
+    lags = _lags(scenario, [axis for axis in axes if axis not in (delays or {})])
+    applied = {axis: (delays or {})[axis] if axis not in lags else lags[axis].delay for axis in axes}
+    plain = _fully_recorded(scenario, turn)
+
+    def told(what: str) -> Callable[[int, int], None]:
+        return lambda done, total: progress(what, done, total) if progress is not None else None
+
+    with FrictionLaw(fmus) as law:
+        torque = friction_feedforward(machine, program, used, applied, law)
+        before = run(plain, program=program, fmus=fmus, progress=told("without compensation"))
+        after = run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
+        variations = _table(scenario, program, turn, used, applied, law, fmus=fmus, progress=progress) if table else ()
+    T_c = machine.cycles.T_c
+    feedforward = Trace(
+        np.arange(len(next(iter(torque.values()))), dtype=np.float64) * T_c,
+        {f"{axis}.M_ff": values for axis, values in torque.items()},
+        {f"{axis}.M_ff": "N.m" for axis in torque},
+    )
+    return Compensation(
+        task=task,
+        frictions=used,
+        lags=lags,
+        delays=applied,
+        feedforward=feedforward,
+        before=before,
+        after=after,
+        figures=_figures(turn, before, after, lags, applied, torque),
+        table=variations,
+        warnings=(*dict.fromkeys((*before.warnings, *after.warnings)), *_doubts(applied)),
+    )
+
+
+def quality(trace: Trace, turn: Turn) -> Quality:
+    """What is left on a turn."""
+    measured = contour(trace, turn)
+    return Quality(
+        G=float(np.ptp(measured.deviation)),
+        peak={axis: max(g.height for g in measured.glitches if g.axis == axis) for axis in turn.axes},
+        dip={axis: _dip(measured, axis) for axis in turn.axes},
+    )
+
+
+def _dip(measured: Contour, axis: str) -> float:
+    return min(
+        float(measured.deviation[quadrant(measured.angle, glitch.crossing)].min()) - measured.median
+        for glitch in measured.glitches
+        if glitch.axis == axis
+    )
+
+
+def _lags(scenario: Scenario, axes: Sequence[str]) -> dict[str, Lag]:
+    lags: dict[str, Lag] = {}
+    problems = []
+    for axis in axes:
+        try:
+            lags[axis] = lag_of(scenario.machine.axes[axis], scenario.machine.cycles)
+        except InputError as error:
+            problems.append(f"axis {axis}: {error}; give the delay of its compensation (--delay {axis}=...)")
+    if problems:
+        raise InputError.of(f"{scenario.file}: the delay of the compensation is not known", problems)
+    return lags
+
+
+def _fully_recorded(scenario: Scenario, turn: Turn) -> Scenario:
+    """The scenario with everything recorded that is looked at, and without a log, which is of a run."""
+    recording = scenario.recording
+    if recording.variables is not None:
+        needed = [f"{axis}.{signal}" for axis in turn.axes for signal in ("x_a", "n_a", "M_fr")]
+        recording = Recording(interval=recording.interval, variables=(*recording.variables, *needed))
+    return scenario.model_copy(update={"recording": recording, "logging": None})
+
+
+def _table(
+    scenario: Scenario,
+    program: Program,
+    turn: Turn,
+    frictions: Mapping[str, Friction],
+    delays: Mapping[str, float],
+    law: Law,
+    *,
+    fmus: Path | None,
+    progress: Progress | None,
+) -> tuple[Variation, ...]:
+    """One run up to the end of the turn for every error."""
+    machine = scenario.machine
+    columns = tuple(f"{axis}.x_a" for axis in turn.axes)
+    lean = scenario.model_copy(
+        update={"recording": Recording(interval=scenario.recording.interval, variables=columns), "logging": None}
+    )
+    last = min(int(np.searchsorted(program.time, turn.end)) + 1, len(program.time) - 1)
+    cut = replace(
+        program,
+        time=program.time[: last + 1],
+        x_s={axis: x[: last + 1] for axis, x in program.x_s.items()},
+        n_ffw={axis: n[: last + 1] for axis, n in program.n_ffw.items()},
+    )
+    instants = last * round(machine.cycles.T_pos / machine.cycles.T_c) + 1
+    wanted: list[tuple[str, float, str, Mapping[str, Friction], Mapping[str, float]]] = [
+        ("delay", error * 1e3, "ms", frictions, {axis: delay + error for axis, delay in delays.items()})
+        for error in DELAY_ERRORS
+    ]
+    for names in VARIED:
+        for share in (-SHARE, SHARE):
+            varied = {axis: _varied(friction, names, 1 + share) for axis, friction in frictions.items()}
+            if varied != frictions:
+                wanted.append((", ".join(names), share * 100, "%", varied, delays))
+    found = []
+    for done, (what, change, unit, set_, delay) in enumerate(wanted):
+        if progress is not None:
+            progress("what errors cost", done, len(wanted))
+        # Of the whole program, then cut: a delay below 0 looks ahead.
+        torque = friction_feedforward(machine, program, set_, delay, law)
+        torque = {axis: values[:instants] for axis, values in torque.items()}
+        result = run(lean, program=cut, fmus=fmus, torque_feedforward=torque)
+        found.append(Variation(what, change, unit, quality(result.trace, turn)))
+    if progress is not None:
+        progress("what errors cost", len(wanted), len(wanted))
+    return tuple(found)
+
+
+def _varied(friction: Friction, names: Sequence[str], factor: float) -> Friction:
+    """A set with some parameters multiplied; the same where they have no effect."""
+    if friction.W == 0 and any(name in OF_ENGAGING for name in names):
+        return friction
+    values = {name: getattr(friction, name) * factor for name in names}
+    if "gamma" in values:
+        values["gamma"] = min(values["gamma"], 1.0)
+    return friction.model_copy(update=values)
+
+
+def _figures(
+    turn: Turn,
+    before: Run,
+    after: Run,
+    lags: Mapping[str, Lag],
+    delays: Mapping[str, float],
+    torque: Mapping[str, Array],
+) -> dict[str, Figure]:
+    figures: dict[str, Figure] = {}
+    for name, words, result in (("before", "without", before), ("after", "with", after)):
+        found = circularity(result.trace, turn)
+        for axis, dip in quality(result.trace, turn).dip.items():
+            found[f"dip_{axis}"] = Figure(
+                dip * 1e6,
+                "um",
+                f"lowest radius deviation within +-45 deg of where {axis} reverses, less the median, by the linear "
+                "scales: too much compensation leaves a dip",
+            )
+        figures |= {
+            f"{name}.{key}": replace(figure, meaning=f"{words} compensation: {figure.meaning}")
+            for key, figure in found.items()
+        }
+    for axis, delay in delays.items():
+        if axis in lags:
+            lag = lags[axis]
+            figures[f"{axis}.axis_lag"] = Figure(lag.axis * 1e3, "ms", f"lag of {axis} behind its speed setpoint n_ffw")
+            figures[f"{axis}.torque_lag"] = Figure(
+                lag.torque * 1e3, "ms", f"lag of the torque of {axis} behind its setpoint: current loop and filters"
+            )
+        figures[f"{axis}.delay"] = Figure(
+            delay * 1e3, "ms", f"delay of the torque feedforward of {axis} behind the speed setpoint n_ffw"
+        )
+        figures[f"{axis}.peak_feedforward"] = Figure(
+            float(np.abs(torque[axis]).max()), "N.m", f"largest torque feedforward of {axis}"
+        )
+    return figures
+
+
+def _doubts(delays: Mapping[str, float]) -> list[str]:
+    return [
+        f"axis {axis}: the feedforward looks {-delay * 1e3:.3g} ms ahead of the speed setpoint; a control can do that "
+        "only where it knows its setpoints in advance"
+        for axis, delay in delays.items()
+        if delay < 0
+    ]

@@ -1,0 +1,164 @@
+"""feedsim compensate: friction compensation by torque feedforward, judged by a circle."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from argparse import BooleanOptionalAction, Namespace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from feedsim.cli.options import add_fmus, add_overrides
+
+if TYPE_CHECKING:
+    from feedsim.analysis.compensation import Progress
+    from feedsim.scenario import Friction
+
+DESCRIPTION = """Run a circle without and with friction compensation. A friction model, driven by the speed setpoint
+with the lag of the axis, gives a torque that is added to the torque setpoint of every axis that moves. Without
+--friction the model has the machine's own parameters: what is possible at best. With the file of an identified set it
+shows what that set is worth."""
+EPILOG = """examples:
+  feedsim compensate scenarios/xz_circle.yaml --out results/compensate
+  feedsim compensate scenarios/xz_circle.yaml --friction X=friction_x.yaml --friction Z=friction_z.yaml
+  feedsim compensate scenarios/xz_circle.yaml --delay "4.2 ms" --no-table
+"""
+
+
+def add_command(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add ``compensate`` to the commands."""
+    command = subparsers.add_parser(
+        "compensate",
+        help="friction compensation by torque feedforward: a circle without and with it",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="scenario with a circle")
+    command.add_argument(
+        "--out", type=Path, metavar="DIR", help="where the results go (default: results/compensate_<name of the file>)"
+    )
+    command.add_argument(
+        "--friction",
+        action="append",
+        default=[],
+        dest="frictions",
+        metavar="AXIS=FILE.yaml",
+        help="friction parameters that the compensation of an axis uses (default: the machine's own, which the machine "
+        "keeps in any case); may be given several times",
+    )
+    command.add_argument(
+        "--delay",
+        action="append",
+        default=[],
+        dest="delays",
+        metavar="[AXIS=]VALUE",
+        help="delay of the feedforward behind the speed setpoint, e.g. '4.2 ms' (default: from the parameters of the "
+        "drive); may be given several times",
+    )
+    command.add_argument(
+        "--table",
+        action=BooleanOptionalAction,
+        default=True,
+        help="with the runs that show what errors of the delay and of the parameters cost (default: yes)",
+    )
+    add_overrides(command, "machine.axes.Z.friction.F_C='1.8 N.m'")
+    add_fmus(command)
+    command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    command.set_defaults(action=compensate)
+
+
+def compensate(options: Namespace) -> None:
+    """Read, run, write."""
+    from feedsim import nc, report, scenario
+    from feedsim.analysis import compensation as analysis
+
+    plan = scenario.load(options.scenario, options.overrides)
+    directory: Path = options.out or Path("results") / f"compensate_{options.scenario.stem}"
+    program = nc.plan(plan)
+    analysis.circle_task(plan, program)
+    axes = analysis.moving_axes(program)
+    files, frictions = _frictions(options.frictions, axes)
+    delays = _delays(options.delays, axes)
+    report.check_compensation_writable(directory)
+    with _bar(options.quiet) as progress:
+        result = analysis.compensate(
+            plan,
+            program,
+            frictions=frictions,
+            delays=delays,
+            table=options.table,
+            fmus=options.fmus,
+            progress=progress,
+        )
+    report.write_compensation(result, files, directory)
+    for warning in result.warnings:
+        print(f"feedsim: warning: {warning}", file=sys.stderr)
+    if not options.quiet:
+        line = report.compensation_summary_line(result)
+        print(f"{plan.name}: friction compensation -> {directory / 'report.html'}\n  {line}")
+
+
+def _frictions(texts: Sequence[str], axes: Sequence[str]) -> tuple[Mapping[str, Path], Mapping[str, Friction]]:
+    """Axis -> file, and axis -> what is in it."""
+    from feedsim.errors import InputError
+    from feedsim.scenario.friction_file import read_friction
+
+    files: dict[str, Path] = {}
+    for text in texts:
+        axis, equals, file = text.partition("=")
+        if not (equals and axis and file):
+            raise InputError(f"--friction {text}: AXIS=FILE.yaml is needed, such as Z=friction_z.yaml")
+        _moves(f"--friction {text}", axis, axes)
+        files[axis] = Path(file)
+    return files, {axis: read_friction(file) for axis, file in files.items()}
+
+
+def _delays(texts: Sequence[str], axes: Sequence[str]) -> Mapping[str, float]:
+    """Axis -> delay [s]; one without an axis is that of all, and one with it counts more."""
+    from feedsim import units
+    from feedsim.errors import InputError
+
+    common: dict[str, float] = {}
+    single: dict[str, float] = {}
+    for text in texts:
+        axis, equals, value = text.rpartition("=")
+        if equals:
+            _moves(f"--delay {text}", axis, axes)
+        try:
+            delay = units.parse(value, "s", "4.2 ms")
+        except InputError as error:
+            raise InputError(f"--delay {text}: {error}") from None
+        if equals:
+            single[axis] = delay
+        else:
+            common = dict.fromkeys(axes, delay)
+    return common | single
+
+
+def _moves(option: str, axis: str, axes: Sequence[str]) -> None:
+    from feedsim.errors import InputError
+
+    if axis not in axes:
+        raise InputError(f"{option}: no axis {axis!r} moves in this scenario; those that do are {', '.join(axes)}")
+
+
+@contextmanager
+def _bar(quiet: bool) -> Iterator[Progress]:
+    """A progress bar that names what is being done."""
+    from tqdm import tqdm
+
+    said = ""
+    with tqdm(unit_scale=True, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
+
+        def progress(what: str, done: int, total: int) -> None:
+            nonlocal said
+            if what != said:
+                said = what
+                bar.reset(total)
+                bar.set_description(what)
+            bar.update(done - bar.n)
+
+        yield progress

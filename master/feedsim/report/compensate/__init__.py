@@ -1,0 +1,1 @@
+"""Friction compensation: circle without and with it, torque feedforward, what errors cost."""

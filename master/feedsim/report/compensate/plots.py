@@ -1,0 +1,216 @@
+"""The pictures of a report on friction compensation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from feedsim.analysis import Contour, Turn, contour
+from feedsim.analysis.circularity import quadrant
+from feedsim.analysis.compensation import Compensation, Variation
+from feedsim.report.circle_plots import NOMINAL, RING_GAPS, ring_step
+from feedsim.report.labels import heading, legend_above, plain_box
+from feedsim.report.style import (
+    BLUE,
+    GREEN,
+    GRID,
+    MUTED,
+    ORANGE,
+    VERMILLION,
+    Array,
+    Picture,
+    drawing,
+    finish,
+    thinned,
+)
+from feedsim.report.words import minus
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BEFORE: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.3, "label": "without"}
+AFTER: dict[str, Any] = {"color": BLUE, "linewidth": 1.6, "label": "with compensation"}
+AROUND = 0.03  # s to either side of a reversal
+
+
+def pictures_of(compensation: Compensation) -> list[Picture]:
+    """Contour, reversals, torques and, where there is a table, what errors cost."""
+    turn = compensation.turn
+    before, after = (contour(run.trace, turn) for run in (compensation.before, compensation.after))
+    plane = f"{turn.axes[0]}-{turn.axes[1]}"
+    pictures = [
+        _contour_picture(turn, before, after, plane),
+        _reversals_picture(turn, before, after, plane),
+        _torque_picture(compensation),
+    ]
+    return [*pictures, _errors_picture(compensation)] if compensation.table else pictures
+
+
+def _contour_picture(turn: Turn, before: Contour, after: Contour, plane: str) -> Picture:
+    ring = ring_step(float(np.abs(before.deviation).max()) * 1e6)
+    rings = 1 if float(np.abs(before.deviation).max()) * 1e6 < 1.1 * ring else 2
+    gap = RING_GAPS[rings]
+    with drawing(10.0, 6.0) as figure:
+        polar, unrolled = figure.subplots(1, 2, width_ratios=[1.35, 1])
+        _polar(polar, turn, ((before, BEFORE), (after, AFTER)), ring, rings)
+        for measured, style in ((before, BEFORE), (after, AFTER)):
+            angle = np.rad2deg(measured.angle % (2 * math.pi))
+            order = np.argsort(angle)
+            unrolled.plot(*thinned(angle[order], measured.deviation[order] * 1e6), **style)
+        unrolled.axhline(0.0, color=MUTED, linewidth=0.8)
+        heading(unrolled, "Over the angle")
+        legend_above(unrolled)
+        unrolled.set(xlabel=f"angle from {turn.axes[0]}+ [°]", ylabel="radius deviation [µm]", xlim=(0, 360))
+        unrolled.set_xticks(range(0, 361, 90))
+        return finish(
+            figure,
+            "compensation-contour",
+            f"Circular test in the plane {plane}, without and with friction compensation",
+            f"Radius {turn.radius * 1e3:.6g} mm, turn from {turn.begin:.4f} to {turn.end:.4f} s, by the linear scales. "
+            f"Radius deviation magnified {gap / ring * 1e6 / (NOMINAL / turn.radius):,.0f} times; rings at "
+            f"±{ring:g} µm about the programmed circle.",
+        )
+
+
+def _polar(axes: Axes, turn: Turn, curves: Sequence[tuple[Contour, dict[str, Any]]], ring: float, rings: int) -> None:
+    gap = RING_GAPS[rings]
+    around = np.linspace(0, 2 * math.pi, 361)
+    axes.set_aspect("equal", anchor="N")
+    axes.set_axis_off()
+    for value in range(-rings, rings + 1):
+        radius = NOMINAL + value * gap
+        style: dict[str, Any] = (
+            {"color": GRID, "linewidth": 0.9} if value else {"color": MUTED, "linewidth": 1.1, "linestyle": (0, (6, 3))}
+        )
+        axes.plot(radius * np.cos(around), radius * np.sin(around), **style)
+        if value:
+            at = radius * math.cos(math.pi / 4)
+            axes.text(
+                at, at, minus(f"{value * ring:+g} µm"), color=MUTED, fontsize=8.5, ha="center", va="center",
+                rotation=-45, bbox=plain_box(),
+            )  # fmt: skip
+    outer = NOMINAL + 1.16 * gap * rings
+    first, second = turn.axes
+    for text, x, y in ((f"{first}+", 1, 0), (f"{second}+", 0, 1), (f"{first}−", -1, 0), (f"{second}−", 0, -1)):
+        axes.plot([0, outer * x], [0, outer * y], color=GRID, linewidth=0.9)
+        axes.text(x * (outer + 0.06), y * (outer + 0.06), text, ha="center", va="center", fontweight="bold")
+    for measured, style in curves:
+        r = NOMINAL + measured.deviation * 1e6 * gap / ring
+        rows = thinned(np.arange(len(r), dtype=float), r)[0].astype(int)
+        axes.plot(r[rows] * np.cos(measured.angle[rows]), r[rows] * np.sin(measured.angle[rows]), **style)
+    axes.set_xlim(-1.12 * outer, 1.12 * outer)
+    axes.set_ylim(-1.12 * outer, 1.12 * outer)
+    heading(axes, f"Contour error, {first}-{second}, R {turn.radius * 1e3:g} mm")
+
+
+def _reversals_picture(turn: Turn, before: Contour, after: Contour, plane: str) -> Picture:
+    with drawing(10.0, 6.4) as figure:
+        rooms = figure.subplots(2, 4, sharex=True, sharey="row")
+        for room, glitch in zip(rooms.T, before.glitches, strict=True):
+            for axes, curves in zip(room, (((before, BEFORE), (after, AFTER)), ((after, AFTER),)), strict=True):
+                for measured, style in curves:
+                    near = quadrant(measured.angle, glitch.crossing)
+                    angle = np.rad2deg((measured.angle[near] - glitch.crossing + math.pi) % (2 * math.pi) - math.pi)
+                    order = np.argsort(angle)
+                    axes.plot(angle[order], measured.deviation[near][order] * 1e6, **style)
+                axes.axhline(0.0, color=MUTED, linewidth=0.8)
+            heading(room[0], f"{minus(glitch.name)}: {glitch.axis} reverses")
+            room[1].set(xlabel="angle from the crossing [°]")
+            room[1].set_xticks((-45, 0, 45))
+        legend_above(rooms[0, 0])
+        rooms[0, 0].set_ylabel("radius deviation [µm]")
+        rooms[1, 0].set_ylabel("with compensation [µm]")
+        return finish(
+            figure,
+            "compensation-reversals",
+            f"Circular test in the plane {plane}: the contour around the reversals",
+            "Radius deviation by the linear scales within ±45° of every crossing. Below: the compensated contour "
+            "alone, on a scale of its own.",
+        )
+
+
+def _torque_picture(compensation: Compensation) -> Picture:
+    turn, feedforward = compensation.turn, compensation.feedforward
+    axes_of = [axis for axis in turn.axes if f"{axis}.M_ff" in feedforward.columns]
+    signs = {axis: compensation.scenario.machine.axes[axis].display_sign for axis in axes_of}
+    torque = feedforward.between(turn.begin, turn.end)
+    real = compensation.after.trace.between(turn.begin, turn.end)
+    reversed_ones = [axis for axis in axes_of if signs[axis] < 0]
+    with drawing(10.0, 3.4 * max(1, len(axes_of))) as figure:
+        rooms = figure.subplots(max(1, len(axes_of)), 2, squeeze=False, width_ratios=[1.5, 1])
+        for (whole, near), axis in zip(rooms, axes_of, strict=True):
+            sign = signs[axis]
+            reversal = _reversal(real.time, real[f"{axis}.n_a"])
+            for room in (whole, near):
+                room.plot(
+                    *thinned(torque.time, sign * torque[f"{axis}.M_ff"]), color=GREEN, label="feedforward $M_{ff}$"
+                )
+                room.plot(
+                    *thinned(real.time, sign * real[f"{axis}.M_fr"]), color=ORANGE, linestyle=(0, (4, 2)),
+                    label=r"friction $M_{fr}$",
+                )  # fmt: skip
+                room.axhline(0.0, color=MUTED, linewidth=0.8)
+                room.set(xlabel="time [s]")
+            near.set_xlim(reversal - AROUND, reversal + AROUND)
+            heading(whole, f"Axis {axis}: torque over the turn")
+            heading(near, "Around a reversal")
+            legend_above(whole)
+            whole.set_ylabel("torque [N·m]" if sign > 0 else "torque, sign reversed [N·m]")
+            whole.margins(x=0.01)
+        return finish(
+            figure,
+            "compensation-torque",
+            "Torque feedforward of the friction compensation",
+            "Feedforward as it is added to the torque setpoint, and the friction torque of the compensated run. The "
+            "feedforward is ahead by the lag of the torque behind its setpoint."
+            + (f" Torques of {', '.join(reversed_ones)} are drawn with reversed sign." if reversed_ones else ""),
+        )
+
+
+def _reversal(time: Array, n: Array) -> float:
+    """First instant at which the speed changes its sign within the inner nine tenths of the time, else the middle."""
+    begin, end = time[0] + 0.05 * np.ptp(time), time[-1] - 0.05 * np.ptp(time)
+    at = time[1:][(np.sign(n[1:]) != np.sign(n[:-1])) & (time[1:] > begin) & (time[1:] < end)]
+    return float(at[0]) if at.size else float(time[len(time) // 2])
+
+
+def _errors_picture(compensation: Compensation) -> Picture:
+    by_delay = [each for each in compensation.table if each.what == "delay"]
+    others = [each for each in compensation.table if each.what != "delay"]
+    names = list(dict.fromkeys(each.what for each in others))
+    with drawing(10.0, 4.6) as figure:
+        left, right = figure.subplots(1, 2, width_ratios=[1, 1.1])
+        error, G = _by_change(by_delay, compensation.figures["after.G"].value)
+        left.plot(error, G, color=BLUE, marker="o", markersize=4)
+        left.set(xlabel="error of the delay [ms]", ylabel="circular deviation G [µm]")
+        left.set_ylim(bottom=0.0)
+        heading(left, "Delay")
+        for offset, low, colour in ((0.19, True, VERMILLION), (-0.19, False, BLUE)):
+            chosen = {each.what: each for each in others if (each.change < 0) == low}
+            widths = [chosen[name].quality.G * 1e6 if name in chosen else 0.0 for name in names]
+            share = next((each.change for each in chosen.values()), 0.0)
+            right.barh(
+                [-i + offset for i in range(len(names))], widths, height=0.36, color=colour,
+                label=minus(f"{share:+.3g} %"),
+            )  # fmt: skip
+        right.axvline(compensation.figures["after.G"].value, color=MUTED, linewidth=1.1, linestyle=(0, (1, 2)))
+        right.set_yticks([-i for i in range(len(names))], names)
+        right.set(xlabel="circular deviation G [µm]")
+        heading(right, "Parameters")
+        legend_above(right)
+        return finish(
+            figure,
+            "compensation-errors",
+            "What errors of the compensation cost",
+            "Circular deviation G of the compensated circle when the delay or a parameter of all axes is wrong. "
+            "Dotted: without the error. Without compensation G is "
+            f"{compensation.figures['before.G'].value:.3g} µm.",
+        )
+
+
+def _by_change(variations: Sequence[Variation], without_error: float) -> tuple[list[float], list[float]]:
+    points = sorted([(0.0, without_error), *((each.change, each.quality.G * 1e6) for each in variations)])
+    return [change for change, _ in points], [G for _, G in points]

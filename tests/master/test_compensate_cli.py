@@ -1,0 +1,179 @@
+"""feedsim compensate as a user meets it: what it writes, that it agrees with itself, messages and exit codes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_report import Page
+
+from feedsim.trace import read_csv
+from report_helpers import contents
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENARIOS = ROOT / "scenarios"
+CIRCLE = SCENARIOS / "xz_circle.yaml"
+
+FRICTION_Z = """
+F_C: 1.44 N.m     # 10 % too small
+F_S: 1.89 N.m
+v_s: 0.6 rad/s
+F_log: 0.4 N.m
+v_log: 3 rad/s
+sigma_0: 300 N.m/rad
+sigma_1: 0.8 N.m.s/rad
+sigma_2: 0.006 N.m.s/rad
+W: 0.040 rad
+gamma: 0.35
+"""
+
+Process = subprocess.CompletedProcess[str]
+
+
+def feedsim(*words: str | Path, fmus: Path, cwd: Path) -> Process:
+    command = [sys.executable, "-c", "from feedsim.cli import entry; entry()", *map(str, words)]
+    environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master"), "PYTHONUTF8": "1"}
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, encoding="utf-8", check=False)
+
+
+@pytest.fixture(scope="module")
+def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Process, Path]:
+    """Without the table, with a set and a delay given."""
+    folder = tmp_path_factory.mktemp("compensate")
+    (folder / "friction_z.yaml").write_text(FRICTION_Z, encoding="utf-8")
+    words = ["--friction", "Z=friction_z.yaml", "--delay", "X=3.9417 ms", "--no-table"]
+    # what is needed is recorded whatever the scenario leaves out
+    words += ["--set", 'recording.variables=["X.x_a"]']
+    return feedsim("compensate", CIRCLE, "--out", "out", *words, fmus=fmus, cwd=folder), folder
+
+
+def summary_of(folder: Path) -> dict[str, Any]:
+    text = (folder / "out" / "summary.json").read_text(encoding="utf-8")
+    content: dict[str, Any] = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    return content
+
+
+def test_everything_is_written_and_told(done: tuple[Process, Path]) -> None:
+    process, folder = done
+    assert (process.returncode, process.stderr) == (0, "")
+    first, second = process.stdout.splitlines()
+    assert first == f"X-Z circle: friction compensation -> {Path('out') / 'report.html'}"
+    assert second.startswith("  G 8.19 -> 0.8")
+    files = set(contents(folder / "out"))
+    assert files == {
+        *("result.csv", "uncompensated.csv", "feedforward.csv", "compensation.csv", "summary.json", "report.html"),
+        *(f"figures/compensation-{stem}.png" for stem in ("contour", "reversals", "torque")),
+    }
+    assert set(summary_of(folder)["files"]) == files
+
+
+def test_summary_tells_what_was_compensated_with(done: tuple[Process, Path]) -> None:
+    summary = summary_of(done[1])
+    axes = summary["compensation"]["axes"]
+    assert list(axes) == ["X", "Z"]
+    assert axes["X"]["delay"] == {"value": 0.0039417, "unit": "s"}
+    assert (axes["X"]["delay_from"], axes["X"]["friction_from"]) == ("given", "the machine")
+    assert (axes["Z"]["delay_from"], axes["Z"]["friction_from"]) == ("the drive's parameters", "friction_z.yaml")
+    assert axes["Z"]["friction"]["F_C"] == {"value": 1.44, "unit": "N.m"}
+    assert summary["machine"]["axes"]["Z"]["friction"]["F_C"]["value"] == 1.6
+    assert "made up" in summary["machine"]["note"]
+    named = {item["role"]: item["name"] for item in summary["inputs"]}
+    assert named["friction of the compensation of Z"] == "friction_z.yaml"
+    figures = summary["figures"]
+    assert "X.axis_lag" not in figures
+    assert figures["Z.delay"]["value"] == pytest.approx(4.191, abs=1e-3)
+    assert figures["Z.axis_lag"]["value"] - figures["Z.torque_lag"]["value"] == pytest.approx(
+        figures["Z.delay"]["value"]
+    )
+    assert figures["after.glitch_Z"]["value"] == pytest.approx(0.1 * figures["before.glitch_Z"]["value"], rel=0.05)
+    assert figures["after.glitch_X"]["value"] < 0.05
+    assert figures["after.G"]["meaning"].startswith("with compensation: ISO 230-4")
+    assert all(figure["unit"] and figure["meaning"] for figure in figures.values())
+
+
+def test_curves_can_be_read_back(done: tuple[Process, Path]) -> None:
+    folder = done[1] / "out"
+    with_it, without, torque = (read_csv(folder / f"{name}.csv") for name in ("result", "uncompensated", "feedforward"))
+    assert set(with_it.columns) == {"X.x_a", "Z.x_a", "X.n_a", "Z.n_a", "X.M_fr", "Z.M_fr"}
+    assert np.array_equal(with_it.time, without.time)
+    assert list(torque.columns) == ["X.M_ff", "Z.M_ff"]
+    assert torque.unit("Z.M_ff") == "N.m"
+    assert torque.time[1] == pytest.approx(125e-6)
+    assert torque.time[-1] == pytest.approx(with_it.time[-1])
+    assert np.abs(torque["Z.M_ff"]).max() == pytest.approx(
+        summary_of(done[1])["figures"]["Z.peak_feedforward"]["value"]
+    )
+
+
+def test_table_without_errors_has_both_runs(done: tuple[Process, Path]) -> None:
+    with (done[1] / "out" / "compensation.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["compensation"] for row in rows] == ["none", "as computed"]
+    figures = summary_of(done[1])["figures"]
+    for row, run in zip(rows, ("before", "after"), strict=True):
+        assert float(row["G [um]"]) == pytest.approx(figures[f"{run}.G"]["value"], rel=1e-5)
+        for axis in ("X", "Z"):
+            assert float(row[f"peak_{axis} [um]"]) == pytest.approx(figures[f"{run}.glitch_{axis}"]["value"], rel=1e-5)
+            assert float(row[f"dip_{axis} [um]"]) == pytest.approx(figures[f"{run}.dip_{axis}"]["value"], rel=1e-5)
+
+
+def test_report_shows_what_counts(done: tuple[Process, Path]) -> None:
+    text = (done[1] / "out" / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert "Friction compensation: X-Z circle" in text
+    assert "8.19 → 0.8" in text
+    assert "made up to be credible" in text
+    assert "friction_z.yaml" in text
+    assert 'id="compensation-contour"' in text
+    assert 'id="compensation-errors"' not in text
+    assert all(reference.startswith(("#", "data:")) for reference in page.references)
+    assert len(page.ids) == len(set(page.ids))
+
+
+def test_nothing_of_an_earlier_run_is_left(done: tuple[Process, Path], fmus: Path, tmp_path: Path) -> None:
+    """Another command in the same folder takes the files away that it does not write itself."""
+    (tmp_path / "out").mkdir()
+    for name, data in contents(done[1] / "out").items():
+        (tmp_path / "out" / name).parent.mkdir(exist_ok=True)
+        (tmp_path / "out" / name).write_bytes(data)
+    run = feedsim("run", SCENARIOS / "z_positioning.yaml", "--out", "out", "--quiet", fmus=fmus, cwd=tmp_path)
+    assert run.returncode == 0
+    assert set(contents(tmp_path / "out")) == set(summary_of(tmp_path)["files"])
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        ([SCENARIOS / "z_positioning.yaml"], 2, "z_positioning.yaml: there is no circle"),
+        ([CIRCLE, "--friction", "Z"], 2, "--friction Z: AXIS=FILE.yaml is needed"),
+        (
+            [CIRCLE, "--friction", "Y=a.yaml"],
+            2,
+            "--friction Y=a.yaml: no axis 'Y' moves in this scenario; those that do",
+        ),
+        ([CIRCLE, "--friction", "Z=missing.yaml"], 2, "missing.yaml"),
+        ([CIRCLE, "--friction", "Z=bad.yaml"], 2, "bad.yaml:1"),
+        ([CIRCLE, "--delay", "4"], 2, "--delay 4: 4 has no unit; a time is expected"),
+        ([CIRCLE, "--delay", "Q=4 ms"], 2, "--delay Q=4 ms: no axis 'Q' moves"),
+        ([CIRCLE, "--set", "machine.axes.Z.drive.K_v=0 1/s"], 2, "axis Z: K_v is 0"),
+        (["missing_scenario.yaml"], 2, "missing_scenario.yaml"),
+        ([CIRCLE, "--out", "taken"], 4, "taken"),
+    ],
+    ids=lambda value: " ".join(map(str, value[1:])) or "file" if isinstance(value, list) else None,
+)
+def test_refusals(words: list[str | Path], code: int, message: str, fmus: Path, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("a file", encoding="utf-8")
+    (tmp_path / "bad.yaml").write_text("F_C: 1.6\n" + FRICTION_Z.replace("F_C: 1.44 N.m", ""), encoding="utf-8")
+    process = feedsim("compensate", *words, "--no-table", fmus=fmus, cwd=tmp_path)
+    assert process.returncode == code
+    assert message in process.stderr
+    assert process.stderr.startswith("feedsim: ")
+    assert process.stdout == ""
+    assert set(contents(tmp_path)) == {"taken", "bad.yaml"}

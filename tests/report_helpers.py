@@ -30,6 +30,7 @@ class FakeRun:
     )
     pose: PoseUse | None = None
     warnings: tuple[str, ...] = ()
+    log: Trace | None = None
 
 
 def run_of(described: Scenario, **changes: Any) -> FakeRun:

@@ -69,6 +69,38 @@ def refused(tmp_path: Path) -> Refused:
             ": 'centre_by' must give X and Z, the axes of the plane",
         ),
         ("dwell, duration: 0 s", ".duration: 0 s is outside the allowed range: more than 0 s"),
+        ("constant_speed, axis: Z", ".speeds: missing; List of speeds, or {from: ..., to: ..., count: ...}"),
+        ("constant_speed, axis: Z, speeds: 5 m/min", ".speeds: '5 m/min'; a list is expected"),
+        ("constant_speed, axis: Z, speeds: []", ".speeds: 0 entries; at least 1 needed"),
+        ("constant_speed, axis: Z, speeds: [1 m/min, 5 mm]", ".speeds.1: '5 mm' is a length; a speed is expected"),
+        ("constant_speed, axis: Z, speeds: {from: 1 m/min}", ".speeds.to: missing; a speed, for example to: 5000"),
+        (
+            "constant_speed, axis: Z, speeds: {from: 1 m/s, to: 2 m/s, count: 1}",
+            ".speeds.count: 1 is outside the allowed range: at least 2",
+        ),
+        (
+            "constant_speed, axis: Z, speeds: {from: 1 m/s, to: 2 m/s, cuont: 3}",
+            ".speeds.cuont: unknown key; did you mean 'count'?",
+        ),
+        ("constant_speed, axis: Z, speeds: {from: 1 m/s, to: 1 m/s}", ".speeds: 'from' and 'to' are both 1 m/s"),
+        ("constant_speed, axis: Q, speeds: [1 m/min]", ".axis: the machine has no axis 'Q'; it has X, Y, Z"),
+        (
+            "constant_speed, axis: Z, speeds: [1 m/s], rest: -1 s",
+            ".rest: -1 s is outside the allowed range: at least 0",
+        ),
+        ("sine, axis: Z, moves: []", ".moves: 0 entries; at least 1 needed"),
+        (
+            "sine, axis: Z, moves: [{amplitude: 1 um, frequency: 10, periods: 2}]",
+            ".moves.0.frequency: 10 has no unit; an angular speed or frequency is expected, for example 5 Hz",
+        ),
+        (
+            "sine, axis: Z, moves: [{amplitude: 1 um, frequency: 1 Hz, periods: 2.5}]",
+            ".moves.0.periods: 2.5 is no whole number",
+        ),
+        (
+            "sine, axis: Z, fade: 0, moves: [{amplitude: 1 um, frequency: 1 Hz, periods: 2}]",
+            ".fade: 0 is outside the allowed range: from 0.5 to 100",
+        ),
         ("setpoints, file: none.csv, columns: {Z: q}", ".file: no such file: "),
         ("setpoints, file: s.yaml, columns: {}", ".columns: 0 entries; at least 1 needed"),
         (
@@ -89,7 +121,8 @@ def test_motions(refused: Refused, motion: str, message: str) -> None:
     [
         (
             ["motions: [{by: {Z: 1 mm}}]"],
-            "s.yaml:3: motions.0: missing key 'kind'; allowed: move, arc, circle, dwell, setpoints",
+            "s.yaml:3: motions.0: missing key 'kind'; allowed: move, arc, circle, dwell, setpoints, "
+            "constant_speed, sine",
         ),
         (["motions: 5"], "s.yaml:3: motions: 5; a list is expected"),
         (["motions: []"], "s.yaml:3: motions: 0 entries; at least 1 needed"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from feedsim.cosim import wiring
@@ -41,22 +43,30 @@ def recorded_columns(scenario: Scenario) -> list[str]:
 
 
 class Recording:
-    """Rows of all units' signals, one every `every` control cycles.
+    """Rows of the units' signals, one every `every` control cycles.
 
     Attributes:
         logs: instance -> its :class:`Log`.
     """
 
-    def __init__(self, system: System, cycles: int, every: int) -> None:
+    def __init__(self, system: System, cycles: int, every: int, only: Collection[str] | None = None) -> None:
+        """`only`: columns of the trace to be; None: all."""
         self.system = system
         self.every = every
+        self.only = only
         rows = cycles // every + 1
         plant = [f"{axis}.{signal}" for axis in system.axes for signal in PLANT_SIGNALS] + list(TOOL_SIGNALS)
-        self.logs = {wiring.PLANT: Log(system.plant, plant, rows)}
+        self.logs = {wiring.PLANT: Log(system.plant, [name for name in plant if self._wanted(name)], rows)}
         for axis in system.axes:
-            control, contact = wiring.controller(axis), wiring.friction(axis)
-            self.logs[control] = Log(system.units[control], CONTROLLER_SIGNALS, rows)
-            self.logs[contact] = Log(system.units[contact], FRICTION_SIGNALS, rows)
+            for instance, signals in (
+                (wiring.controller(axis), CONTROLLER_SIGNALS),
+                (wiring.friction(axis), FRICTION_SIGNALS),
+            ):
+                names = [signal for signal in signals if self._wanted(f"{axis}.{signal}")]
+                self.logs[instance] = Log(system.units[instance], names, rows)
+
+    def _wanted(self, column: str) -> bool:
+        return self.only is None or column in self.only
 
     def record(self, k: int) -> None:
         """Record the instant k T_c, where it is one to be recorded."""
@@ -65,7 +75,7 @@ class Recording:
                 log.record(k // self.every)
 
     def trace(self, program: Program, T_c: float, ratio: int) -> Trace:
-        """All signals over time; setpoints are those of the position cycle, `ratio` control cycles long."""
+        """The signals over time; setpoints are those of the position cycle, `ratio` control cycles long."""
         plant = self.logs[wiring.PLANT]
         of_plant = plant.columns()
         cycle = np.arange(len(plant.reals)) * self.every
@@ -74,16 +84,20 @@ class Recording:
         units: dict[str, str] = {}
         for axis in self.system.axes:
             for setpoint, values in (("x_s", program.x_s), ("n_ffw", program.n_ffw)):
+                if not self._wanted(f"{axis}.{setpoint}"):
+                    continue
                 columns[f"{axis}.{setpoint}"] = values[axis][position_cycle]
                 units[f"{axis}.{setpoint}"] = wiring.SETPOINT_UNITS[setpoint]
-            for signal in PLANT_SIGNALS:
-                columns[f"{axis}.{signal}"] = of_plant[f"{axis}.{signal}"]
-                units[f"{axis}.{signal}"] = plant.unit.archive.unit_of(f"{axis}.{signal}")
+            for name in (f"{axis}.{signal}" for signal in PLANT_SIGNALS):
+                if name in of_plant:
+                    columns[name] = of_plant[name]
+                    units[name] = plant.unit.archive.unit_of(name)
             for log in (self.logs[wiring.controller(axis)], self.logs[wiring.friction(axis)]):
                 for signal, column in log.columns().items():
                     columns[f"{axis}.{signal}"] = column
                     units[f"{axis}.{signal}"] = log.unit.archive.unit_of(signal)
         for signal in TOOL_SIGNALS:
-            columns[signal] = of_plant[signal]
-            units[signal] = plant.unit.archive.unit_of(signal)
+            if signal in of_plant:
+                columns[signal] = of_plant[signal]
+                units[signal] = plant.unit.archive.unit_of(signal)
         return Trace(time=np.asarray(cycle * T_c, dtype=np.float64), columns=columns, units=units)

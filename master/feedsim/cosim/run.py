@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from feedsim.cosim import trust
+from feedsim.cosim.feedforward import TorqueFeedforward, feeder
+from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
 from feedsim.cosim.pose import PoseUse, pose_use
 from feedsim.cosim.recording import Recording, recorded_columns
 from feedsim.cosim.schedule import SCHEMES, Cycle
@@ -34,6 +36,9 @@ class Run:
         units: per instance, GUID and version of its archive.
         pose: how far the motion leaves the plant's pose, or how the plant followed it.
         warnings: what a user should know before believing the result, a sentence each.
+        fine: the log's signals, and the setpoints of its axes, at the control cycle; None without a log. Other logs can
+            be made of it: :func:`feedsim.cosim.logged`.
+        log: the log as the scenario asks for it; None without one.
     """
 
     scenario: Scenario
@@ -44,6 +49,8 @@ class Run:
     units: Mapping[str, Mapping[str, str]]
     pose: PoseUse
     warnings: tuple[str, ...]
+    fine: Trace | None = None
+    log: Trace | None = None
 
 
 def fmus_directory() -> Path:
@@ -58,6 +65,7 @@ def run(
     program: Program | None = None,
     fmus: Path | None = None,
     progress: Progress | None = None,
+    torque_feedforward: TorqueFeedforward | None = None,
 ) -> Run:
     """Run `scenario` and return its trace.
 
@@ -65,6 +73,8 @@ def run(
         program: the scenario's planned motions, where they are at hand already.
         fmus: folder with plant.fmu, controller.fmu, friction.fmu; default :func:`fmus_directory`.
         progress: called now and then with (cycles done, cycles in all).
+        torque_feedforward: axis -> torque [N.m] added to its torque setpoint at the instants k T_c, from 0 to the
+            program's end.
 
     Raises:
         InputError: the motion violates a limit, the archives do not fit the machine.
@@ -80,6 +90,8 @@ def run(
     with System(scenario.machine, fmus or fmus_directory()) as system:
         cycle = Cycle(system, SCHEMES[scenario.coupling.scheme], cycles.T_c, scenario.coupling.substeps)
         recording = Recording(system, total, every)
+        at_full_rate = Recording(system, total, 1, full_rate_columns(scenario)) if scenario.logging else None
+        feed_forward = feeder(system, torque_feedforward or {}, total + 1)
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
         with np.errstate(over="ignore", invalid="ignore"):  # the unit that meets an overflow reports it
@@ -87,14 +99,20 @@ def run(
                 if k % ratio == 0:
                     system.set_setpoints(program, k // ratio)
                 recording.record(k)
+                if at_full_rate is not None:
+                    at_full_rate.record(k)
+                feed_forward(k)
                 cycle.run(k)
                 if progress is not None and (k + 1) % 512 == 0:
                     progress(k + 1, total)
-        recording.record(total)
+        for last in (recording, at_full_rate):
+            if last is not None:
+                last.record(total)
         if progress is not None:
             progress(total, total)
         wall_time = time.perf_counter() - begun
         pose = pose_use(scenario.machine, program, system)
+        fine = None if at_full_rate is None else at_full_rate.trace(program, cycles.T_c, ratio)
         return Run(
             scenario=scenario,
             program=program,
@@ -112,6 +130,8 @@ def run(
                 *pose.warnings,
                 *trust.found(scenario, cycle, recording),
             ),
+            fine=fine,
+            log=None if fine is None or scenario.logging is None else log(fine, scenario.logging, ideal_axes(scenario)),
         )
 
 

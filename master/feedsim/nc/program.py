@@ -16,13 +16,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
+from feedsim.nc.constant_speed import strokes
 from feedsim.nc.limits import violations
 from feedsim.nc.path import CircularPath, Line, arc, full_circle, line
 from feedsim.nc.profile import Profile, rest_to_rest
 from feedsim.nc.recorded import recorded, recording_violations
 from feedsim.nc.segment import Circular, Program, Recorded, Segment, Straight, whole_cycles
+from feedsim.nc.sine import sines
 from feedsim.nc.spline import RestSpline
-from feedsim.scenario import Arc, Circle, Dwell, MeasuredSetpoints, Motion, Move, Scenario, moved_axes
+from feedsim.scenario import (
+    Arc,
+    Circle,
+    ConstantSpeed,
+    Dwell,
+    MeasuredSetpoints,
+    Motion,
+    Move,
+    Scenario,
+    Sine,
+    moved_axes,
+)
 
 Array = NDArray[np.float64]
 
@@ -79,6 +92,8 @@ def plan(scenario: Scenario) -> Program:
                 _leave_out(state, motion)
             elif isinstance(motion, MeasuredSetpoints):
                 found = _append_recording(state, scenario, index, motion)
+            elif isinstance(motion, ConstantSpeed | Sine):
+                found = _append_experiment(state, scenario, index, motion)
             else:
                 found = _append_planned(state, scenario, index, motion)
         except InputError as error:
@@ -104,11 +119,15 @@ def _depends_on(motion: Motion, lost: set[str]) -> bool:
         return not lost.isdisjoint(motion.to)
     if isinstance(motion, Arc):
         return bool(motion.centre or motion.to) and not lost.isdisjoint(motion.plane)
+    if isinstance(motion, ConstantSpeed):
+        return motion.axis in lost
     return isinstance(motion, MeasuredSetpoints) and motion.relative and not lost.isdisjoint(motion.columns)
 
 
 def _leave_out(state: _Plan, motion: Motion) -> None:
     """Go on behind a motion that cannot be planned: its axes are where it says, if it says so."""
+    if isinstance(motion, ConstantSpeed | Sine):
+        return  # ends where it begins
     if isinstance(motion, MeasuredSetpoints):
         ends: Mapping[str, float] = {}
     else:
@@ -136,10 +155,6 @@ def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion
     if (state.instant + count) * (cycles.T_ipo / cycles.T_pos) > LONGEST:
         state.instant += count
         return []  # plan() reports it; sampling it would exhaust the memory
-    stretch = state.pieces[-1]
-    if isinstance(stretch, _Inset):
-        stretch = _stretch(state)
-        state.pieces.append(stretch)
     samples: Mapping[str, Array] = {}
     problems: list[str] = []
     if profile is not None and path is not None:
@@ -148,15 +163,13 @@ def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion
             if axis in state.lost:
                 peaks = (origin[axis], origin[axis], *peaks[2:])
             problems += violations(axis, scenario.machine.axes[axis], origin[axis], *peaks)
-    for axis, points in stretch.points.items():
-        points.append(samples[axis] if axis in samples else np.full(count, origin[axis]))
+    _append_points(state, samples, count)
     if path is not None:
         state.position |= {axis: float(x[0]) for axis, x in path.position(np.array([path.length])).items()}
     if isinstance(motion, Move):
         state.position |= motion.to
     elif isinstance(motion, Circle):
         state.position = dict(origin)
-    state.instant += count
     state.segments.append(
         Segment(
             kind=motion.kind,
@@ -171,6 +184,45 @@ def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion
         )
     )
     return problems
+
+
+def _append_points(state: _Plan, samples: Mapping[str, Array], count: int) -> None:
+    """The next ``count`` points of all axes; those without ``samples`` are held."""
+    stretch = state.pieces[-1]
+    if isinstance(stretch, _Inset):
+        stretch = _stretch(state)
+        state.pieces.append(stretch)
+    for axis, points in stretch.points.items():
+        points.append(samples[axis] if axis in samples else np.full(count, state.position[axis]))
+    state.instant += count
+
+
+def _append_experiment(state: _Plan, scenario: Scenario, index: int, motion: ConstantSpeed | Sine) -> list[str]:
+    """Plan an experiment and append it; what is wrong with it."""
+    machine, cycle = scenario.machine, scenario.machine.cycles.T_ipo
+    start, origin = state.instant * cycle, dict(state.position)
+    axis, here = machine.axes[motion.axis], origin[motion.axis]
+    most = int(LONGEST * machine.cycles.T_pos / cycle) - state.instant
+    if isinstance(motion, ConstantSpeed):
+        course = strokes(motion, axis, here, machine.path, cycle, start, most)
+    else:
+        course = sines(motion, cycle, start, most)
+    low, high = (here, here) if motion.axis in state.lost else (here + course.low, here + course.high)
+    _append_points(state, {motion.axis: here + course.points}, len(course.points))
+    state.segments.append(
+        Segment(
+            kind=motion.kind,
+            index=index,
+            start=start,
+            end=start + course.duration,
+            description=_describe(motion),
+            origin=origin,
+            target=dict(origin),
+            axes=(motion.axis,),
+            geometry=course.geometry,
+        )
+    )
+    return violations(motion.axis, axis, here, low, high, course.speed, course.acceleration)
 
 
 def _append_recording(state: _Plan, scenario: Scenario, index: int, motion: MeasuredSetpoints) -> list[str]:
@@ -273,6 +325,12 @@ def _describe(motion: Motion) -> str:
         return f"dwell {motion.duration:g} s"
     if isinstance(motion, MeasuredSetpoints):
         return f"recorded setpoints of {', '.join(motion.columns)} from {motion.file.name}"
+    if isinstance(motion, ConstantSpeed):
+        feeds = [feed * 6e4 for feed in motion.feeds]
+        return f"constant speeds of {motion.axis}: {len(feeds)}, {min(feeds):.6g} to {max(feeds):.6g} mm/min"
+    if isinstance(motion, Sine):
+        sizes = ", ".join(f"{move.amplitude * 1e6:.6g} um at {move.frequency:.6g} Hz" for move in motion.moves[:4])
+        return f"sines of {motion.axis}: {sizes}{' ...' if len(motion.moves) > 4 else ''}"
     feed = f"at {motion.feed * 6e4:.6g} mm/min"
     if isinstance(motion, Move):
         by = [f"{axis} by {d * 1e3:.6g} mm" for axis, d in motion.by.items()]

@@ -68,12 +68,61 @@ class Recorded:
 
 
 @dataclass(frozen=True)
+class Stroke:
+    """A move at constant speed, from rest to rest."""
+
+    speed: float
+    """Constant speed [m/s], signed."""
+    steady: tuple[float, float]
+    """Begin and end of the constant speed [s], program time."""
+    start: float
+    end: float
+    """Exact begin and end of the stroke [s], program time."""
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """Strokes of an axis there and back, in the order in which they are driven."""
+
+    axis: str
+    strokes: tuple[Stroke, ...]
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """A sine, amplitude sin(2 pi frequency (t - full[0]) + phase) about where the axis was while at full amplitude."""
+
+    amplitude: float
+    """Amplitude [m]."""
+    frequency: float
+    """Frequency [Hz]."""
+    phase: float
+    """Phase at the begin of the full amplitude [rad]."""
+    full: tuple[float, float]
+    """Begin and end of the full amplitude [s], program time."""
+    start: float
+    end: float
+    """Exact begin and end with the fading [s], program time."""
+
+
+@dataclass(frozen=True)
+class Oscillations:
+    """Sines of an axis, in the order in which they are driven."""
+
+    axis: str
+    moves: tuple[Oscillation, ...]
+
+
+Geometry = Straight | Circular | Recorded | Strokes | Oscillations
+
+
+@dataclass(frozen=True)
 class Segment:
     """One motion of the program.
 
-    kind: that of the motion (move, arc, circle, dwell, setpoints); index: its place in the scenario's list, from 0;
-    start, end: exact begin and end of the motion [s], the start on the T_ipo grid; origin, target: positions of all
-    axes there [m]; axes: those whose setpoint it moves; geometry: None for a dwell.
+    kind: that of the motion (move, arc, circle, dwell, setpoints, constant_speed, sine); index: its place in the
+    scenario's list, from 0; start, end: exact begin and end of the motion [s], the start on the T_ipo grid; origin,
+    target: positions of all axes there [m]; axes: those whose setpoint it moves; geometry: None for a dwell.
     """
 
     kind: str
@@ -84,7 +133,7 @@ class Segment:
     origin: Mapping[str, float]
     target: Mapping[str, float]
     axes: tuple[str, ...] = ()
-    geometry: Straight | Circular | Recorded | None = None
+    geometry: Geometry | None = None
 
     @property
     def duration(self) -> float:

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from html import escape
 
-from feedsim.nc import Circular, Recorded, Segment, Straight
+from feedsim.nc import Circular, Oscillations, Recorded, Segment, Straight, Strokes
+from feedsim.report.log_part import log_text
 from feedsim.report.parts import software
 from feedsim.report.provenance import input_files
 from feedsim.report.summary import Run
@@ -45,6 +46,11 @@ def path(segment: Segment) -> str:
         angle = f"{math.degrees(geometry.sweep):.6g}°"
         turns = f" ({len(geometry.turns)} full turn{'s'[: len(geometry.turns) != 1]})" if geometry.turns else ""
         return f"R {geometry.radius * 1e3:.6g} mm, {angle}{turns}"
+    if isinstance(geometry, Strokes):
+        shortest = min(stroke.steady[1] - stroke.steady[0] for stroke in geometry.strokes)
+        return f"{len(geometry.strokes)} strokes, {shortest:.3g} s or more at constant speed"
+    if isinstance(geometry, Oscillations):
+        return f"{len(geometry.moves)} sine{'s'[: len(geometry.moves) != 1]}"
     return f"recording of {', '.join(geometry.axes)}" if isinstance(geometry, Recorded) else ""
 
 
@@ -59,6 +65,7 @@ def provenance(run: Run) -> str:
         ("Machine", machine.name),
         ("Cycles", ", ".join(f"{n} {duration(getattr(cycles, n))}" for n in ("T_c", "T_pos", "T_ipo"))),
         ("Recording", f"every {duration(scenario.recording.interval)}, {len(run.trace)} rows"),
+        *([("Log", log_text(scenario.logging, run.log))] if scenario.logging is not None else []),
         ("Coupling", f"{coupling.scheme}, {coupling.substeps} exchange step(s) per control cycle"),
         ("Software", ", ".join(f"{name} {text}" for name, text in software().items())),
     ]

@@ -7,9 +7,11 @@ from typing import Any, Protocol
 
 from feedsim.analysis import Figure, Result
 from feedsim.cosim import PoseUse
+from feedsim.report.log_part import logging_part
 from feedsim.report.parts import figures_part, inputs_part, machine_part, software
 from feedsim.report.pose_section import pose_part
 from feedsim.report.provenance import input_files
+from feedsim.trace import Trace
 
 FORMAT = 1
 COUPLING = {
@@ -31,6 +33,8 @@ class Run(Result, Protocol):
     @property
     def pose(self) -> PoseUse | None: ...
     @property
+    def log(self) -> Trace | None: ...
+    @property
     def warnings(self) -> tuple[str, ...]: ...
 
 
@@ -50,6 +54,7 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
             "duration": {"value": run.program.duration, "unit": "s"},
             "coupling": {"scheme": scenario.coupling.scheme, "substeps": scenario.coupling.substeps},
             "recording_interval": {"value": scenario.recording.interval, "unit": "s"},
+            "logging": logging_part(scenario.logging, run.log),
             "motions": [
                 {
                     "description": segment.description,

@@ -16,17 +16,17 @@ from feedsim.report.style import Picture
 from feedsim.report.summary import Run, summary
 from feedsim.trace import write_csv
 
-RESULT = "result.csv"
+RESULT, LOG = "result.csv", "log.csv"
 FILES = (RESULT, REPORT, SUMMARY)
 
 
 def check_writable(directory: Path | str) -> None:
     """Raise OutputError unless the results of a run can be written to ``directory``; leaves nothing behind."""
-    check_place(directory, FILES)
+    check_place(directory, (*FILES, LOG))
 
 
 def write(run: Run, figures: Mapping[str, Figure], directory: Path | str) -> tuple[Path, ...]:
-    """Write result.csv, summary.json, report.html and figures/*.png of ``run``; returns their paths.
+    """Write result.csv, summary.json, report.html, figures/*.png and log.csv, if there is one; returns their paths.
 
     figures: as from ``analysis.evaluate``. Files of an earlier run are replaced. Raises OutputError.
     """
@@ -34,10 +34,13 @@ def write(run: Run, figures: Mapping[str, Figure], directory: Path | str) -> tup
 
     def fill(fresh: Path, names: Sequence[str]) -> None:
         write_csv(fresh / RESULT, run.trace)
+        if run.log is not None:
+            write_csv(fresh / LOG, run.log)
         write_text(fresh / REPORT, page(run, figures, pictures))
         write_text(fresh / SUMMARY, to_json(summary(run, figures, names)))
 
-    return write_results(directory, FILES, pictures, fill)
+    files = FILES if run.log is None else (RESULT, LOG, REPORT, SUMMARY)
+    return write_results(directory, files, pictures, fill)
 
 
 def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:

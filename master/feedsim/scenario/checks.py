@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from feedsim.scenario.experiment import ConstantSpeed, Sine
 from feedsim.scenario.fields import is_multiple, no_axis
 from feedsim.scenario.motion import Arc, Circle, MeasuredSetpoints, Motion, Move
 
@@ -22,6 +23,8 @@ def moved_axes(motion: Motion) -> tuple[str, ...]:
         return motion.plane
     if isinstance(motion, MeasuredSetpoints):
         return tuple(motion.columns)
+    if isinstance(motion, (ConstantSpeed, Sine)):
+        return (motion.axis,)
     return ()
 
 
@@ -44,11 +47,30 @@ def _plane_fault(item: CircleTest, columns: tuple[str, ...]) -> str | None:
     return None
 
 
+def _logging_faults(scenario: Scenario) -> Iterator[tuple[Place, str]]:
+    """Place and message of what does not fit the log's own signals, the axes and the control cycle."""
+    logging = scenario.logging
+    if logging is None:
+        return
+    if message := interval_fault(logging.interval, scenario.machine.cycles.T_c):
+        yield ("logging", "interval"), message
+    for i, axis in enumerate(logging.axes or ()):
+        if axis not in scenario.machine.axes:
+            yield ("logging", "axes", i), no_axis(axis, scenario.machine.axes)
+    if logging.axes is None and not any(map(moved_axes, scenario.motions)):
+        yield ("logging",), "no motion moves an axis; name the axes to be logged, for example axes: [Z]"
+    for group, signals in logging.disturbed().items():
+        for signal in signals:
+            if signal not in logging.signals:
+                yield ("logging", group, signal), f"{signal} is not logged; signals: {', '.join(logging.signals)}"
+
+
 def contradictions(scenario: Scenario) -> Iterator[tuple[Place, str]]:
     """Place and message of everything in a scenario that cannot go together."""
     machine = scenario.machine
     if message := interval_fault(scenario.recording.interval, machine.cycles.T_c):
         yield ("recording", "interval"), message
+    yield from _logging_faults(scenario)
     for i, motion in enumerate(scenario.motions):
         for axis in moved_axes(motion):
             if axis not in machine.axes:

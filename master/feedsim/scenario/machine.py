@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from math import pi
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, PrivateAttr, StrictBool, StrictInt, StrictStr, ValidationInfo, field_validator
 
@@ -66,6 +66,26 @@ class Friction(ParameterGroup):
     gamma: Annotated[float, Quantity("1", minimum=0, maximum=1)] = Field(
         default=1.0, description="Share of the bristle stiffness that is engaged at once after a reversal"
     )
+    identified: dict[str, Any] = Field(
+        default={},
+        description="Where the parameters come from, as feedsim identify writes it: kept and shown, never calculated "
+        "with. Its keys are free, but names of parameters are refused: they would have no effect here",
+    )
+
+    @field_validator("identified")
+    @classmethod
+    def _no_parameters(cls, identified: dict[str, Any]) -> dict[str, Any]:
+        if misplaced := [name for name in identified if name != "identified" and name in cls.model_fields]:
+            raise fault(
+                f"{misplaced[0]!r} has no effect inside 'identified'; parameters stand beside it, not inside: check "
+                "the indentation"
+            )
+        return identified
+
+    def parameters(self) -> dict[str, Parameter]:
+        values = super().parameters()
+        del values["identified"]
+        return values
 
     @field_validator("F_S")
     @classmethod

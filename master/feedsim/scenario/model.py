@@ -10,6 +10,7 @@ from pydantic import Field, PrivateAttr, StrictInt, StrictStr, ValidationInfo, f
 
 from feedsim.scenario.checks import Place, contradictions, interval_fault
 from feedsim.scenario.fields import AxisName, Model, Quantity, Reading, fault
+from feedsim.scenario.logging import Logging
 from feedsim.scenario.machine import Machine
 from feedsim.scenario.motion import Motion
 
@@ -97,6 +98,7 @@ class Scenario(Model):
     )
     coupling: Coupling = Coupling()
     recording: Recording
+    logging: Logging | None = Field(default=None, description="A log as a control records it, log.csv")
     evaluate: tuple[Evaluation, ...] = Field(default=(), description="Figures to derive")
 
     _file: Path = PrivateAttr(default=Path("scenario.yaml"))

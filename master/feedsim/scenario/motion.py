@@ -9,6 +9,7 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr, ValidationInfo, fi
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.scenario.experiment import ConstantSpeed, Sine
 from feedsim.scenario.fields import AxisName, File, Model, Quantity, fault
 
 Position = Annotated[float, Quantity("m")]
@@ -148,4 +149,4 @@ class MeasuredSetpoints(Model):
         return between
 
 
-Motion = Annotated[Move | Arc | Circle | Dwell | MeasuredSetpoints, Field(discriminator="kind")]
+Motion = Annotated[Move | Arc | Circle | Dwell | MeasuredSetpoints | ConstantSpeed | Sine, Field(discriminator="kind")]

@@ -107,11 +107,8 @@ def _wanted(source: Source, model: Any, place: Place) -> str:
     """What belongs at a place, e.g. "a speed, for example 5000 mm/min"."""
     parent = shape.expected(model, source.data, place[:-1])
     annotation = shape.child(parent, place[-1])
-    description = (
-        parent.model_fields[place[-1]].description
-        if shape.is_model(parent) and place[-1] in parent.model_fields
-        else None
-    )
+    info = shape.field(parent, place[-1]) if shape.is_model(parent) else None
+    description = info.description if info is not None else None
     if quantity := _quantity(annotation):
         example = quantity.example or units.example(quantity.unit)
         text = f"{units.article(quantity.kind)}, for example {dotted(place[-1:])}: {example}"
@@ -125,7 +122,7 @@ def _wanted(source: Source, model: Any, place: Place) -> str:
 def _quantity(annotation: Any) -> Quantity | None:
     if isinstance(annotation, Quantity):
         return annotation
-    for part in get_args(annotation) if get_origin(annotation) is not dict else ():
+    for part in get_args(annotation) if get_origin(annotation) not in (dict, tuple) else ():
         if found := _quantity(part):
             return found
     return None
@@ -141,7 +138,7 @@ def _words(model: Any, source: Source, place: Place) -> list[str]:
 
 
 def _place(data: Any, loc: tuple[int | str, ...]) -> Place:
-    """pydantic's location without what is no key of the data (names of union members, "[key]")."""
+    """pydantic's location without what is no key of the data (names of union members, "[key]", "[list]")."""
     place: list[str | int] = []
     for i, key in enumerate(loc):
         last = i == len(loc) - 1
@@ -150,6 +147,6 @@ def _place(data: Any, loc: tuple[int | str, ...]) -> Place:
         ):
             data = data[key]  # type: ignore[index]
             place.append(key)
-        elif last and key != "[key]" and not (isinstance(data, dict) and key == data.get("kind")):
+        elif last and not str(key).startswith("[") and not (isinstance(data, dict) and key == data.get("kind")):
             place.append(key)
     return tuple(place)

@@ -1,4 +1,4 @@
-"""JSON Schema of scenario and machine files, for editors."""
+"""JSON Schema of scenario, machine, structure and mapping files, for editors."""
 
 from __future__ import annotations
 
@@ -9,24 +9,28 @@ from typing import TYPE_CHECKING, Any, Literal
 from feedsim import units
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from feedsim.scenario.fields import Quantity
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def json_schema(kind: Literal["scenario", "machine", "structure"] = "scenario") -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of a scenario file, a machine file or a structure file.
+def json_schema(kind: Literal["scenario", "machine", "structure", "columns"] = "scenario") -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a scenario, machine or structure file, or of a mapping of a trace's columns.
 
     It knows keys, words and the spelling of quantities; it cannot know limits of quantities nor what needs two places
     to be seen together. What it refuses, load() refuses too.
     """
+    from feedsim.scenario.columns import Columns
     from feedsim.scenario.machine import Machine
     from feedsim.scenario.model import Scenario
 
     if kind == "structure":
         schema = _structure_schema()
     else:
-        schema = (Scenario if kind == "scenario" else Machine).model_json_schema()
+        models: dict[str, type[BaseModel]] = {"scenario": Scenario, "machine": Machine, "columns": Columns}
+        schema = models[kind].model_json_schema()
     definitions: dict[str, Any] = schema.pop("$defs")
     for group in (*definitions.values(), schema):
         _open_to_files(group, definitions)
@@ -39,6 +43,9 @@ def json_schema(kind: Literal["scenario", "machine", "structure"] = "scenario") 
         schema["required"].remove("recording")
         definitions["Recording"].pop("required")
         definitions["Column"] = {"anyOf": [{"type": "string", "minLength": 1}, definitions["Column"]]}
+    if kind == "columns":
+        short = [{"type": "string", "pattern": rf"^\s*{units.NUMBER}"}, {"type": "number"}]
+        definitions["Factor"] = {"anyOf": [*short, definitions["Factor"]]}
     return {
         "$schema": DIALECT,
         "title": f"feedsim {kind} file",

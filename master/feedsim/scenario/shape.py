@@ -6,6 +6,7 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from feedsim.scenario.fields import ExistingFile
 from feedsim.scenario.source import Place
@@ -26,7 +27,7 @@ def expected(model: Any, data: Any, place: Place) -> Any:
 def child(annotation: Any, key: str | int) -> Any:
     """Annotation of what `key` names inside a value of `annotation` (resolved); None where there is no such key."""
     if is_model(annotation):
-        info = annotation.model_fields.get(key)
+        info = field(annotation, key)
         if info is None:
             return None
         return Annotated[(info.annotation, *info.metadata)] if info.metadata else info.annotation
@@ -49,8 +50,11 @@ def resolve(annotation: Any, data: Any) -> Any:
         elif origin in (Union, UnionType):
             options = [option for option in arguments if option is not NoneType]
             if len(options) > 1:
-                kind = data.get("kind") if isinstance(data, dict) else None
-                options = [option for option in options if kind_of(option) == kind]
+                if all(map(kind_of, options)):
+                    kind = data.get("kind") if isinstance(data, dict) else None
+                    options = [option for option in options if kind_of(option) == kind]
+                else:  # a group or something else, as the data is
+                    options = [part for part in options if is_group(resolve(part, None)) == isinstance(data, dict)]
                 if not options:
                     return None
             annotation = options[0]
@@ -66,7 +70,12 @@ def kind_of(model: Any) -> str | None:
 
 def keys(annotation: Any) -> list[str] | None:
     """Keys that a group may hold; None where keys are free (axis names) or it is no group."""
-    return list(annotation.model_fields) if is_model(annotation) else None
+    return [info.alias or name for name, info in annotation.model_fields.items()] if is_model(annotation) else None
+
+
+def field(model: Any, key: str | int) -> FieldInfo | None:
+    """The field of a model that a file's `key` fills; None where there is none."""
+    return next((info for name, info in model.model_fields.items() if (info.alias or name) == key), None)
 
 
 def is_model(annotation: Any) -> bool:

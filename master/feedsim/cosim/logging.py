@@ -1,0 +1,167 @@
+"""The log of a run as a control records it: sampled, delayed, disturbed by noise, rounded.
+
+Sampling is at instants, without a filter ahead of it. What a signal is between two control cycles is known exactly, or
+to far below a log's resolution: currents and motor torque run linearly over a cycle (so is the drive computed),
+setpoints are held, position and speed are smooth and interpolated by a cubic through four cycles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.cosim.unit import Floats
+from feedsim.errors import InputError
+from feedsim.scenario import Level, Logging, Scenario, moved_axes
+from feedsim.trace import Trace
+
+LINEAR = ("i_d", "i_q", "M_a", "M_fr", "z", "c")
+SMOOTH = ("x_a", "n_a")
+# Signals of the drive that jump where the current loop is ideal: what a cycle ends with holds over all of it.
+IDEAL = ("i_d", "i_q", "M_a")
+ON_THE_GRID = 1e-6  # of a control cycle: instants come from decimal text
+# Below this share of the largest speed setpoint an axis stands: the spline of the setpoints rings down exponentially.
+STANDS = 1e-9
+
+
+class FullRate(Protocol):
+    """What is needed of a run (feedsim.cosim.Run is one)."""
+
+    @property
+    def scenario(self) -> Scenario: ...
+    @property
+    def fine(self) -> Trace | None: ...
+
+
+def logged(source: FullRate | Trace, logging: Logging | None = None, *, ideal: Sequence[str] = ()) -> Trace:
+    """A log of a run that has been simulated, without simulating again.
+
+    Args:
+        source: a run with its signals at the control cycle (`fine`), or those signals alone.
+        logging: how to log; default: as the run's scenario says. Its interval must be a multiple of the control cycle
+            of the signals, its axes and signals among theirs.
+        ideal: axes with an ideal current loop, where `source` is a trace; of a run they are known.
+
+    Raises:
+        InputError: a run without logging, a signal that was not recorded, an interval off the grid.
+    """
+    if isinstance(source, Trace):
+        fine = source
+    else:
+        if source.fine is None:
+            raise InputError(f"{source.scenario.file}: the run has no signals at the control cycle; give it 'logging'")
+        fine = source.fine
+        logging = logging or source.scenario.logging
+        ideal = ideal_axes(source.scenario)
+    return log(fine, logging or Logging(), ideal)
+
+
+def log(fine: Trace, logging: Logging, ideal: Sequence[str] = ()) -> Trace:
+    """The log of signals at the control cycle: columns "A.signal", a row per logging interval, the first at 0.
+
+    fine: columns "A.signal" at k T_c from 0; with A.n_ffw where noise is given as a share. Before the start every
+    signal has been as it is at 0. Noise of every signal is a random stream of its own, made of the seed and
+    the column's name.
+    """
+    cycle = float(fine.time[-1] - fine.time[0]) / max(len(fine) - 1, 1)
+    every = round(logging.interval / cycle)
+    if every < 1 or abs(logging.interval / cycle - every) > ON_THE_GRID * every:
+        raise InputError(
+            f"logging.interval: {logging.interval:.9g} s is no whole multiple of the signals' cycle, {cycle:.9g} s"
+        )
+    rows = np.arange(0, len(fine), every)
+    columns: dict[str, Floats] = {}
+    noise, steps, delays = logging.noise.given(), logging.quantisation.given(), logging.delay.given()
+    for axis in logging.axes or _axes_of(fine):
+        for signal in logging.signals:
+            name = f"{axis}.{signal}"
+            values = sampled(fine[name], rows, delays.get(signal, 0.0) / cycle, _course(signal, axis in ideal))
+            if signal in noise:
+                deviation = _deviation(noise[signal], fine, axis, name)
+                values = values + deviation * _stream(logging.seed, name).standard_normal(len(values))
+            if signal in steps:
+                values = np.round(values / steps[signal]) * steps[signal]
+            columns[name] = values
+    return Trace(np.asarray(rows * cycle, dtype=np.float64), columns, {name: fine.unit(name) for name in columns})
+
+
+def sampled(values: Floats, rows: NDArray[np.int64], delay: float, course: str) -> Floats:
+    """Values (N,) at the cycles ``rows`` less ``delay`` [cycles, any fraction].
+
+    course: "linear" between cycles, "cubic" (Lagrange through four of them), "held" from a cycle on, "ahead": held from
+    the cycle before.
+    """
+    at = np.maximum(rows - delay, 0.0)
+    nearest = np.rint(at)
+    at = np.where(np.abs(at - nearest) <= ON_THE_GRID, nearest, at)
+    before = np.floor(at).astype(np.int64)
+    share = at - before
+    last = len(values) - 1
+    after = np.minimum(before + 1, last)
+    if course == "held" or not share.any():
+        return np.asarray(values[before])
+    if course == "ahead":
+        return np.asarray(np.where(share > 0, values[after], values[before]))
+    if course == "linear" or len(values) < 4:
+        return np.asarray(values[before] + share * (values[after] - values[before]))
+    first = np.clip(before - 1, 0, last - 3)
+    u = at - first
+    # Differences from the first point keep the digits of a small motion far from the origin.
+    origin = values[first]
+    d1, d2, d3 = (values[first + i] - origin for i in (1, 2, 3))
+    cubic = d1 * u * (u - 2) * (u - 3) / 2 - d2 * u * (u - 1) * (u - 3) / 2 + d3 * u * (u - 1) * (u - 2) / 6
+    return np.asarray(np.where(share > 0, origin + cubic, values[before]))
+
+
+def logged_axes(scenario: Scenario) -> tuple[str, ...]:
+    """Axes of a scenario's log, in the machine's order unless named."""
+    if scenario.logging is None:
+        return ()
+    moved = {axis for motion in scenario.motions for axis in moved_axes(motion)}
+    return scenario.logging.axes or tuple(axis for axis in scenario.machine.axes if axis in moved)
+
+
+def ideal_axes(scenario: Scenario) -> tuple[str, ...]:
+    """Axes with an ideal current loop."""
+    return tuple(name for name, axis in scenario.machine.axes.items() if axis.drive.ideal_current_loop)
+
+
+def full_rate_columns(scenario: Scenario) -> tuple[str, ...]:
+    """What must be recorded at the control cycle for a scenario's log; none without one.
+
+    The setpoints tell when an axis moves.
+    """
+    if scenario.logging is None:
+        return ()
+    return tuple(
+        f"{axis}.{signal}"
+        for axis in logged_axes(scenario)
+        for signal in dict.fromkeys(("x_s", "n_ffw", *scenario.logging.signals))
+    )
+
+
+def _course(signal: str, ideal: bool) -> str:
+    if ideal and signal in IDEAL:
+        return "ahead"
+    return "linear" if signal in LINEAR else "cubic" if signal in SMOOTH else "held"
+
+
+def _axes_of(fine: Trace) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name.partition(".")[0] for name in fine))
+
+
+def _deviation(level: Level, fine: Trace, axis: str, name: str) -> float:
+    if not level.relative:
+        return level.value
+    speed = np.abs(fine[f"{axis}.n_ffw"])
+    moving = speed > STANDS * speed.max(initial=0.0)
+    return level.value * math.sqrt(float(np.mean(fine[name][moving] ** 2))) if moving.any() else 0.0
+
+
+def _stream(seed: int, name: str) -> np.random.Generator:
+    """A random stream that depends on the seed and the name alone."""
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=tuple(name.encode()))))

@@ -15,6 +15,7 @@
 
 #include "biquad.h"
 #include "current.h"
+#include "measured_speed.h"
 #include "pmsm.h"
 #include "position.h"
 #include "prefix.h"
@@ -33,6 +34,7 @@ typedef struct Drive {
     Position position;
     SetpointRamp ramp;
     ReferenceModel reference_model;
+    MeasuredSpeed measured_speed;
     SpeedController speed;
     int32_t filters; /* how many of the following are in use */
     Biquad filter[FILTERS];
@@ -41,7 +43,7 @@ typedef struct Drive {
     CurrentController current;
     Pmsm motor;
     /* Where the delay lines begin among the `samples` doubles; filled in by drive_layout(). */
-    size_t x_ring, n_ring, reference_ring, samples;
+    size_t x_ring, n_ring, reference_ring, speed_ring, samples;
 } Drive;
 
 typedef struct DriveInputs {
@@ -71,6 +73,7 @@ typedef struct DriveState {
     PositionState position;
     SetpointRampState ramp;
     ReferenceModelState reference_model;
+    int32_t speed_newest; /* of the positions that the speed is formed from */
     SpeedState speed;
     BiquadState filter[FILTERS];
     CurrentState current;

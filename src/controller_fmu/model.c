@@ -4,9 +4,9 @@
  *   output   M_a, linear over a control cycle; the rest are observables
  *
  * Equations, symbols and units stand in the headers of the blocks: position.h (delay.h, lag.h), setpoint_ramp.h,
- * reference_model.h, speed.h, biquad.h, current.h, pmsm.h; drive.h puts them in order; README.md shows the whole.
- * Source: Wiesauer, Bleicher, 18th CIRP CMMO (2021), section 2.2. This file holds what is about time and about the
- * unit's interface.
+ * reference_model.h, measured_speed.h, speed.h, biquad.h, current.h, pmsm.h; drive.h puts them in order; README.md
+ * shows the whole. Source: Wiesauer, Bleicher, 18th CIRP CMMO (2021), section 2.2. This file holds what is about time
+ * and about the unit's interface.
  *
  * Instant k lies at t_k = start + k T_c; k is counted, so that nothing drifts. A step [t, t + H) works the instants in
  * that interval and reads the inputs at each, value + slope (t_k - t). H may be anything. */
@@ -99,6 +99,7 @@ static void derive_blocks(const Scalars *v, Drive *p) {
     p->ramp.ticks = p->ticks;
     p->ramp.ramped = v->ramp_speed_setpoint != 0;
     p->reference_model = reference_model_of(v->reference_model != 0, v->omega_0, v->D, v->T_ref, v->T_c);
+    p->measured_speed = measured_speed_of(v->speed_window, v->T_c, v->I_P);
     p->speed = speed_of(v->K_p, v->T_n, v->speed_integrator != 0, v->M_max, v->T_c);
     p->ideal_current_loop = v->ideal_current_loop != 0;
     p->K_t = v->K_t;

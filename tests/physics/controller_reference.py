@@ -25,7 +25,7 @@ Parameters = Mapping[str, float]
 DEFAULTS: dict[str, float] = {
     "T_c": 125e-6, "T_pos": 1e-3, "I_P": 0.02 / (2 * math.pi),
     "K_v": 4 * 1000 / 60, "k_ffw": 1, "T_dyn": 1.326e-3, "T_sym": 3.528e-3, "symmetry_lag": 0, "ramp_speed_setpoint": 1,
-    "K_p": 6.18, "T_n": 0.012, "speed_integrator": 1,
+    "K_p": 6.18, "T_n": 0.012, "speed_integrator": 1, "speed_window": 0,
     "reference_model": 1, "omega_0": 915.3, "D": 1.214, "T_ref": 0, "M_max": 80,
     "filter_1.type": 1, "filter_1.f": 602, "filter_1.D_num": 0.08, "filter_1.D_den": 0.8,
     "filter_2.type": 0, "filter_2.f": 1000, "filter_2.D_num": 0.1, "filter_2.D_den": 1,
@@ -152,6 +152,7 @@ def drive(p: Parameters) -> Generator[Cycle, Inputs, None]:
     lag_u = lag_y = 0.0
     n_new = n_old = x_e = 0.0
     n_s_history: list[float] = []
+    places: list[float] = []  # x_a at every instant
     w, D = p["omega_0"], p["D"]
     model = started(section([0, 0, w * w], [1, 2 * D * w, w * w], 1 / p["T_c"]))
     filters = current_filters(p)
@@ -195,9 +196,13 @@ def drive(p: Parameters) -> Generator[Cycle, Inputs, None]:
             n_ref = model.send(linear(n_s_history, p["T_ref"] / p["T_c"]))
 
         # 4. PI: compute, saturate, then tell the integrator what was realised
+        places.append(now.x_a)
+        n, window = now.n_a, int(p["speed_window"])
+        if window:
+            n = (now.x_a - places[max(k - window, 0)]) / (window * p["T_c"] * p["I_P"])
         step = p["T_c"] / p["T_n"] if p["speed_integrator"] else 0.0
-        integral += p["K_p"] * step * (n_ref - now.n_a)
-        wanted = p["K_p"] * (n_s - now.n_a) + integral + now.M_add
+        integral += p["K_p"] * step * (n_ref - n)
+        wanted = p["K_p"] * (n_s - n) + integral + now.M_add
         M_s = min(max(wanted, -p["M_max"]), p["M_max"])
         integral += min(1.0, step) * (M_s - wanted)
 

@@ -96,7 +96,8 @@ class DriveSimulation:
             above = [w * w] if each.type == "low_pass" else [1, 2 * float(each.D_num or 0) * w, w * w]
             # prewarping: the bilinear transform at the rate that makes w exact
             self.filters.append(Block(*bilinear(above, below, w / math.tan(w * T_c / 2) / 2)))
-        self.blocks += [*self.reference, *self.filters]  # type: ignore[arg-type]
+        self.places = Line(d.speed_window, False)
+        self.blocks += [self.places, *self.reference, *self.filters]  # type: ignore[arg-type]
 
     def instant(
         self, j: int, x_s: complex, n_ffw: complex, x_a: complex, n_a: complex, n_add: complex, M_add: complex
@@ -115,12 +116,15 @@ class DriveSimulation:
             own[N_NEW] = (d.K_v * (x - x_a) + d.k_ffw * self.I_P * n) / self.I_P if self.closed == "position" else 0.0
         share = (j + 1) / self.ticks if d.ramp_speed_setpoint else 1.0
         n_s = own[N_OLD] + (own[N_NEW] - own[N_OLD]) * share + n_add
+        n_m = n_a
+        if d.speed_window:
+            n_m = (x_a - self.places(x_a)) / (d.speed_window * T_c * self.I_P)
         n_ref = n_s
         for block in self.reference:
             n_ref = block(n_ref)
         if d.speed_integrator:
-            own[INTEGRAL] += d.K_p * T_c / float(d.T_n or 1) * (n_ref - n_a)
-        M = d.K_p * (n_s - n_a) + own[INTEGRAL] + M_add
+            own[INTEGRAL] += d.K_p * T_c / float(d.T_n or 1) * (n_ref - n_m)
+        M = d.K_p * (n_s - n_m) + own[INTEGRAL] + M_add
         for block in self.filters:
             M = block(M)
         if d.ideal_current_loop:

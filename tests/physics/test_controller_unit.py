@@ -53,6 +53,8 @@ OPTIONS: dict[str, Mapping[str, float]] = {
     "salient motor, four filters, lag, held": {**SALIENT, **FOUR_FILTERS, "symmetry_lag": 1, "ramp_speed_setpoint": 0},
     "no resistance": {"R": 0},
     "one cycle for all": {"T_c": 1e-3, "T_pos": 1e-3, "filter_1.type": 0, "current.K_p": 2.0},
+    "speed from the position": {"speed_window": 2},
+    "speed from the position over more than a position cycle": {"speed_window": 11},
     "other cycles": {"T_c": 62.5e-6, "T_pos": 2e-3},
     "torque limit": {"M_max": 15},
     "voltage limit": {"M_max": 1e6, "u_max": 50},

@@ -80,6 +80,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "reference dead time": {"T_ref": 0.41e-3},
     "no integrator": {"speed_integrator": False},
     "ideal current loop": {"ideal_current_loop": True},
+    "speed from the position": {"speed_window": 2},
+    "speed from the position, P controller": {"speed_window": 1, "speed_integrator": False},
     "four filters": {
         "filter_2": Filter(type="low_pass", f=1200.0, D_den=0.7),
         "filter_3": Filter(type="second_order", f=60.0, D_num=0.4, D_den=0.2),

@@ -2,6 +2,7 @@
 #include "check.h"
 #include "delay.h"
 #include "lag.h"
+#include "measured_speed.h"
 
 #define RING 64
 
@@ -115,6 +116,34 @@ static void lag_settles_on_the_input(void) {
     CHECK_NEAR(lag_step(&none, &x, 5.0), 5.0, 1e-15);
 }
 
+static void speed_is_the_mean_of_the_window(void) {
+    /* x = x_0 + v t + a t^2/2: the mean speed of the last 3 cycles is v + a (t - 1.5 h); n = that over the lead */
+    const double h = 1e-3, lead = 2e-3, v = 0.4, a = 3.0;
+    const MeasuredSpeed p = measured_speed_of(3, h, lead);
+    double ring[RING];
+    int32_t newest;
+    CHECK(p.window.length <= RING);
+    measured_speed_start(&p, &newest, ring, 0.7);
+    for (int k = 0; k < 20; ++k) {
+        const double t = k * h;
+        const double n = measured_speed_step(&p, &newest, ring, 0.7 + v * t + a * t * t / 2, 1e9);
+        if (k == 0) {
+            CHECK_NEAR(n, 0.0, 0.0); /* the axis stood before */
+        } else if (k >= 3) {
+            /* positions near 0.7 m are rounded to 1e-16; over 3 h of 2 mm/rad that is 2e-11 rad/s */
+            CHECK_NEAR(n, (v + a * (t - 1.5 * h)) / lead, 1e-10);
+        }
+    }
+}
+
+static void without_a_window_the_motor_speed_is_taken(void) {
+    const MeasuredSpeed p = measured_speed_of(0, 1e-3, 2e-3);
+    double ring[RING];
+    int32_t newest;
+    measured_speed_start(&p, &newest, ring, 0.7);
+    CHECK_NEAR(measured_speed_step(&p, &newest, ring, 0.9, 12.25), 12.25, 0.0);
+}
+
 int main(void) {
     cubics_are_exact();
     lines_are_exact();
@@ -125,5 +154,7 @@ int main(void) {
     a_constant_past_stays();
     lag_follows_a_ramp();
     lag_settles_on_the_input();
+    speed_is_the_mean_of_the_window();
+    without_a_window_the_motor_speed_is_taken();
     return CHECK_RESULT;
 }

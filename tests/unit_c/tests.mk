@@ -33,7 +33,7 @@ SOURCES_test_cells := $(addprefix src/plant_fmu/,cells.c modal.c)
 SOURCES_test_poses := $(addprefix src/plant_fmu/,csv.c modes.c poses.c) src/fmi2/numbers.c src/fmi2/text.c
 SOURCES_test_modes := $(addprefix src/plant_fmu/,axes.c csv.c modes.c) src/fmi2/numbers.c src/fmi2/text.c
 
-SOURCES_test_controller_delay   := $(addprefix src/controller_fmu/,delay.c lag.c)
+SOURCES_test_controller_delay   := $(addprefix src/controller_fmu/,delay.c lag.c measured_speed.c)
 SOURCES_test_controller_drive   := $(filter-out %/model.c,$(wildcard src/controller_fmu/*.c))
 SOURCES_test_controller_filters := $(filter-out %/model.c,$(wildcard src/controller_fmu/*.c))
 SOURCES_test_controller_loops   := $(filter-out %/model.c,$(wildcard src/controller_fmu/*.c))

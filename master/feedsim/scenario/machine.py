@@ -170,6 +170,11 @@ class Drive(ParameterGroup):
     T_n: Annotated[float, Quantity("s", minimum=1e-6, example="12 ms")] | None = Field(
         default=None, description="Speed controller integral-action time"
     )
+    speed_window: Annotated[StrictInt, Field(ge=0, le=1000)] = Field(
+        default=0,
+        validate_default=False,
+        description="Speed from the measured position, over this many control cycles; 0: the motor speed n_a",
+    )
     reference_model: StrictBool = Field(
         default=True, description="Reference model; false: the integrator sees the speed setpoint"
     )

@@ -4,7 +4,8 @@ Sampling as the drive does it (Wiesauer, Bleicher, 18th CIRP CMMO (2021), sectio
 in the controller unit's documentation). At the instants t_k of the control cycle T_c, with m = T_pos/T_c:
 
     n_s  = r + n_add                          r: the position controller's setpoint, ramped or held over T_pos
-    M_s  = S n_s - C n_a + M_add              S = K_p + I R, C = K_p + I, I = (K_p T_c/T_n)/(1 - 1/z), R: n_ref/n_s
+    M_s  = S n_s - C n + M_add                S = K_p + I R, C = K_p + I, I = (K_p T_c/T_n)/(1 - 1/z), R: n_ref/n_s
+    n    = n_a, or V x_a                      V = (1 - 1/z^N)/(N T_c I_P): speed from the position over N cycles
     M_a  = E M_s - G_n n_a                    E: current setpoint filters and current loop, G_n: what the EMF leaves
 
 Limits (torque, voltage) are not reached. The motor's equations are linearised about a steady speed and torque.
@@ -98,6 +99,11 @@ class LinearDrive:
         omega_0, D = _given(d.omega_0), _given(d.D)
         denominator = (1.0, 2 * D * omega_0, omega_0**2)
         return _bilinear(s, (0.0, 0.0, omega_0**2), denominator, 2 / T_c, T_c) * _linear_delay(s, d.T_ref / T_c, T_c)
+
+    def speed_of_position(self, s: Complexes) -> Complexes | None:
+        """V: speed formed from the measured position [rad/(s.m)]; None where the motor speed is taken."""
+        window = self.drive.speed_window * self.cycles.T_c
+        return np.asarray(-np.expm1(-s * window) / (window * self.I_P)) if window else None
 
     def from_speed(self, s: Complexes) -> Complexes:
         """C: torque setpoint per negative speed, K_p + I [N.m.s/rad]."""

@@ -53,14 +53,18 @@ def position_reference(system: LinearSystem, axis: str, frequency: Floats, *, fe
 
 
 def speed_gain(system: LinearSystem, axis: str, s: Complexes) -> Complexes:
-    """Open-loop gain of the speed loop at s (F,) [rad/s]: cut at n_a ahead of the speed controller; every position loop
-    open, the other axes' speed loops as they are. A gain margin is the factor that K_p stands."""
+    """Open-loop gain of the speed loop at s (F,) [rad/s]: cut at the speed ahead of the speed controller; every
+    position loop open, the other axes' speed loops as they are. A gain margin is the factor that K_p stands."""
     i = _index(system, axis)
     cut = system.closing({axis: "none"})
     drive = system.drives[i]
-    n_per_M = cut.speed_level(s)[:, i, 2 * len(system.axes) + i]
+    axes = len(system.axes)
+    per_torque = cut.speed_level(s)[:, :, 2 * axes + i]
+    n_a = per_torque[:, i]
+    V = drive.speed_of_position(s)
+    n = n_a if V is None else V * per_torque[:, axes + i]
     E, G_n = drive.torque(s)
-    return E * drive.from_speed(s) * n_per_M / (1 + G_n * n_per_M)
+    return np.asarray(E * drive.from_speed(s) * n / (1 + G_n * n_a))
 
 
 def position_gain(system: LinearSystem, axis: str, s: Complexes) -> Complexes:

@@ -36,8 +36,8 @@ def unstable_poles(system: LinearSystem) -> int:
     cycles = system.machine.cycles
 
     def torque_loop(s: Complexes) -> Complexes:
-        ports = system.ports(s)[:, :axes, :axes]
-        return np.asarray(np.linalg.det(np.eye(axes) + system.speed_feedback(s)[:, :, None] * ports))
+        loop = system.torque_loop(s, system.ports(s))
+        return np.asarray(np.linalg.det(np.eye(axes) + loop[:, :, :axes]))
 
     def position_loop(s: Complexes) -> Complexes:
         return np.asarray(np.linalg.det(np.eye(axes) + system.position_gains[:, None] * system.position_level(s)))

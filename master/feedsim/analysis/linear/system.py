@@ -182,7 +182,8 @@ class LinearSystem:
         """(F, outputs, 3 A + 3): responses with every position loop open, to n_add, M_add, M_a and tool forces."""
         axes = len(self.axes)
         ports = self.ports(s, tool_force)
-        E, back = self._torque_feedback(s)
+        E = np.stack([drive.torque(s)[0] for drive in self.drives], axis=1) * self._controlled
+        loop = self.torque_loop(s, ports)
         S = np.stack([drive.from_setpoint(s) for drive in self.drives], axis=1)
         given = np.zeros((len(s), axes, 3 * axes + len(TOOL_DIRECTIONS)), dtype=np.complex128)
         each = np.arange(axes)
@@ -190,8 +191,8 @@ class LinearSystem:
         given[:, each, axes + each] = E
         given[:, each, 2 * axes + each] = ~self._controlled
         forces = given.shape[2] - len(TOOL_DIRECTIONS)
-        given[:, :, forces:] = -back[:, :, None] * ports[:, :axes, axes:]
-        torques = np.linalg.solve(np.eye(axes) + back[:, :, None] * ports[:, :axes, :axes], given)
+        given[:, :, forces:] = -loop[:, :, axes:]
+        torques = np.linalg.solve(np.eye(axes) + loop[:, :, :axes], given)
         result = np.zeros((len(s), len(self.outputs), given.shape[2]), dtype=np.complex128)
         mechanical = ports.shape[1]
         result[:, :mechanical] = ports[:, :, :axes] @ torques
@@ -200,17 +201,18 @@ class LinearSystem:
         result[:, mechanical + axes + each, each] = 1.0
         return result
 
-    def speed_feedback(self, s: Complexes) -> Complexes:
-        """(F, A) E C + G_n [N.m.s/rad]: M_a = E (S n_s + M_add) - (E C + G_n) n_a; 0 for axes without control."""
-        return self._torque_feedback(s)[1]
-
-    def _torque_feedback(self, s: Complexes) -> tuple[Complexes, Complexes]:
-        """(F, A) E and E C + G_n of the axes, 0 for axes without control."""
-        E, back = (np.zeros((len(s), len(self.axes)), dtype=np.complex128) for _ in range(2))
+    def torque_loop(self, s: Complexes, ports: Complexes) -> Complexes:
+        """(F, A, A + 3): what the speed loops take off the motor torques per motor torque [1] and per tool force [m],
+        with the structure's `ports`: E C n + G_n n_a; 0 for axes without control."""
+        axes = len(self.axes)
+        loop = np.zeros((len(s), axes, ports.shape[2]), dtype=np.complex128)
         for i in np.flatnonzero(self._controlled):
-            E[:, i], G_n = self.drives[i].torque(s)
-            back[:, i] = E[:, i] * self.drives[i].from_speed(s) + G_n
-        return E, back
+            drive = self.drives[i]
+            E, G_n = drive.torque(s)
+            V, n_a = drive.speed_of_position(s), ports[:, i]
+            n = n_a if V is None else V[:, None] * ports[:, axes + i]
+            loop[:, i] = (E * drive.from_speed(s))[:, None] * n + G_n[:, None] * n_a
+        return loop
 
     def position_level(self, s: Complexes) -> Complexes:
         """(F, A, A): what the position controllers sample of x_a per setpoint that they give, position loops open.

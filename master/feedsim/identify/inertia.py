@@ -1,0 +1,262 @@
+"""Inertia from accelerating parts: inverse dynamics of a rigid axis, linear in its parameters.
+
+    M = J dn/dt + sigma_2 n + F_C sgn n + M_0 (+ known load)
+
+Both sides pass the same low-pass without phase, as is usual for robots (M. Gautier, ICRA 1997). It is a finite window
+here, and only windows within which the axis moves in one direction are taken: nothing of rest or of a reversal, where
+sgn n is no model of friction, leaks into them. Derivatives are taken of the window, never of the recorded signal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.errors import InputError
+from feedsim.identify.averages import white
+from feedsim.identify.fit import correlation
+from feedsim.identify.record import Record
+from feedsim.identify.result import Correlation, Estimate
+
+Array = NDArray[np.float64]
+
+QUANTITIES = {
+    "J": ("kg.m2", "inertia seen by the motor"),
+    "sigma_2": ("N.m.s/rad", "viscous coefficient"),
+    "F_C": ("N.m", "Coulomb torque"),
+    "M_0": ("N.m", "constant load against the motor torque"),
+}
+
+
+@dataclass(frozen=True)
+class Filter:
+    """How the low-pass is chosen and what is left out.
+
+    Attributes:
+        window: length of the Hann window [s]: -6 dB at 1/window. It is doubled, up to `longest`, as long as noise of
+            the motion makes up more than the share `noise` of the acceleration's variance (that share is what J comes
+            out too small by).
+        overlap: rows that are kept per window length.
+        slow: share of the highest speed of all records below which the axis counts as near rest.
+        smooth: time that the speed is averaged over for that [s].
+    """
+
+    window: float = 0.04
+    longest: float = 0.32
+    noise: float = 1e-3
+    overlap: int = 4
+    slow: float = 0.003
+    smooth: float = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """Inverse-dynamics least squares.
+
+    Attributes:
+        estimates: J, sigma_2, F_C, M_0; the last three of the simple friction model, as they are good to start from.
+        covariance: in the order of correlation.names, with the residuals' autocorrelation accounted for.
+        rms: residual of the filtered torque [N.m]. rows: filtered rows. window: length of the low-pass [s].
+    """
+
+    estimates: Mapping[str, Estimate]
+    correlation: Correlation
+    covariance: Array
+    rms: float
+    rows: int
+    window: float
+    warnings: tuple[str, ...]
+
+    @property
+    def J(self) -> Estimate:
+        """Inertia [kg.m2]."""
+        return self.estimates["J"]
+
+
+STANDARD = Filter()
+LEAST_ROWS = 20
+LEAST_SHARE = 0.05  # of the torque (rms) that accelerates, below which the friction model's faults may pass for J
+VAGUE = 0.1  # relative standard deviation of J that is worth a warning
+
+
+def inertia(records: Sequence[Record], settings: Filter = STANDARD) -> Inertia:
+    """J with sigma_2, F_C and M_0 from every part of the records where the axis moves.
+
+    Raises InputError: nothing moves long enough; the axis does not accelerate.
+    """
+    length = settings.window
+    # One threshold for all: what a record of small motions holds is pre-sliding, which is no F_C sgn n.
+    slow = settings.slow * max((float(np.max(np.abs(_smooth_speed(r, settings)))) for r in records), default=0.0)
+    while True:
+        stretches = [stretch for record in records for stretch in _stretches(record, length, slow, settings)]
+        rows = sum(len(stretch.torque) for stretch in stretches)
+        if rows < LEAST_ROWS:
+            raise InputError(
+                f"{', '.join(record.name for record in records)}: the axis does not move for {length:g} s in one "
+                "direction often enough to tell its inertia; give the inertia, or record moves that accelerate"
+            )
+        acceleration = np.concatenate([stretch.columns[:, 0] for stretch in stretches])
+        noise = max(stretch.noise for stretch in stretches)
+        if noise**2 <= settings.noise * float(np.mean(acceleration**2)) or 2 * length > settings.longest:
+            break
+        length *= 2
+    return _solve(stretches, length)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Filtered rows of one move in one direction: columns (N, 4) and torque (N,); noise of the acceleration."""
+
+    columns: Array
+    torque: Array
+    noise: float
+
+
+def _stretches(record: Record, length: float, slow: float, settings: Filter) -> list[_Stretch]:
+    """Filtered moves of a record."""
+    h = record.interval
+    kernel = np.sin(np.pi * np.arange(max(round(length / h), 4) + 1) / max(round(length / h), 4)) ** 2
+    kernel /= np.sum(kernel)
+    size = len(kernel)
+    if len(record) <= size:
+        return []
+    padded = np.concatenate([[0.0], kernel, [0.0]])
+    # By parts: the window's derivatives in place of the signal's. Both vanish beyond its ends.
+    first, second = -(padded[2:] - padded[:-2]) / (2 * h), np.diff(padded, 2) / h**2
+    torque = record.torque if record.load is None else record.torque - record.load
+    ways = []
+    if record.speed is not None:
+        ways.append((white(record.speed) * float(np.linalg.norm(first)), record.speed, kernel, first))
+    if record.angle is not None:
+        ways.append((white(record.angle) * float(np.linalg.norm(second)), record.angle, first, second))
+    # The one that tells the acceleration with less noise.
+    noise, signal, to_speed, to_acceleration = min(ways, key=lambda way: way[0])
+    speed = _smooth_speed(record, settings)
+    moving = np.abs(speed) > slow
+    moving[1:] &= np.sign(speed[1:]) == np.sign(speed[:-1])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], moving.astype(np.int8), [0]])))
+    found = []
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - begin < size:
+            continue
+        part = slice(int(begin), int(end))
+        step = max(size // settings.overlap, 1)
+        side = float(np.sign(speed[(begin + end) // 2]))
+        count = len(range(0, int(end - begin) - size + 1, step))
+        columns = [
+            _apply(to_acceleration, signal[part], step),
+            _apply(to_speed, signal[part], step),
+            np.full(count, side),
+            np.ones(count),
+        ]
+        found.append(_Stretch(np.column_stack(columns), _apply(kernel, torque[part], step), noise))
+    return found
+
+
+def _apply(weights: Array, signal: Array, step: int) -> Array:
+    """Weighted sums over windows that lie wholly within the signal, every `step` rows."""
+    # About the first value: a position far from 0 would cost digits. What the weights sum up to brings it back.
+    away = np.convolve(signal - signal[0], weights[::-1], "valid")[::step]
+    return np.asarray(away + signal[0] * np.sum(weights), dtype=np.float64)
+
+
+def _smooth_speed(record: Record, settings: Filter) -> Array:
+    """(N,) speed, averaged over a short time, to tell rest and reversals."""
+    half = max(ceil(settings.smooth / record.interval / 2), 1)
+    if record.speed is not None:
+        spread = np.pad(record.speed, half, mode="edge")
+        return np.convolve(spread, np.full(2 * half + 1, 1 / (2 * half + 1)), "valid")
+    assert record.angle is not None
+    spread = np.pad(record.angle, half, mode="edge")
+    return np.asarray((spread[2 * half :] - spread[: -2 * half]) / (2 * half * record.interval), dtype=np.float64)
+
+
+def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
+    """Ordinary least squares with a covariance for correlated residuals."""
+    names, held, said = list(QUANTITIES), {}, []
+    columns = np.vstack([stretch.columns for stretch in stretches])
+    torque = np.concatenate([stretch.torque for stretch in stretches])
+    if np.ptp(columns[:, 2]) == 0:
+        names.remove("M_0")
+        held["M_0"] = "motion in one direction only does not tell it from friction"
+        said.append("motion in one direction only: the constant load is taken for friction")
+    chosen = [list(QUANTITIES).index(name) for name in names]
+    scale = np.linalg.norm(columns[:, chosen], axis=0)
+    scaled = columns[:, chosen] / np.where(scale > 0, scale, 1.0)
+    strength = np.linalg.svd(scaled, compute_uv=False)
+    if scale[0] == 0 or strength[-1] < 1e-6 * strength[0]:
+        raise InputError(
+            "the records tell no inertia: the axis neither accelerates nor changes its speed in them; give the "
+            "inertia, or record moves that accelerate"
+        )
+    values = np.linalg.solve(scaled.T @ scaled, scaled.T @ torque)
+    residuals = torque - scaled @ values
+    inverse = np.linalg.inv(scaled.T @ scaled)
+    covariance = inverse @ _scatter(stretches, scaled, residuals) @ inverse
+    covariance *= len(torque) / max(len(torque) - len(names), 1)
+    values, covariance = values / scale, covariance / np.outer(scale, scale)
+    sigma = np.sqrt(np.diag(covariance))
+    estimates = {}
+    for name, (unit, meaning) in QUANTITIES.items():
+        if name in held:
+            estimates[name] = Estimate(name, 0.0, unit, meaning, status="undetermined", reason=held[name])
+            continue
+        k = names.index(name)
+        estimates[name] = Estimate(name, float(values[k]), unit, meaning, float(sigma[k]))
+    if not values[0] > 0:
+        raise InputError(
+            f"the inertia comes out at {values[0]:.4g} kg.m2: the signs of torque and motion do not fit together, or "
+            "the axis hardly accelerates; check the signs, or give the inertia"
+        )
+    share = float(values[0] * np.std(columns[:, 0]) / np.sqrt(np.mean(torque**2)))
+    if share < LEAST_SHARE:
+        said.append(
+            f"accelerating takes {100 * share:.1f} % of the torque only: the inertia may be what the simple friction "
+            "model lacks; record moves that accelerate harder, or give it"
+        )
+    if sigma[0] > VAGUE * values[0]:
+        said.append(
+            f"the inertia is known to {100 * sigma[0] / values[0]:.0f} % only: record moves that accelerate harder, or "
+            "give it"
+        )
+    return Inertia(
+        estimates,
+        Correlation(tuple(names), correlation(covariance)),
+        covariance,
+        float(np.sqrt(np.mean(residuals**2))),
+        len(torque),
+        length,
+        tuple(said),
+    )
+
+
+def _scatter(stretches: Sequence[_Stretch], columns: Array, residuals: Array) -> Array:
+    """(P, P) covariance of columns^T residuals.
+
+    Neighbours are correlated (windows overlap, and what the model lacks lasts): products up to a lag are summed with
+    falling weights (W. Newey, K. West, Econometrica 55, 1987), never across two moves. The lag is the usual
+    4 (N/100)^(2/9), and at least two windows. What the model lacks may last over whole moves, which no lag sees: the
+    sum over moves is taken where it is larger.
+    """
+    scores = columns * residuals[:, None]
+    bounds = np.cumsum([0, *(len(stretch.torque) for stretch in stretches)])
+    lag = max(int(4 * (len(residuals) / 100) ** (2 / 9)), 8)
+    near = np.zeros((columns.shape[1],) * 2)
+    whole = np.zeros_like(near)
+    for begin, end in pairwise(bounds):
+        part = scores[begin:end]
+        near += part.T @ part
+        for k in range(1, min(lag, len(part) - 1) + 1):
+            product = part[k:].T @ part[:-k]
+            near += (1 - k / (lag + 1)) * (product + product.T)
+        total = np.sum(part, axis=0)
+        whole += np.outer(total, total)
+    if len(stretches) < LEAST_ROWS:
+        return near
+    widen = np.sqrt(np.maximum(np.diag(whole) / np.maximum(np.diag(near), 1e-300), 1.0))
+    return np.asarray(near * np.outer(widen, widen), dtype=np.float64)

@@ -1,0 +1,260 @@
+"""Stretches of constant speed in a record, and the mean torque over each of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import ceil, hypot, inf, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from feedsim.identify.averages import derivative, mean, resolution, white, window
+from feedsim.identify.record import Record
+from feedsim.identify.result import Plateau
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Search:
+    """How plateaus are looked for. Times [s], the travel [rad].
+
+    Attributes:
+        block: speeds are compared as means over this time.
+        change: largest relative change of speed from block to block; half of it bounds how far the speed may be from
+            the plateau's.
+        settle_time: left out at the start: control and structure ring down.
+        settle_travel: left out at the start as well: bristles and the engaging zone (0.04 rad is usual)
+            come to rest. Of a stretch short of travel at most the share `settle_share` is left out for it.
+        drift: relative difference of torque between the first and the last third that passes for settled.
+        limit: the same, beyond which a stretch is refused; between both, the drift adds to the standard deviation.
+        margin: left out at the end, for channels that are late.
+        taper: over which the weights of the mean rise and fall; two periods of the lowest mode damp it best, one does.
+        shortest: time that must be left.
+    """
+
+    block: float = 0.04
+    change: float = 0.01
+    settle_time: float = 0.1
+    settle_travel: float = 0.06
+    settle_share: float = 0.4
+    drift: float = 1e-3
+    limit: float = 0.05
+    margin: float = 0.01
+    taper: float = 0.05
+    shortest: float = 0.1
+
+
+@dataclass(frozen=True)
+class Found:
+    """Plateaus of a record in time order, and the stretches that were not taken: (begin [s], end [s], why)."""
+
+    plateaus: tuple[Plateau, ...]
+    refused: tuple[tuple[float, float, str], ...]
+
+
+STANDARD = Search()
+MOST_DROPPED = 0.6  # of a stretch, looking for where its torque has settled
+CERTAIN = 4.0  # standard deviations that pass for noise
+QUIETER = 1.5  # times less noise in the speed that the angle tells, for the recorded speed to be passed over
+LONGER = (1, 4, 16)  # times the block, one after the other as far as noise asks for it
+COARSE = 0.2  # share of a speed that the noise of a block may have (CERTAIN of its standard deviations)
+SLOWEST = 1e-5  # of the highest speed: what is slower counts as rest
+GAP = 5  # blocks that an interruption lasts at most
+ALIKE = 0.1  # relative difference of speed on both sides of an interruption
+FEWEST = 20  # rows that a mean and its correlation can be had from
+
+
+def plateaus(record: Record, J: float, search: Search = STANDARD) -> tuple[Plateau, ...]:
+    """Plateaus of a record. J: inertia seen at the motor [kg.m2]; the mean of J dn/dt is small, J need not be sharp."""
+    return find(record, J, search).plateaus
+
+
+def find(record: Record, J: float, search: Search = STANDARD) -> Found:
+    """Plateaus of a record, and what was left out why."""
+    taken: list[Plateau] = []
+    refused: list[tuple[float, float, str]] = []
+    highest = inf
+    for longer in LONGER:
+        # Blocks as long as noise asks for: slow plateaus show in long ones only, fast ones are too short for them.
+        motion = _Motion(record, replace(search, block=longer * search.block))
+        lowest = motion.noise(motion.rows) * CERTAIN / COARSE if longer < LONGER[-1] else 0.0
+        for first, last in _candidates(motion, search):
+            if not lowest <= abs(float(np.median(motion.blocks[first:last]))) < highest:
+                continue
+            outcome = _plateau(record, motion, first, last, J, search)
+            if isinstance(outcome, Plateau):
+                taken.append(outcome)
+            elif outcome:
+                refused.append((float(record.time[first]), float(record.time[last - 1]), outcome))
+        highest = lowest
+        if lowest <= SLOWEST * float(np.max(np.abs(motion.blocks))):
+            break
+    return Found(tuple(sorted(taken, key=lambda plateau: plateau.begin)), tuple(sorted(refused)))
+
+
+class _Motion:
+    """Travel and speed over blocks, from the speed where it was recorded, else from the angle. Where both were, and the
+    angle tells a much quieter speed, from the angle.
+
+    travel: (N,) [rad]. blocks: (N,) mean speed over a block about each row [rad/s]. direct: from the speed.
+    """
+
+    def __init__(self, record: Record, search: Search) -> None:
+        self.interval = record.interval
+        self.rows = max(ceil(search.block / self.interval) | 1, 3)
+        half = self.rows // 2
+        self.direct = record.speed is not None and (
+            record.angle is None or self._noise(record.speed, True) <= QUIETER * self._noise(record.angle, False)
+        )
+        if self.direct:
+            assert record.speed is not None
+            self.signal = record.speed
+            steps = 0.5 * (record.speed[1:] + record.speed[:-1]) * self.interval
+            self.travel = np.concatenate([[0.0], np.cumsum(steps)])
+            self.blocks = uniform_filter1d(record.speed, self.rows, mode="nearest")
+        else:
+            assert record.angle is not None  # the record makes sure of one of both
+            self.signal = self.travel = record.angle
+            spread = np.pad(record.angle, half, mode="reflect", reflect_type="odd")
+            self.blocks = (spread[2 * half :] - spread[: len(spread) - 2 * half]) / (2 * half * self.interval)
+        self.scatter = white(self.signal)
+
+    def _noise(self, signal: Array, direct: bool) -> float:
+        """Of a block's mean speed, told from one signal or the other."""
+        return white(signal) * (1 / sqrt(self.rows) if direct else sqrt(2) / (self.rows * self.interval))
+
+    def noise(self, rows: int) -> float:
+        """Of a mean over rows that lie within reach of each other."""
+        if self.direct:
+            return self.scatter / sqrt(rows)
+        return self.scatter * sqrt(2) / (rows * self.interval)
+
+    def speed(self, first: int, last: int) -> float:
+        """Plain mean over rows first <= i < last."""
+        if self.direct:
+            return float(np.mean(self.signal[first:last]))
+        return float((self.signal[last - 1] - self.signal[first]) / ((last - 1 - first) * self.interval))
+
+
+def _candidates(motion: _Motion, search: Search) -> list[tuple[int, int]]:
+    """Rows (first, behind the last) of stretches whose speed changes little from block to block and that do move."""
+    rows, blocks = motion.rows, motion.blocks
+    if len(blocks) < 3 * rows:
+        return []
+    half = rows // 2
+    noise = motion.noise(rows)
+    # Blocks that adjoin at each row.
+    ahead, behind = np.roll(blocks, -half - 1), np.roll(blocks, half + 1)
+    quiet = np.abs(ahead - behind) <= search.change * np.abs(blocks) + CERTAIN * np.sqrt(2) * noise
+    moving = np.abs(blocks) > max(CERTAIN * noise, SLOWEST * float(np.max(np.abs(blocks))))
+    inside = quiet & moving
+    inside[: half + 1] = inside[len(inside) - half - 1 :] = False
+    # A change of sign parts two stretches even if noise hides what lies between.
+    inside[1:] &= np.sign(blocks[1:]) == np.sign(blocks[:-1])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(np.int8), [0]])))
+    return _joined([(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)], blocks, rows)
+
+
+def _joined(parts: list[tuple[int, int]], blocks: Array, rows: int) -> list[tuple[int, int]]:
+    """Neighbours at nearly one speed as one stretch: an axis that breaks loose interrupts it, and what comes before is
+    its settling."""
+    whole: list[tuple[int, int]] = []
+    for first, last in parts:
+        if whole and first - whole[-1][1] <= GAP * rows:
+            here, before = np.median(blocks[first:last]), np.median(blocks[slice(*whole[-1])])
+            if abs(here - before) <= ALIKE * abs(here):
+                whole[-1] = (whole[-1][0], last)
+                continue
+        whole.append((first, last))
+    return whole
+
+
+def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float, search: Search) -> Plateau | str:
+    """The plateau within a candidate; else why there is none, empty where nobody would have expected one."""
+    interval = motion.interval
+    least = max(ceil(search.shortest / interval), FEWEST)
+    if last - first < least:
+        return ""
+    speed = float(np.median(motion.blocks[first:last]))
+    allowed = 0.5 * search.change * abs(speed) + CERTAIN * motion.noise(motion.rows)
+    near = np.flatnonzero(np.abs(motion.blocks[first:last] - speed) <= allowed)
+    begin, end = first + int(near[0]), first + int(near[-1]) + 1
+    if len(near) < 0.5 * (last - first) or not _steady(motion, begin, end, search):
+        return "the speed drifts"
+    end -= ceil(search.margin / interval)
+    earliest = begin + max(ceil(search.settle_time / interval), _travelled(motion, begin, end, search))
+    if end - earliest < least:
+        return f"too short: {search.shortest:g} s and {FEWEST} rows must be left once friction has settled"
+    torque = record.torque if record.load is None else record.torque - record.load
+    step = resolution(record.torque)
+    start, drift = _settled(torque, earliest, begin + int(MOST_DROPPED * (end - begin)), end, least, step, search)
+    weights = _weights(end - start, search.taper, interval)
+    order = 1 if motion.direct else 2
+    average, sigma = mean(torque[start:end], weights, step)
+    average -= J * derivative(weights, motion.signal[start:end], interval, order)
+    if drift > search.limit * abs(average):
+        return f"the torque drifts by {100 * drift / max(abs(average), 1e-300):.2g} %"
+    mean_speed = (
+        float(np.sum(weights * motion.signal[start:end]))
+        if motion.direct
+        else derivative(weights, motion.signal[start:end], interval, 1)
+    )
+    return Plateau(
+        record.name,
+        float(record.time[start]),
+        float(record.time[end - 1]),
+        mean_speed,
+        average,
+        # A drift that is left is as good as a rectangular distribution of so much width.
+        hypot(sigma, drift / np.sqrt(12)),
+        end - start,
+    )
+
+
+def _steady(motion: _Motion, begin: int, end: int, search: Search) -> bool:
+    """Whether the speed of the later part keeps its value over four quarters (the start may still ring)."""
+    begin += (end - begin) // 5
+    bounds = np.linspace(begin, end, 5).astype(int)
+    if bounds[1] - bounds[0] < 3:
+        return False
+    means = [motion.speed(int(a), int(b)) for a, b in pairwise(bounds)]
+    noise = CERTAIN * np.sqrt(2) * motion.noise(int(bounds[1] - bounds[0]))
+    return bool(np.ptp(means) <= search.change * abs(float(np.mean(means))) + noise)
+
+
+def _travelled(motion: _Motion, begin: int, end: int, search: Search) -> int:
+    """Rows until the settling travel is behind."""
+    travel = np.abs(motion.travel[begin:end] - motion.travel[begin])
+    needed = min(search.settle_travel, search.settle_share * float(travel[-1]))
+    return int(np.argmax(travel >= needed))
+
+
+def _weights(rows: int, taper: float, interval: float) -> Array:
+    """At most a fifth of the rows at either end is tapered: the loss of rows stays below 15 %."""
+    return window(rows, min(ceil(taper / interval), rows // 5))
+
+
+def _settled(
+    torque: Array, earliest: int, latest: int, end: int, least: int, step: float, search: Search
+) -> tuple[int, float]:
+    """Row from which on the torque has settled, and how much it still drifts (0: not beyond noise and `search.drift`).
+
+    Where it never settles (torque that depends on position) the earliest row stays: leaving more out gains nothing.
+    """
+    first_drift = 0.0
+    for start in np.linspace(earliest, max(latest, earliest), 8).astype(int):
+        third = (end - start) // 3
+        if end - start < least or third < 4:
+            break
+        weights = window(third, third // 4)
+        before, before_sigma = mean(torque[start : start + third], weights, step, trend=True)
+        after, after_sigma = mean(torque[end - third : end], weights, step, trend=True)
+        drift = abs(after - before)
+        if drift <= max(CERTAIN * hypot(before_sigma, after_sigma), search.drift * abs(after)):
+            return int(start), 0.0
+        if start == earliest:
+            first_drift = drift
+    return earliest, first_drift

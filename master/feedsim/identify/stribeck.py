@@ -1,0 +1,266 @@
+"""Stationary friction from plateaus: weighted least squares of Eq. 7, the viscous part and the constant load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from feedsim.errors import InputError
+from feedsim.identify import doubts
+from feedsim.identify.doubts import Points
+from feedsim.identify.fit import Fit, Parameter, correlation, fit
+from feedsim.identify.level import QUANTITIES, curve, torque
+from feedsim.identify.result import Correlation, Estimate, Plateau, Stationary, Status
+
+Array = NDArray[np.float64]
+
+USUAL: Mapping[str, float] = {"beta": 1.0, "v_log": 3.0}  # held unless freed
+SPEEDS = 200  # of the curve that is handed on
+STARTS = 6
+DOUBTFUL = 0.95  # probability of a smaller chi^2 from which on plateaus count as scattering more than their noise
+CLEAR = 0.99  # the same, of the drop that a Stribeck effect must bring
+
+# The fit moves F_C and rise = F_S - F_C >= 0 in place of F_S: F_C <= F_S is a bound then.
+ORDER = ("F_C", "rise", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
+
+
+def stationary(
+    plateaus: Sequence[Plateau],
+    *,
+    hold: Mapping[str, float] = USUAL,
+    free: Sequence[str] = (),
+    seed: int = 0,
+    I_P: float | None = None,
+) -> Stationary:
+    """Friction over speed from plateaus.
+
+    Args:
+        hold: name -> value of what is not estimated, on top of `USUAL`; any of the estimates' names.
+        free: names of `hold` and `USUAL` that are estimated nevertheless.
+        seed: of the further starts. I_P: lead [m/rad], for advice in mm/min.
+
+    What the plateaus cannot tell is held with a reason and a warning (F_S = F_C, v_s, F_log = 0, sigma_2 = 0,
+    asymmetry = 0, M_0 = 0). Plateaus that scatter about the curve by more than their own noise explains (friction that
+    depends on position, temperature) get a share of their torque added to their standard deviation, as large as makes
+    the residuals plausible (R. Paule, J. Mandel, J. Res. NBS 87, 1982): the confidence intervals tell it then.
+
+    Raises InputError: no plateau; a name that is none; F_S held below F_C.
+    """
+    if not plateaus:
+        raise InputError(
+            "no plateau of constant speed: stationary friction needs stretches of at least 0.4 s (0.15 s settle) at "
+            "constant speed, best 12 speeds from 10 to 20000 mm/min in both directions"
+        )
+    held = {name: value for name, value in {**USUAL, **hold}.items() if name not in free}
+    for name in (*hold, *free):
+        if name not in QUANTITIES:
+            raise InputError(f"{name} is no parameter of stationary friction: {', '.join(QUANTITIES)}")
+    points = Points.of(plateaus)
+    problem = _Problem(points, held, seed)
+    found, reasons, extra = problem.solve()
+    return _conclude(tuple(plateaus), points, problem, found, reasons, extra, I_P)
+
+
+class _Problem:
+    """The fit with what is held."""
+
+    def __init__(self, points: Points, given: Mapping[str, float], seed: int) -> None:
+        self.points, self.given, self.seed = points, dict(given), seed
+        self.usual = _guess(points)
+        if "F_S" in given and "F_C" in given and given["F_S"] < given["F_C"]:
+            raise InputError(f"F_S is held at {given['F_S']:g} N.m, below F_C at {given['F_C']:g} N.m")
+
+    def solve(self) -> tuple[Fit, dict[str, str], float]:
+        """The fit that stands, why what is held, and the share of the torque that plateaus scatter by besides noise."""
+        free = [name for name in ORDER if ("F_S" if name == "rise" else name) not in self.given]
+        reasons = doubts.unseparated(self.points) | doubts.too_few(self.points, free)
+        reasons = {name: reason for name, reason in reasons.items() if name in free}
+        while True:
+            left = [name for name in free if name not in reasons]
+            if not left:
+                raise InputError("every parameter of stationary friction is held: nothing is left to estimate")
+            found, extra = self.weighted(left, reasons)
+            more = self.needless(found, reasons, extra)
+            more = more or doubts.unanswered(self.points, found, self.inner(found.mapping(), reasons))
+            more = {name: reason for name, reason in more.items() if name in left}
+            if not more or len(more) == len(left):
+                return found, reasons, extra
+            reasons |= more
+            for name in ("v_s", "beta"):
+                if name in more:
+                    self.usual[name] = found[name]
+
+    def needless(self, found: Fit, reasons: Mapping[str, str], extra: float) -> dict[str, str]:
+        """Rise, v_s and beta where the plateaus are met as well without a Stribeck effect, name -> reason.
+
+        A fit makes one of noise alone: with none, the drop of chi^2 is that of as many random numbers.
+        """
+        parts = [name for name in ("rise", "v_s", "beta") if name in found.names]
+        if not {"rise", "v_s"} <= set(parts) or found.sigma["v_s"] <= doubts.VAGUE * found["v_s"]:
+            return {}
+        reason = (
+            f"the torque at the speeds from {self.points.speeds[0]:.3g} rad/s on is met as well without a Stribeck "
+            "effect: no plateau lies within its range"
+        )
+        without = {**reasons} | dict.fromkeys(parts, reason)
+        left = [name for name in found.names if name not in parts]
+        bare = self.fit(left, without, extra, 1, found)
+        if 2 * (bare.cost - found.cost) > chi2.ppf(CLEAR, len(parts)):
+            return {}
+        return dict.fromkeys(parts, reason)
+
+    def inner(self, moved: Mapping[str, float], reasons: Mapping[str, str]) -> dict[str, float]:
+        """All values, F_S and rise both, from those that are moved."""
+        neutral = {"rise": 0.0, "F_log": 0.0, "sigma_2": 0.0, "asymmetry": 0.0, "M_0": 0.0}
+        values = {**self.usual, **{name: neutral[name] for name in reasons if name in neutral}}
+        values |= {**self.given, **moved}
+        if "F_S" in self.given:
+            values["rise"] = self.given["F_S"] - values["F_C"]
+        values["F_S"] = values["F_C"] + values["rise"]
+        return values
+
+    def weighted(self, left: Sequence[str], reasons: Mapping[str, str]) -> tuple[Fit, float]:
+        """Fit with the plateaus' own noise; where that does not explain the scatter, with a share of torque added."""
+        starts = STARTS
+        found = self.fit(left, reasons, 0.0, starts)
+        freedom = len(self.points.speed) - len(left)
+        if freedom < 1 or 2 * found.cost <= chi2.ppf(DOUBTFUL, freedom):
+            return found, 0.0
+        low, high = 0.0, 1.0
+        for _ in range(12):
+            # In equal ratios once a lower end is there: shares of 1e-4 and of 0.1 both occur.
+            middle = high / 10 if low == 0 else float(np.sqrt(low * high))
+            found = self.fit(left, reasons, middle, 1, found)
+            if 2 * found.cost > freedom:
+                low = middle
+            else:
+                high = middle
+        return self.fit(left, reasons, high, starts, found), high
+
+    def fit(
+        self, left: Sequence[str], reasons: Mapping[str, str], extra: float, starts: int, near: Fit | None = None
+    ) -> Fit:
+        """One weighted fit."""
+        points = self.points
+        weight = 1.0 / np.hypot(points.sigma, extra * np.abs(points.torque))
+        begin = {**self.usual, **(near.mapping() if near is not None else {})}
+
+        def residuals(moved: Mapping[str, float]) -> Array:
+            return np.asarray((points.torque - torque(self.inner(moved, reasons), points.speed)) * weight)
+
+        return fit(residuals, [self.parameter(name, begin[name]) for name in left], starts=starts, seed=self.seed)
+
+    def parameter(self, name: str, start: float) -> Parameter:
+        """Bounds and the range of further starts, from what the plateaus span."""
+        points = self.points
+        top, fast, slow = float(np.max(np.abs(points.torque))), float(points.speeds[-1]), float(points.speeds[0])
+        if name == "v_s":
+            return Parameter(name, start, slow / 20, 2 * fast, scatter=(slow, max(fast / 3, 2 * slow)), log=True)
+        if name == "v_log":
+            return Parameter(name, start, 1e-2 * slow, 1e2 * fast, scatter=(slow, fast * 1.01), log=True)
+        if name == "beta":
+            return Parameter(name, start, 0.2, 4.0, scatter=(0.5, 2.0), log=True)
+        if name == "asymmetry":
+            return Parameter(name, start, -0.5, 0.5, 0.1, scatter=(-0.05, 0.05))
+        if name == "M_0":
+            return Parameter(name, start, -2 * top, 2 * top, 0.1 * top, scatter=(-0.05 * top, 0.05 * top))
+        if name == "sigma_2":
+            return Parameter(name, start, 0.0, 2 * top / fast, 0.1 * top / fast, scatter=(0.0, 0.5 * top / fast))
+        if name == "F_C":
+            # Held F_S is an upper bound: the rise must not be negative.
+            highest = min(2 * top, self.given.get("F_S", 2 * top))
+            return Parameter(
+                name, min(start, highest), 1e-3 * top, highest, 0.3 * top, scatter=(0.2 * top, min(top, highest))
+            )
+        return Parameter(name, start, 0.0, 2 * top, 0.1 * top, scatter=(0.0, 0.5 * top))
+
+
+def _guess(points: Points) -> dict[str, float]:
+    """First values, and what stays where a parameter is held for lack of data."""
+    friction, _ = points.friction()
+    lowest = int(np.argmin(friction))
+    slow, fast = float(points.speeds[0]), float(points.speeds[-1])
+    rise = float(friction[0] - friction[lowest])
+    climb = float(friction[-1] - friction[lowest])
+    return {
+        "F_C": float(friction[lowest]),
+        "rise": max(rise, 0.0),
+        # Down to 5 % at the speed of the lowest torque.
+        "v_s": max(float(points.speeds[lowest]) / 3, slow / 2),
+        "F_log": 0.3 * max(climb, 0.0),
+        "sigma_2": 0.5 * max(climb, 0.0) / fast,
+        "asymmetry": 0.0,
+        "M_0": float(np.mean(points.torque)) if points.both else 0.0,
+        **USUAL,
+    }
+
+
+def _conclude(
+    plateaus: tuple[Plateau, ...],
+    points: Points,
+    problem: _Problem,
+    found: Fit,
+    reasons: Mapping[str, str],
+    extra: float,
+    I_P: float | None,
+) -> Stationary:
+    """Everything that is reported."""
+    values = problem.inner(found.mapping(), reasons)
+    # From what was moved to what is reported: F_S = F_C + rise.
+    names = tuple("F_S" if name == "rise" else name for name in found.names)
+    turn = np.eye(len(names))
+    if "rise" in found.names and "F_C" in found.names:
+        turn[found.names.index("rise"), found.names.index("F_C")] = 1.0
+    covariance = turn @ found.covariance @ turn.T
+    matrix = correlation(covariance)
+    sigma = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
+    told = {"F_S" if name == "rise" else name: reason for name, reason in reasons.items()}
+    estimates = {}
+    for name, (unit, meaning) in QUANTITIES.items():
+        status: Status = "estimated" if name in names else "undetermined" if name in told else "held"
+        reason = told.get(name, "" if status == "estimated" else "held at a given or usual value")
+        estimates[name] = Estimate(name, values[name], unit, meaning, float(sigma.get(name, nan)), status, reason)
+    said = doubts.warnings(points, found, matrix, names, I_P)
+    said += [f"{name} is not estimated but held at {values[name]:.4g}: {reason}" for name, reason in told.items()]
+    if extra > 0:
+        said.append(
+            f"plateaus scatter about the curve by {100 * extra:.2g} % of their torque beyond their own noise (friction "
+            "that depends on position or temperature, or a shape the model has not); the confidence intervals hold it"
+        )
+    speeds = np.geomspace(points.speeds[0], points.speeds[-1], SPEEDS) if len(points.speeds) > 1 else points.speeds
+    away = points.torque - torque(values, points.speed)
+    return Stationary(
+        plateaus,
+        estimates,
+        Correlation(names, matrix),
+        covariance,
+        speeds,
+        curve(values, speeds),
+        _band(problem, found, reasons, speeds),
+        (float(points.speeds[0]), float(points.speeds[-1])),
+        float(np.sqrt(np.mean(away**2))),
+        float(np.max(np.abs(away) / curve(values, points.speed))),
+        tuple(said),
+    )
+
+
+def _band(problem: _Problem, found: Fit, reasons: Mapping[str, str], speeds: Array) -> Array:
+    """(K,) standard deviation of the curve, linearised."""
+    rows = []
+    for k, name in enumerate(found.names):
+        parameter = problem.parameter(name, float(found.values[k]))
+        # Up to the bound and beyond: the curve is smooth there, and only its slope is asked for.
+        step = 1e-5 * (float(found.values[k]) if parameter.log else parameter.step)
+        ahead, behind = found.mapping(), found.mapping()
+        ahead[name] += step
+        behind[name] -= step
+        values = (problem.inner(side, reasons) for side in (ahead, behind))
+        first, second = (curve(side, speeds) for side in values)
+        rows.append((first - second) / (2 * step))
+    slopes = np.column_stack(rows)
+    finite = np.where(np.isfinite(found.covariance), found.covariance, 0.0)
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", slopes, finite, slopes), 0.0)))

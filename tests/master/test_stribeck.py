@@ -1,0 +1,173 @@
+"""Stationary friction from plateaus: values, confidence, what is held for lack of data, warnings with their reason."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from feedsim.errors import InputError
+from feedsim.identify import stribeck
+from feedsim.identify.level import curve, torque
+from feedsim.identify.result import Plateau, Stationary
+from identify_records import I_P, SPEEDS, TRUE, stationary
+
+
+def made(
+    speeds: Sequence[float] = tuple(SPEEDS),
+    p: Mapping[str, float] = TRUE,
+    *,
+    noise: float = 1e-5,
+    seed: int | None = None,
+    sides: Sequence[float] = (1.0, -1.0),
+) -> list[Plateau]:
+    """Plateaus whose standard deviation is a share of their torque; with a seed they are disturbed by it."""
+    random = np.random.default_rng(seed)
+    found = []
+    for speed in speeds:
+        for side in sides:
+            exact = stationary(p, side * speed)
+            sigma = noise * abs(exact)
+            off = 0.0 if seed is None else sigma * float(random.standard_normal())
+            found.append(Plateau("made", 0.0, 1.0, side * speed, exact + off, sigma, 500))
+    return found
+
+
+def check_curve(found: Stationary, p: Mapping[str, float], error: float) -> None:
+    np.testing.assert_allclose(found.torque, curve(p, found.speeds), rtol=error)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{}, {"M_0": -0.8}, {"asymmetry": 0.04}, {"M_0": 0.5, "asymmetry": -0.1}, {"F_log": 0.0}, {"sigma_2": 0.0}],
+    ids=str,
+)
+def test_undisturbed_plateaus_give_the_truth(change: dict[str, float]) -> None:
+    p = {**TRUE, **change}
+    found = stribeck.stationary(made(p=p), I_P=I_P)
+    for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0"):
+        estimate = found.estimates[name]
+        assert estimate.status == "estimated", estimate.reason
+        assert estimate.value == pytest.approx(p[name], rel=1e-6, abs=1e-7), name
+    check_curve(found, p, 1e-7)
+    assert found.range == pytest.approx((SPEEDS[0], SPEEDS[-1]))
+    assert found.covariance.shape == (7, 7)
+    assert all("bound" in said for said in found.warnings)  # of what is 0 alone
+    assert bool(found.warnings) == (0.0 in [change.get("F_log"), change.get("sigma_2")])
+
+
+def test_held_values_are_freed_on_request() -> None:
+    p = {**TRUE, "beta": 1.4, "v_log": 5.0}
+    speeds = np.geomspace(SPEEDS[0], SPEEDS[-1], 24)
+    found = stribeck.stationary(made(speeds, p), free=("beta", "v_log"))
+    for name in ("beta", "v_log", "F_S", "v_s"):
+        assert found.estimates[name].status == "estimated"
+        assert found.estimates[name].value == pytest.approx(p[name], rel=1e-4)
+    held = stribeck.stationary(made(speeds, p), hold={"beta": 1.4, "v_log": 5.0, "F_S": 2.1, "asymmetry": 0.0})
+    assert held.estimates["F_S"].status == "held"
+    assert held.estimates["F_S"].value == 2.1
+    assert np.isnan(held.estimates["F_S"].sigma)
+    assert held.estimates["F_C"].value == pytest.approx(1.6, rel=1e-6)
+
+
+def test_confidence_and_band_are_the_scatter() -> None:
+    names = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0")
+    values, curves, scores = [], [], []
+    for seed in range(60):
+        found = stribeck.stationary(made(noise=3e-3, seed=seed))
+        values.append([found.estimates[name].value for name in names])
+        scores.append([(found.estimates[name].value - TRUE[name]) / found.estimates[name].sigma for name in names])
+        curves.append(found.torque)
+    # A standard deviation of 60 draws is known to 9 %: three of it.
+    assert np.all(np.abs(np.sqrt(np.mean(np.square(scores), axis=0)) - 1) < 0.3)
+    np.testing.assert_allclose(np.std(curves, axis=0)[::20], found.sigma[::20], rtol=0.35)
+    matrix = np.corrcoef(np.array(values).T)
+    assert np.max(np.abs(matrix - found.correlation.matrix)) < 0.4  # of uncorrelated ones: 0.13 each
+
+
+def test_scatter_beyond_the_noise_widens_the_confidence() -> None:
+    random = np.random.default_rng(7)
+    rough = [
+        Plateau("x", 0, 1, p.speed, p.torque * (1 + 0.02 * float(random.standard_normal())), 1e-5, 500) for p in made()
+    ]
+    found = stribeck.stationary(rough)
+    assert any("beyond their own noise" in said for said in found.warnings)
+    for name in ("F_C", "F_S", "M_0"):
+        estimate = found.estimates[name]
+        assert abs(estimate.value - TRUE[name]) < 4 * estimate.sigma
+    assert found.estimates["F_S"].sigma > 0.005
+
+
+def said(found: Stationary, text: str) -> bool:
+    return any(text in warning for warning in found.warnings)
+
+
+def test_warnings_name_their_reason() -> None:
+    found = stribeck.stationary(made(SPEEDS[3:]), I_P=I_P)
+    assert said(found, "the lowest speed is 79.5 mm/min, above 50 mm/min")
+    assert not said(found, "fewer than 8")
+    assert said(stribeck.stationary(made(SPEEDS[::2])), "6 speed(s), fewer than 8")
+    found = stribeck.stationary(made(sides=(1.0,)))
+    assert said(found, "one direction only")
+    for name in ("M_0", "asymmetry"):
+        assert found.estimates[name].status == "undetermined"
+        assert found.estimates[name].value == 0.0
+    assert found.estimates["F_C"].value == pytest.approx(1.6, rel=1e-6)
+    # All speeds far below v_log: F_log / v_log and sigma_2 are one slope.
+    slow = np.geomspace(0.01, 0.3, 10)
+    p = {**TRUE, "v_s": 0.03}
+    found = stribeck.stationary(made(slow, p, noise=1e-4))
+    assert said(found, "F_log")
+    check_curve(found, p, 1e-3)
+
+
+def test_no_plateau_within_the_stribeck_range() -> None:
+    fast = SPEEDS[SPEEDS > 5.0]
+    found = stribeck.stationary(made(np.geomspace(fast[0], fast[-1], 10), noise=2e-3, seed=3), I_P=I_P)
+    for name in ("v_s", "F_S"):
+        assert found.estimates[name].status == "undetermined"
+        assert found.estimates[name].reason
+        assert said(found, f"{name} is not estimated")
+    check_curve(found, TRUE, 0.02)
+
+
+def test_a_level_that_does_not_vary_leaves_the_asymmetry_at_zero() -> None:
+    p = {**TRUE, "F_S": 1.6, "F_log": 0.0, "M_0": 0.3}
+    found = stribeck.stationary(made(p=p, noise=1e-4, seed=1))
+    assert found.estimates["asymmetry"].status == "undetermined"
+    assert "does not tell it from the constant load" in found.estimates["asymmetry"].reason
+    assert found.estimates["M_0"].value == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("start", [0, 6])
+@pytest.mark.parametrize("sides", [(1.0, -1.0), (-1.0,)], ids=["both", "one"])
+def test_few_speeds_never_fail_and_always_pass_through_the_data(
+    count: int, start: int, sides: tuple[float, ...]
+) -> None:
+    speeds = SPEEDS[start : start + count]
+    plateaus = made(speeds, noise=1e-3, seed=5, sides=sides)
+    found = stribeck.stationary(plateaus, I_P=I_P)
+    values = {name: estimate.value for name, estimate in found.estimates.items()}
+    assert said(found, "fewer than 8")
+    for plateau in plateaus:
+        # What is held cannot bend the curve by more than this over neighbouring speeds.
+        assert torque(values, np.array([plateau.speed]))[0] == pytest.approx(plateau.torque, rel=0.03)
+    assert sum(estimate.status == "estimated" for estimate in found.estimates.values()) <= len(plateaus)
+    for estimate in found.estimates.values():
+        assert estimate.status == "estimated" or estimate.reason
+
+
+def test_refusals() -> None:
+    with pytest.raises(InputError, match="no plateau of constant speed"):
+        stribeck.stationary([])
+    with pytest.raises(InputError, match=r"F_c is no parameter .* F_C, F_S"):
+        stribeck.stationary(made(), hold={"F_c": 1.0})
+    with pytest.raises(InputError, match="below F_C"):
+        stribeck.stationary(made(), hold={"F_C": 2.0, "F_S": 1.0})
+
+
+def test_the_same_seed_gives_the_same_result() -> None:
+    first, second = (stribeck.stationary(made(noise=1e-2, seed=9), seed=4) for _ in range(2))
+    assert [e.value for e in first.estimates.values()] == [e.value for e in second.estimates.values()]

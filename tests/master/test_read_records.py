@@ -13,7 +13,7 @@ import pytest
 from scipy.io import savemat
 
 from feedsim.identify.read import read_records
-from feedsim.scenario import Machine, load_machine
+from feedsim.scenario import Machine, load_columns, load_machine
 from record_helpers import ANGLE, DIGITS, K_T, LEAD, PITCH, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -237,14 +237,15 @@ def test_a_mass_needs_a_pitch(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif("FEEDSIM_EMPS" not in os.environ, reason="FEEDSIM_EMPS does not name the measured record")
-def test_emps(tmp_path: Path) -> None:
+def test_emps() -> None:
     """Newton's law with the published parameters of the data set fits what is read, in signs and in units."""
-    text = (ROOT / "scenarios" / "recordings" / "emps_columns.yaml").read_text(encoding="utf-8")
-    found = read_records(Path(os.environ["FEEDSIM_EMPS"]), mapped(tmp_path, text + "pitch: 20 mm\n"))
+    mapping = load_columns(ROOT / "scenarios" / "machines" / "emps" / "columns.yaml")
+    found = read_records(Path(os.environ["FEEDSIM_EMPS"]), mapping, axis="X")
     record = only(found)
     assert found.provenance.warnings == ()
     assert record.interval == pytest.approx(1e-3, rel=1e-6)
-    position, force = record.angle * LEAD, record.torque / LEAD
+    lead = found.provenance.pitch / (2 * np.pi)
+    position, force = record.angle * lead, record.torque / lead
     step = 5  # [ms] half the window that the acceleration is taken over
     speed = (position[2 * step :] - position[: -2 * step]) / (2 * step * record.interval)
     acceleration = (position[2 * step :] - 2 * position[step:-step] + position[: -2 * step]) / (

@@ -119,7 +119,7 @@ def test_validate_and_schema(scenario_file: Path, fmus: Path, tmp_path: Path) ->
     done = feedsim("validate", scenario_file, fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "valid" in done.stdout
-    for kind in ("scenario", "machine"):
+    for kind in ("scenario", "machine", "columns"):
         done = feedsim("schema", kind, fmus=fmus, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert json.loads(done.stdout)["$schema"].startswith("https://json-schema.org/")

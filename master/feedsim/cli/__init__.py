@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from feedsim.cli import frf, machine
+from feedsim.cli import compensate, frf, identify, machine
 from feedsim.cli.options import add_fmus, add_overrides
 
 EPILOG = """exit codes:
@@ -28,6 +28,8 @@ examples:
   feedsim machine show scenarios/machines/test_centre --mode 21Hz --animate --out results/structure
   feedsim machine pack scenarios/machines/test_centre --out my_plant.fmu
   feedsim frf scenarios/machines/test_centre --axes X,Z
+  feedsim identify results/identify_z_constant/log.csv --axis Z --machine scenarios/machines/test_centre
+  feedsim compensate scenarios/xz_circle.yaml
 """
 
 
@@ -57,11 +59,13 @@ def parser() -> argparse.ArgumentParser:
 
     machine.add_commands(commands)
     frf.add_command(commands)
+    identify.add_command(commands)
+    compensate.add_command(commands)
 
     schema = commands.add_parser(
-        "schema", help="print the JSON Schema of scenario, machine or structure files, for editors"
+        "schema", help="print the JSON Schema of scenario, machine, structure or mapping files, for editors"
     )
-    schema.add_argument("kind", nargs="?", choices=("scenario", "machine", "structure"), default="scenario")
+    schema.add_argument("kind", nargs="?", choices=("scenario", "machine", "structure", "columns"), default="scenario")
 
     convert = commands.add_parser(
         "convert",

@@ -154,7 +154,9 @@ class Identification:
         I_P: lead [m/rad], for values at the slide.
         estimates: the final set, by name: every friction parameter, M_0, J, delay.
         correlation: of all estimated together.
-        seconds: wall time per step ("read", "stage 1", "stage 2").
+        seconds: wall time per step ("reading", "inertia", "plateaus", "stage 1", "stage 2").
+        rigid: the simple model beside it, by inverse dynamics of all records: J, sigma_2, F_C, M_0; empty where the
+            records tell no inertia.
     """
 
     axis: str
@@ -166,3 +168,4 @@ class Identification:
     warnings: tuple[str, ...]
     advice: tuple[str, ...]
     seconds: Mapping[str, float]
+    rigid: Mapping[str, Estimate] = field(default_factory=dict)

@@ -22,6 +22,7 @@ LOGARITHMIC = ("sigma_0", "W", "v_s")  # known by their order of magnitude at fi
 DECADES = {"sigma_0": 2.0, "W": 1.5, "v_s": 1.5}  # that they may move either way from their start
 SCALES = {"delay": 1e-4, "asymmetry": 0.1}
 DELAYS = (-5e-3, 20e-3)  # [s] of the torque channel against the motion's
+MOST_EXCESS = 2.0  # of the friction: static friction beyond three times Coulomb's is none
 MOST_ASYMMETRY = 0.6  # beyond, it plays the constant load's part
 REACH = {"z": 1.0, "c": 0.5}
 
@@ -157,6 +158,8 @@ def _parameter(name: str, begin: Mapping[str, float]) -> Parameter:
         lower, upper = -MOST_ASYMMETRY, MOST_ASYMMETRY
     if name == "gamma":
         lower = 1e-3
+    if name == EXCESS:
+        upper = MOST_EXCESS * max(begin["F_C"], begin["F_S"])
     scale = {
         "sigma_1": max(abs(start), 1e-4 * begin["sigma_0"]),
         "sigma_2": max(abs(start), 1e-4 * begin["F_C"]),

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from feedsim.analysis import Figure
-from feedsim.report.provenance import InputFile, Parameter, axis_parameters
+from feedsim.report.provenance import InputFile, Parameter, axis_parameters, friction_origins
 from feedsim.scenario import Machine
 
 
@@ -45,6 +45,7 @@ def machine_part(machine: Machine) -> dict[str, Any]:
         "note": machine.note,
         "pose": {a: {"value": x, "unit": "m"} for a, x in machine.pose.items()},
         "axes": {name: _axis(axis_parameters(axis)) for name, axis in machine.axes.items()},
+        "friction_origins": friction_origins(machine),
     }
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from feedsim.scenario import Axis, Drive, Friction, MeasuredSetpoints, Scenario
+from feedsim.scenario import Axis, Drive, Friction, Machine, MeasuredSetpoints, Scenario
 from feedsim.scenario.fields import Quantity
 
 Parameter = float | int | bool | str
@@ -68,6 +68,24 @@ def axis_parameters(axis: Axis) -> dict[str, dict[str, tuple[Parameter, str]]]:
     mechanics: dict[str, tuple[Parameter, str]] = {"pitch": (axis.pitch, "m"), "M_0": (axis.M_0, "N.m")}
     drive, friction = (_with_units(group) for group in (axis.drive, axis.friction))
     return {"axis": mechanics, "drive": drive, "friction": friction}
+
+
+def friction_origins(machine: Machine) -> dict[str, str]:
+    """Axis -> where its friction comes from, as far as its group `identified` says; axes without one are left out.
+
+    What the group holds is not checked when it is read: whatever stands there ends as text.
+    """
+    origins: dict[str, str] = {}
+    for name, axis in machine.axes.items():
+        told = axis.friction.identified
+        if not told:
+            continue
+        traces = told.get("traces")
+        files = [item.get("file") for item in traces if isinstance(item, dict)] if isinstance(traces, list) else []
+        parts = [f"identified {told['date']}" if "date" in told else "identified"]
+        parts += ["from " + ", ".join(str(file) for file in files)] if files else []
+        origins[name] = " ".join(parts)
+    return origins
 
 
 def _with_units(group: Drive | Friction) -> dict[str, tuple[Parameter, str]]:

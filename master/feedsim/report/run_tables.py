@@ -9,7 +9,7 @@ from html import escape
 from feedsim.nc import Circular, Oscillations, Recorded, Segment, Straight, Strokes
 from feedsim.report.log_part import log_text
 from feedsim.report.parts import software
-from feedsim.report.provenance import input_files
+from feedsim.report.provenance import friction_origins, input_files
 from feedsim.report.summary import Run
 from feedsim.report.tables import archives_table, files_table, pairs_table, parameters_table, table
 from feedsim.report.words import duration, minus
@@ -63,6 +63,7 @@ def provenance(run: Run) -> str:
         ("Set in the scenario", ", ".join(scenario.settings) or "nothing"),
         ("Set on the command line", ", ".join(scenario.overrides) or "nothing"),
         ("Machine", machine.name),
+        *((f"Friction of {axis}", text) for axis, text in friction_origins(machine).items()),
         ("Cycles", ", ".join(f"{n} {duration(getattr(cycles, n))}" for n in ("T_c", "T_pos", "T_ipo"))),
         ("Recording", f"every {duration(scenario.recording.interval)}, {len(run.trace)} rows"),
         *([("Log", log_text(scenario.logging, run.log))] if scenario.logging is not None else []),

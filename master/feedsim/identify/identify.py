@@ -1,0 +1,363 @@
+"""Friction of an axis from its records: which record serves which stage, both stages, and one set of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from math import nan
+from time import perf_counter
+
+import numpy as np
+
+from feedsim.errors import InputError
+from feedsim.identify.flexible import with_structure
+from feedsim.identify.inertia import Inertia, inertia
+from feedsim.identify.level import QUANTITIES
+from feedsim.identify.motion import motion
+from feedsim.identify.output_error import dynamic
+from feedsim.identify.parameters import FRICTION, KINDS, PRE_SLIDING, USUAL
+from feedsim.identify.plateaus import plateaus
+from feedsim.identify.record import Record
+from feedsim.identify.result import (
+    NORMAL_95,
+    Correlation,
+    Dynamic,
+    Estimate,
+    Identification,
+    Plateau,
+    Stationary,
+    Status,
+)
+from feedsim.identify.stretches import Part, parts
+from feedsim.identify.stribeck import stationary
+from feedsim.identify.torque import Law
+from feedsim.structure import Modes
+
+Progress = Callable[[str, int, int], None]  # what is being done, how many of its steps are done, of how many
+
+STAGES = (1, 2)
+ORDER = (*FRICTION, "M_0", "J", "delay")
+# Pre-sliding of an axis without a word from its records: bristles that give 5 mrad at break-away and relax in 2.5 ms.
+USUAL_DEFLECTION, USUAL_RELAXATION = 5e-3, 2.5e-3
+INERTIA_OFF, CERTAIN = 0.1, 4.0  # relative, standard deviations: a given inertia that is off by both is worth a warning
+# What a parameter is held at where no stage tells it and no machine was named: no effect.
+NO_EFFECT = {"F_log": 0.0, "sigma_2": 0.0, "asymmetry": 0.0, "W": 0.0, "gamma": 1.0, "v_s": 0.6}
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is known and what is wanted.
+
+    Attributes:
+        axis: its name. I_P: lead [m/rad].
+        J: inertia seen at the motor [kg.m2], `given`; None: estimated from accelerating parts.
+        modes: of the machine whose J_tot is given: what its structure takes beyond J dn/dt is known then.
+        delay: of the torque channel [s]; None: estimated.
+        hold: name -> SI value that a parameter keeps. free: names that are estimated although they are usually held.
+        fallback: name -> SI value, for what the records do not tell: the friction of the machine so far.
+        stages: 1 stationary friction, 2 pre-sliding.
+        seed: of the random starts.
+    """
+
+    axis: str
+    I_P: float
+    J: Estimate | None = None
+    modes: Modes | None = None
+    delay: float | None = None
+    hold: Mapping[str, float] = field(default_factory=dict)
+    free: tuple[str, ...] = ()
+    fallback: Mapping[str, float] = field(default_factory=dict)
+    stages: tuple[int, ...] = STAGES
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        known = (*FRICTION, "M_0")
+        for name in (*self.hold, *self.free):
+            if name not in known:
+                raise InputError(f"no parameter {name!r}; there are {', '.join(known)}")
+            if name in self.hold and name in self.free:
+                raise InputError(f"{name} cannot be held and free at once")
+
+
+def identify(records: Sequence[Record], law: Law, options: Options, progress: Progress | None = None) -> Identification:
+    """Friction parameters of one axis.
+
+    law: the friction model as a function of the speed. Stage 1 takes every stretch at constant speed; stage 2 takes the
+    records with sines or, where there are none, all whose axis reverses. Stage 1 enters stage 2 as a prior, unless both
+    are of the same records. Either may be absent; what it would tell is then held, with the reason.
+
+    Raises InputError: no records, neither plateaus nor reversals, or a fit that cannot be made.
+    """
+    if not records:
+        raise InputError("no records to identify from")
+    if options.modes is not None:
+        records = [with_structure(record, options.modes, options.axis) for record in records]
+    run = _Run(records, law, options, progress or (lambda what, done, total: None))
+    return run.result()
+
+
+class _Run:
+    """One identification: steps, how long each took, and what there is to say."""
+
+    def __init__(self, records: Sequence[Record], law: Law, options: Options, progress: Progress) -> None:
+        self.records, self.law, self.options, self.progress = records, law, options, progress
+        self.seconds: dict[str, float] = {}
+        self.warnings: list[str] = []
+        self.advice: list[str] = []
+        self.reasons: dict[int, str] = {}  # stage -> why it is absent
+        self.prior = True  # whether stage 1 enters stage 2
+        self.doubted: dict[str, float] = {}  # held in stage 2, because stage 1 has shown that it cannot be told
+
+    def result(self) -> Identification:
+        options = self.options
+        with self._timed("inertia"):
+            rigid = self._rigid(self.records)
+            J = options.J or (rigid.J if rigid is not None else None)
+            self._compare(rigid)
+        with self._timed("plateaus"):
+            # J dn/dt hardly matters at constant speed.
+            found = self._plateaus(J.value if J is not None else 0.0) if 1 in options.stages else ()
+        with self._timed("stage 1"):
+            first = self._stationary(found)
+        with self._timed("stage 2"):
+            second = self._dynamic(first)
+        if first is None and second is None:
+            raise InputError(
+                "the records tell no friction: " + "; ".join(self.reasons[stage] for stage in sorted(self.reasons))
+            )
+        estimates = self._merged(first, second, J)
+        for stage in (first, second):
+            for text in stage.warnings if stage is not None else ():
+                if not any(text in said for said in self.warnings):  # a reason that stage 2 hands on from stage 1
+                    self.warnings.append(text)
+        self.advice += second.advice if second is not None else ()
+        return Identification(
+            axis=options.axis,
+            I_P=options.I_P,
+            estimates=estimates,
+            correlation=merged_correlation(first if self.prior or second is None else None, second),
+            stationary=first,
+            dynamic=second,
+            warnings=tuple(dict.fromkeys(self.warnings)),
+            advice=tuple(dict.fromkeys(self.advice)),
+            seconds=self.seconds,
+            rigid=rigid.estimates if rigid is not None else {},
+        )
+
+    def _plateaus(self, J: float) -> tuple[Plateau, ...]:
+        found: list[Plateau] = []
+        for k, record in enumerate(self.records):
+            self.progress("plateaus", k, len(self.records))
+            found += plateaus(record, J)
+        self.progress("plateaus", len(self.records), len(self.records))
+        return tuple(found)
+
+    def _stationary(self, found: tuple[Plateau, ...]) -> Stationary | None:
+        if 1 not in self.options.stages:
+            self.reasons[1] = "stage 1 was not asked for"
+            return None
+        if not found:
+            self.reasons[1] = "no stretches at constant speed"
+            self.advice.append(
+                "no stretch at constant speed was found: strokes at 8 or more speeds from 10 mm/min up, in both "
+                "directions, tell the Stribeck curve"
+            )
+            return None
+        self.progress("stage 1: Stribeck curve", 0, 1)
+        hold, free = self._held(QUANTITIES)
+        try:
+            return stationary(found, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
+        except InputError as error:
+            self.reasons[1] = str(error)
+            self.warnings.append(f"no Stribeck curve: {error}")
+            return None
+        finally:
+            self.progress("stage 1: Stribeck curve", 1, 1)
+
+    def _dynamic(self, first: Stationary | None) -> Dynamic | None:
+        chosen = transitions(self.records) if 2 in self.options.stages else ()
+        if 2 not in self.options.stages:
+            self.reasons[2] = "stage 2 was not asked for"
+        elif not chosen:
+            self.reasons[2] = "no reversals"
+            self.advice.append(
+                "the axis reverses nowhere in the records: sines of 5 um at 10 Hz, 20 um at 5 Hz, 100 um at 2 Hz and "
+                "200 um at 1 Hz tell the pre-sliding"
+            )
+        if not chosen:
+            return None
+        # No record counts twice: what was found at constant speed in the same records is no prior to their motion.
+        names = {record.name for record in chosen}
+        others = [record for record in self.records if record.name not in names]
+        if first is not None and any(plateau.record in names for plateau in first.plateaus):
+            self.prior = False
+            self._doubt(first)
+        hold, free = self._held((*FRICTION, "M_0"))
+        hold = self.doubted | hold
+        try:
+            return dynamic(
+                chosen,
+                self.law,
+                prior=first if self.prior else None,
+                J=self.options.J or self._inertia(others),
+                delay=self.options.delay,
+                hold=hold,
+                free=free,
+                I_P=self.options.I_P,
+                progress=lambda what, share: self.progress(f"stage 2: {what}", round(100 * share), 100),
+            )
+        except InputError as error:
+            if first is None:
+                raise
+            self.reasons[2] = str(error)
+            self.warnings.append(f"no pre-sliding parameters: {error}")
+            return None
+
+    def _doubt(self, first: Stationary) -> None:
+        """What plateaus of the same records do not tell from the constant load their motion does not tell either."""
+        lean = first.estimates["asymmetry"]
+        if lean.status == "undetermined" and "asymmetry" not in self.options.free:
+            self.doubted["asymmetry"] = lean.value
+
+    def _rigid(self, records: Sequence[Record]) -> Inertia | None:
+        """Inverse dynamics; None where the records tell no inertia."""
+        self.progress("inertia", 0, 1)
+        try:
+            found = inertia(records)
+        except InputError:
+            return None
+        finally:
+            self.progress("inertia", 1, 1)
+        if self.options.J is None:
+            self.warnings += [text for text in found.warnings if text not in self.warnings]
+        return found
+
+    def _inertia(self, records: Sequence[Record]) -> Estimate | None:
+        found = self._rigid(records) if records else None
+        return found.J if found is not None else None
+
+    def _compare(self, rigid: Inertia | None) -> None:
+        """Warn where the given inertia is not that of the accelerating parts."""
+        given = self.options.J
+        if given is None or rigid is None:
+            return
+        away = rigid.J.value - given.value
+        if abs(away) > max(INERTIA_OFF * given.value, CERTAIN * rigid.J.sigma):
+            self.warnings.append(
+                f"the inertia is given as {given.value:.4g} kg.m2, accelerating parts of the records say "
+                f"{rigid.J.value:.4g} +- {NORMAL_95 * rigid.J.sigma:.2g} kg.m2: check the inertia, the torque constant "
+                "and the pitch, or let it be estimated"
+            )
+
+    def _held(self, names: Collection[str]) -> tuple[dict[str, float], tuple[str, ...]]:
+        """What of `names` is held at which value, besides the usual ones, and what is freed."""
+        held = {name: value for name, value in self.options.hold.items() if name in names}
+        return held, tuple(name for name in self.options.free if name in names)
+
+    def _merged(self, first: Stationary | None, second: Dynamic | None, J: Estimate | None) -> dict[str, Estimate]:
+        """One estimate per parameter: stage 2's, which knows stage 1, else stage 1's, else what is held, and why.
+
+        Where stage 2 stands alone its whole set is taken: values of two fits do not make one friction.
+        """
+        found: dict[str, Estimate] = {"J": J} if J is not None else {}
+        for stage in (first, second):
+            if stage is not None:
+                known = {name for name, each in found.items() if each.status == "estimated" and self.prior}
+                found |= {
+                    name: each
+                    for name, each in stage.estimates.items()
+                    if name not in known or each.status == "estimated"
+                }
+        found |= {name: first.estimates[name] for name in self.doubted if first is not None}
+        if "delay" not in found and self.options.delay is not None:
+            found["delay"] = _held("delay", self.options.delay, "given", "not used: stage 2 is absent")
+        for name in FRICTION:
+            if name not in found:
+                found[name] = self._absent(name, found)
+        if found["F_S"].value < found["F_C"].value:
+            reason = "the fit puts it below F_C, that is: no rise towards rest is seen"
+            found["F_S"] = replace(
+                found["F_S"], value=found["F_C"].value, sigma=nan, status="undetermined", reason=reason
+            )
+        return {name: found[name] for name in ORDER if name in found}
+
+    def _absent(self, name: str, found: Mapping[str, Estimate]) -> Estimate:
+        """A parameter that no stage tells."""
+        reason = self.reasons.get(2 if name in PRE_SLIDING else 1, "")
+        if name in self.options.hold:
+            return _held(name, self.options.hold[name], "held", "as asked for")
+        if name in USUAL and name not in self.options.free:
+            return _held(name, USUAL[name], "held", "usual value")
+        if name in self.options.fallback:
+            return _held(name, self.options.fallback[name], "held", f"{reason}; value of the machine file".lstrip("; "))
+        if name in ("F_C", "F_S"):
+            other = found.get("F_C" if name == "F_S" else "F_S")
+            if other is None:
+                raise InputError(f"{name} cannot be told from the records: {reason}")
+            return _held(name, other.value, "held", f"{reason}; as {other.name}".lstrip("; "))
+        if name == "sigma_0":
+            return _held(
+                name, found["F_S"].value / USUAL_DEFLECTION, "held", f"{reason}; usual deflection".lstrip("; ")
+            )
+        if name == "sigma_1":
+            value = found["sigma_0"].value * USUAL_RELAXATION
+            return _held(name, value, "held", f"{reason}; usual relaxation time".lstrip("; "))
+        return _held(name, NO_EFFECT.get(name, USUAL.get(name, 0.0)), "held", f"{reason}; no effect".lstrip("; "))
+
+    def _timed(self, step: str) -> AbstractContextManager[None]:
+        return _Timed(self.seconds, step)
+
+
+class _Timed(AbstractContextManager[None]):
+    """Adds the time that a block takes to `seconds`."""
+
+    def __init__(self, seconds: dict[str, float], step: str) -> None:
+        self.seconds, self.step = seconds, step
+
+    def __enter__(self) -> None:
+        self.begin = perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        self.seconds[self.step] = perf_counter() - self.begin
+
+
+def transitions(records: Sequence[Record]) -> tuple[Record, ...]:
+    """Records that stage 2 is fitted to: those with sines, else those in which the axis reverses."""
+    found = {id(record): _parts(record) for record in records}
+    sines = tuple(r for r in records if any(part.kind == "sine" for part in found[id(r)]))
+    return sines or tuple(r for r in records if _reverses(r, found[id(r)]))
+
+
+def merged_correlation(first: Stationary | None, second: Dynamic | None) -> Correlation:
+    """Of all that was estimated; nan between a parameter that stage 1 alone tells and one that stage 2 alone does."""
+    stages = [stage.correlation for stage in (second, first) if stage is not None]
+    names = tuple(dict.fromkeys(name for each in stages for name in each.names))
+    matrix = np.full((len(names), len(names)), nan)
+    for each in reversed(stages):  # stage 2 last: it knows more
+        at = [names.index(name) for name in each.names]
+        matrix[np.ix_(at, at)] = each.matrix
+    np.fill_diagonal(matrix, 1.0)
+    order = [name for name in ORDER if name in names] + [name for name in names if name not in ORDER]
+    at = [names.index(name) for name in order]
+    return Correlation(tuple(order), matrix[np.ix_(at, at)])
+
+
+def _parts(record: Record) -> tuple[Part, ...]:
+    try:
+        return parts(record, motion(record))
+    except InputError:  # too short to tell a motion from noise
+        return ()
+
+
+def _reverses(record: Record, found: Sequence[Part]) -> bool:
+    """Whether the axis moves in both directions, within a stretch or from one to the next."""
+    if any(part.reversals for part in found):
+        return True
+    speed = motion(record).coarse()
+    return len({float(np.sign(np.sum(speed[part.rows]))) for part in found}) > 1
+
+
+def _held(name: str, value: float, status: Status, reason: str) -> Estimate:
+    kind = KINDS[name]
+    return Estimate(name, value, kind.unit, kind.meaning, nan, status, reason)

@@ -1,0 +1,339 @@
+"""Stage 2: the friction law itself on the recorded motion, fitted to the recorded torque (output error)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.errors import InputError
+from feedsim.identify.advice import advice
+from feedsim.identify.determined import Verdict, verdict
+from feedsim.identify.fit import Prior, correlation
+from feedsim.identify.motion import noise_of
+from feedsim.identify.parameters import KINDS, PRE_SLIDING, STATIONARY, USUAL
+from feedsim.identify.record import Record
+from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
+from feedsim.identify.search import Search, Solution, joined, spread
+from feedsim.identify.starts import grid, sliding
+from feedsim.identify.torque import Law, RecordTorque, deflection, models
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+# Of the record's RMS torque: what the model itself is not better than (interpolation between the samples, modes of the
+# structure). Without it the quietest move of a record without noise would count for all.
+FLOOR = 1e-3
+STARTS = 3  # of the grid's best that are followed
+FIRST, FINAL = 1e-3, 1e-9  # tolerances of cost and step: to compare starts, and for the result
+WORTH = 12.0  # least fall of the sum of squares (of unit variance) per parameter more: significant beyond 99.9 %
+# In the order in which they are tried where no stage 1 tells them: what friction is first, refinements last. Asymmetry
+# comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
+REFINEMENTS = (
+    ("sigma_1",),
+    ("F_log", "asymmetry"),
+    ("F_log",),
+    ("F_S", "v_s"),
+    ("asymmetry",),
+    ("W", "gamma"),
+    ("F_S", "v_s"),  # once more: what engages passed for it, or hid it
+    ("F_log",),
+)
+LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant load to be told apart
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What is known before the fit: start values, which parameters the prior tells, which are held or given."""
+
+    values: dict[str, float]
+    prior: Prior
+    told: tuple[str, ...]
+    held: dict[str, tuple[Status, str]]
+
+
+def dynamic(
+    records: Sequence[Record],
+    law: Law,
+    *,
+    prior: Stationary | None = None,
+    J: Estimate | None = None,
+    delay: float | None = None,
+    hold: Mapping[str, float] | None = None,
+    free: Collection[str] = (),
+    I_P: float | None = None,
+    progress: Progress | None = None,
+) -> Dynamic:
+    """Pre-sliding and transition from records of sines, or of any motion with reversals.
+
+    All parameters are estimated together; what stage 1 found enters with its covariance, so that its uncertainty
+    carries over. The noise level is taken from the residuals of each stretch and the fit repeated with it.
+
+    Args:
+        records: of one axis. Those of constant speed that `prior` was made of would count twice: leave them out.
+        law: the friction law.
+        prior: result of stage 1; None: everything from these records, as far as they tell it.
+        J: inertia [kg.m2]; with a standard deviation it is refined, without it is held; None: estimated.
+        delay: of the torque channel [s]; None: estimated.
+        hold: name -> value that is not touched. free: what is usually held but is to be estimated (beta, v_log).
+        I_P: lead [m/rad], for advice in micrometres.
+        progress: is told what is done and the share of the work that lies behind.
+
+    Raises InputError: nothing moves in the records.
+    """
+    tell = progress or (lambda what, share: None)
+    tell("motion", 0.0)
+    fine = models(records, law)
+    if not fine:
+        raise InputError("stage 2: nothing moves in " + ", ".join(record.name for record in records))
+    known = _known(fine, prior, J, delay, hold or {}, free)
+    weights = [_first_weights(model) for model in fine]
+    base = _base(known, prior is not None, delay is None)
+    tell("start values", 0.1)
+    search = Search(fine, known.prior, weights)
+    states = np.zeros((len(fine), 2))
+    coarse = models(records, law, coarse=True)
+    starts = [start for start in grid(coarse, known.values, base, STARTS + 1) if "W" not in base or start["W"] > 0]
+    tell("first fits", 0.2)
+    found = min(
+        (search.solve(start, states, base, tolerance=FIRST, limit=12) for start in starts[:STARTS]),
+        key=lambda one: one.fit.cost,
+    )
+    search = Search(fine, known.prior, _weights(fine, found, weights))
+    held = dict(known.held)
+    found, base = _told(search, found, base, known, held)
+    if prior is None:
+        for k, group in enumerate(REFINEMENTS):
+            tell("refinements", 0.4 + 0.06 * k)
+            found, base = _refined(search, coarse, found, base, group, known, held)
+            search = Search(fine, known.prior, _weights(fine, found, weights))
+    tell("final fit", 0.9)
+    found = search.solve(found.values, found.states, base, tolerance=FINAL, limit=40)
+    found, base = _told(search, found, base, known, held)
+    result = _result(fine, search, found, base, held, I_P)
+    tell("done", 1.0)
+    return result
+
+
+def _known(
+    fine: Sequence[RecordTorque],
+    prior: Stationary | None,
+    J: Estimate | None,
+    delay: float | None,
+    hold: Mapping[str, float],
+    free: Collection[str],
+) -> _Known:
+    values = {**USUAL, "asymmetry": 0.0, "F_log": 0.0, "M_0": 0.0, "sigma_2": 0.0, "J": 0.0, "W": 0.0, "gamma": 1.0}
+    values |= {"delay": delay if delay is not None else 0.0, "sigma_1": 0.0}
+    held: dict[str, tuple[Status, str]] = {
+        name: ("held", "at its usual value: records of friction hardly tell it") for name in USUAL if name not in free
+    }
+    priors: list[Prior] = []
+    unknown = {"J", "sigma_2", "F_C", "M_0"}
+    if prior is not None:
+        values |= {name: estimate.value for name, estimate in prior.estimates.items() if name in KINDS}
+        unknown = {"J"}
+        for name, estimate in prior.estimates.items():
+            if estimate.status != "estimated" and name in KINDS and name not in free:
+                held[name] = estimate.status, estimate.reason or "as in stage 1"
+        names = tuple(name for name in prior.correlation.names if name not in held and name not in hold)
+        places = [prior.correlation.names.index(name) for name in names]
+        if names:
+            at = np.array([values[name] for name in names])
+            priors.append(Prior(names, at, np.asarray(prior.covariance[np.ix_(places, places)])))
+    if J is not None:
+        values["J"] = J.value
+        unknown.discard("J")
+        if isfinite(J.sigma) and J.sigma > 0:
+            priors.append(Prior(("J",), np.array([J.value]), np.array([[J.sigma**2]])))
+        else:
+            held["J"] = (J.status if J.status != "estimated" else "given"), J.reason or "no standard deviation is known"
+    if prior is None and not _both_directions(fine):
+        reason = "the axis moves in one direction only: friction, constant load and asymmetry cannot be told apart"
+        held |= {name: ("undetermined", reason) for name in ("M_0", "asymmetry")}
+        unknown.discard("M_0")
+    if delay is not None:
+        held["delay"] = "given", ""
+    values |= hold
+    held |= {name: ("given", "") for name in hold}
+    values |= sliding(fine, values, unknown - set(hold))
+    if prior is None:
+        values["F_S"] = max(hold.get("F_S", values["F_C"]), values["F_C"])
+        fastest = max(float(np.max(np.abs(model.moved(values["delay"])[1]))) for model in fine)
+        values["v_s"] = hold.get("v_s", 0.02 * fastest)
+    values.setdefault("sigma_0", 0.0)
+    told = tuple(name for one in priors for name in one.names)
+    return _Known(values, joined(priors), told, held)
+
+
+def _both_directions(fine: Sequence[RecordTorque]) -> bool:
+    speed = np.concatenate([model.moved(0.0)[1] for model in fine])
+    fast = speed[np.abs(speed) > 0.05 * np.max(np.abs(speed))]
+    return LEAST_SHARE < float(np.mean(fast > 0)) < 1 - LEAST_SHARE
+
+
+def _base(known: _Known, with_prior: bool, with_delay: bool) -> list[str]:
+    """What is free at first."""
+    wanted = ["sigma_0", "J", *(["delay"] if with_delay else [])]
+    if with_prior:
+        wanted += [*PRE_SLIDING[1:], *STATIONARY]
+        wanted += [name for name in USUAL if name in known.told]
+        wanted = [name for name in wanted if name not in STATIONARY or name in known.told]
+    else:
+        wanted += ["F_C", "sigma_2", "M_0", *(name for name in USUAL if name not in known.held)]
+    return [name for name in wanted if name not in known.held]
+
+
+def _first_weights(model: RecordTorque) -> Array:
+    """Noise of the recorded torque per stretch [N.m], from its differences."""
+    levels = [noise_of(model.record.torque[part.rows]) for part in model.parts]
+    return np.asarray(np.maximum(levels, 1e-2 * _rms(model)), dtype=np.float64)
+
+
+def _weights(fine: Sequence[RecordTorque], found: Solution, before: Sequence[Array]) -> list[Array]:
+    """Of the residuals per stretch [N.m]."""
+    made = []
+    for model, state, weight in zip(fine, found.states, before, strict=True):
+        residual = model.residual(found.values, float(state[0]), float(state[1]))
+        levels = np.array([spread(residual[model.stretch == k]) for k in range(len(weight))])
+        made.append(np.hypot(levels, FLOOR * float(np.sqrt(np.mean(model.measured**2)))))
+    return made
+
+
+def _rms(model: RecordTorque) -> Array:
+    squares = np.bincount(model.stretch, model.measured**2) / np.bincount(model.stretch)
+    return np.asarray(np.sqrt(np.maximum(squares, 1e-30)), dtype=np.float64)
+
+
+def _told(
+    search: Search, found: Solution, base: list[str], known: _Known, held: dict[str, tuple[Status, str]]
+) -> tuple[Solution, list[str]]:
+    """Without what the data do not tell, one after the other."""
+    while (judged := verdict(found, base, known.told)) is not None:
+        found, base = _without(search, found, base, judged, held)
+    return found, base
+
+
+def _without(
+    search: Search, found: Solution, base: list[str], judged: Verdict, held: dict[str, tuple[Status, str]]
+) -> tuple[Solution, list[str]]:
+    held |= {name: ("undetermined", judged.reason) for name in judged.held}
+    values = {**found.values, **judged.held}
+    left = [name for name in base if name not in judged.held]
+    if not left:
+        raise InputError(f"stage 2: these records tell no parameter at all; last {judged.reason}")
+    return search.solve(values, found.states, left, tolerance=FINAL, limit=40), left
+
+
+def _refined(
+    search: Search,
+    coarse: Sequence[RecordTorque],
+    found: Solution,
+    base: list[str],
+    group: tuple[str, ...],
+    known: _Known,
+    held: dict[str, tuple[Status, str]],
+) -> tuple[Solution, list[str]]:
+    """With a group of parameters more, if the data ask for them and tell them."""
+    added = [name for name in group if name not in known.held and name not in base]
+    if not added or len(added) < len(group):
+        return found, base
+    if group == ("asymmetry",) and not {"F_log", "v_s"} & set(base):
+        held["asymmetry"] = "undetermined", "asymmetry: friction that hardly depends on speed leaves it a constant load"
+        return found, base
+    values = dict(found.values)
+    if "sigma_1" in added:
+        values["sigma_1"] = 1e-2 * values["sigma_0"] * deflection(values)
+    if "F_S" in added:
+        values["F_S"] = 1.2 * values["F_C"]
+    if "F_log" in added:
+        values["F_log"] = 0.05 * values["F_C"]
+    starts = [values]
+    if {"W", "gamma"} <= set(added):
+        starts = [start for start in grid(coarse, values, ["W", "gamma", "sigma_0"], STARTS) if start["W"] > 0][:2]
+    tried = min(
+        (search.solve(start, found.states, [*base, *added], tolerance=FIRST, limit=12) for start in starts),
+        key=lambda one: one.fit.cost,
+    )
+    # Weighted by what the richer model leaves: what it explains must not pass for noise that hides it.
+    search = Search(search.models, known.prior, _weights(search.models, tried, search.weights))
+    tried = search.solve(tried.values, tried.states, [*base, *added], tolerance=1e-6, limit=30)
+    judged = verdict(tried, added)
+    gain = search.cost(found) - search.cost(tried)
+    reason = judged.reason if judged is not None else ""
+    if not reason and gain < WORTH * len(added):
+        reason = f"{' and '.join(added)}: the residual hardly falls with it (sum of squares by {gain:.1f})"
+    if not reason:
+        for name in added:
+            held.pop(name, None)
+        return tried, [*base, *added]
+    held |= {name: ("undetermined", reason) for name in added}
+    return found, base
+
+
+def _result(
+    fine: Sequence[RecordTorque],
+    search: Search,
+    found: Solution,
+    base: list[str],
+    held: Mapping[str, tuple[Status, str]],
+    I_P: float | None,
+) -> Dynamic:
+    names = tuple(name for name in KINDS if name in base)
+    covariance = found.covariance(names)
+    sigma = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    estimates = {}
+    for name, kind in KINDS.items():
+        status, reason = held.get(name, ("estimated" if name in names else "held", ""))
+        estimates[name] = Estimate(
+            name, found.values[name], kind.unit, kind.meaning, sigma.get(name, nan), status, reason
+        )
+    without = dict(sigma)
+    if "delay" in names:
+        at = names.index("delay")
+        given = covariance - np.outer(covariance[:, at], covariance[at]) / covariance[at, at]
+        without = {name: float(np.sqrt(max(given[k, k], 0.0))) for k, name in enumerate(names) if name != "delay"}
+    pieces = tuple(
+        piece
+        for model, weight, state in zip(fine, search.weights, found.states, strict=True)
+        for piece in _stretches(model, weight, found.values, float(state[0]), float(state[1]))
+    )
+    rows = sum(len(piece.time) for piece in pieces)
+    rms = float(np.sqrt(sum(len(piece.time) * piece.rms**2 for piece in pieces) / rows))
+    return Dynamic(
+        pieces,
+        estimates,
+        Correlation(names, correlation(covariance)),
+        covariance,
+        rms,
+        without,
+        advice(pieces, estimates, without, deflection(found.values), I_P),
+        tuple(dict.fromkeys(reason for status, reason in held.values() if status == "undetermined" and reason)),
+    )
+
+
+def _stretches(model: RecordTorque, weight: Array, values: Mapping[str, float], z: float, c: float) -> list[Stretch]:
+    measured, friction = model.friction_measured(values), model.friction_model(values, z, c)
+    speed = model.moved(values["delay"])[1]
+    angle = np.asarray(model.motion.speed.antiderivative()(model.motion.time - values["delay"]))[model.rows]
+    made = []
+    for k, part in enumerate(model.parts):
+        own = model.stretch == k
+        made.append(
+            Stretch(
+                model.record.name,
+                part.kind,
+                model.record.time[part.rows],
+                angle[own],
+                speed[own],
+                measured[own],
+                friction[own],
+                part.amplitude,
+                part.frequency,
+                float(weight[k]),
+            )
+        )
+    return made

@@ -1,0 +1,113 @@
+"""What the drive's torque ought to be: inertia, load and the friction law on recorded motion, as the log saw it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.identify.motion import Motion, motion
+from feedsim.identify.parameters import FRICTION
+from feedsim.identify.record import Record
+from feedsim.identify.stretches import Part, parts
+
+Array = NDArray[np.float64]
+
+KEPT = 4  # results of the law kept per record: a difference quotient of another record's start asks for the same again
+
+
+class Law(Protocol):
+    """The friction law: M_fr (N+1,) [N.m] at the N+1 instants of `n` [rad/s], h [s] apart, linear in between, from the
+    bristle deflection z [rad] and the position in the engaging zone c [rad] on."""
+
+    def __call__(
+        self, parameters: Mapping[str, float], n: Array, h: float, *, z: float = 0.0, c: float = 0.0
+    ) -> Array: ...
+
+
+def deflection(values: Mapping[str, float]) -> float:
+    """Largest bristle deflection at rest, F_S/sigma_0 [rad]."""
+    return values["F_S"] / values["sigma_0"]
+
+
+class RecordTorque:
+    """Model of one record's torque, at the rows of its stretches.
+
+    The torque recorded at t is that of t - delay. The motion is looked at earlier by the delay; the noisy torque is
+    left as it is. The law runs over the whole record, as it remembers what lies between the stretches too.
+
+    What z and c were when the record began is not known (an axis at rest keeps any of them). They are parameters of
+    their own, as shares of what is possible: `z` of F_S/sigma_0, within -1 and 1, `c` of W, within -1/2 and 1/2. How
+    much they matter, and for how long, the sensitivities then tell by themselves: after travelling W in one direction
+    nothing is left of them.
+    """
+
+    def __init__(self, record: Record, law: Law, *, coarse: bool = False) -> None:
+        """coarse: a step of the law per row, for a first look."""
+        self.record, self.law = record, law
+        self.motion: Motion = motion(record)
+        self.parts: tuple[Part, ...] = parts(record, self.motion)
+        self.count = 1 if coarse else self.motion.parts
+        chosen = [np.arange(part.first, part.last) for part in self.parts]
+        self.rows = np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.intp)
+        # Which stretch a row belongs to.
+        self.stretch = np.repeat(np.arange(len(chosen)), [len(rows) for rows in chosen])
+        self.measured = record.torque[self.rows]
+        self._law: dict[tuple[float, ...], Array] = {}
+        self._moved: dict[float, tuple[Array, Array, Array, Array]] = {}
+
+    def friction(self, values: Mapping[str, float], z: float, c: float) -> Array:
+        """(rows,) friction torque [N.m] without its viscous part."""
+        key = (*(values[name] for name in FRICTION if name != "sigma_2"), values["delay"], z, c)
+        if key not in self._law:
+            fine = self.moved(values["delay"])[0]
+            # Linear in sigma_2: that part is added outside and costs no run.
+            law = {name: values[name] for name in FRICTION} | {"sigma_2": 0.0}
+            start = {"z": z * deflection(values), "c": c * values["W"]}
+            found = self.law(law, fine, self.record.interval / self.count, **start)
+            if len(self._law) >= KEPT:
+                del self._law[next(iter(self._law))]
+            self._law[key] = np.asarray(found[:: self.count][self.rows], dtype=np.float64)
+        return self._law[key]
+
+    def moved(self, delay: float) -> tuple[Array, Array, Array, Array]:
+        """Speed at the law's instants; speed, acceleration and known load at the rows; all `delay` before the log."""
+        if delay not in self._moved:
+            fine = self.motion.fine(delay)
+            step = self.motion.parts
+            speed = fine[::step]
+            if self.count == 1:
+                fine = speed
+            load = np.zeros(len(self.rows))
+            if self.record.load is not None:
+                load = np.interp(self.record.time - delay, self.record.time, self.record.load)[self.rows]
+            if len(self._moved) >= KEPT:
+                del self._moved[next(iter(self._moved))]
+            self._moved[delay] = (
+                np.ascontiguousarray(fine),
+                speed[self.rows],
+                self.motion.acceleration(delay)[self.rows],
+                load,
+            )
+        return self._moved[delay]
+
+    def friction_measured(self, values: Mapping[str, float]) -> Array:
+        """(rows,) recorded torque less inertia, known and constant load [N.m]."""
+        _, _, acceleration, load = self.moved(values["delay"])
+        return np.asarray(self.measured - values["J"] * acceleration - load - values["M_0"], dtype=np.float64)
+
+    def friction_model(self, values: Mapping[str, float], z: float, c: float) -> Array:
+        """(rows,) friction torque [N.m]."""
+        return self.friction(values, z, c) + values["sigma_2"] * self.moved(values["delay"])[1]
+
+    def residual(self, values: Mapping[str, float], z: float, c: float) -> Array:
+        """(rows,) model less record [N.m]."""
+        return self.friction_model(values, z, c) - self.friction_measured(values)
+
+
+def models(records: Sequence[Record], law: Law, *, coarse: bool = False) -> tuple[RecordTorque, ...]:
+    """Of the records that move at all."""
+    made = (RecordTorque(record, law, coarse=coarse) for record in records)
+    return tuple(model for model in made if len(model.rows))

@@ -1,0 +1,141 @@
+"""Figures of stage 2: torque over speed and over position, and what the model leaves over."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from feedsim.identify.result import NORMAL_95, Dynamic, Identification, Stretch
+from feedsim.report.labels import heading, legend_above
+from feedsim.report.style import (
+    BLUE,
+    GREEN,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    Array,
+    Picture,
+    drawing,
+    finish,
+    thinned,
+)
+
+MOST_LOOPS = 6
+COLUMNS = 3
+LONG = 2e-3  # [m] of travel from which positions are shown in mm
+COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, MUTED)
+Over = Literal["speed", "position"]
+
+
+def loops_picture(found: Identification, stage: Dynamic, over: Over) -> Picture | None:
+    """Measured and model torque of each move, over speed or over position; None where there is no stretch."""
+    shown = _distinct(stage.stretches)
+    if not shown:
+        return None
+    columns = 2 if len(shown) == 4 else min(COLUMNS, len(shown))
+    rows = math.ceil(len(shown) / columns)
+    with drawing({1: 5.5, 2: 8.0, 3: 10.2}[columns], 0.8 + 3.1 * rows) as figure:
+        rooms = figure.subplots(rows, columns, squeeze=False).ravel()
+        for room in rooms[len(shown) :]:
+            room.set_visible(False)
+        for k, (room, stretch) in enumerate(zip(rooms, shown, strict=False)):
+            scale, unit = _length([stretch], found.I_P)
+            abscissa = stretch.speed if over == "speed" else _position(stretch, scale)
+            room.plot(abscissa, stretch.measured, ".", color=BLUE, markersize=2.2, label="measured", rasterized=True)
+            room.plot(abscissa, stretch.model, color=VERMILLION, linewidth=1.0, label="model")
+            room.axhline(0.0, color=MUTED, linewidth=0.8)
+            room.axvline(0.0, color=MUTED, linewidth=0.8)
+            heading(room, describe(stretch, found.I_P))
+            room.set_xlabel("motor speed [rad/s]" if over == "speed" else f"position [{unit}]")
+            if k % columns == 0:
+                room.set_ylabel("friction torque [N·m]")
+            legend_above(room)
+        left = len(stage.stretches) - len(shown)
+        more = f" {left} further stretches are not shown." if left else ""
+        about = ", about its middle" if over == "position" else ""
+        caption = (
+            f"Axis {found.axis}: motor torque less inertia and known load{about}, with the friction model driven by "
+            f"the recorded motion.{more}"
+        )
+        return finish(figure, f"loops-{over}", f"Friction torque over {over}", caption)
+
+
+def residuals_picture(found: Identification, stage: Dynamic) -> Picture | None:
+    """Measured less model: over time, over speed and over position."""
+    stretches = [stretch for stretch in stage.stretches if len(stretch.time)]
+    if not stretches:
+        return None
+    with drawing(10.0, 5.6) as figure:
+        grid = figure.add_gridspec(2, 2)
+        time, speed, position = (figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0]),
+                                 figure.add_subplot(grid[1, 1]))  # fmt: skip
+        begin, borders = 0.0, []
+        scale, unit = _length(stretches, found.I_P)
+        for k, stretch in enumerate(stretches):
+            colour = COLOURS[k % len(COLOURS)]
+            left = stretch.measured - stretch.model
+            t, e = thinned(stretch.time - stretch.time[0] + begin, left)
+            label = describe(stretch, found.I_P) if len(stretches) <= len(COLOURS) else None
+            time.plot(t, e, color=colour, linewidth=0.8, label=label)
+            ends = [begin, begin + stretch.time[-1] - stretch.time[0]]
+            for sign in (1, -1):
+                level = sign * NORMAL_95 * stretch.weight
+                time.plot(ends, [level, level], color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
+            dots: dict[str, Any] = {"color": colour, "markersize": 2.0, "rasterized": True}
+            speed.plot(stretch.speed, left, ".", **dots)
+            position.plot(_position(stretch, scale), left, ".", **dots)
+            begin = ends[1]
+            borders.append(begin)
+        for border in borders[:-1]:
+            time.axvline(border, color=MUTED, linewidth=0.6)
+        for room in (time, speed, position):
+            room.axhline(0.0, color=MUTED, linewidth=0.8)
+            room.set_ylabel("residual [N·m]")
+        time.margins(x=0.01)
+        heading(time, f"Axis {found.axis}: measured less model, {stage.rms:.2g} N·m rms")
+        if len(stretches) <= len(COLOURS):
+            legend_above(time)
+        time.set_xlabel("time, stretches one after another [s]")
+        speed.set_xlabel("motor speed [rad/s]")
+        position.set_xlabel(f"position about the middle of the move [{unit}]")
+        speed.set_title("Over speed")
+        position.set_title("Over position")
+        caption = (
+            "What the friction model leaves over. Dashed: 95 % of the scatter that the fit reckoned with. Structure "
+            "over speed or position is what the model does not know."
+        )
+        return finish(figure, "residuals", "Residuals", caption)
+
+
+def describe(stretch: Stretch, I_P: float) -> str:
+    """ "20 µm, 5 Hz", or the range of a motion that is no sine."""
+    amplitude = stretch.amplitude * I_P
+    length = f"{amplitude * 1e6:.3g} µm" if amplitude < 1e-3 else f"{amplitude * 1e3:.3g} mm"
+    if stretch.kind == "sine" and math.isfinite(stretch.frequency):
+        return f"{length}, {stretch.frequency:.3g} Hz"
+    return f"motion of ±{length}"
+
+
+def _distinct(stretches: Sequence[Stretch]) -> list[Stretch]:
+    """The first of each amplitude and frequency, sines first; MOST_LOOPS at most."""
+    once: dict[tuple[str, float, float], Stretch] = {}
+    for stretch in sorted(stretches, key=lambda s: s.kind != "sine"):
+        frequency = round(stretch.frequency, 1) if math.isfinite(stretch.frequency) else 0.0
+        once.setdefault((stretch.kind, float(f"{stretch.amplitude:.1g}"), frequency), stretch)
+    return list(once.values())[:MOST_LOOPS]
+
+
+def _position(stretch: Stretch, scale: float) -> Array:
+    """About the middle of the move; scale: display unit per radian."""
+    middle = (stretch.angle.max() + stretch.angle.min()) / 2
+    return np.asarray((stretch.angle - middle) * scale)
+
+
+def _length(stretches: Sequence[Stretch], I_P: float) -> tuple[float, str]:
+    """Display unit of positions per radian, and its name: um, or mm for long moves."""
+    longest = max(float(np.ptp(stretch.angle)) for stretch in stretches) * I_P
+    return (1e6 * I_P, "µm") if longest < LONG else (1e3 * I_P, "mm")

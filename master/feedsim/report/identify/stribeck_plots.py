@@ -1,0 +1,181 @@
+"""Figures of stage 1: friction over speed with its plateaus, and where the plateaus were found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from feedsim.identify.level import torque as motor_torque
+from feedsim.identify.record import Record
+from feedsim.identify.result import NORMAL_95, Identification, Plateau, Stationary
+from feedsim.report.identify.account import MM_PER_MIN, curve_error
+from feedsim.report.labels import heading, legend_above
+from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, VERMILLION, Array, Picture, drawing, finish, thinned
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DIRECTIONS = ((1, BLUE, "^", "positive"), (-1, VERMILLION, "v", "negative"))
+TITLE_PAD, LEGEND_PAD = 58.0, 37.0  # points above the axes, clear of the scale at the top
+FEW_DECADES = 20  # ratio of speeds below which an axis is labelled between the decades too, or is linear
+MOST_RECORDS = 3  # with plateaus, that are shown over time
+
+
+def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
+    """Friction over speed with its 95 % band, the plateaus of both directions, and how far they are from the curve."""
+    values = {name: each.value for name, each in stage.estimates.items()}
+    load, asymmetry = values["M_0"], values["asymmetry"]
+    lag = 100 * curve_error(stage)
+    with drawing(9.6, 6.4) as figure:
+        main, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [2.6, 1]})
+        half = NORMAL_95 * stage.sigma
+        main.fill_between(
+            stage.speeds, stage.torque - half, stage.torque + half, color=GREEN, alpha=0.25, linewidth=0,
+            label="95 % band",
+        )  # fmt: skip
+        main.plot(stage.speeds, stage.torque, color=GREEN, label="curve", zorder=3)
+        below.fill_between(
+            stage.speeds, -100 * half / stage.torque, 100 * half / stage.torque, color=GREEN, alpha=0.25, linewidth=0
+        )
+        below.axhline(0.0, color=GREEN, linewidth=1.4)
+        for sign, colour, marker, word in DIRECTIONS:
+            chosen = [p for p in stage.plateaus if p.speed * sign > 0]
+            if not chosen:
+                continue
+            speed = np.array([abs(p.speed) for p in chosen])
+            friction = np.array([sign * (p.torque - load) for p in chosen])
+            spread = NORMAL_95 * np.array([p.sigma for p in chosen])
+            style = {"fmt": marker, "color": colour, "markersize": 5.5, "elinewidth": 0.9, "capsize": 2, "zorder": 4}
+            main.errorbar(speed, friction, spread, label=f"plateaus, {word} direction", **style)
+            expected = _of_direction(values, sign, speed)
+            if asymmetry:
+                dashes = {"color": colour, "linewidth": 0.9, "linestyle": (0, (4, 2)), "zorder": 2}
+                main.plot(stage.speeds, _of_direction(values, sign, stage.speeds), **dashes)
+            below.errorbar(speed, 100 * (friction / expected - 1), 100 * spread / expected, **style)
+        main.set_xscale("log")
+        main.set_ylim(bottom=0)
+        main.set_ylabel("friction torque [N·m]")
+        below.set_ylabel("deviation [%]")
+        below.set_xlabel("motor speed [rad/s]")
+        _feed_axis(main, found.I_P)
+        main.set_title(f"Axis {found.axis}: friction over speed, known to ±{lag:.2g} % (95 %)", pad=TITLE_PAD)
+        _legend(main)
+        slide = main.secondary_yaxis("right", functions=(lambda M: M / found.I_P, lambda F: F * found.I_P))
+        slide.set_ylabel("at the slide [N]")
+        caption = (
+            "Motor torque of every plateau less the constant load, over the amount of its speed; bars: 95 % of the "
+            "mean's scatter. Below: deviation from the curve"
+            + (" of its direction (dashed), which the direction dependence shifts" if asymmetry else "")
+            + f"; shaded: 95 % band of the curve. Largest deviation of a plateau {100 * stage.worst_curve:.2g} %."
+        )
+        return finish(figure, "stribeck", "Stribeck curve", caption)
+
+
+def plateaus_picture(found: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:
+    """The plateaus in torque and speed over time; None where none of the records is at hand."""
+    count = {record.name: sum(p.record == record.name for p in stage.plateaus) for record in records}
+    shown = sorted((r for r in records if count[r.name]), key=lambda r: -count[r.name])[:MOST_RECORDS]
+    if not shown:
+        return None
+    with drawing(10.0, 0.6 + 4.4 * len(shown)) as figure:
+        rooms = figure.subplots(2 * len(shown), 1, squeeze=False)[:, 0]
+        for record, torque, speed in zip(shown, rooms[::2], rooms[1::2], strict=True):
+            speed.sharex(torque)
+            own = [p for p in stage.plateaus if p.record == record.name]
+            _over_time(torque, record.time, record.torque, "motor torque")
+            _over_time(speed, record.time, _speed(record) * found.I_P * MM_PER_MIN, "")
+            for room in (torque, speed):
+                for p in own:
+                    room.axvspan(p.begin, p.end, color=ORANGE, alpha=0.2, linewidth=0)
+                room.axhline(0.0, color=MUTED, linewidth=0.8)
+                room.margins(x=0.01)
+            _levels(torque, own)
+            heading(torque, f"{record.name}: {len(own)} plateaus")
+            torque.set_ylabel("torque [N·m]")
+            speed.set_ylabel("speed [mm/min]")
+            _decades(speed, _smallest(own, found.I_P))
+            speed.set_xlabel("time [s]")
+            legend_above(torque)
+        left = sum(1 for number in count.values() if number) - len(shown)
+        more = f" {left} more record(s) with plateaus are not shown." if left > 0 else ""
+        caption = (
+            "Shaded: stretches at constant speed whose mean torque (line) counts as friction. Speeds of several "
+            f"decades are drawn logarithmically in both directions.{more}"
+        )
+        return finish(figure, "plateaus", "Plateaus found in the traces", caption)
+
+
+def _levels(axes: Axes, plateaus: Sequence[Plateau]) -> None:
+    for k, p in enumerate(plateaus):
+        label = "mean of a plateau" if k == 0 else None
+        axes.plot([p.begin, p.end], [p.torque, p.torque], color=VERMILLION, linewidth=2.0, label=label)
+
+
+def _over_time(axes: Axes, time: Array, values: Array, label: str) -> None:
+    t, y = thinned(time, values)
+    axes.plot(t, y, color=BLUE, linewidth=0.8, label=label)
+
+
+def _decades(axes: Axes, smallest: float) -> None:
+    """A scale that is logarithmic in both directions, with a tick per decade from the slowest plateau on; linear where
+    the speeds are of one order."""
+    if float(np.max(np.abs(axes.dataLim.intervaly))) < FEW_DECADES * smallest:
+        return
+    axes.set_yscale("symlog", linthresh=smallest, linscale=0.5)
+    largest = float(np.max(np.abs(axes.dataLim.intervaly)))
+    first, last = math.floor(math.log10(smallest) + 1e-9), math.floor(math.log10(max(largest, smallest)))
+    decades = [10.0**k for k in range(first, last + 1) if 10.0**k >= 0.5 * smallest]
+    axes.set_yticks([*(-v for v in reversed(decades)), 0.0, *decades])
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))
+    axes.minorticks_off()
+
+
+def _smallest(plateaus: Sequence[Plateau], I_P: float) -> float:
+    return min(abs(p.speed) for p in plateaus) * I_P * MM_PER_MIN
+
+
+def _speed(record: Record) -> Array:
+    if record.speed is not None:
+        return record.speed
+    assert record.angle is not None
+    return np.asarray(np.gradient(record.angle, record.interval), dtype=np.float64)
+
+
+def _of_direction(values: Mapping[str, float], sign: int, speed: Array) -> Array:
+    """The curve in one direction."""
+    return np.asarray(sign * (motor_torque(values, sign * speed) - values["M_0"]))
+
+
+def _feed_axis(axes: Axes, I_P: float) -> None:
+    per = I_P * MM_PER_MIN
+
+    def to_feed(speed: Any) -> Any:
+        return speed * per
+
+    def to_speed(feed: Any) -> Any:
+        return feed / per
+
+    top = axes.secondary_xaxis("top", functions=(to_feed, to_speed))
+    top.set_xlabel("axis speed [mm/min]", labelpad=4)
+    low, high = axes.get_xlim()
+    few = high < FEW_DECADES * low
+
+    def minor(value: float, _: float) -> str:
+        return f"{value:g}" if few and f"{value:e}"[0] in "235" else ""
+
+    for axis in (top.xaxis, axes.xaxis):
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.set_minor_formatter(minor)
+
+
+def _legend(axes: Axes) -> None:
+    from matplotlib.transforms import ScaledTranslation
+
+    shift = ScaledTranslation(0, LEGEND_PAD / 72, axes.figure.dpi_scale_trans)
+    legend_above(axes)
+    legend = axes.get_legend()
+    assert legend is not None
+    legend.set_bbox_to_anchor((0, 1), transform=axes.transAxes + shift)

@@ -1,0 +1,198 @@
+"""summary.json of an identification, the table for the terminal, and the CSV files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from feedsim.identify.result import Estimate, Identification
+from feedsim.report.identify.account import (
+    Account,
+    at_slide,
+    curve_error,
+    interval_text,
+    relative_text,
+    remark_text,
+    shown_unit,
+    value_text,
+)
+from feedsim.report.parts import inputs_part, machine_part, software
+from feedsim.trace.csv import quoted, shortest
+
+FORMAT = 1
+WIDTH = 118  # columns of the terminal's table
+
+
+def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
+    """Content of summary.json; what could not be determined is null."""
+    found = account.found
+    return {
+        "format": FORMAT,
+        "warnings": account.warnings,
+        "advice": list(found.advice),
+        "axis": found.axis,
+        "date": account.date,
+        "lead": {"value": found.I_P, "unit": "m/rad"},
+        "parameters": {name: _estimate(estimate, found.I_P) for name, estimate in found.estimates.items()},
+        "rigid_axis": {name: _estimate(estimate, found.I_P) for name, estimate in found.rigid.items()},
+        "correlation": {"names": list(found.correlation.names), "matrix": _matrix(found.correlation.matrix)},
+        "curve": _curve(found),
+        "pre_sliding": _pre_sliding(found),
+        "settings": dict(account.settings),
+        "machine": machine_part(account.subject.machine) if account.subject is not None else None,
+        "traces": [
+            {
+                "file": name,
+                "sha256": source.sha256,
+                "columns": dict(source.columns),
+                "note": source.note,
+                "pitch": {"value": source.pitch, "unit": "m"},
+                "torque_constant": {"value": source.torque_constant, "unit": "N.m/A"},
+            }
+            for name, source in zip(account.traces, account.sources, strict=True)
+        ],
+        "records": [
+            {"name": r.name, "rows": len(r), "interval": {"value": r.interval, "unit": "s"}} for r in account.records
+        ],
+        "inputs": inputs_part(account.input_files()),
+        "software": software(),
+        "performance": {f"{step}": {"value": taken, "unit": "s"} for step, taken in found.seconds.items()},
+        "files": list(files),
+    }
+
+
+def table_lines(account: Account) -> list[str]:
+    """Parameter, value, 95 % interval, relative, note: a line each, for the terminal."""
+    found = account.found
+    rows = [("", "value", "95 % interval", "+-", "")]
+    for estimate in found.estimates.values():
+        factor, unit = shown_unit(estimate)
+        value = f"{value_text(estimate, factor)} {unit}".removesuffix(" 1")
+        rows.append(
+            (estimate.name, value, interval_text(estimate, factor), relative_text(estimate), remark_text(estimate))
+        )
+    widths = [max(len(row[i]) for row in rows) for i in range(4)]
+    room = max(20, WIDTH - sum(widths) - 10)
+    lines = []
+    for name, value, interval, relative, note in rows:
+        note = note if len(note) <= room else f"{note[: room - 3].rstrip()}..."
+        cells = (
+            f"{name:<{widths[0]}}",
+            f"{value:<{widths[1]}}",
+            f"{interval:<{widths[2]}}",
+            f"{relative:>{widths[3]}}",
+        )
+        lines.append("  ".join(("", *cells, note)).rstrip())
+    return lines
+
+
+def headline(account: Account) -> str:
+    """How well curve and pre-sliding are known, in one line."""
+    found, parts = account.found, []
+    if (stage := found.stationary) is not None:
+        low, high = (n * found.I_P * 60e3 for n in stage.range)
+        parts.append(
+            f"curve within {100 * curve_error(stage):.2g} % (95 %) from {low:.3g} to {high:.5g} mm/min, "
+            f"{len(stage.plateaus)} plateaus"
+        )
+    if (dynamic := found.dynamic) is not None:
+        parts.append(f"pre-sliding from {len(dynamic.stretches)} stretches, residual {dynamic.rms:.2g} N.m rms")
+    return "; ".join(parts) or "neither plateaus nor reversals"
+
+
+def plateaus_csv(found: Identification) -> str:
+    """Every plateau: record, begin, end, speed, torque and its standard deviation, rows."""
+    assert found.stationary is not None
+    lines = ["record,begin [s],end [s],speed [rad/s],torque [N.m],sigma [N.m],rows"]
+    for p in found.stationary.plateaus:
+        numbers = shortest(np.array([p.begin, p.end, p.speed, p.torque, p.sigma]))
+        lines.append(",".join([quoted(p.record), *numbers, str(p.rows)]))
+    return "\n".join(lines) + "\n"
+
+
+def residuals_csv(found: Identification) -> str:
+    """Time, measured and model torque of every stretch, one after another; the stretch is numbered from 1."""
+    assert found.dynamic is not None
+    lines = [
+        "stretch,record,time [s],angle [rad],speed [rad/s],measured [N.m],model [N.m],residual [N.m]",
+    ]
+    for number, stretch in enumerate(found.dynamic.stretches, 1):
+        columns = (stretch.time, stretch.angle, stretch.speed, stretch.measured, stretch.model)
+        texts = [shortest(np.asarray(values)) for values in (*columns, stretch.measured - stretch.model)]
+        head = f"{number},{quoted(stretch.record)}"
+        lines += [f"{head},{','.join(row)}" for row in zip(*texts, strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def _estimate(estimate: Estimate, I_P: float) -> dict[str, Any]:
+    slide = at_slide(estimate.name, I_P)
+    low, high = estimate.interval
+    return {
+        "value": _finite(estimate.value),
+        "unit": estimate.unit,
+        "sigma": _finite(estimate.sigma),
+        "interval": [low, high] if math.isfinite(low) and math.isfinite(high) else None,
+        "status": estimate.status,
+        "reason": estimate.reason,
+        "meaning": estimate.meaning,
+        "at_slide": {"value": _finite(slide[0] * estimate.value), "unit": slide[1]} if slide else None,
+    }
+
+
+def _curve(found: Identification) -> dict[str, Any] | None:
+    stage = found.stationary
+    if stage is None:
+        return None
+    return {
+        "error": {"value": _finite(curve_error(stage)), "unit": "1", "meaning": "largest half width of its 95 % band"},
+        "worst_plateau": {"value": _finite(stage.worst_curve), "unit": "1", "meaning": "largest relative deviation"},
+        "rms": {"value": _finite(stage.rms), "unit": "N.m", "meaning": "residual of the plateaus"},
+        "plateaus": len(stage.plateaus),
+        "speeds": {"value": list(stage.range), "unit": "rad/s"},
+        "correlation": {
+            "names": list(stage.correlation.names),
+            "matrix": _matrix(stage.correlation.matrix),
+        },
+    }
+
+
+def _pre_sliding(found: Identification) -> dict[str, Any] | None:
+    stage = found.dynamic
+    if stage is None:
+        return None
+    return {
+        "rms": {"value": _finite(stage.rms), "unit": "N.m"},
+        "stretches": [
+            {
+                "record": stretch.record,
+                "kind": stretch.kind,
+                "begin": {"value": float(stretch.time[0]), "unit": "s"},
+                "end": {"value": float(stretch.time[-1]), "unit": "s"},
+                "amplitude": {"value": _finite(stretch.amplitude), "unit": "rad"},
+                "frequency": {"value": _finite(stretch.frequency), "unit": "Hz"},
+                "rms": {"value": _finite(stretch.rms), "unit": "N.m"},
+            }
+            for stretch in stage.stretches
+        ],
+        "sigma_were_the_delay_known": {name: _finite(sigma) for name, sigma in stage.without_delay.items()},
+    }
+
+
+def _matrix(matrix: Any) -> list[list[float | None]]:
+    return [[_finite(float(value)) for value in row] for row in matrix]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def rigid_line(account: Account) -> str:
+    """The simple model in one line; empty where there is none."""
+    parts = []
+    for estimate in account.found.rigid.values():
+        if estimate.status == "estimated":
+            parts.append(f"{estimate.name} {value_text(estimate)} {estimate.unit}")
+    return f"rigid axis with simple friction: {', '.join(parts)}" if parts else ""

@@ -1,0 +1,50 @@
+"""Write the results of an identification into a directory, whole or not at all."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+
+from feedsim.report.identify.account import Account
+from feedsim.report.identify.friction import FRICTION, friction_file
+from feedsim.report.identify.page import page
+from feedsim.report.identify.plots import pictures_of
+from feedsim.report.identify.summary import plateaus_csv, residuals_csv, summary
+from feedsim.report.parts import to_json
+from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, write_text
+from feedsim.report.style import remarked
+
+PLATEAUS, RESIDUALS = "plateaus.csv", "residuals.csv"
+REMARK_WIDTH, REMARK_LINES = 100, 3  # fits the narrowest figure
+
+
+def check_identification_writable(directory: Path | str) -> None:
+    """Raise OutputError unless the results can be written to ``directory``; leaves nothing behind."""
+    check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, REPORT, SUMMARY))
+
+
+def write_identification(account: Account, directory: Path | str) -> tuple[Path, ...]:
+    """Write friction.yaml, plateaus.csv and residuals.csv (where there are any), summary.json, report.html, figures.
+
+    Returns the paths. Files of an earlier run are replaced. Raises OutputError.
+    """
+    found = account.found
+    friction = friction_file(account)
+    with remarked("\n".join(textwrap.wrap(account.remark, REMARK_WIDTH)[:REMARK_LINES])):
+        pictures = pictures_of(account)
+    files = [FRICTION]
+    files += [PLATEAUS] if found.stationary is not None else []
+    files += [RESIDUALS] if found.dynamic is not None else []
+    files += [REPORT, SUMMARY]
+
+    def fill(fresh: Path, names: Sequence[str]) -> None:
+        write_text(fresh / FRICTION, friction)
+        if found.stationary is not None:
+            write_text(fresh / PLATEAUS, plateaus_csv(found))
+        if found.dynamic is not None:
+            write_text(fresh / RESIDUALS, residuals_csv(found))
+        write_text(fresh / REPORT, page(account, pictures))
+        write_text(fresh / SUMMARY, to_json(summary(account, names)))
+
+    return write_results(directory, files, pictures, fill)

@@ -1,0 +1,312 @@
+"""What an identification leaves: friction.yaml, tables, page, figures; what it says where a stage is absent."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_report import Page
+
+from feedsim.errors import OutputError
+from feedsim.identify.result import NORMAL_95, Correlation, Estimate, Identification
+from feedsim.report import (
+    check_identification_writable,
+    constant_load_hint,
+    identification_headline,
+    identification_table,
+    rigid_line,
+    write_identification,
+)
+from feedsim.report.identify.account import at_slide, curve_error, interval_text, relative_text, value_text
+from feedsim.report.identify.correlation_plot import correlation_picture
+from feedsim.report.identify.loop_plots import _length, describe, loops_picture, residuals_picture
+from feedsim.report.identify.page import page
+from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_picture
+from feedsim.report.provenance import friction_origins
+from feedsim.scenario import load_machine
+from feedsim.scenario.friction_file import read_friction
+from identification_helpers import I_P, M_0, TRUE, J, account, identification, provenance, records, stretch
+from report_helpers import contents
+from scenario_helpers import MACHINE
+
+FIGURES = {"stribeck", "plateaus", "loops-speed", "loops-position", "residuals", "correlation"}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("identified") / "out"
+    write_identification(account(), folder)
+    return folder
+
+
+def told(folder: Path) -> dict[str, Any]:
+    text = (folder / "summary.json").read_text(encoding="utf-8")
+    content: dict[str, Any] = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    return content
+
+
+def test_everything_is_there_and_listed(written: Path) -> None:
+    files = set(contents(written))
+    named = {"friction.yaml", "plateaus.csv", "residuals.csv", "report.html", "summary.json"}
+    assert files == named | {f"figures/{stem}.png" for stem in FIGURES}
+    assert set(told(written)["files"]) == files
+
+
+def test_friction_file_is_a_friction(written: Path) -> None:
+    friction = read_friction(written / "friction.yaml")
+    for name, value in friction.parameters().items():
+        assert value == pytest.approx(TRUE[name][0], rel=1e-7)
+    group = friction.identified
+    assert group["axis"] == "Z"
+    assert group["constant_load"]["value"] == "0.25 N.m"
+    assert group["inertia"] == {"value": "0.0164 kg.m^2", "status": "given", "reason": "of the machine's modes"}
+    assert group["parameters"]["beta"] == {"status": "held", "reason": "usual value"}
+    low, high = (float(text.split()[0]) for text in group["parameters"]["F_C"]["interval"])
+    assert (low + high) / 2 == pytest.approx(1.6, rel=1e-7)
+    assert high - low == pytest.approx(2 * NORMAL_95 * 0.0014 * 1.6, rel=1e-4)
+    assert [trace["file"] for trace in group["traces"]] == ["constant.csv", "sine.csv"]
+    assert len(group["correlation"]["names"]) == len(group["correlation"]["matrix"])
+    assert "Synthetic" in group["machine"]["note"]
+    text = (written / "friction.yaml").read_text(encoding="utf-8")
+    head = [line for line in text.splitlines() if line.startswith("#")]
+    assert "identified by feedsim" in head[0]
+    assert any("Synthetic machine" in line for line in head)
+    assert any('machine.axes.Z.constant_load="0.25 N.m"' in line for line in head)
+
+
+def test_a_friction_that_cannot_be_is_not_written(tmp_path: Path) -> None:
+    found = identification()
+    wrong = {**found.estimates, "gamma": replace(found.estimates["gamma"], value=1.2)}
+    with pytest.raises(OutputError, match=r"friction\.yaml is not written: gamma"):
+        write_identification(account(found=replace(found, estimates=wrong)), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_summary(written: Path) -> None:
+    summary = told(written)
+    parameters = summary["parameters"]
+    assert list(parameters) == list(TRUE)
+    assert parameters["sigma_0"]["at_slide"] == {"value": pytest.approx(300 / I_P**2 * 1e-6), "unit": "N/um"}
+    assert parameters["J"]["interval"] is None
+    assert parameters["J"]["status"] == "given"
+    assert summary["curve"]["plateaus"] == 24
+    assert summary["curve"]["error"]["value"] == pytest.approx(0.0053, abs=2e-4)
+    assert len(summary["pre_sliding"]["stretches"]) == 4
+    assert summary["pre_sliding"]["sigma_were_the_delay_known"] == {"sigma_1": 0.011}
+    assert summary["machine"]["note"].startswith("Synthetic")
+    assert summary["settings"] == {"hold": "beta=1"}
+    assert [item["role"] for item in summary["inputs"]][:2] == ["trace", "trace"]
+    assert {"feedsim", "numpy", "scipy"} <= set(summary["software"])
+
+
+def test_the_simple_model_stands_beside(written: Path) -> None:
+    assert set(told(written)["rigid_axis"]) == {"J", "F_C"}
+    text = (written / "report.html").read_text(encoding="utf-8")
+    assert "Rigid axis with simple friction" in text
+    assert rigid_line(account()).startswith("rigid axis with simple friction: J 0.01640 kg.m^2, F_C 1.9000 N.m")
+    without = account(found=identification(rigid={}))
+    assert rigid_line(without) == ""
+    assert "Rigid axis" not in page(without, [])
+
+
+def test_a_run_tells_where_its_friction_is_from(written: Path) -> None:
+    machine = load_machine(MACHINE, [f"axes.Z.friction={written / 'friction.yaml'}"])
+    assert friction_origins(machine) == {"Z": "identified 2026-01-31 from constant.csv, sine.csv"}
+    odd = machine.axes["Z"].friction.model_copy(update={"identified": {"traces": 3, "date": [1]}})
+    axes = {"Z": machine.axes["Z"].model_copy(update={"friction": odd})}
+    assert friction_origins(machine.model_copy(update={"axes": axes})) == {"Z": "identified [1]"}
+    assert friction_origins(load_machine(MACHINE)) == {}
+
+
+def test_tables_read_back(written: Path) -> None:
+    with (written / "plateaus.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["record", "begin [s]", "end [s]", "speed [rad/s]", "torque [N.m]", "sigma [N.m]", "rows"]
+    stage = identification().stationary
+    assert stage is not None
+    assert [float(row[3]) for row in rows[1:]] == [p.speed for p in stage.plateaus]
+    with (written / "residuals.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    dynamic = identification().dynamic
+    assert dynamic is not None
+    assert len(rows) - 1 == sum(len(each.time) for each in dynamic.stretches)
+    assert {row[0] for row in rows[1:]} == {"1", "2", "3", "4"}
+    measured, model, left = (np.array([float(row[i]) for row in rows[1:]]) for i in (5, 6, 7))
+    assert np.array_equal(measured - model, left)
+
+
+def test_page(written: Path) -> None:
+    text = (written / "report.html").read_text(encoding="utf-8")
+    words_of_page = " ".join(Page(text).words)
+    for words in ("Friction of axis Z", "error of the curve", "Synthetic machine", "N/µm", "kg·m²", "2 µm at 20 Hz",
+                  "sigma_1 is known to 6.7 % only", "constant_load", "Were the delay known"):  # fmt: skip
+        assert words in words_of_page, words
+    assert all(f'<figure id="{stem}">' in text for stem in FIGURES)
+    assert not re.search(r"\bnan\b", re.sub(r"<svg.*?</svg>|data:[^\"]*", "", text, flags=re.S))
+    assert str(Path.cwd()) not in text
+    # sigma_0 at the slide, beside the motor side's
+    assert f"{300e-6 / I_P**2:.3f}"[:4] in words_of_page
+
+
+@pytest.mark.parametrize("absent", ["stationary", "dynamic", "both warnings"])
+def test_a_stage_may_be_absent(tmp_path: Path, absent: str) -> None:
+    changes: dict[str, Any] = {absent: None} if absent != "both warnings" else {"warnings": (), "advice": ()}
+    whole = account(found=identification(**changes), subject=None)
+    names = {path.name for path in write_identification(whole, tmp_path)}
+    assert ("plateaus.csv" in names) == (absent != "stationary")
+    assert ("residuals.csv" in names) == (absent != "dynamic")
+    assert {"friction.yaml", "report.html", "correlation.png"} <= names
+    assert ("stribeck.png" in names) == (absent != "stationary")
+    assert told(tmp_path)["machine"] is None
+    line = identification_headline(whole)
+    assert ("curve within" in line) == (absent != "stationary")
+
+
+def test_files_of_an_earlier_run_go(tmp_path: Path) -> None:
+    write_identification(account(), tmp_path)
+    write_identification(account(found=identification(dynamic=None)), tmp_path)
+    assert set(contents(tmp_path)) == set(told(tmp_path)["files"])
+    assert not (tmp_path / "residuals.csv").exists()
+
+
+def test_place_is_checked_ahead(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="is a file"):
+        check_identification_writable(tmp_path / "file")
+    check_identification_writable(tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_table_for_the_terminal() -> None:
+    lines = identification_table(account())
+    assert len(lines) == 1 + len(TRUE)
+    assert any(re.fullmatch(r"  F_C +1\.6000 N\.m +1\.5956 to 1\.6044 +0\.27 %", line) for line in lines)
+    assert any(line.startswith("  delay") and "0.50 ms" in line for line in lines)
+    assert all(line.isascii() and len(line) <= 120 for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "texts"),
+    [
+        (1.6, 0.0022, ("1.6000", "1.5957 to 1.6043", "0.27 %")),
+        (-0.25, 0.04, ("-0.250", "-0.328 to -0.172", "31 %")),
+        (300.0, 100.0, ("300", "104 to 496", "65 %")),
+        (0.04, math.nan, ("0.04", "", "")),
+        (1e-9, 1.0, ("0.0", "-2.0 to 2.0", "over 100 %")),
+        (3.0, 0.0, ("3", "", "")),
+    ],
+)
+def test_numbers_in_words(value: float, sigma: float, texts: tuple[str, str, str]) -> None:
+    estimate = Estimate("F_C", value, "N.m", "", sigma)
+    assert (value_text(estimate), interval_text(estimate), relative_text(estimate)) == texts
+
+
+def test_values_at_the_slide() -> None:
+    """x = I_P angle and F = M/I_P, by dimensions."""
+    lead = 0.02 / (2 * math.pi)
+    expected = {
+        "F_C": (1.6 / lead, "N"),
+        "sigma_0": (300 / lead**2 * 1e-6, "N/um"),
+        "sigma_2": (0.006 / lead**2 * 1e-3, "N.s/mm"),
+        "v_s": (0.6 * lead * 60e3, "mm/min"),
+        "W": (0.04 * lead * 1e6, "um"),
+        "J": (J / lead**2, "kg"),
+    }
+    for name, (value, unit) in expected.items():
+        found = at_slide(name, lead)
+        assert found is not None
+        assert (found[0] * TRUE[name][0], found[1]) == (pytest.approx(value), unit)
+    assert at_slide("gamma", lead) is None
+    assert expected["J"][0] == pytest.approx(1618.6, abs=0.1)  # a slide of some 1.6 t
+
+
+def test_error_of_the_curve_is_that_between_the_plateaus() -> None:
+    stage = identification().stationary
+    assert stage is not None
+    wide = replace(stage, sigma=np.where(stage.speeds > 50, 1.0, stage.sigma), range=(stage.range[0], 40.0))
+    assert curve_error(wide) < 0.01 < curve_error(replace(wide, range=stage.range))
+
+
+def test_constant_load_is_told_where_there_is_one() -> None:
+    whole = account()
+    assert 'machine.axes.Z.constant_load="0.25 N.m"' in constant_load_hint(whole)
+    none = {name: each for name, each in whole.found.estimates.items() if name != "M_0"}
+    assert constant_load_hint(account(found=replace(whole.found, estimates=none))) == ""
+    assert "0.245" in constant_load_hint(whole)
+    assert M_0 == 0.25
+
+
+class TestFigures:
+    found: Identification = identification()
+
+    def test_stribeck_headline_is_the_error_of_the_curve(self) -> None:
+        assert self.found.stationary is not None
+        picture = stribeck_picture(self.found, self.found.stationary)
+        assert "of its direction (dashed)" in picture.caption
+        assert "plateau 0.4 %" in picture.caption
+        plain = {**self.found.stationary.estimates}
+        plain["asymmetry"] = replace(plain["asymmetry"], value=0.0)
+        other = stribeck_picture(self.found, replace(self.found.stationary, estimates=plain))
+        assert "of its direction (dashed)" not in other.caption
+        assert other.png != picture.png
+
+    def test_one_direction_alone(self) -> None:
+        stage = self.found.stationary
+        assert stage is not None
+        one = replace(stage, plateaus=tuple(p for p in stage.plateaus if p.speed > 0))
+        assert stribeck_picture(self.found, one).png
+
+    def test_plateaus_in_their_records(self) -> None:
+        stage = self.found.stationary
+        assert stage is not None
+        assert plateaus_picture(self.found, stage, records()[1:]) is None
+        many = [replace(records()[0], name=f"piece {k}") for k in range(5)]
+        spread = tuple(replace(p, record=f"piece {k % 5}") for k, p in enumerate(stage.plateaus))
+        picture = plateaus_picture(self.found, replace(stage, plateaus=spread), many)
+        assert picture is not None
+        assert "2 more record(s)" in picture.caption
+
+    def test_loops_show_each_move_once(self) -> None:
+        stage = self.found.dynamic
+        assert stage is not None
+        picture = loops_picture(self.found, stage, "speed")
+        assert picture is not None
+        assert "further stretches" not in picture.caption
+        twice = replace(stage, stretches=stage.stretches * 2)
+        again = loops_picture(self.found, twice, "speed")
+        assert again is not None
+        assert "4 further stretches" in again.caption
+        assert again.png == picture.png or "not shown" in again.caption
+        assert loops_picture(self.found, replace(stage, stretches=()), "speed") is None
+        assert residuals_picture(self.found, replace(stage, stretches=())) is None
+
+    def test_moves_in_words(self) -> None:
+        assert describe(stretch(20e-6, 5.0, 0.0), I_P) == "20 µm, 5 Hz"
+        general = replace(stretch(0.1, 5.0, 0.0), kind="motion", frequency=math.nan)
+        assert describe(general, I_P) == "motion of ±100 mm"
+
+    def test_units_follow_the_length_of_the_moves(self) -> None:
+        assert _length([stretch(20e-6, 5.0, 0.0)], I_P) == (pytest.approx(1e6 * I_P), "µm")
+        assert _length([stretch(20e-6, 5.0, 0.0), stretch(0.1, 5.0, 0.0)], I_P) == (pytest.approx(1e3 * I_P), "mm")
+
+    def test_correlation_leaves_open_what_is_not_known(self) -> None:
+        names = ("F_C", "sigma_0", "W")
+        matrix = np.array([[1, 0.95, np.nan], [0.95, 1, -0.2], [np.nan, -0.2, 1]])
+        picture = correlation_picture("Z", Correlation(names, matrix))
+        assert picture is not None
+        assert correlation_picture("Z", Correlation(("F_C",), np.eye(1))) is None
+
+
+def test_text_of_others_is_escaped() -> None:
+    whole = account(sources=(provenance("<b>.csv", note="a < b"),))
+    text = page(whole, [])
+    assert "<b>.csv" not in text
+    assert "&lt;b&gt;.csv" in text
+    assert "a &lt; b" in text

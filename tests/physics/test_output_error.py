@@ -1,0 +1,203 @@
+"""Stage 2 of the identification against what the closed loop was simulated with, and against the Cramer-Rao bound."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from feedsim import cosim, scenario
+from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.errors import InputError
+from feedsim.identify.bounds import SineMove, bounds, planned
+from feedsim.identify.motion import motion
+from feedsim.identify.output_error import dynamic
+from feedsim.identify.record import Record
+from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary
+from feedsim.identify.stretches import parts
+from identify_records import I_P, TRUE, J
+
+Array = NDArray[np.float64]
+MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"
+K_T = 2.0  # N.m/A
+SOUGHT = ("sigma_0", "W", "gamma", "sigma_1")
+# Largest error [%] at a noise of 1 % and 5 % of the torque's RMS, and how many seeds.
+ASKED = {0.01: (1.0, 1.0, 1.0, 3.0), 0.05: (2.0, 3.0, 3.0, 6.0)}
+SEEDS = 20
+INERTIA = Estimate("J", J, "kg.m2", "inertia", 2e-3 * J)
+SLIDING = 21.4  # s, before the last sine: the one for the delay
+SINES = f"""
+name: sines
+machine: {MACHINE}
+motions:
+  - {{kind: dwell, duration: 0.2 s}}
+  - kind: sine
+    axis: Z
+    moves:
+      - {{amplitude: 200 um, frequency: 1 Hz, periods: 6}}
+      - {{amplitude: 100 um, frequency: 2 Hz, periods: 9}}
+      - {{amplitude: 20 um, frequency: 5 Hz, periods: 16}}
+      - {{amplitude: 5 um, frequency: 10 Hz, periods: 32}}
+      - {{amplitude: 500 um, frequency: 5 Hz, periods: 12}}
+  - {{kind: dwell, duration: 0.3 s}}
+logging: {{interval: 2 ms}}
+"""
+
+
+@pytest.fixture(scope="module")
+def law(fmus: Path) -> Iterator[FrictionLaw]:
+    with FrictionLaw(fmus) as law:
+        yield law
+
+
+@pytest.fixture(scope="module")
+def closed_loop(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> cosim.Run:
+    file = tmp_path_factory.mktemp("sines") / "sines.yaml"
+    file.write_text(SINES, encoding="utf-8")
+    return cosim.run(scenario.load(file), fmus=fmus)
+
+
+def logged(run: cosim.Run, *, noise: float = 0.0, delay: float = 0.0, seed: int = 0, until: float = 1e9) -> Record:
+    """500 Hz log of the run: torque `delay` late, with white noise of a share of its RMS while the setpoint moves."""
+    fine = run.fine
+    assert fine is not None
+    kept = fine.time[::16] < until
+    time = fine.time[::16][kept]
+    torque = K_T * np.interp(time - delay, fine.time, fine["Z.i_q"])
+    setpoint = fine["Z.x_s"][::16][kept] / I_P
+    moves = np.gradient(setpoint) != 0
+    level = noise * float(np.sqrt(np.mean(torque[moves] ** 2)))
+    torque = torque + level * np.random.default_rng(seed).standard_normal(len(torque))
+    return Record("sines", time, torque, speed=fine["Z.n_a"][::16][kept], setpoint=setpoint)
+
+
+def stage_1(relative: float) -> Stationary:
+    """A first stage that found the truth, within a relative standard deviation."""
+    names = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0")
+    sigma = np.array([relative * (abs(TRUE[name]) or 1.0) for name in names])
+    found = {name: Estimate(name, TRUE[name], "", "", float(s)) for name, s in zip(names, sigma, strict=True)}
+    found |= {name: Estimate(name, TRUE[name], "", "", status="held") for name in ("beta", "v_log")}
+    nothing = np.zeros(1)
+    return Stationary(
+        (), found, Correlation(names, np.eye(7)), np.diag(sigma**2), nothing, nothing, nothing, (0.0, 1.0), 0.0, 0.0
+    )
+
+
+def errors(found: Dynamic) -> Array:
+    """Of the sought parameters [%]."""
+    return np.array([100 * (found.estimates[name].value / TRUE[name] - 1) for name in SOUGHT])
+
+
+def exact(law: FrictionLaw, moves: list[SineMove], true: dict[str, float], *, noise: float = 0.01) -> Record:
+    """Record of planned sines, its torque from the law at sixteen steps per row."""
+    plan = planned(moves, I_P)
+    fine = np.linspace(plan.time[0], plan.time[-1], 16 * (len(plan) - 1) + 1)
+    way = motion(plan)
+    friction = law({k: v for k, v in true.items() if k != "M_0"}, np.ascontiguousarray(way.speed(fine)), fine[1])
+    torque = friction[::16] + J * way.acceleration(0.0)
+    level = noise * float(np.sqrt(np.mean(torque**2)))
+    torque = torque + level * np.random.default_rng(5).standard_normal(len(torque))
+    return Record("sines", plan.time, torque, speed=plan.speed, setpoint=plan.setpoint)
+
+
+def test_without_noise_the_parameters_come_back(law: FrictionLaw, closed_loop: cosim.Run) -> None:
+    found = dynamic([logged(closed_loop, until=SLIDING)], law, prior=stage_1(1e-4), J=INERTIA, delay=0.0)
+    # What remains is the interpolation between the samples and the bed's mode in J dn/dt: at most 0.03 and 0.08 % here.
+    np.testing.assert_array_less(np.abs(errors(found)), [0.1, 0.1, 0.1, 0.3])
+
+
+@pytest.mark.parametrize("noise", ASKED)
+def test_monte_carlo(law: FrictionLaw, closed_loop: cosim.Run, noise: float) -> None:
+    """Errors as asked at every seed; scatter within 1.3 of the bound (its own scatter at 20 seeds is 16 %)."""
+    seen, told = [], []
+    for seed in range(SEEDS):
+        record = logged(closed_loop, noise=noise, seed=seed, until=SLIDING)
+        found = dynamic([record], law, prior=stage_1(1e-3), J=INERTIA, delay=0.0)
+        seen.append(errors(found))
+        told.append([100 * found.estimates[name].sigma / TRUE[name] for name in SOUGHT])
+    assert np.all(np.abs(seen) < ASKED[noise]), np.max(np.abs(seen), axis=0)
+    ratio = np.std(seen, axis=0, ddof=1) / np.mean(told, axis=0)
+    assert np.all(ratio < 1.3), ratio
+    values = {**TRUE, "J": J, "delay": 0.0}
+    free = (*SOUGHT, "F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0", "J")
+    known = {name: 1e-3 * (abs(values[name]) or 1.0) for name in free[4:]} | {"J": INERTIA.sigma}
+    bound = bounds([logged(closed_loop, until=SLIDING)], law, values, free, share=noise, known=known)
+    # The same bound from its own sensitivities at the true parameters.
+    for name, sigma in zip(SOUGHT, np.mean(told, axis=0), strict=True):
+        assert sigma == pytest.approx(100 * bound.relative(name), rel=0.1), name
+
+
+def test_a_late_torque_is_told_and_costs_sigma_1_nothing(law: FrictionLaw, closed_loop: cosim.Run) -> None:
+    quiet = dynamic([logged(closed_loop, delay=0.5e-3)], law, prior=stage_1(1e-3), J=INERTIA)
+    assert quiet.estimates["delay"].value == pytest.approx(0.5e-3, abs=0.1e-3)
+    assert abs(errors(quiet)[3]) < 2.0  # uncorrected 12 % low
+    for seed in range(3):
+        found = dynamic([logged(closed_loop, noise=0.05, delay=0.5e-3, seed=seed)], law, prior=stage_1(1e-3), J=INERTIA)
+        delay = found.estimates["delay"]
+        # 3: three seeds lie within three standard deviations; twice the bound holds for the mean square over many.
+        assert delay.value == pytest.approx(0.5e-3, abs=3 * delay.sigma)
+        assert delay.sigma < 0.05e-3
+        assert found.without_delay["sigma_1"] < found.estimates["sigma_1"].sigma < 0.025 * TRUE["sigma_1"]
+
+
+def test_a_record_that_begins_in_motion(law: FrictionLaw, closed_loop: cosim.Run) -> None:
+    whole = logged(closed_loop, noise=0.01)
+    begin = int(np.searchsorted(whole.time, 9.0))  # within the 100 um sine
+    found = dynamic([whole.between(begin, len(whole))], law, prior=stage_1(1e-3), J=INERTIA, delay=0.0)
+    np.testing.assert_array_less(np.abs(errors(found)), ASKED[0.01])
+
+
+def test_stretches_are_found(closed_loop: cosim.Run) -> None:
+    record = logged(closed_loop)
+    found = parts(record, motion(record))
+    assert [part.kind for part in found] == ["sine"] * 5
+    np.testing.assert_allclose([part.frequency for part in found], [1, 2, 5, 10, 5], rtol=1e-3)
+    # The axis follows small sines in part only.
+    amplitudes = np.array([part.amplitude * I_P for part in found])
+    np.testing.assert_allclose(amplitudes, [200e-6, 100e-6, 20e-6, 5e-6, 500e-6], rtol=0.25)
+
+
+def test_pure_lugre_is_told_as_such(law: FrictionLaw) -> None:
+    true = {**TRUE, "W": 0.0, "gamma": 1.0}
+    moves = [SineMove(100e-6, 2, 9), SineMove(20e-6, 5, 17), SineMove(5e-6, 10, 30)]
+    found = dynamic([exact(law, moves, true)], law, prior=stage_1(1e-4), J=INERTIA, delay=0.0)
+    assert found.estimates["W"].status == found.estimates["gamma"].status == "undetermined"
+    assert (found.estimates["W"].value, found.estimates["gamma"].value) == (0.0, 1.0)
+    assert "full stiffness" in found.estimates["gamma"].reason
+    assert found.estimates["sigma_0"].value == pytest.approx(TRUE["sigma_0"], rel=0.01)
+
+
+def test_what_small_sines_do_not_tell_is_said(law: FrictionLaw) -> None:
+    found = dynamic(
+        [exact(law, [SineMove(5e-6, 2, 20)], TRUE, noise=0.05)],
+        law,
+        prior=stage_1(1e-3),
+        J=INERTIA,
+        delay=0.0,
+        I_P=I_P,
+    )
+    assert any(text.startswith("W needs") and "20 um" in text for text in found.advice)
+    assert any(text.startswith("gamma needs") and "50 um" in text for text in found.advice)
+    assert any(text.startswith("sigma_1 is best told by") and "5 Hz" in text for text in found.advice)
+
+
+def test_a_sliding_sine_parts_delay_and_damping(law: FrictionLaw) -> None:
+    """The planned moves' bounds say what the Monte Carlo runs show."""
+    values = {**TRUE, "J": J, "delay": 0.0}
+    free = (*SOUGHT, "delay", "J")
+    small = [SineMove(200e-6, 1, 7), SineMove(100e-6, 2, 9), SineMove(20e-6, 5, 17), SineMove(5e-6, 10, 32)]
+    known = {"J": INERTIA.sigma}
+    without = bounds([planned(small, I_P)], law, values, free, known=known)
+    sliding = [*small, SineMove(500e-6, 5, 12)]
+    with_it = bounds([planned(sliding, I_P)], law, values, free, known=known)
+    assert with_it.sigma("delay") < without.sigma("delay") / 3
+    assert with_it.sigma("sigma_1") < without.sigma("sigma_1") / 2
+
+
+def test_nothing_that_moves_is_refused(law: FrictionLaw) -> None:
+    time = 2e-3 * np.arange(500)
+    with pytest.raises(InputError, match="nothing moves in rest"):
+        dynamic([Record("rest", time, np.zeros(500), speed=np.zeros(500))], law)

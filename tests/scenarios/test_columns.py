@@ -100,8 +100,8 @@ def test_spellings_of_drives(unit: str, meant: str) -> None:
         (GOOD + "torque_constant: 2 N.m", "m.yaml:7: torque_constant: '2 N.m' is a torque; a torque constant is"),
         (GOOD + "delay: {torqe: 1 ms}", "m.yaml:7: delay.torqe: unknown key; did you mean 'torque'?"),
         (
-            GOOD + "delay: {torque: -1 ms}",
-            "m.yaml:7: delay.torque: -1 ms is outside the allowed range: from 0 s to 1 s",
+            GOOD + "delay: {torque: -2 s}",
+            "m.yaml:7: delay.torque: -2 s is outside the allowed range: from -1 s to 1 s",
         ),
         (GOOD + "setpoint: q", "m.yaml:7: setpoint: 'q'; a group of keys is expected"),
         (GOOD + "setpoint: {unit: mm}", "m.yaml:7: setpoint.column: missing; Name in the header"),

@@ -216,15 +216,12 @@ def _delay(text: str | None, sources: Sequence[Provenance]) -> float | None:
 
     if text is None:
         delays = {source.torque_delay for source in sources}
-        return delays.pop() or None if len(delays) == 1 else None
+        return delays.pop() if len(delays) == 1 else None
     if text == "estimate":
         return None
     if text.strip() in ("0", "0.0"):
         return 0.0
-    value = _quantity("delay", text, "s")
-    if value < 0:
-        raise InputError(f"--delay {text}: the torque cannot be logged ahead of the motion; at least 0 s")
-    return value
+    return _quantity("delay", text, "s")
 
 
 def _hold(texts: Sequence[str]) -> dict[str, float]:

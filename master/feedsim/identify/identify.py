@@ -107,7 +107,6 @@ class _Run:
         self.advice: list[str] = []
         self.reasons: dict[int, str] = {}  # stage -> why it is absent
         self.prior = True  # whether stage 1 enters stage 2
-        self.doubted: dict[str, float] = {}  # held in stage 2, because stage 1 has shown that it cannot be told
 
     def result(self) -> Identification:
         options = self.options
@@ -192,9 +191,7 @@ class _Run:
         others = [record for record in self.records if record.name not in names]
         if first is not None and any(plateau.record in names for plateau in first.plateaus):
             self.prior = False
-            self._doubt(first)
         hold, free = self._held((*FRICTION, "M_0"))
-        hold = self.doubted | hold
         try:
             return dynamic(
                 chosen,
@@ -213,12 +210,6 @@ class _Run:
             self.reasons[2] = str(error)
             self.warnings.append(f"no pre-sliding parameters: {error}")
             return None
-
-    def _doubt(self, first: Stationary) -> None:
-        """What plateaus of the same records do not tell from the constant load their motion does not tell either."""
-        lean = first.estimates["asymmetry"]
-        if lean.status == "undetermined" and "asymmetry" not in self.options.free:
-            self.doubted["asymmetry"] = lean.value
 
     def _rigid(self, records: Sequence[Record]) -> Inertia | None:
         """Inverse dynamics; None where the records tell no inertia."""
@@ -269,7 +260,6 @@ class _Run:
                     for name, each in stage.estimates.items()
                     if name not in known or each.status == "estimated"
                 }
-        found |= {name: first.estimates[name] for name in self.doubted if first is not None}
         if "delay" not in found and self.options.delay is not None:
             found["delay"] = _held("delay", self.options.delay, "given", "not used: stage 2 is absent")
         for name in FRICTION:

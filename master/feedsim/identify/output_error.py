@@ -42,6 +42,9 @@ REFINEMENTS = (
     ("F_S", "v_s"),  # once more: what engages passed for it, or hid it
     ("F_log",),
 )
+# Where all speeds are far above the usual v_log the logarithm is a constant to them, and what friction gains with speed
+# falls to sigma_2 alone. It then bends at a BEND-th of the typical speed.
+FAR_ABOVE, BEND = 10.0, 3.0
 LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant load to be told apart
 
 
@@ -162,17 +165,26 @@ def _known(
     values |= sliding(fine, values, unknown - set(hold))
     if prior is None:
         values["F_S"] = max(hold.get("F_S", values["F_C"]), values["F_C"])
-        fastest = max(float(np.max(np.abs(model.moved(values["delay"])[1]))) for model in fine)
-        values["v_s"] = hold.get("v_s", 0.02 * fastest)
+        sliding_speed = np.abs(_sliding(fine))
+        values["v_s"] = hold.get("v_s", 0.02 * float(np.max(sliding_speed)))
+        typical = float(np.median(sliding_speed))
+        if "v_log" not in hold and "v_log" not in free and typical > FAR_ABOVE * USUAL["v_log"]:
+            values["v_log"] = typical / BEND
+            held["v_log"] = "held", "a third of the typical speed, so that the logarithm bends where the axis moves"
     values.setdefault("sigma_0", 0.0)
     told = tuple(name for one in priors for name in one.names)
     return _Known(values, joined(priors), told, held)
 
 
 def _both_directions(fine: Sequence[RecordTorque]) -> bool:
-    speed = np.concatenate([model.moved(0.0)[1] for model in fine])
-    fast = speed[np.abs(speed) > 0.05 * np.max(np.abs(speed))]
+    fast = _sliding(fine)
     return LEAST_SHARE < float(np.mean(fast > 0)) < 1 - LEAST_SHARE
+
+
+def _sliding(fine: Sequence[RecordTorque]) -> Array:
+    """Speeds [rad/s] at the rows that are not near a reversal."""
+    speed = np.concatenate([model.moved(0.0)[1] for model in fine])
+    return np.asarray(speed[np.abs(speed) > 0.05 * np.max(np.abs(speed))])
 
 
 def _base(known: _Known, with_prior: bool, with_delay: bool) -> list[str]:

@@ -59,7 +59,7 @@ class Provenance:
     pitch: float | None = None
     torque_constant: float | None = None
     inertia: float | None = None
-    torque_delay: float = 0.0
+    torque_delay: float | None = None
     warnings: tuple[str, ...] = ()
 
 
@@ -267,6 +267,6 @@ def _provenance(
         pitch=drive.pitch,
         torque_constant=drive.torque_constant,
         inertia=inertia,
-        torque_delay=mapping.delay.torque if mapping is not None else 0.0,
+        torque_delay=mapping.delay.torque if mapping is not None else None,
         warnings=warnings,
     )

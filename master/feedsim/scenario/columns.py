@@ -169,10 +169,10 @@ class Clock(Model):
 class Delay(Model):
     """Known delays between channels."""
 
-    torque: Annotated[float, Quantity("s", minimum=0, maximum=1, example="0.5 ms")] = Field(
-        default=0.0,
-        validate_default=False,
-        description="By how much torque or current is logged later than the position",
+    torque: Annotated[float, Quantity("s", minimum=-1, maximum=1, example="0.5 ms")] | None = Field(
+        default=None,
+        description="By how much torque or current is logged later than the motion (below 0: earlier, as a command that "
+        "is held from its instant on); left out: to be estimated",
     )
 
 

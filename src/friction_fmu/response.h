@@ -1,8 +1,8 @@
 /* The whole response of the friction contact to a given speed in one call: what the unit computes when it is stepped
  * with the slope of n_fr, without the FMI in between. For fits, which need it by the thousand.
  *
- * The one function of the library that is not of the FMI. It keeps nothing between calls, so calls from several threads
- * do not know of each other. */
+ * With free_axis.h one of the two functions of the library that are not of the FMI. It keeps nothing between calls, so
+ * calls from several threads do not know of each other. */
 #ifndef FEEDSIM_RESPONSE_H
 #define FEEDSIM_RESPONSE_H
 

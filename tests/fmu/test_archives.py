@@ -215,7 +215,7 @@ def test_archive_of_other_resources_is_refused(plant: Archive) -> None:
 
 
 # What a unit exports besides the functions of the standard.
-OWN_FUNCTIONS = {"friction": {"friction_response"}}
+OWN_FUNCTIONS = {"friction": {"friction_response", "friction_free_axis"}}
 
 
 def test_exactly_the_functions_of_the_standard_are_exported(archive: Archive) -> None:

@@ -12,12 +12,14 @@ import os
 from pathlib import Path
 
 import pytest
-from emps_axis import I_P, Measured, Parameters, closed_loop, least_squares, open_loop, read
+from emps_axis import I_P, SCENARIO, Measured, Parameters, closed_loop, least_squares, open_loop, read
 
+from feedsim.cli import main
 from feedsim.identify.inertia import inertia
 
 pytestmark = pytest.mark.skipif("FEEDSIM_EMPS" not in os.environ, reason="FEEDSIM_EMPS names no measured data")
 
+MAPPING = SCENARIO.parent / "machines" / "emps" / "columns.yaml"
 PUBLISHED_RECORD = "6cf6814ae14618795da0101aae2bb97ff0c6351b0501b5492751b02b07facf7e"
 PUBLISHED = [95.109, 203.50, 20.39, -3.165]  # M, F_v, F_C, offset
 
@@ -28,11 +30,12 @@ def measured() -> Measured:
 
 
 @pytest.fixture(scope="module")
-def identified() -> Parameters:
-    """The set that identification finds in the record."""
-    if "FEEDSIM_EMPS_FRICTION" not in os.environ:
-        pytest.skip("FEEDSIM_EMPS_FRICTION names no friction file of the axis")
-    return Parameters.identified(Path(os.environ["FEEDSIM_EMPS_FRICTION"]))
+def identified(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Parameters:
+    """The set that identification finds in the record, by the command as documented."""
+    out = tmp_path_factory.mktemp("emps")
+    words = ["--columns", MAPPING, "--machine", MAPPING.parent, "--axis", "X", "--fmus", fmus, "--out", out, "--quiet"]
+    assert main(["identify", os.environ["FEEDSIM_EMPS"], *map(str, words)]) == 0
+    return Parameters.identified(out / "friction.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,12 @@ import shutil
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from friction_reference import X_AXIS, Z_AXIS, line, sine, solved
+from friction_reference import X_AXIS, Z_AXIS, level, line, sine, solved, torque
+from scipy.integrate import solve_ivp
 
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError, SimulationError
@@ -153,6 +155,94 @@ def test_threads_do_not_meet(law: FrictionLaw) -> None:
         np.testing.assert_array_equal(a, b)
 
 
+# --- the free axis
+
+J, M_0 = 0.0164, 0.3  # synthetic, like the default machine's Z axis
+
+
+def reached(p: dict[str, float], torques: Floats, h: float, n: float, z: float) -> tuple[Floats, Floats]:
+    """Angle and speed by DOP853 at 1e-11, interval by interval, and within one from stop of c to stop of c."""
+
+    def rate(_: float, state: Floats, torque_held: float) -> list[float]:
+        _, n, z, c = state
+        inside = abs(c) < p["W"] / 2 or c * n < 0
+        bounded = min(max(c, -p["W"] / 2), p["W"] / 2)
+        return [
+            n,
+            (torque_held - M_0 - torque(p, z, bounded, n)) / J,
+            n - abs(n) / level(p, n) * z,
+            n if inside else 0.0,
+        ]
+
+    state = np.array([0.0, n, z, 0.0])
+    states = [state]
+    for held in torques:
+        solution = solve_ivp(rate, (0.0, h), state, method="DOP853", rtol=1e-11, atol=1e-13, args=(held,), max_step=h)
+        assert solution.success
+        state = solution.y[:, -1].copy()
+        state[3] = min(max(state[3], -p["W"] / 2), p["W"] / 2)
+        states.append(state)
+    return np.array(states)[:, 0], np.array(states)[:, 1]
+
+
+@pytest.mark.parametrize("parameters", SETS)
+def test_free_axis_solves_the_equations(law: FrictionLaw, parameters: dict[str, float]) -> None:
+    # Sliding both ways, break-away, and a torque below it, at which the axis comes to rest.
+    h, k = 2e-3, np.arange(200)
+    torques = np.where(k < 140, 7.5 * np.sin(0.09 * k) + 1.5 * np.sin(0.31 * k), 0.9)
+    angle, speed = reached(parameters, torques, h, 2.0, 1e-3)
+    assert speed.max() > 5 > -5 > speed.min()
+    assert abs(speed[-1]) < 0.15
+    errors = []
+    for substeps in (2, 512):
+        seen = law.free_axis(parameters, J, M_0, torques, h, n=2.0, z=1e-3, substeps=substeps)
+        errors.append((np.abs(seen[0] - angle).max(), np.abs(seen[1] - speed).max()))
+    (coarse, _), (fine, fine_speed) = errors
+    # Second order. Where the reversals lie within their steps changes the factor, by 2 or 3, which is an eighth of an
+    # order over 256 times the substeps.
+    assert np.log(coarse / fine) / np.log(256) == pytest.approx(2.0, abs=0.15)
+    assert fine < 1e-7
+    assert fine_speed < 1e-5
+
+
+def test_free_axis_begins_at_what_it_is_given(law: FrictionLaw) -> None:
+    angle, speed = law.free_axis({}, J, M_0, [], H, n=3.0)
+    assert (angle.tolist(), speed.tolist()) == ([0.0], [3.0])
+    held = law.free_axis({"W": 0.0}, J, M_0, np.full(400, 1.0), H, z=0.7 / 300.0)  # bristles that bear the torque
+    assert np.abs(held).max() < 1e-12
+    torques = 3 * np.sin(np.arange(300) * 0.1)
+    np.testing.assert_array_equal(
+        law.free_axis({}, J, 0.25, torques[::-2], H), law.free_axis({}, J, 0.25, torques[::-2].tolist(), H)
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"parameters": {"beta": 11.0}}, "'beta' is out of range: 11"),
+        ({"parameters": {"F_S": 1.5}}, "'F_S' is 1.5 N.m and 'F_C' is 1.6 N.m"),
+        ({"parameters": {"sigma_3": 1.0}}, "no parameter 'sigma_3'"),
+        ({"M_a": [[1.0, 2.0]]}, "torques: shape (1, 2)"),
+        ({"J": 0.0}, "inertia: 0.0 kg.m2; it must be finite and greater than 0"),
+        ({"J": math.nan}, "inertia: nan"),
+        ({"h": -1.0}, "time between torques: -1.0 s"),
+        ({"substeps": 0}, "substeps = 0; it must be at least 1"),
+    ],
+)
+def test_free_axis_refuses(law: FrictionLaw, changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError) as raised:
+        law.free_axis(**{"parameters": {}, "J": J, "M_0": M_0, "M_a": [1.0, 2.0], "h": H} | changes)
+    assert words in str(raised.value)
+    law.free_axis({}, J, M_0, [1.0], H)  # and nothing is left of it
+
+
+def test_free_axis_that_is_no_number_says_when(law: FrictionLaw) -> None:
+    with pytest.raises(SimulationError, match=r"no finite number at 0\.3 s"):
+        law.free_axis({}, J, M_0, [0.0, 1.0, math.inf, 1.0], 0.1, substeps=100)
+    with pytest.raises(SimulationError, match=r"no finite number at 0 s"):
+        law.free_axis({}, J, M_0, [0.0], 0.1, n=math.nan)
+
+
 # --- refusals
 
 
@@ -217,3 +307,5 @@ def test_closed(fmus: Path) -> None:
     law.close()
     with pytest.raises(ValueError, match="closed"):
         law({}, [0.0, 1.0], H)
+    with pytest.raises(ValueError, match="closed"):
+        law.free_axis({}, J, M_0, [0.0, 1.0], H)

@@ -23,10 +23,11 @@ SOURCES_test_location        := $(TOY)
 SOURCES_test_numbers         :=
 SOURCES_test_text            := src/fmi2/text.c
 
-SOURCES_test_lugre    := src/friction_fmu/lugre.c
-SOURCES_test_tem      := src/friction_fmu/tem.c
-SOURCES_test_contact  := $(addprefix src/friction_fmu/,contact.c lugre.c tem.c)
-SOURCES_test_response := $(filter-out %/model.c,$(wildcard src/friction_fmu/*.c))
+SOURCES_test_lugre     := src/friction_fmu/lugre.c
+SOURCES_test_tem       := src/friction_fmu/tem.c
+SOURCES_test_contact   := $(addprefix src/friction_fmu/,contact.c lugre.c tem.c)
+SOURCES_test_response  := $(filter-out %/model.c,$(wildcard src/friction_fmu/*.c))
+SOURCES_test_free_axis := $(filter-out %/model.c,$(wildcard src/friction_fmu/*.c))
 
 SOURCES_test_modal := src/plant_fmu/modal.c
 SOURCES_test_cells := $(addprefix src/plant_fmu/,cells.c modal.c)

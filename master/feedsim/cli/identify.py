@@ -112,7 +112,8 @@ def identify(options: Namespace) -> None:
         report.check_identification_writable(directory)
         records = named_apart(recorded)
         with FrictionLaw(options.fmus) as law:
-            found = identified(records, law, _options(options, axis, sources, subject), progress)
+            known = _options(options, axis, sources, subject)
+            found = identified(records, law, known, progress, free_axis=law.free_axis)
     found = replace(found, seconds=reading | dict(found.seconds))
     account = report.Account(found, records, tuple(sources), subject, _settings(options), date.today().isoformat())
     report.write_identification(account, directory)

@@ -1,4 +1,5 @@
-"""The friction torque along a given speed, in one call of the friction unit's library: no FMI, no instance per run."""
+"""The friction law in one call of the friction unit's library: the torque along a given speed, and the motion under a
+given torque. No FMI, no instance per run."""
 
 from __future__ import annotations
 
@@ -15,12 +16,18 @@ from feedsim.cosim.run import fmus_directory
 from feedsim.cosim.unit import Archive, Floats, Unit
 from feedsim.errors import InputError, SimulationError
 
-FUNCTION = "friction_response"  # src/friction_fmu/response.h
+RESPONSE = "friction_response"  # src/friction_fmu/response.h
+FREE_AXIS = "friction_free_axis"  # src/friction_fmu/free_axis.h
 
 _RESPONSE = ctypes.CFUNCTYPE(
     ctypes.c_size_t,
     *(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double, ctypes.c_size_t, ctypes.c_size_t),
     *(ctypes.c_double, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p),
+)
+_FREE_AXIS = ctypes.CFUNCTYPE(
+    ctypes.c_size_t,
+    *(ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double),
+    *(ctypes.c_size_t, ctypes.c_double, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p),
 )
 
 
@@ -39,7 +46,7 @@ class FrictionLaw:
         """Open friction.fmu in the folder `fmus` (default: :func:`~feedsim.cosim.run.fmus_directory`).
 
         Raises:
-            InputError: no usable archive, or one without the function.
+            InputError: no usable archive, or one without the functions.
         """
         self._archive = Archive((fmus or fmus_directory()) / "friction.fmu")
         self._refusing = Lock()
@@ -47,13 +54,15 @@ class FrictionLaw:
         try:
             # The instance holds the library, and its GUID stands for the order of the parameters in it.
             self._unit = Unit(self._archive, "friction")
-            try:
-                self._response = _RESPONSE((FUNCTION, self._unit.library))
-            except AttributeError:
-                raise InputError(
-                    f"{self._archive.path}: its library has no function {FUNCTION}; it was built from older sources, "
-                    "`make fmus` builds it anew"
-                ) from None
+            library = self._unit.library
+            for name in (RESPONSE, FREE_AXIS):
+                if not hasattr(library, name):
+                    raise InputError(
+                        f"{self._archive.path}: its library has no function {name}; it was built from older sources, "
+                        "`make fmus` builds it anew"
+                    )
+            self._response = _RESPONSE((RESPONSE, library))
+            self._free_axis = _FREE_AXIS((FREE_AXIS, library))
         except BaseException:
             self.close()
             raise
@@ -118,6 +127,69 @@ class FrictionLaw:
         M_fr, z_out, c_out = self._respond(parameters, n, h, z, c, substeps, every, states=True)
         return M_fr, z_out, c_out
 
+    def free_axis(
+        self,
+        parameters: Mapping[str, float],
+        J: float,
+        M_0: float,
+        M_a: ArrayLike,
+        h: float,
+        *,
+        n: float = 0.0,
+        z: float = 0.0,
+        substeps: int = 1,
+    ) -> tuple[Floats, Floats]:
+        """Angle [rad] and speed [rad/s], each (N + 1,), of a rigid axis under a given motor torque.
+
+            J dn/dt = M_a - M_0 - M_fr
+
+        Args:
+            parameters: by the unit's names and in its units; those left out have their start values.
+            J: inertia [kg.m2]. M_0: constant load against the motor torque [N.m].
+            M_a: (N,) motor torque [N.m], each held over its interval of h.
+            h: length of an interval [s].
+            n, z: speed [rad/s] and bristle deflection [rad] at the start; the angle begins at 0, c at 0.
+            substeps: equal steps per interval; the solution is of second order in h/substeps, and stable while
+                (sigma_1 + sigma_2) h/substeps is well below J.
+
+        Raises:
+            InputError: parameters that the unit refuses, with its own words, or arguments out of range.
+            SimulationError: the motion would be no finite number.
+        """
+        torque = self._row(M_a, "torques", 0)
+        if not 0.0 < J < np.inf:
+            raise InputError(f"inertia: {J} kg.m2; it must be finite and greater than 0")
+        self._check_steps(h, "torques", substeps=substeps)
+        values = self._ordered(parameters)
+        motion = np.empty((2, torque.size + 1))
+        angle, speed = (row.ctypes.data for row in motion)
+        done = self._free_axis(values, J, M_0, torque.ctypes.data, torque.size, h, substeps, n, z, angle, speed)
+        if done == motion.shape[1]:
+            return motion[0], motion[1]
+        if done == 0:
+            self._let_unit_refuse(parameters)
+        raise SimulationError(
+            f"{self._archive.path.name}: the motion would be no finite number at {done * h:.9g} s; torques are "
+            f"{torque.min(initial=0.0):.6g} to {torque.max(initial=0.0):.6g} N.m, the load is {M_0:.6g} N.m, speed and "
+            f"z at the start {n:.6g} rad/s and {z:.6g} rad"
+        )
+
+    def _row(self, given: ArrayLike, what: str, least: int) -> Floats:
+        """As the library takes it, while it is there."""
+        if self._unit is None:
+            raise ValueError("this friction law is closed")
+        row = np.ascontiguousarray(given, dtype=np.float64)
+        if row.ndim != 1 or row.size < least:
+            raise InputError(f"{what}: shape {row.shape}; a row{' of at least one' * least} is needed")
+        return row
+
+    def _check_steps(self, h: float, what: str, **counts: int) -> None:
+        if not 0.0 < h < np.inf:
+            raise InputError(f"time between {what}: {h} s; it must be finite and greater than 0")
+        if min(counts.values()) < 1:
+            listed = ", ".join(f"{name} = {count}" for name, count in counts.items())
+            raise InputError(f"{listed}; {'both' if len(counts) > 1 else 'it'} must be at least 1")
+
     def _respond(
         self,
         parameters: Mapping[str, float],
@@ -131,15 +203,8 @@ class FrictionLaw:
         states: bool,
     ) -> tuple[Floats, ...]:
         """M_fr and, with `states`, z and c."""
-        if self._unit is None:
-            raise ValueError("this friction law is closed")
-        speeds = np.ascontiguousarray(n, dtype=np.float64)
-        if speeds.ndim != 1 or not speeds.size:
-            raise InputError(f"speeds: shape {speeds.shape}; a row of at least one is needed")
-        if not 0.0 < h < np.inf:
-            raise InputError(f"time between speeds: {h} s; it must be finite and greater than 0")
-        if substeps < 1 or every < 1:
-            raise InputError(f"substeps = {substeps}, every = {every}; both must be at least 1")
+        speeds = self._row(n, "speeds", 1)
+        self._check_steps(h, "speeds", substeps=substeps, every=every)
         values = self._ordered(parameters)
         rows = (speeds.size - 1) // every + 1
         table = np.empty((3 if states else 1, rows))

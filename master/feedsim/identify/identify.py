@@ -11,6 +11,7 @@ from time import perf_counter
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.identify.balance import Balance, FreeAxis, balanced
 from feedsim.identify.flexible import with_structure
 from feedsim.identify.inertia import Inertia, inertia
 from feedsim.identify.level import QUANTITIES
@@ -80,10 +81,18 @@ class Options:
                 raise InputError(f"{name} cannot be held and free at once")
 
 
-def identify(records: Sequence[Record], law: Law, options: Options, progress: Progress | None = None) -> Identification:
+def identify(
+    records: Sequence[Record],
+    law: Law,
+    options: Options,
+    progress: Progress | None = None,
+    *,
+    free_axis: FreeAxis | None = None,
+) -> Identification:
     """Friction parameters of one axis.
 
-    law: the friction model as a function of the speed. Stage 1 takes every stretch at constant speed; stage 2 takes the
+    law: the friction model as a function of the speed; free_axis: as what holds back a rigid axis, for records of
+    general motion, whose F_C and M_0 are then taken from the position in open loop (balance.py). Stage 1 takes every stretch at constant speed; stage 2 takes the
     records with sines or, where there are none, all whose axis reverses. Stage 1 enters stage 2 as a prior, unless both
     are of the same records. Either may be absent; what it would tell is then held, with the reason.
 
@@ -93,15 +102,23 @@ def identify(records: Sequence[Record], law: Law, options: Options, progress: Pr
         raise InputError("no records to identify from")
     if options.modes is not None:
         records = [with_structure(record, options.modes, options.axis) for record in records]
-    run = _Run(records, law, options, progress or (lambda what, done, total: None))
+    run = _Run(records, law, options, progress or (lambda what, done, total: None), free_axis)
     return run.result()
 
 
 class _Run:
     """One identification: steps, how long each took, and what there is to say."""
 
-    def __init__(self, records: Sequence[Record], law: Law, options: Options, progress: Progress) -> None:
+    def __init__(
+        self,
+        records: Sequence[Record],
+        law: Law,
+        options: Options,
+        progress: Progress,
+        free_axis: FreeAxis | None,
+    ) -> None:
         self.records, self.law, self.options, self.progress = records, law, options, progress
+        self.free_axis = free_axis
         self.seconds: dict[str, float] = {}
         self.warnings: list[str] = []
         self.advice: list[str] = []
@@ -125,7 +142,9 @@ class _Run:
             raise InputError(
                 "the records tell no friction: " + "; ".join(self.reasons[stage] for stage in sorted(self.reasons))
             )
-        estimates = self._merged(first, second, J)
+        with self._timed("open loop"):
+            balance = self._balanced(self._merged(first, second, J)) if second is not None else None
+        estimates = balance.estimates if balance is not None else self._merged(first, second, J)
         for stage in (first, second):
             for text in stage.warnings if stage is not None else ():
                 if not any(text in said for said in self.warnings):  # a reason that stage 2 hands on from stage 1
@@ -142,6 +161,7 @@ class _Run:
             advice=tuple(dict.fromkeys(self.advice)),
             seconds=self.seconds,
             rigid=rigid.estimates if rigid is not None else {},
+            balance=balance,
         )
 
     def _plateaus(self, J: float) -> tuple[Plateau, ...]:
@@ -210,6 +230,22 @@ class _Run:
             self.reasons[2] = str(error)
             self.warnings.append(f"no pre-sliding parameters: {error}")
             return None
+
+    def _balanced(self, estimates: Mapping[str, Estimate]) -> Balance | None:
+        """F_C and M_0 from the position in open loop, where stage 2 was fitted to general motion."""
+        if self.free_axis is None:
+            return None
+        self.progress("open loop", 0, 1)
+        found = balanced(
+            transitions(self.records),
+            self.free_axis,
+            estimates,
+            self.law,
+            hold=self.options.hold,
+            I_P=self.options.I_P,
+        )
+        self.progress("open loop", 1, 1)
+        return found
 
     def _rigid(self, records: Sequence[Record]) -> Inertia | None:
         """Inverse dynamics; None where the records tell no inertia."""

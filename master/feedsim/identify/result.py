@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import nan
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from feedsim.identify.balance import Balance
 
 Array = NDArray[np.float64]
 
@@ -154,9 +157,10 @@ class Identification:
         I_P: lead [m/rad], for values at the slide.
         estimates: the final set, by name: every friction parameter, M_0, J, delay.
         correlation: of all estimated together.
-        seconds: wall time per step ("reading", "inertia", "plateaus", "stage 1", "stage 2").
+        seconds: wall time per step ("reading", "inertia", "plateaus", "stage 1", "stage 2", "open loop").
         rigid: the simple model beside it, by inverse dynamics of all records: J, sigma_2, F_C, M_0; empty where the
             records tell no inertia.
+        balance: F_C and M_0 from the position in open loop; None where that was not asked for.
     """
 
     axis: str
@@ -169,3 +173,4 @@ class Identification:
     advice: tuple[str, ...]
     seconds: Mapping[str, float]
     rigid: Mapping[str, Estimate] = field(default_factory=dict)
+    balance: Balance | None = None

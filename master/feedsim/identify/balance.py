@@ -1,0 +1,368 @@
+"""Step 3, for records of general motion: constant load and Coulomb friction from the position in open loop.
+
+Stage 2 compares torques. To it 1 % of the friction that is wrong all through the record weighs no more than 1 % that
+changes its sign with every turn of the screw; where its model lacks something (ripple, a load that drifts) it gives
+F_C and M_0 what suits the rest. A position is the second integral of the torque: driven by the recorded torque, the
+model drifts away by millimetres from an error that is lost in the torque's residual. All of that drift is at the lowest
+frequencies, where M_0 and F_C act (in both directions, and against each) and the other parameters hardly do: those are
+left to the inverse dynamics, these two to the position.
+
+Therefore M_0 and F_C are estimated once more by least squares on the position in open loop: recorded angle less the
+angle that a rigid axis with this friction reaches under the recorded torque, from the recorded speed at the start.
+F_S moves by as much as F_C, and all else is held. The step refuses itself where the drift is no such evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil, inf, isfinite, nan, sqrt
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.errors import InputError, SimulationError
+from feedsim.identify.fit import Fit, Parameter, Residuals, fit
+from feedsim.identify.level import level
+from feedsim.identify.parameters import FRICTION
+from feedsim.identify.record import Record
+from feedsim.identify.result import NORMAL_95, Estimate
+from feedsim.identify.torque import Law, RecordTorque, deflection
+
+Array = NDArray[np.float64]
+
+SHORTEST = 3.0  # [s]: in less the drift of a wrong torque hardly shows beside the error of the first speed
+SLIDING = 20.0  # times the way of pre-sliding (bristles and engaging zone) that a move must be long
+LEAST_GAIN = 0.02  # of the position's rms that must be won
+FRICTION_MOVES = 0.2  # of F_C, and
+LOAD_MOVES = 1.0  # of F_C: changes of F_C and M_0 beyond which something else is wrong
+ROW, ROW_STEP = 12, 0.025  # values of F_C to either side that are tried, and their distance, of F_C
+TORQUE_GROWS = 0.1  # of the torque residual's rms: what the position may cost
+STEP = 0.25  # of the quickest time of bristles and inertia: the longest step of the free axis, which goes explicitly
+MOST_STEPS = 32  # per interval: beyond that the bristles are too stiff to be told by this record
+START = 0.01, 9  # [s], rows, whichever is more: what the cubic for the first speed goes through
+OUTLIER = 5.0  # standard deviations from that cubic that no sample of it may lie off
+NEEDED = (*FRICTION, "M_0", "J")
+
+
+class FreeAxis(Protocol):
+    """Angle and speed, each (N + 1,), of a rigid axis from 0 on under the torque M_a (N,) [N.m], held for h [s] each:
+    J dn/dt = M_a - M_0 - M_fr, from the speed n [rad/s] and the bristle deflection z [rad] on."""
+
+    def __call__(
+        self,
+        parameters: Mapping[str, float],
+        J: float,
+        M_0: float,
+        M_a: Array,
+        h: float,
+        *,
+        n: float = 0.0,
+        z: float = 0.0,
+        substeps: int = 1,
+    ) -> tuple[Array, Array]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """What the step found.
+
+    Attributes:
+        estimates: all that were given; where it was applied, with the new F_C, F_S and M_0. Their standard deviation is
+            no less than what puts the value before at the end of the interval of 95 %: two criteria disagree by that.
+        applied: whether the values are new. reason: why not; empty where they are.
+        records: names of those that it looked at.
+        position: rms of the angle in open loop [rad], before and after; torque: rms of the torque residual [N.m] at the
+            rows of stage 2, before and after. After is what was tried where it was refused; nan where nothing was.
+        I_P: lead [m/rad], nan where it was not given.
+    """
+
+    estimates: Mapping[str, Estimate]
+    applied: bool
+    reason: str
+    records: tuple[str, ...] = ()
+    position: tuple[float, float] = (nan, nan)
+    torque: tuple[float, float] = (nan, nan)
+    I_P: float = nan
+
+    @property
+    def position_at_slide(self) -> tuple[float, float]:
+        """Rms of the position in open loop [m], before and after."""
+        return self.position[0] * self.I_P, self.position[1] * self.I_P
+
+    @property
+    def torque_change(self) -> float:
+        """What it costs in the rms of the torque residual [N.m]."""
+        return self.torque[1] - self.torque[0]
+
+
+def balanced(
+    records: Sequence[Record],
+    free_axis: FreeAxis,
+    estimates: Mapping[str, Estimate],
+    law: Law,
+    *,
+    hold: Collection[str] = (),
+    I_P: float | None = None,
+) -> Balance:
+    """F_C and M_0 from the position in open loop.
+
+    Args:
+        records: of general motion, motor side. Those with sines, of small moves, without a position or shorter than
+            `SHORTEST` are left out.
+        free_axis, law: the friction model as it moves an axis, and as a torque (for the residual of the torque).
+        estimates: every friction parameter, M_0, J, and the delay of the torque (0 where it is missing). The recorded
+            torque is that of `delay` earlier; one that is held over the coming interval h has the delay -h/2.
+        hold: names that keep their value: the user's word. An estimate that is not `estimated` keeps its own, except
+            for F_S, which goes with F_C.
+
+    Raises InputError: an estimate is missing, or a parameter that the law refuses.
+    """
+    missing = [name for name in NEEDED if name not in estimates]
+    if missing:
+        raise InputError(f"open loop: no value of {', '.join(missing)}")
+    values = {name: each.value for name, each in estimates.items()}
+    values.setdefault("delay", 0.0)
+    lead = nan if I_P is None else I_P
+
+    def refused(reason: str, **seen: tuple[float, float]) -> Balance:
+        return Balance(estimates, False, reason, tuple(each.record.name for each in axes), I_P=lead, **seen)
+
+    axes: list[_OpenLoop] = []
+    free = [name for name in ("M_0", "F_C") if name not in hold and estimates[name].status == "estimated"]
+    if not free:
+        return refused("neither F_C nor M_0 is free")
+    whys = []
+    directions: set[float] = set()
+    for record in records:
+        model = None if record.angle is None else _model(record, law)
+        why = _unfit(record, model, values)
+        if why:
+            whys.append(f"{record.name}: {why}")
+        elif model is not None:
+            axes.append(_OpenLoop(record, model, free_axis))
+            directions |= _directions(model)
+    if not axes:
+        return refused("; ".join(whys) or "no records")
+    if len(free) > 1 and len(directions) < 2:
+        return refused("motion in one direction only does not tell load from friction")
+
+    def moved(found: Mapping[str, float]) -> dict[str, float]:
+        new = values | dict(found)
+        if "F_S" not in hold:
+            # max: where both are one, their sums with a difference need not be.
+            new["F_S"] = max(new["F_S"] + (new["F_C"] - values["F_C"]), new["F_C"])
+        return new
+
+    def residuals(found: Mapping[str, float]) -> Array:
+        return np.concatenate([axis.residual(moved(found)) for axis in axes])
+
+    if any(substeps(values, axis.record.interval) > MOST_STEPS for axis in axes):
+        return refused("sigma_0 or sigma_1 is so large that the axis cannot be moved by the recorded torque")
+    try:
+        before = _rms(residuals({}))  # here the law refuses what it does
+    except SimulationError as error:
+        return refused(f"the axis cannot be moved by the recorded torque: {error}")
+    try:
+        found = _solve(residuals, values, free, "F_S" in hold)
+    except (SimulationError, InputError) as error:
+        return refused(f"no least squares in open loop: {error}")
+    new = moved(found)
+    position = before, _rms(residuals(found))
+    torque = _torque_rms(axes, values), _torque_rms(axes, new)
+    why = _doubt(values, new, position, torque)
+    if why:
+        return refused(why, position=position, torque=torque)
+    changed = {
+        name: _changed(estimates[name], new[name]) for name in ("F_C", "F_S", "M_0") if new[name] != values[name]
+    }
+    names = tuple(axis.record.name for axis in axes)
+    return Balance({**estimates, **changed}, True, "", names, position, torque, lead)
+
+
+class _OpenLoop:
+    """One record: where the model goes under its torque."""
+
+    def __init__(self, record: Record, model: RecordTorque, free_axis: FreeAxis) -> None:
+        assert record.angle is not None
+        self.record, self.model, self.free_axis = record, model, free_axis
+        self.angle = record.angle
+        first, self.n = first_speed(self.angle, record.interval)
+        self.origin = float(first)
+        self._torque: tuple[float, Array] | None = None
+
+    def residual(self, values: Mapping[str, float]) -> Array:
+        """(N,) recorded less reached angle [rad]."""
+        torque, h = self.torque(values["delay"]), self.record.interval
+        parameters = {name: values[name] for name in FRICTION}
+        z = first_deflection(values, self.n, float(torque[0]) - values["M_0"])
+        steps = substeps(values, h)
+        angle, _ = self.free_axis(parameters, values["J"], values["M_0"], torque, h, n=self.n, z=z, substeps=steps)
+        return np.asarray(self.angle - self.origin - angle, dtype=np.float64)
+
+    def torque(self, delay: float) -> Array:
+        """(N - 1,) motor torque less known load [N.m] in the middle of every interval."""
+        if self._torque is None or self._torque[0] != delay:
+            time, h = self.record.time, self.record.interval
+            middle = time[:-1] + h / 2
+            torque = np.interp(middle + delay, time, self.record.torque)
+            if self.record.load is not None:
+                torque = torque - np.interp(middle, time, self.record.load)
+            self._torque = delay, np.asarray(torque, dtype=np.float64)
+        return self._torque[1]
+
+
+def first_speed(angle: Array, h: float) -> tuple[float, float]:
+    """Angle and speed at the first of the instants h apart, by a cubic through the first ones; samples far off it are
+    left out."""
+    count = min(max(ceil(START[0] / h), START[1]), len(angle))
+    t = np.arange(count) / max(count - 1, 1)
+    columns, first = np.vander(t, 4, increasing=True), angle[:count]
+
+    def through(weights: Array) -> tuple[Array, Array]:
+        root = np.sqrt(weights)
+        shape = np.linalg.lstsq(columns * root[:, None], first * root, rcond=None)[0]
+        return np.asarray(shape, dtype=np.float64), np.asarray(np.abs(first - columns @ shape), dtype=np.float64)
+
+    # Smallest sum of distances, by least squares over and over, so that a sample far off does not bend the cubic.
+    weights = np.ones(count)
+    least = 1e-9 * max(float(np.ptp(first)), 1e-30)
+    for _ in range(30):
+        _, off = through(weights)
+        weights = least / np.maximum(off, least)
+    scatter = float(np.median(off)) / 0.6745
+    kept = off <= max(OUTLIER * scatter, 10 * least)
+    shape, _ = through(kept.astype(np.float64) if np.count_nonzero(kept) >= 6 else np.ones(count))
+    return float(shape[0]), float(shape[1]) / (h * max(count - 1, 1))
+
+
+def first_deflection(values: Mapping[str, float], n: float, torque: float) -> float:
+    """z [rad] at the start. Where the axis moves that far within `START`, it is that of sliding; else what holds the
+    torque [N.m] on it, the transmission half engaged (c = 0), as far as bristles can."""
+
+    def most(side: float) -> float:
+        return (1 + values["asymmetry"] * side) * float(level(values, np.array([n]))[0]) / values["sigma_0"]
+
+    if abs(n) * START[0] > most(float(np.sign(n))):
+        return float(np.sign(n)) * most(float(np.sign(n)))
+    share = 1.0 if values["W"] == 0 else values["gamma"] + (1 - values["gamma"]) / 2
+    return float(np.clip(torque / (share * values["sigma_0"]), -most(-1.0), most(1.0)))
+
+
+def substeps(values: Mapping[str, float], h: float) -> int:
+    """Steps of the free axis per interval: what friction and inertia exchange has to be slow against them."""
+    damping = (values["sigma_1"] + values["sigma_2"]) / values["J"]
+    stiffness = sqrt(values["sigma_0"] / values["J"])
+    return max(1, ceil(h * max(damping, stiffness) / STEP))
+
+
+def _model(record: Record, law: Law) -> RecordTorque | None:
+    try:
+        return RecordTorque(record, law)
+    except InputError:  # too short for a motion
+        return None
+
+
+def _unfit(record: Record, model: RecordTorque | None, values: Mapping[str, float]) -> str:
+    """Why a record tells nothing in open loop."""
+    duration = record.interval * (len(record) - 1)
+    if record.angle is None:
+        return "no position"
+    if duration < SHORTEST or model is None:
+        return f"{duration:.3g} s are too short; at least {SHORTEST:g} s are needed"
+    if not model.parts:
+        return "nothing moves"
+    if any(part.kind == "sine" for part in model.parts):
+        return "sines; the open loop needs general motion"
+    way = SLIDING * max(deflection(values), values["W"])
+    if max(2 * part.amplitude for part in model.parts) < way:
+        return f"no move is longer than {SLIDING:g} times the way of pre-sliding"
+    return ""
+
+
+def _directions(model: RecordTorque) -> set[float]:
+    """Signs of the speeds that count."""
+    speed = model.motion.coarse()
+    return {float(side) for side in np.unique(np.sign(speed[np.abs(speed) > 0.1 * float(np.max(np.abs(speed)))]))}
+
+
+def _solve(residuals: Residuals, values: Mapping[str, float], free: Sequence[str], below: bool) -> dict[str, float]:
+    """The least squares. Whether the model still sticks or already slips where the record all but stops changes the
+    drift from there on: there are several minima over F_C. Therefore M_0 is fitted along a row of F_C first."""
+
+    def best(held: Mapping[str, float], started: Mapping[str, float], names: Sequence[str], tolerance: float) -> Fit:
+        return fit(
+            lambda found: residuals({**held, **found}),
+            [_parameter(name, values, started[name], below) for name in names],
+            normalised=False,
+            difference=1e-4,  # small against what a change is worth, large against rounding over the record
+            tolerance=tolerance,
+            limit=30,
+        )
+
+    begin = {name: values[name] for name in free}
+    if "F_C" in free:
+        found: list[tuple[float, dict[str, float]]] = []
+        low, high = _room("F_C", values, below)
+        for side in (1, -1):
+            now = dict(begin)
+            for k in range(ROW + 1):
+                now["F_C"] = min(max((1 + side * k * ROW_STEP) * values["F_C"], low), high)
+                if "M_0" in free:
+                    now["M_0"] = best({"F_C": now["F_C"]}, now, ["M_0"], 1e-4)["M_0"]
+                found.append((_rms(residuals(now)), dict(now)))
+        begin = min(found, key=lambda each: each[0])[1]
+    return best({}, begin, free, 1e-8).mapping()
+
+
+def _room(name: str, values: Mapping[str, float], below_static: bool) -> tuple[float, float]:
+    """Bounds: enough to see a change that is too large."""
+    F_C = values["F_C"]
+    if name == "M_0":
+        return values["M_0"] - 2 * LOAD_MOVES * F_C, values["M_0"] + 2 * LOAD_MOVES * F_C
+    upper = (1 + 2 * FRICTION_MOVES) * F_C
+    return (1 - 2 * FRICTION_MOVES) * F_C, max(min(upper, values["F_S"]), F_C * (1 + 1e-9)) if below_static else upper
+
+
+def _parameter(name: str, values: Mapping[str, float], start: float, below_static: bool) -> Parameter:
+    return Parameter(name, start, *_room(name, values, below_static), scale=values["F_C"])
+
+
+def _torque_rms(axes: Sequence[_OpenLoop], values: Mapping[str, float]) -> float:
+    """Of the torque residual over all records [N.m]."""
+    found = []
+    for axis in axes:
+        # As shares of what is possible, in the words of the model.
+        z = first_deflection(values, axis.n, float(axis.torque(values["delay"])[0]) - values["M_0"])
+        share = min(max(z / deflection(values), -1.0), 1.0)
+        found.append(axis.model.residual(values, share, 0.0))
+    return _rms(np.concatenate(found))
+
+
+def _doubt(
+    old: Mapping[str, float], new: Mapping[str, float], position: tuple[float, float], torque: tuple[float, float]
+) -> str:
+    """Why a result is not taken; empty where it is."""
+    friction, load = new["F_C"] / old["F_C"] - 1, (new["M_0"] - old["M_0"]) / old["F_C"]
+    if not all(isfinite(each) for each in (*position, *torque)):
+        return "the position in open loop is no number"
+    if not position[1] < (1 - LEAST_GAIN) * position[0]:
+        return f"the position in open loop does not improve ({position[0]:.4g} rad to {position[1]:.4g} rad rms)"
+    if abs(friction) > FRICTION_MOVES:
+        return f"F_C would change by {100 * friction:+.0f} %; more than {100 * FRICTION_MOVES:.0f} % is not believed"
+    if abs(load) > LOAD_MOVES:
+        return f"M_0 would change by {load:+.2g} times F_C; more than {LOAD_MOVES:g} is not believed"
+    growth = torque[1] / torque[0] - 1 if torque[0] > 0 else inf
+    if growth > TORQUE_GROWS:
+        return f"the torque's residual would grow by {100 * growth:.0f} %; allowed are {100 * TORQUE_GROWS:.0f} %"
+    return ""
+
+
+def _changed(before: Estimate, value: float) -> Estimate:
+    least = abs(value - before.value) / NORMAL_95
+    return replace(before, value=value, sigma=max(before.sigma, least) if isfinite(before.sigma) else before.sigma)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

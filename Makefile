@@ -30,7 +30,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-sanitize test-sanitize-scenario test-valgrind fmus lint format reference check-reference bench pose-study lock ansys clean
+.PHONY: help run test test-c test-python test-sanitize test-sanitize-scenario test-valgrind fmus lint format reference check-reference bench pose-study identification-study lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-16s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -121,6 +121,9 @@ bench: fmus $(VENV)/.run ## measure the units and the master loop
 
 pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full model (some minutes; docs/position-dependence.md)
 	$(PY) benchmarks/pose_grid.py
+
+identification-study: fmus $(VENV)/.run ## how far identified parameters can be trusted, Monte Carlo (some ten minutes; docs/identification.md)
+	$(PY) benchmarks/identification.py
 
 # --- keep ----------------------------------------------------------------------------------------------------------
 

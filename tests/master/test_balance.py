@@ -129,6 +129,14 @@ def test_finds_what_the_axis_was_made_with(general: Record, law: FrictionLaw) ->
     assert balance.torque_change < 0 < balance.torque[1]  # nothing else is wrong: the torque gains too
     others = set(given) - {"F_C", "F_S", "M_0"}
     assert all(balance.estimates[name] is given[name] for name in others)
+    for name in ("F_C", "F_S", "M_0"):
+        assert balance.changes[name] == (given[name].value, balance.estimates[name].value)
+    (drift,) = balance.drifts
+    assert (drift.record, len(drift.time)) == ("axis", len(general))
+    assert general.angle is not None
+    assert np.ptp(drift.angle) == pytest.approx(np.ptp(general.angle))
+    for error, rms in zip((drift.before, drift.after), balance.position, strict=True):
+        assert np.sqrt(np.mean(error**2)) == pytest.approx(rms)
 
 
 def test_says_how_far_both_criteria_are_apart(general: Record, law: FrictionLaw) -> None:
@@ -241,6 +249,9 @@ def test_sines_are_left_to_stage_2(law: FrictionLaw) -> None:
     record = driven(lambda t: 0.8 * float(np.sin(2 * pi * 2.0 * t)), 4.0)
     given = estimates(OFF)
     assert_refused(found(record, law, given), given, "sines")
+    assert not found(record, law, given).applies
+    assert not found(record, law, given, hold=("F_C", "M_0")).applies
+    assert found([record, replace(record, angle=None)], law, given).applies  # that one is for want of a position
 
 
 def test_one_direction(law: FrictionLaw) -> None:
@@ -265,6 +276,8 @@ def test_changes_that_are_not_believed(general: Record, law: FrictionLaw, off: d
     balance = found(general, law, given)
     assert_refused(balance, given, words)
     assert balance.position[1] < 0.5 * balance.position[0]  # it was tried
+    assert balance.changes["F_C"][0] == given["F_C"].value
+    assert len(balance.drifts) == 1
 
 
 def test_a_torque_that_grows_too_much(general: Record, law: FrictionLaw) -> None:

@@ -277,6 +277,26 @@ def test_no_record_counts_twice(calls: dict[str, Any], monkeypatch: pytest.Monke
     assert found.correlation.names == tuple(name for name in ORDER if name in alone.correlation.names)
 
 
+@pytest.mark.parametrize("record", ["sine.csv", "constant.csv"])
+def test_doubts_of_stage_1_count_where_it_is_used(
+    calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch, record: str
+) -> None:
+    own = stationary(estimates())
+    plateaus = tuple(replace(p, record=record) for p in own.plateaus)
+    doubtful = replace(own, plateaus=plateaus, warnings=("3 speeds only",))
+    monkeypatch.setattr(room, "stationary", lambda *words, **more: doubtful)
+    alone = replace(dynamic(estimates()), estimates=estimates(), warnings=("gamma: vague",))
+    monkeypatch.setattr(room, "dynamic", lambda *words, **more: alone)
+    found = identify(records(), no_law, options())
+    assert found.prior == (record == "constant.csv")
+    assert ("3 speeds only" in found.warnings) == found.prior
+    assert "gamma: vague" in found.warnings
+    assert found.stationary is doubtful
+    # Stage 1 alone is what there is: its doubts are those of the result.
+    monkeypatch.setattr(room, "transitions", lambda records: ())
+    assert "3 speeds only" in identify(records(), no_law, options()).warnings
+
+
 def test_nothing_to_be_found(calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "plateaus", lambda record, J: ())
     monkeypatch.setattr(room, "transitions", lambda records: ())

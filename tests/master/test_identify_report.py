@@ -15,24 +15,39 @@ import pytest
 from test_report import Page
 
 from feedsim.errors import OutputError
+from feedsim.identify.balance import Balance
 from feedsim.identify.result import NORMAL_95, Correlation, Estimate, Identification
 from feedsim.report import (
     check_identification_writable,
     constant_load_hint,
     identification_headline,
     identification_table,
+    identification_warnings,
+    open_loop_line,
     rigid_line,
     write_identification,
 )
 from feedsim.report.identify.account import at_slide, curve_error, interval_text, relative_text, value_text
 from feedsim.report.identify.correlation_plot import correlation_picture
 from feedsim.report.identify.loop_plots import _length, describe, loops_picture, residuals_picture
+from feedsim.report.identify.open_loop_plot import open_loop_picture
 from feedsim.report.identify.page import page
 from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_picture
 from feedsim.report.provenance import friction_origins
 from feedsim.scenario import load_machine
 from feedsim.scenario.friction_file import read_friction
-from identification_helpers import I_P, M_0, TRUE, J, account, identification, provenance, records, stretch
+from identification_helpers import (
+    I_P,
+    M_0,
+    TRUE,
+    J,
+    account,
+    balance,
+    identification,
+    provenance,
+    records,
+    stretch,
+)
 from report_helpers import contents
 from scenario_helpers import MACHINE
 
@@ -155,6 +170,101 @@ def test_page(written: Path) -> None:
     assert f"{300e-6 / I_P**2:.3f}"[:4] in words_of_page
 
 
+def open_loop_text(found: Identification) -> str:
+    """The section of the page, without its tags."""
+    text = page(account(found=found), [])
+    start = text.index('id="position-in-open-loop"')
+    return re.sub(r"<[^>]+>", " ", text[start : text.index("<h2", start)])
+
+
+def test_position_in_open_loop(tmp_path: Path) -> None:
+    found = identification(balance=balance())
+    write_identification(account(found=found), tmp_path)
+    before = balance().position[0]
+    assert open_loop_line(found) == (
+        f"position off by {100 * before * I_P:.3g} mm rms instead of {1e3 * before * I_P:.3g} mm; "
+        "F_C and F_S -4 %, M_0 +0.01 N.m; torque residual +2 %"
+    )
+    part = told(tmp_path)["open_loop"]
+    assert (part["applied"], part["reason"], part["records"]) == (True, "", ["move.csv"])
+    assert part["position"]["before"] == before
+    assert part["position"]["at_slide"] == {
+        "before": pytest.approx(before * I_P), "after": pytest.approx(0.1 * before * I_P), "unit": "m"
+    }  # fmt: skip
+    assert part["torque"]["after"] == 0.051
+    assert part["changes"]["M_0"] == {"before": 0.24, "after": 0.25, "unit": "N.m"}
+    assert read_friction(tmp_path / "friction.yaml").identified["open_loop"] == open_loop_line(found)
+    text = open_loop_text(found)
+    for words in ("Applied", f"{before:.4g}", f"{1e3 * before * I_P:.4g}", "+2 %", "−4 %", "+0.01 N·m", "1.667"):
+        assert words in text, words
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert '<figure id="open-loop">' in report
+    assert "open_loop.csv" in report
+    with (tmp_path / "open_loop.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["record", "time [s]", "angle [rad]", "error before [rad]", "error after [rad]"]
+    drift = balance().drifts[0]
+    for column, values in zip((1, 2, 3, 4), (drift.time, drift.angle, drift.before, drift.after), strict=True):
+        assert [float(row[column]) for row in rows[1:]] == list(values)
+    write_identification(account(), tmp_path)
+    assert not (tmp_path / "open_loop.csv").exists()
+
+
+def test_open_loop_that_was_tried_and_refused(tmp_path: Path) -> None:
+    found = identification(balance=balance(applied=False, reason="F_C would change by +23 %"))
+    write_identification(account(found=found), tmp_path)
+    assert open_loop_line(found) == "not applied: F_C would change by +23 %"
+    text = open_loop_text(found)
+    assert "Not applied: F_C would change by +23 %." in text
+    assert "Tried" in text
+    assert told(tmp_path)["open_loop"]["applied"] is False
+    assert (tmp_path / "figures" / "open-loop.png").exists()
+
+
+def test_open_loop_is_not_spoken_of_where_it_is_none(tmp_path: Path) -> None:
+    sines = Balance({}, False, "sine.csv: sines; the open loop needs general motion", applies=False)
+    found = identification(balance=sines)
+    write_identification(account(found=found), tmp_path)
+    assert open_loop_line(found) == ""
+    assert "sine.csv: sines" in open_loop_text(found)
+    assert "rms" not in open_loop_text(found)
+    part = told(tmp_path)["open_loop"]
+    assert part["applies"] is False
+    assert part["position"]["before"] is None
+    assert "open_loop" not in read_friction(tmp_path / "friction.yaml").identified
+    assert not (tmp_path / "open_loop.csv").exists()
+    assert open_loop_line(identification()) == ""
+    assert "open-loop" not in page(account(), [])
+
+
+def test_doubts_of_a_stage_1_that_was_not_used(tmp_path: Path) -> None:
+    stage = identification().stationary
+    assert stage is not None
+    doubtful = replace(stage, warnings=("F_log sits at its bound 0",))
+    apart = account(found=identification(stationary=doubtful, prior=False))
+    write_identification(apart, tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert text.index("<main>") < text.index("F_log sits at its bound 0")  # in its section, not above all
+    assert told(tmp_path)["curve"]["warnings"] == ["F_log sits at its bound 0"]
+    assert told(tmp_path)["curve"]["used"] is False
+    assert "F_log sits at its bound 0" not in told(tmp_path)["warnings"]
+    assert identification_headline(apart).startswith("curve of stage 1 alone within")
+    assert 'id="stage-1"' not in page(account(found=identification(stationary=doubtful)), [])
+
+
+def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
+    found = identification()
+    vague = replace(found.estimates["F_S"], status="undetermined", reason="known to +-281 % only (95 %)")
+    also = replace(found.estimates["v_s"], status="undetermined", reason="no Stribeck effect shows")
+    both = {**found.estimates, "F_S": vague, "v_s": also}
+    repeating = ("F_S: known to +-281 % only (95 %)", "v_s is not estimated but held at 2: no Stribeck effect shows",
+                 "F_S and W: known to +-281 % only (95 %)")  # fmt: skip
+    telling = ("sigma_1 is known to 6.7 % only", "W: known to +-281 % only (95 %)", "no Stribeck effect shows")
+    whole = account(found=replace(found, estimates=both, warnings=(*repeating, *telling)))
+    assert identification_warnings(whole) == list(telling)
+    assert whole.warnings == [*repeating, *telling]
+
+
 @pytest.mark.parametrize("absent", ["stationary", "dynamic", "both warnings"])
 def test_a_stage_may_be_absent(tmp_path: Path, absent: str) -> None:
     changes: dict[str, Any] = {absent: None} if absent != "both warnings" else {"warnings": (), "advice": ()}
@@ -190,6 +300,19 @@ def test_table_for_the_terminal() -> None:
     assert any(re.fullmatch(r"  F_C +1\.6000 N\.m +1\.5956 to 1\.6044 +0\.27 %", line) for line in lines)
     assert any(line.startswith("  delay") and "0.50 ms" in line for line in lines)
     assert all(line.isascii() and len(line) <= 120 for line in lines)
+
+
+def test_reasons_are_cut_at_a_word() -> None:
+    found = identification()
+    reason = "the first words say what matters and all others may as well be left out where there is no room for them"
+    long = {**found.estimates, "W": replace(found.estimates["W"], status="undetermined", reason=reason)}
+    lines = identification_table(account(found=replace(found, estimates=long)))
+    (line,) = (line for line in lines if line.startswith("  W "))
+    said = line[line.index("undetermined: ") + len("undetermined: ") :].removesuffix(" ...")
+    assert line.endswith(" ...")
+    assert len(line) <= 120
+    assert reason.startswith(f"{said} ")
+    assert len(said) > 30
 
 
 @pytest.mark.parametrize(
@@ -295,6 +418,18 @@ class TestFigures:
     def test_units_follow_the_length_of_the_moves(self) -> None:
         assert _length([stretch(20e-6, 5.0, 0.0)], I_P) == (pytest.approx(1e6 * I_P), "µm")
         assert _length([stretch(20e-6, 5.0, 0.0), stretch(0.1, 5.0, 0.0)], I_P) == (pytest.approx(1e3 * I_P), "mm")
+
+    def test_open_loop(self) -> None:
+        once = balance()
+        picture = open_loop_picture(self.found, once)
+        assert picture is not None
+        assert "not shown" not in picture.caption
+        assert "not taken" not in picture.caption
+        many = open_loop_picture(self.found, replace(once, drifts=once.drifts * 4, applied=False))
+        assert many is not None
+        assert "1 further records are not shown" in many.caption
+        assert "What was tried was not taken." in many.caption
+        assert open_loop_picture(self.found, replace(once, drifts=())) is None
 
     def test_correlation_leaves_open_what_is_not_known(self) -> None:
         names = ("F_C", "sigma_0", "W")

@@ -117,11 +117,14 @@ def identify(options: Namespace) -> None:
     found = replace(found, seconds=reading | dict(found.seconds))
     account = report.Account(found, records, tuple(sources), subject, _settings(options), date.today().isoformat())
     report.write_identification(account, directory)
-    for warning in account.warnings:
+    # Without the table, all of them: it holds the reasons that some only repeat.
+    for warning in account.warnings if options.quiet else report.identification_warnings(account):
         print(f"feedsim: warning: {warning}", file=sys.stderr)
     if not options.quiet:
         print(f"axis {axis}: {report.identification_headline(account)} -> {directory / 'report.html'}")
         print("\n".join(report.identification_table(account)))
+        if line := report.open_loop_line(found):
+            print(f"  open loop: {line}")
         if line := report.rigid_line(account):
             print(f"  {line}")
         for advice in found.advice:
@@ -213,8 +216,6 @@ def _given(name: str, value: float, reason: str) -> Estimate:
 
 
 def _delay(text: str | None, sources: Sequence[Provenance]) -> float | None:
-    from feedsim.errors import InputError
-
     if text is None:
         delays = {source.torque_delay for source in sources}
         return delays.pop() if len(delays) == 1 else None

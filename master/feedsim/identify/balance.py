@@ -15,9 +15,9 @@ F_S moves by as much as F_C, and all else is held. The step refuses itself where
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import ceil, inf, isfinite, nan, sqrt
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,7 @@ STEP = 0.25  # of the quickest time of bristles and inertia: the longest step of
 MOST_STEPS = 32  # per interval: beyond that the bristles are too stiff to be told by this record
 START = 0.01, 9  # [s], rows, whichever is more: what the cubic for the first speed goes through
 OUTLIER = 5.0  # standard deviations from that cubic that no sample of it may lie off
+SINES = "sines; the open loop needs general motion"
 NEEDED = (*FRICTION, "M_0", "J")
 
 
@@ -65,6 +66,22 @@ class FreeAxis(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class Drift:
+    """One record in open loop.
+
+    Attributes:
+        time (N,) [s]; angle (N,): recorded, from the start on [rad].
+        before, after: (N,) recorded less reached angle [rad]; after with what was tried where the step was refused.
+    """
+
+    record: str
+    time: Array
+    angle: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Balance:
     """What the step found.
 
@@ -76,6 +93,9 @@ class Balance:
         position: rms of the angle in open loop [rad], before and after; torque: rms of the torque residual [N.m] at the
             rows of stage 2, before and after. After is what was tried where it was refused; nan where nothing was.
         I_P: lead [m/rad], nan where it was not given.
+        changes: F_C, F_S and M_0 before and after (what was tried where it was refused); empty where nothing was tried.
+        drifts: the records in open loop; empty where nothing was tried.
+        applies: False where all records are of sines, which the step is not meant for.
     """
 
     estimates: Mapping[str, Estimate]
@@ -85,6 +105,9 @@ class Balance:
     position: tuple[float, float] = (nan, nan)
     torque: tuple[float, float] = (nan, nan)
     I_P: float = nan
+    changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    drifts: tuple[Drift, ...] = ()
+    applies: bool = True
 
     @property
     def position_at_slide(self) -> tuple[float, float]:
@@ -126,25 +149,26 @@ def balanced(
     values.setdefault("delay", 0.0)
     lead = nan if I_P is None else I_P
 
-    def refused(reason: str, **seen: tuple[float, float]) -> Balance:
+    def refused(reason: str, **seen: Any) -> Balance:
         return Balance(estimates, False, reason, tuple(each.record.name for each in axes), I_P=lead, **seen)
 
     axes: list[_OpenLoop] = []
     free = [name for name in ("M_0", "F_C") if name not in hold and estimates[name].status == "estimated"]
-    if not free:
-        return refused("neither F_C nor M_0 is free")
     whys = []
     directions: set[float] = set()
     for record in records:
         model = None if record.angle is None else _model(record, law)
         why = _unfit(record, model, values)
         if why:
-            whys.append(f"{record.name}: {why}")
+            whys.append((record.name, why))
         elif model is not None:
             axes.append(_OpenLoop(record, model, free_axis))
             directions |= _directions(model)
     if not axes:
-        return refused("; ".join(whys) or "no records")
+        sines = bool(whys) and all(why == SINES for _, why in whys)
+        return refused("; ".join(f"{name}: {why}" for name, why in whys) or "no records", applies=not sines)
+    if not free:
+        return refused("neither F_C nor M_0 is free")
     if len(free) > 1 and len(directions) < 2:
         return refused("motion in one direction only does not tell load from friction")
 
@@ -161,7 +185,7 @@ def balanced(
     if any(substeps(values, axis.record.interval) > MOST_STEPS for axis in axes):
         return refused("sigma_0 or sigma_1 is so large that the axis cannot be moved by the recorded torque")
     try:
-        before = _rms(residuals({}))  # here the law refuses what it does
+        start = [axis.residual(moved({})) for axis in axes]  # here the law refuses what it does
     except SimulationError as error:
         return refused(f"the axis cannot be moved by the recorded torque: {error}")
     try:
@@ -169,16 +193,17 @@ def balanced(
     except (SimulationError, InputError) as error:
         return refused(f"no least squares in open loop: {error}")
     new = moved(found)
-    position = before, _rms(residuals(found))
+    end = [axis.residual(new) for axis in axes]
+    position = _rms(np.concatenate(start)), _rms(np.concatenate(end))
     torque = _torque_rms(axes, values), _torque_rms(axes, new)
+    changes = {name: (values[name], new[name]) for name in ("F_C", "F_S", "M_0")}
+    drifts = tuple(axis.drift(*both) for axis, *both in zip(axes, start, end, strict=True))
     why = _doubt(values, new, position, torque)
     if why:
-        return refused(why, position=position, torque=torque)
-    changed = {
-        name: _changed(estimates[name], new[name]) for name in ("F_C", "F_S", "M_0") if new[name] != values[name]
-    }
+        return refused(why, position=position, torque=torque, changes=changes, drifts=drifts)
+    changed = {name: _changed(estimates[name], after) for name, (before, after) in changes.items() if after != before}
     names = tuple(axis.record.name for axis in axes)
-    return Balance({**estimates, **changed}, True, "", names, position, torque, lead)
+    return Balance({**estimates, **changed}, True, "", names, position, torque, lead, changes, drifts)
 
 
 class _OpenLoop:
@@ -200,6 +225,9 @@ class _OpenLoop:
         steps = substeps(values, h)
         angle, _ = self.free_axis(parameters, values["J"], values["M_0"], torque, h, n=self.n, z=z, substeps=steps)
         return np.asarray(self.angle - self.origin - angle, dtype=np.float64)
+
+    def drift(self, before: Array, after: Array) -> Drift:
+        return Drift(self.record.name, self.record.time, self.angle - self.origin, before, after)
 
     def torque(self, delay: float) -> Array:
         """(N - 1,) motor torque less known load [N.m] in the middle of every interval."""
@@ -274,7 +302,7 @@ def _unfit(record: Record, model: RecordTorque | None, values: Mapping[str, floa
     if not model.parts:
         return "nothing moves"
     if any(part.kind == "sine" for part in model.parts):
-        return "sines; the open loop needs general motion"
+        return SINES
     way = SLIDING * max(deflection(values), values["W"])
     if max(2 * part.amplitude for part in model.parts) < way:
         return f"no move is longer than {SLIDING:g} times the way of pre-sliding"

@@ -8,21 +8,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim.identify.parameters import KINDS
+from feedsim.identify.result import NORMAL_95
 from feedsim.identify.search import EXCESS, Solution, outer
 
 # Of the value: a standard deviation above says that even the order of magnitude is open (95 % interval down to 0).
 VAGUE = 0.5
 # A Stribeck peak that is this vague is an artefact of what happens within a few rows of the reversals.
 VAGUE_STRIBECK = 0.25
+GOES_WITH = "goes with"  # begins the reason of a parameter that is only held because another is
 SIGNIFICANT = 2.0  # standard deviations that something must differ from what it would be without
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Parameters that are held from here on, at which values, and why."""
+    """Parameters that are held from here on, at which values, and why.
+
+    name: the one that was judged; what else is held goes with it. reason: about it, without its name.
+    """
 
     held: Mapping[str, float]
+    name: str
     reason: str
+
+    @property
+    def reasons(self) -> dict[str, str]:
+        """For each of those held."""
+        return {name: self.reason if name == self.name else f"{GOES_WITH} {self.name}" for name in self.held}
 
 
 def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = ()) -> Verdict | None:
@@ -58,22 +69,21 @@ def _judge(solution: Solution, name: str) -> tuple[float, Verdict] | None:
     key = EXCESS if name == "F_S" else name
     value = solution.fit[key]
     sigma = solution.sigma(key)
-    what = KINDS[outer(key)].meaning
     if name == "gamma" and value > 1 - SIGNIFICANT * min(sigma, 0.25):
-        reason = f"gamma is {value:.3g}: after reversals the full stiffness acts at once, no engaging zone shows"
-        return np.inf, Verdict({"gamma": 1.0}, reason)
+        reason = f"no engaging zone shows, the full stiffness acts at once after reversals (gamma {value:.3g})"
+        return np.inf, Verdict({"gamma": 1.0}, name, reason)
     if name in ("sigma_1", "sigma_2", "F_log", "F_S") and value <= 1e-9 * max(abs(solution.values["F_C"]), 1e-300):
-        reason = f"{name}: the record fits best without ({what} 0, the least that is physical)"
-        return np.inf, Verdict({name: 0.0}, reason)
+        reason = "the record fits best without (0 is the least that is physical)"
+        return np.inf, Verdict({name: 0.0}, name, reason)
     if not np.isfinite(sigma):
-        return np.inf, Verdict({name: value}, f"{name}: the record does not answer to it")
+        return np.inf, Verdict({name: value}, name, "the record does not answer to it")
     if key in solution.fit.at_bound:
-        reason = f"{name}: the fit ends at the end of its range ({value:.3g} {KINDS[outer(key)].unit})"
-        return np.inf, Verdict({name: value}, reason)
+        reason = f"the fit ends at the end of its range ({value:.3g} {KINDS[outer(key)].unit})"
+        return np.inf, Verdict({name: value}, name, reason)
     if sigma > (VAGUE_STRIBECK if name in ("F_S", "v_s") else VAGUE) * abs(value):
-        of = "F_S - F_C" if name == "F_S" else name
-        reason = f"{name}: the standard deviation would be {100 * sigma / max(abs(value), 1e-300):.0f} % of {of}"
-        return sigma / max(abs(value), 1e-300), Verdict({name: value}, reason)
+        vague = sigma / max(abs(value), 1e-300)
+        of = "F_S - F_C " if name == "F_S" else ""
+        return vague, Verdict({name: value}, name, f"{of}known to +-{100 * NORMAL_95 * vague:.0f} % only (95 %)")
     return None
 
 
@@ -87,4 +97,4 @@ def _complete(judged: Verdict, free: Collection[str], values: Mapping[str, float
     for name in ("sigma_1", "sigma_2", "F_log", "asymmetry"):
         if name in held:
             held[name] = 0.0
-    return Verdict(held, judged.reason)
+    return Verdict(held, judged.name, judged.reason)

@@ -92,9 +92,10 @@ def identify(
     """Friction parameters of one axis.
 
     law: the friction model as a function of the speed; free_axis: as what holds back a rigid axis, for records of
-    general motion, whose F_C and M_0 are then taken from the position in open loop (balance.py). Stage 1 takes every stretch at constant speed; stage 2 takes the
-    records with sines or, where there are none, all whose axis reverses. Stage 1 enters stage 2 as a prior, unless both
-    are of the same records. Either may be absent; what it would tell is then held, with the reason.
+    general motion, whose F_C and M_0 are then taken from the position in open loop (balance.py). Stage 1 takes every
+    stretch at constant speed; stage 2 takes the records with sines or, where there are none, all whose axis reverses.
+    Stage 1 enters stage 2 as a prior, unless both are of the same records. Either may be absent; what it would tell is
+    then held, with the reason.
 
     Raises InputError: no records, neither plateaus nor reversals, or a fit that cannot be made.
     """
@@ -145,16 +146,16 @@ class _Run:
         with self._timed("open loop"):
             balance = self._balanced(self._merged(first, second, J)) if second is not None else None
         estimates = balance.estimates if balance is not None else self._merged(first, second, J)
-        for stage in (first, second):
-            for text in stage.warnings if stage is not None else ():
-                if not any(text in said for said in self.warnings):  # a reason that stage 2 hands on from stage 1
-                    self.warnings.append(text)
+        prior = self.prior or second is None
+        # Doubts of a stage 1 that the estimates do not rest on would be doubts about nothing.
+        self.warnings += first.warnings if first is not None and prior else ()
+        self.warnings += second.warnings if second is not None else ()
         self.advice += second.advice if second is not None else ()
         return Identification(
             axis=options.axis,
             I_P=options.I_P,
             estimates=estimates,
-            correlation=merged_correlation(first if self.prior or second is None else None, second),
+            correlation=merged_correlation(first if prior else None, second),
             stationary=first,
             dynamic=second,
             warnings=tuple(dict.fromkeys(self.warnings)),
@@ -162,6 +163,7 @@ class _Run:
             seconds=self.seconds,
             rigid=rigid.estimates if rigid is not None else {},
             balance=balance,
+            prior=prior,
         )
 
     def _plateaus(self, J: float) -> tuple[Plateau, ...]:
@@ -302,7 +304,7 @@ class _Run:
             if name not in found:
                 found[name] = self._absent(name, found)
         if found["F_S"].value < found["F_C"].value:
-            reason = "the fit puts it below F_C, that is: no rise towards rest is seen"
+            reason = "no rise towards rest is seen: the fit puts it below F_C"
             found["F_S"] = replace(
                 found["F_S"], value=found["F_C"].value, sigma=nan, status="undetermined", reason=reason
             )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.identify.advice import advice
-from feedsim.identify.determined import Verdict, verdict
+from feedsim.identify.determined import GOES_WITH, Verdict, verdict
 from feedsim.identify.fit import Prior, correlation
 from feedsim.identify.motion import noise_of
 from feedsim.identify.parameters import KINDS, PRE_SLIDING, STATIONARY, USUAL
@@ -116,7 +116,7 @@ def dynamic(
     tell("final fit", 0.9)
     found = search.solve(found.values, found.states, base, tolerance=FINAL, limit=40)
     found, base = _told(search, found, base, known, held)
-    result = _result(fine, search, found, base, held, I_P)
+    result = _result(fine, search, found, base, held, I_P, prior)
     tell("done", 1.0)
     return result
 
@@ -132,7 +132,7 @@ def _known(
     values = {**USUAL, "asymmetry": 0.0, "F_log": 0.0, "M_0": 0.0, "sigma_2": 0.0, "J": 0.0, "W": 0.0, "gamma": 1.0}
     values |= {"delay": delay if delay is not None else 0.0, "sigma_1": 0.0}
     held: dict[str, tuple[Status, str]] = {
-        name: ("held", "at its usual value: records of friction hardly tell it") for name in USUAL if name not in free
+        name: ("held", "usual value, records of friction hardly tell it") for name in USUAL if name not in free
     }
     priors: list[Prior] = []
     unknown = {"J", "sigma_2", "F_C", "M_0"}
@@ -232,11 +232,11 @@ def _told(
 def _without(
     search: Search, found: Solution, base: list[str], judged: Verdict, held: dict[str, tuple[Status, str]]
 ) -> tuple[Solution, list[str]]:
-    held |= {name: ("undetermined", judged.reason) for name in judged.held}
+    held |= {name: ("undetermined", reason) for name, reason in judged.reasons.items()}
     values = {**found.values, **judged.held}
     left = [name for name in base if name not in judged.held]
     if not left:
-        raise InputError(f"stage 2: these records tell no parameter at all; last {judged.reason}")
+        raise InputError(f"stage 2: these records tell no parameter at all; last {judged.name}: {judged.reason}")
     return search.solve(values, found.states, left, tolerance=FINAL, limit=40), left
 
 
@@ -254,7 +254,7 @@ def _refined(
     if not added or len(added) < len(group):
         return found, base
     if group == ("asymmetry",) and not {"F_log", "v_s"} & set(base):
-        held["asymmetry"] = "undetermined", "asymmetry: friction that hardly depends on speed leaves it a constant load"
+        held["asymmetry"] = "undetermined", "friction that hardly depends on speed leaves it a constant load"
         return found, base
     values = dict(found.values)
     if "sigma_1" in added:
@@ -275,14 +275,17 @@ def _refined(
     tried = search.solve(tried.values, tried.states, [*base, *added], tolerance=1e-6, limit=30)
     judged = verdict(tried, added)
     gain = search.cost(found) - search.cost(tried)
-    reason = judged.reason if judged is not None else ""
-    if not reason and gain < WORTH * len(added):
-        reason = f"{' and '.join(added)}: the residual hardly falls with it (sum of squares by {gain:.1f})"
-    if not reason:
+    if judged is None and gain >= WORTH * len(added):
         for name in added:
             held.pop(name, None)
         return tried, [*base, *added]
-    held |= {name: ("undetermined", reason) for name in added}
+    if judged is not None:
+        rest = f"{GOES_WITH} {judged.name}"
+        reasons = dict.fromkeys(added, rest) | judged.reasons
+    else:
+        with_it = f"with {' and '.join(added)}" if len(added) > 1 else "with it"
+        reasons = dict.fromkeys(added, f"the residual hardly falls {with_it} (sum of squares by {gain:.1f})")
+    held |= {name: ("undetermined", reasons[name]) for name in added}
     return found, base
 
 
@@ -293,6 +296,7 @@ def _result(
     base: list[str],
     held: Mapping[str, tuple[Status, str]],
     I_P: float | None,
+    prior: Stationary | None,
 ) -> Dynamic:
     names = tuple(name for name in KINDS if name in base)
     covariance = found.covariance(names)
@@ -323,8 +327,19 @@ def _result(
         rms,
         without,
         advice(pieces, estimates, without, deflection(found.values), I_P),
-        tuple(dict.fromkeys(reason for status, reason in held.values() if status == "undetermined" and reason)),
+        _doubts(held, prior),
     )
+
+
+def _doubts(held: Mapping[str, tuple[Status, str]], prior: Stationary | None) -> tuple[str, ...]:
+    """What is undetermined and why, a sentence per reason; what stage 1 hands on it has said itself."""
+    names: dict[str, list[str]] = {}
+    for name, (status, reason) in held.items():
+        before = prior.estimates.get(name) if prior is not None else None
+        handed_on = before is not None and (before.status, before.reason) == (status, reason)
+        if status == "undetermined" and reason and not handed_on and not reason.startswith(GOES_WITH):
+            names.setdefault(reason, []).append(name)
+    return tuple(f"{' and '.join(each)}: {reason}" for reason, each in names.items())
 
 
 def _stretches(model: RecordTorque, weight: Array, values: Mapping[str, float], z: float, c: float) -> list[Stretch]:

@@ -161,6 +161,8 @@ class Identification:
         rigid: the simple model beside it, by inverse dynamics of all records: J, sigma_2, F_C, M_0; empty where the
             records tell no inertia.
         balance: F_C and M_0 from the position in open loop; None where that was not asked for.
+        prior: False where both stages are of the same records: then stage 1 did not enter the estimates, and its
+            warnings are not among these.
     """
 
     axis: str
@@ -174,3 +176,4 @@ class Identification:
     seconds: Mapping[str, float]
     rigid: Mapping[str, Estimate] = field(default_factory=dict)
     balance: Balance | None = None
+    prior: bool = True

@@ -6,9 +6,11 @@ from feedsim.report.frf.summary import summary_line as frf_summary_line
 from feedsim.report.frf.write import check_frf_writable, write_frf
 from feedsim.report.identify.account import Account
 from feedsim.report.identify.friction import constant_load_hint
+from feedsim.report.identify.open_loop import open_loop_line
 from feedsim.report.identify.summary import headline as identification_headline
 from feedsim.report.identify.summary import rigid_line
 from feedsim.report.identify.summary import table_lines as identification_table
+from feedsim.report.identify.summary import terminal_warnings as identification_warnings
 from feedsim.report.identify.write import check_identification_writable, write_identification
 from feedsim.report.machine.write import check_machine_writable, write_machine
 from feedsim.report.summary import Run, summary_line
@@ -27,6 +29,8 @@ __all__ = [
     "frf_summary_line",
     "identification_headline",
     "identification_table",
+    "identification_warnings",
+    "open_loop_line",
     "rigid_line",
     "summary_line",
     "write",

@@ -15,7 +15,7 @@ from feedsim.report.style import Picture
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
 # What a report of any kind leaves besides report.html and summary.json, which every one replaces.
 _OWN_FILE = re.compile(
-    rf"{FIGURES}/[\w-]+\.(png|svg|gif)|result\.csv|log\.csv|frf(_measured)?\.csv|(residuals|plateaus)\.csv"
+    rf"{FIGURES}/[\w-]+\.(png|svg|gif)|result\.csv|log\.csv|frf(_measured)?\.csv|(residuals|open_loop|plateaus)\.csv"
     r"|(uncompensated|feedforward|compensation)\.csv"
 )
 

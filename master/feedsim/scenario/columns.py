@@ -171,8 +171,8 @@ class Delay(Model):
 
     torque: Annotated[float, Quantity("s", minimum=-1, maximum=1, example="0.5 ms")] | None = Field(
         default=None,
-        description="By how much torque or current is logged later than the motion (below 0: earlier, as a command that "
-        "is held from its instant on); left out: to be estimated",
+        description="By how much torque or current is logged later than the motion (below 0: earlier, as a command "
+        "that is held from its instant on); left out: to be estimated",
     )
 
 

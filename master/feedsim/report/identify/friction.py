@@ -10,6 +10,7 @@ import numpy as np
 from feedsim import units
 from feedsim.identify.result import NORMAL_95, Estimate
 from feedsim.report.identify.account import Account, interval_text, relative_text, remark_text, value_text
+from feedsim.report.identify.open_loop import open_loop_line
 from feedsim.report.parts import software
 from feedsim.scenario.friction_file import Line, friction_text
 from feedsim.scenario.machine import Friction
@@ -35,6 +36,9 @@ def constant_load_hint(account: Account) -> str:
     key = f"machine.axes.{account.found.axis}.constant_load"
     interval = f" (95 %: {interval_text(load)})" if interval_text(load) else ""
     text = f"constant load M_0 {value_text(load)} N.m{interval} is no part of the friction"
+    lean = account.found.estimates.get("asymmetry")
+    if lean is not None and lean.status == "estimated" and abs(lean.value) > NORMAL_95 * lean.sigma:
+        text += ", but goes with this asymmetry (either alone is wrong)"
     return f'{text}; set it with {key}="{load.value:.6g} N.m"'
 
 
@@ -58,6 +62,8 @@ def identified(account: Account) -> dict[str, Any]:
     for name, key in named.items():
         if (estimate := found.estimates.get(name)) is not None:
             content[key] = {"value": _quantity(estimate.value, estimate.unit), **_interval(estimate)}
+    if line := open_loop_line(found):
+        content["open_loop"] = line
     content["parameters"] = {
         name: _interval(estimate) for name, estimate in found.estimates.items() if name not in named
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from feedsim.identify.result import Estimate
+from feedsim.identify.result import Estimate, Identification
 from feedsim.report.frame import Tile, frame, picture_section
 from feedsim.report.identify.account import (
     Account,
@@ -20,6 +20,7 @@ from feedsim.report.identify.account import (
 )
 from feedsim.report.identify.friction import FRICTION, constant_load_hint
 from feedsim.report.identify.loop_plots import describe
+from feedsim.report.identify.open_loop import open_loop_section
 from feedsim.report.parts import software
 from feedsim.report.style import Picture
 from feedsim.report.tables import files_table, pairs_table, table
@@ -41,6 +42,8 @@ def page(account: Account, pictures: Sequence[Picture]) -> str:
     found = account.found
     machine = f"{account.subject.machine.name} · " if account.subject is not None else ""
     traces = ", ".join(account.traces)
+    drifts = found.balance is not None and found.balance.drifts
+    tables = ", ".join(["plateaus.csv", "residuals.csv", *(["open_loop.csv"] if drifts else [])])
     return frame(
         f"Friction of axis {found.axis}",
         f"{machine}identified from {traces} · {account.date}",
@@ -52,12 +55,14 @@ def page(account: Account, pictures: Sequence[Picture]) -> str:
             _advice(found.advice),
             *(picture_section(picture) for picture in pictures),
             _parameters(account),
+            _stage_1(found),
+            open_loop_section(found),
             _rigid(account),
             _stretches(account),
             _provenance(account),
         ],
         footer=f"{METHOD} Values in full precision: summary.json; the parameters as files take them: {FRICTION}; "
-        "what the figures show: plateaus.csv, residuals.csv.",
+        f"what the figures show: {tables}.",
     )
 
 
@@ -104,6 +109,19 @@ def _parameters(account: Account) -> str:
         "model linearised at the optimum; they know scatter, not a wrong model.</p>"
     )
     return '<h2 id="parameters">Parameters</h2>\n' + table(HEADS, rows) + note
+
+
+def _stage_1(found: Identification) -> str:
+    """What stage 1 says of itself where the values do not rest on it; else that is among the warnings."""
+    stage = found.stationary
+    if stage is None or found.prior:
+        return ""
+    items = "".join(f"<li>{escape(typeset(text))}</li>" for text in stage.warnings)
+    doubts = f"<p>Its own doubts, which are none about the values above:</p>\n<ul>{items}</ul>" if items else ""
+    return (
+        '<h2 id="stage-1">Stage 1</h2>\n<p>Both stages are of the same records, which must not count twice: the values '
+        f"above are those of stage 2 alone, the curve of stage 1 stands beside them.</p>{doubts}"
+    )
 
 
 def _rigid(account: Account) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from feedsim.report.identify.account import Account
 from feedsim.report.identify.correlation_plot import correlation_picture
 from feedsim.report.identify.loop_plots import loops_picture, residuals_picture
+from feedsim.report.identify.open_loop_plot import open_loop_picture
 from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_picture
 from feedsim.report.style import Picture
 
@@ -18,5 +19,7 @@ def pictures_of(account: Account) -> list[Picture]:
     if (dynamic := found.dynamic) is not None:
         pictures += [loops_picture(found, dynamic, "speed"), loops_picture(found, dynamic, "position")]
         pictures.append(residuals_picture(found, dynamic))
+    if found.balance is not None:
+        pictures.append(open_loop_picture(found, found.balance))
     pictures.append(correlation_picture(found.axis, found.correlation))
     return [picture for picture in pictures if picture is not None]

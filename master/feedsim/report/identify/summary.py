@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,6 +20,7 @@ from feedsim.report.identify.account import (
     shown_unit,
     value_text,
 )
+from feedsim.report.identify.open_loop import open_loop_part
 from feedsim.report.parts import inputs_part, machine_part, software
 from feedsim.trace.csv import quoted, shortest
 
@@ -41,6 +43,7 @@ def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
         "correlation": {"names": list(found.correlation.names), "matrix": _matrix(found.correlation.matrix)},
         "curve": _curve(found),
         "pre_sliding": _pre_sliding(found),
+        "open_loop": open_loop_part(found),
         "settings": dict(account.settings),
         "machine": machine_part(account.subject.machine) if account.subject is not None else None,
         "traces": [
@@ -78,7 +81,7 @@ def table_lines(account: Account) -> list[str]:
     room = max(20, WIDTH - sum(widths) - 10)
     lines = []
     for name, value, interval, relative, note in rows:
-        note = note if len(note) <= room else f"{note[: room - 3].rstrip()}..."
+        note = textwrap.shorten(note, room, placeholder=" ...")
         cells = (
             f"{name:<{widths[0]}}",
             f"{value:<{widths[1]}}",
@@ -89,13 +92,27 @@ def table_lines(account: Account) -> list[str]:
     return lines
 
 
+def terminal_warnings(account: Account) -> list[str]:
+    """Warnings without those that say no more than the reason of a parameter, which the table holds."""
+    estimates = [each for each in account.found.estimates.values() if each.reason]
+    return [text for text in account.warnings if not any(_repeats(text, each) for each in estimates)]
+
+
+def _repeats(text: str, estimate: Estimate) -> bool:
+    """Whether a text is "F_S and v_s: reason" or "F_S is not estimated but held at 2: reason"."""
+    head = text.removesuffix(f": {estimate.reason}")
+    return head != text and head.split(" ")[0] == estimate.name
+
+
 def headline(account: Account) -> str:
     """How well curve and pre-sliding are known, in one line."""
     found, parts = account.found, []
     if (stage := found.stationary) is not None:
         low, high = (n * found.I_P * 60e3 for n in stage.range)
+        what = "curve" if found.prior else "curve of stage 1 alone"
         parts.append(
-            f"curve within {100 * curve_error(stage):.2g} % (95 %) from {low:.3g} to {high:.5g} mm/min, "
+            f"{what} within {100 * curve_error(stage):.2g} % (95 %) from "
+            f"{float(f'{low:.3g}'):g} to {high:.5g} mm/min, "
             f"{len(stage.plateaus)} plateaus"
         )
     if (dynamic := found.dynamic) is not None:
@@ -150,6 +167,8 @@ def _curve(found: Identification) -> dict[str, Any] | None:
         "error": {"value": _finite(curve_error(stage)), "unit": "1", "meaning": "largest half width of its 95 % band"},
         "worst_plateau": {"value": _finite(stage.worst_curve), "unit": "1", "meaning": "largest relative deviation"},
         "rms": {"value": _finite(stage.rms), "unit": "N.m", "meaning": "residual of the plateaus"},
+        "used": found.prior,
+        "warnings": list(stage.warnings),
         "plateaus": len(stage.plateaus),
         "speeds": {"value": list(stage.range), "unit": "rad/s"},
         "correlation": {

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from feedsim.report.identify.account import Account
 from feedsim.report.identify.friction import FRICTION, friction_file
+from feedsim.report.identify.open_loop import open_loop_csv
 from feedsim.report.identify.page import page
 from feedsim.report.identify.plots import pictures_of
 from feedsim.report.identify.summary import plateaus_csv, residuals_csv, summary
@@ -15,17 +16,18 @@ from feedsim.report.parts import to_json
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, write_text
 from feedsim.report.style import remarked
 
-PLATEAUS, RESIDUALS = "plateaus.csv", "residuals.csv"
+PLATEAUS, RESIDUALS, OPEN_LOOP = "plateaus.csv", "residuals.csv", "open_loop.csv"
 REMARK_WIDTH, REMARK_LINES = 100, 3  # fits the narrowest figure
 
 
 def check_identification_writable(directory: Path | str) -> None:
     """Raise OutputError unless the results can be written to ``directory``; leaves nothing behind."""
-    check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, REPORT, SUMMARY))
+    check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY))
 
 
 def write_identification(account: Account, directory: Path | str) -> tuple[Path, ...]:
-    """Write friction.yaml, plateaus.csv and residuals.csv (where there are any), summary.json, report.html, figures.
+    """Write friction.yaml, plateaus.csv, residuals.csv and open_loop.csv (where there are any), summary.json,
+    report.html, figures.
 
     Returns the paths. Files of an earlier run are replaced. Raises OutputError.
     """
@@ -36,6 +38,8 @@ def write_identification(account: Account, directory: Path | str) -> tuple[Path,
     files = [FRICTION]
     files += [PLATEAUS] if found.stationary is not None else []
     files += [RESIDUALS] if found.dynamic is not None else []
+    balance = found.balance if found.balance is not None and found.balance.drifts else None
+    files += [OPEN_LOOP] if balance is not None else []
     files += [REPORT, SUMMARY]
 
     def fill(fresh: Path, names: Sequence[str]) -> None:
@@ -44,6 +48,8 @@ def write_identification(account: Account, directory: Path | str) -> tuple[Path,
             write_text(fresh / PLATEAUS, plateaus_csv(found))
         if found.dynamic is not None:
             write_text(fresh / RESIDUALS, residuals_csv(found))
+        if balance is not None:
+            write_text(fresh / OPEN_LOOP, open_loop_csv(balance))
         write_text(fresh / REPORT, page(account, pictures))
         write_text(fresh / SUMMARY, to_json(summary(account, names)))
 

@@ -29,8 +29,8 @@ DIFFERENCES = 4  # order of the differences that noise is read from: what is lef
 class Motion:
     """Speed of one axis as a piecewise polynomial, and instants to look at it.
 
-    Recorded samples of a speed that is drawn as straight lines between them make the friction law see corners that
-    were not there: the bristle damping comes out several per cent low. A cubic spline through the samples does not.
+    What shifts the motion by half a sampling interval is taken for bristle damping: speeds held between samples at
+    500 Hz put it 19 % high, differences of two positions 26 % off. A spline through the samples shifts nothing.
 
     Attributes:
         time: (N,) [s] of the record.

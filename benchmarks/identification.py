@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from feedsim import cosim, scenario
 from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.identify.identify import Options, identify
+from feedsim.identify import Options, identify
 from feedsim.identify.level import curve
 from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate

@@ -9,10 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.identify.balance import Balance, Drift
 from feedsim.identify.read import Provenance
 from feedsim.identify.record import Array, Record
-from feedsim.identify.result import Correlation, Dynamic, Estimate, Identification, Plateau, Stationary, Stretch
+from feedsim.identify.result import (
+    Balance,
+    Correlation,
+    Drift,
+    Dynamic,
+    Estimate,
+    Identification,
+    Plateau,
+    Stationary,
+    Stretch,
+)
 from feedsim.report.identify.account import Account
 from feedsim.scenario import load_subject
 from feedsim.trace import Trace

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError, SimulationError
-from feedsim.identify.balance import NEEDED, Balance, balanced, first_deflection, first_speed, substeps
+from feedsim.identify.balance import NEEDED, balanced, first_deflection, first_speed, substeps
 from feedsim.identify.record import Record
-from feedsim.identify.result import NORMAL_95, Estimate
+from feedsim.identify.result import NORMAL_95, Balance, Estimate
 
 Array = NDArray[np.float64]
 
@@ -107,6 +107,12 @@ def assert_true(balance: Balance, relative: float) -> None:
         assert balance.estimates[name].value == pytest.approx(TRUE[name], abs=relative * TRUE["F_C"])
 
 
+def torque_change(balance: Balance) -> float:
+    """What the step costs in the rms of the torque residual [N.m]."""
+    before, after = balance.torque
+    return after - before
+
+
 def assert_refused(balance: Balance, given: Mapping[str, Estimate], words: str) -> None:
     assert words in balance.reason
     assert not balance.applied
@@ -126,7 +132,7 @@ def test_finds_what_the_axis_was_made_with(general: Record, law: FrictionLaw) ->
     before, after = balance.position
     assert after < 0.02 * before
     assert balance.position_at_slide == pytest.approx((before * 0.02 / (2 * pi), after * 0.02 / (2 * pi)))
-    assert balance.torque_change < 0 < balance.torque[1]  # nothing else is wrong: the torque gains too
+    assert torque_change(balance) < 0 < balance.torque[1]  # nothing else is wrong: the torque gains too
     others = set(given) - {"F_C", "F_S", "M_0"}
     assert all(balance.estimates[name] is given[name] for name in others)
     for name in ("F_C", "F_S", "M_0"):
@@ -286,7 +292,7 @@ def test_a_torque_that_grows_too_much(general: Record, law: FrictionLaw) -> None
     given = estimates()
     balance = found(replace(general, torque=general.torque + drift), law, given)
     assert_refused(balance, given, "the torque's residual would grow by ")
-    assert balance.torque_change > 0.1 * balance.torque[0]
+    assert torque_change(balance) > 0.1 * balance.torque[0]
 
 
 def test_bristles_too_stiff_for_the_record(general: Record, law: FrictionLaw) -> None:
@@ -380,4 +386,4 @@ def test_published_parameters_of_a_measured_axis(law: FrictionLaw) -> None:
     assert 2.5e-3 < after < 3.5e-3
     assert abs(balance.estimates["F_C"].value / I_P - 20.39) < 1.0
     assert abs(balance.estimates["M_0"].value / I_P + 3.165) < 0.3
-    assert 0 < balance.torque_change / I_P < 0.1
+    assert 0 < torque_change(balance) / I_P < 0.1

@@ -115,6 +115,22 @@ def test_output_folder_that_cannot_be_made(scenario_file: Path, fmus: Path, tmp_
     assert blocker.read_text() == "keep me"
 
 
+@pytest.mark.parametrize(("name", "fate"), [("result.csv", "replaced"), ("frf.csv", "removed"), ("mine.csv", "")])
+def test_inputs_in_the_output_folder_are_not_lost(
+    name: str, fate: str, scenario_file: Path, fmus: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    modes = (ROOT / "scenarios" / "machines" / "test_centre" / "modes.csv").read_bytes()
+    (out / name).write_bytes(modes)
+    (out / "summary.json").write_text(json.dumps({"files": ["frf.csv", "mine.csv"]}))
+    done = feedsim("run", scenario_file, "--out", out, "--set", f"machine.modes={out / name}", fmus=fmus, cwd=tmp_path)
+    assert done.returncode == (4 if fate else 0), done.stderr
+    assert not fate or f"{out / name}: is an input and would be {fate}; take another directory" in done.stderr
+    assert (out / name).read_bytes() == modes
+    assert (out / "report.html").exists() == (not fate)
+
+
 def test_validate_and_schema(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
     done = feedsim("validate", scenario_file, fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

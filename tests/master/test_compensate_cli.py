@@ -12,8 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from test_report import Page
 
+from feedsim.analysis import compensation
+from feedsim.cli import main
+from feedsim.errors import SimulationError
 from feedsim.trace import read_csv
 from report_helpers import contents
 
@@ -156,13 +160,17 @@ def test_nothing_of_an_earlier_run_is_left(done: tuple[Process, Path], fmus: Pat
         (
             [CIRCLE, "--friction", "Y=a.yaml"],
             2,
-            "--friction Y=a.yaml: no axis 'Y' moves in this scenario; those that do",
+            "--friction Y=a.yaml: axis Y rests; the axes that move are X, Z",
         ),
         ([CIRCLE, "--friction", "Z=missing.yaml"], 2, "missing.yaml"),
         ([CIRCLE, "--friction", "Z=bad.yaml"], 2, "bad.yaml:1"),
         ([CIRCLE, "--delay", "4"], 2, "--delay 4: 4 has no unit; a time is expected"),
-        ([CIRCLE, "--delay", "Q=4 ms"], 2, "--delay Q=4 ms: no axis 'Q' moves"),
+        ([CIRCLE, "--delay", "Q=4 ms"], 2, "--delay Q=4 ms: no axis 'Q'; the axes that move are X, Z"),
+        ([CIRCLE, "--delay", "Z=4 ms", "--delay", "Z=5 ms"], 2, "--delay Z=5 ms: that of Z is given twice"),
+        ([CIRCLE, "--delay", "4 ms", "--delay", "5 ms"], 2, "--delay 5 ms: that of all axes is given twice"),
+        ([CIRCLE, "--friction", "Z=a.yaml", "--friction", "Z=b.yaml"], 2, "--friction Z=b.yaml: Z is given twice"),
         ([CIRCLE, "--set", "machine.axes.Z.drive.K_v=0 1/s"], 2, "axis Z: K_v is 0"),
+        ([CIRCLE, "--set", "machine.axes.Z.drive.K_v=0 1/s"], 2, "give the delay of its compensation (--delay AXIS="),
         (["missing_scenario.yaml"], 2, "missing_scenario.yaml"),
         ([CIRCLE, "--out", "taken"], 4, "taken"),
     ],
@@ -177,3 +185,42 @@ def test_refusals(words: list[str | Path], code: int, message: str, fmus: Path, 
     assert process.stderr.startswith("feedsim: ")
     assert process.stdout == ""
     assert set(contents(tmp_path)) == {"taken", "bad.yaml"}
+
+
+@pytest.mark.parametrize(
+    ("words", "lost"),
+    [
+        (["--friction", "Z=out/summary.json"], "summary.json"),
+        (["--set", "machine.axes.Z.friction=out/report.yaml"], ""),
+        (["--set", "machine.modes=out/residuals.csv"], "residuals.csv"),
+        (["--set", "machine.modes=out/feedforward.csv"], "feedforward.csv"),
+    ],
+    ids=lambda value: value[-1] if isinstance(value, list) else None,
+)
+def test_inputs_are_not_lost(words: list[str], lost: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Inputs may lie in the folder of the results where nothing of that name is written or removed."""
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "report.yaml").write_text(FRICTION_Z, encoding="utf-8")
+    for name in ("residuals.csv", "feedforward.csv"):
+        (out / name).write_bytes((SCENARIOS / "machines" / "test_centre" / "modes.csv").read_bytes())
+    # YAML as much as JSON: the summary of an identification, which an earlier residuals.csv is of
+    values = yaml.safe_load(FRICTION_Z) | {"identified": {"axis": "Z"}}
+    listed = values if "summary.json" in lost else {"files": ["residuals.csv"]}
+    (out / "summary.json").write_text(json.dumps(listed), encoding="utf-8")
+    before = contents(out)
+    started: list[str] = []
+
+    def no_run(*given: Any, **more: Any) -> Any:
+        started.append("run")
+        raise SimulationError("far enough")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(compensation, "compensate", no_run)
+    told: list[str] = []
+    monkeypatch.setattr("builtins.print", lambda text, **more: told.append(str(text)))
+    code = main(["compensate", str(CIRCLE), "--out", "out", "--quiet", *words])
+    assert (code, started) == ((4, []) if lost else (3, ["run"]))
+    fate = "removed" if lost == "residuals.csv" else "replaced"
+    assert not lost or f"{Path('out') / lost}: is an input and would be {fate}; take another directory" in told[0]
+    assert contents(out) == before

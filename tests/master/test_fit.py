@@ -75,7 +75,8 @@ def test_further_starts_find_what_the_first_misses() -> None:
     assert abs(fit(residuals, [wave])["w"] - 3.0) > 1.0
     found = fit(residuals, [wave], starts=30, seed=3)
     assert found["w"] == pytest.approx(3.0, rel=1e-8)
-    assert 1 <= found.agreeing < 30
+    # Some starts end there, others elsewhere.
+    assert 1 <= sum(start.cost <= found.cost + 1e-9 for start in found.starts) < 30
     assert len(found.starts) == 30
     again = fit(residuals, [wave], starts=30, seed=3)
     assert again.values == found.values

@@ -221,6 +221,19 @@ def test_a_folder_that_cannot_be_written_is_found_before_the_work(fmus: Path, tm
     assert (tmp_path / "out").read_text() == "mine"
 
 
+def test_curves_laid_over_are_not_lost(fmus: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    curve = tmp_path / "out" / "frf.csv"
+    write_response(curve, responses().closed)
+    before = curve.read_bytes()
+    words = ["--axes", "Z", "--no-measure", "--out", "out", "--overlay", "out/frf.csv"]
+    done = feedsim("frf", MACHINE, *words, fmus=fmus, cwd=tmp_path)
+    assert done.returncode == 4, done.stderr
+    assert "frf.csv: is an input and would be replaced" in done.stderr
+    assert curve.read_bytes() == before
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"frf.csv"}
+
+
 def test_friction_at_standstill_is_warned_of(fmus: Path, tmp_path: Path) -> None:
     words = ["--axes", "Z", "--no-tool", "--friction", "--realisations", "1", "--settle", "1", "--band", "20Hz..200Hz"]
     process = feedsim("frf", MACHINE, "--out", "out", *words, "--quiet", fmus=fmus, cwd=tmp_path)

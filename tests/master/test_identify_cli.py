@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +19,13 @@ import pytest
 from feedsim.cli import main
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
-from feedsim.identify import identify as room
-from feedsim.identify.identify import ORDER, Options, identify, merged_correlation, transitions
+from feedsim.identify import Options, identify
+from feedsim.identify.identify import ORDER, merged_correlation, transitions
 from feedsim.identify.names import distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate
-from feedsim.scenario.friction_file import read_friction
+from feedsim.scenario import load_machine
+from feedsim.scenario.friction_file import Line, friction_text, read_friction
 from feedsim.trace import write_csv
 from identification_helpers import (
     I_P,
@@ -38,10 +41,12 @@ from identification_helpers import (
     stationary,
     strokes,
 )
+from report_helpers import contents
 
 ROOT = Path(__file__).resolve().parents[2]
 MACHINE = ROOT / "scenarios" / "machines" / "test_centre"
 CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
+room = import_module("feedsim.identify.identify")  # its name in the package is that of the function
 MOVES = ((5e-6, 10.0, 20), (20e-6, 5.0, 12), (100e-6, 2.0, 7), (200e-6, 1.0, 5))
 FILES = {"friction.yaml", "plateaus.csv", "residuals.csv", "report.html", "summary.json"}
 Done = subprocess.CompletedProcess[str]
@@ -134,6 +139,8 @@ def test_stage_1_alone_holds_the_rest(traces: Path, fmus: Path) -> None:
         (["sine/log.csv", "--axis", "Z"], "its pitch is needed"),
         (["sine/log.csv", "--machine", MACHINE, "--hold", "beta"], "NAME=VALUE is needed"),
         (["sine/log.csv", "--machine", MACHINE, "--hold", "F_C=1"], "--hold F_C=1: .*torque"),
+        (["sine/log.csv", "--machine", MACHINE, "--hold", "beta=1", "--hold", "beta=2"], "beta=2: beta is given twice"),
+        (["sine/log.csv", "--machine", MACHINE, "--hold", "beta=1,W=0 rad,beta=1"], "beta is given twice"),
         (["sine/log.csv", "--machine", MACHINE, "--hold", "delay=1"], "no parameter 'delay'"),
         (["sine/log.csv", "--machine", MACHINE, "--free", "sigma"], "no parameter 'sigma'"),
         (["sine/log.csv", "--machine", MACHINE, "--free", "beta", "--hold", "beta=1"], "held and free at once"),
@@ -159,6 +166,53 @@ def test_place_is_looked_at_first(traces: Path, fmus: Path) -> None:
     process = feedsim("identify", *words, fmus=fmus, cwd=traces)
     assert process.returncode == 4
     assert "is a file" in process.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["out/log.csv"], "log.csv: is an input and would be removed"),
+        (["out/mine/../log.csv"], "log.csv: is an input and would be removed"),
+        (["out/plateaus.csv"], "plateaus.csv: is an input and would be replaced"),
+        (["linked.csv"], "residuals.csv: is an input and would be replaced"),
+        (["sine.csv", "--columns", "out/open_loop.csv"], "open_loop.csv: is an input and would be replaced"),
+        (["sine.csv", "--machine", "scenario.yaml"], "friction.yaml: is an input and would be replaced"),
+        (["out/mine.csv"], "far enough"),
+        (["sine.csv"], "far enough"),
+    ],
+    ids=lambda value: value[-1] if isinstance(value, list) else None,
+)
+def test_inputs_are_not_lost(
+    traces: Path, tmp_path: Path, fmus: Path, words: list[str], message: str, monkeypatch: Any, capfd: Any
+) -> None:
+    """The folder of an earlier run, whose log.csv would go with it, and names that the results have."""
+    (tmp_path / "out" / "mine").mkdir(parents=True)
+    for name in ("sine.csv", "out/log.csv", "out/plateaus.csv", "out/residuals.csv", "out/mine.csv"):
+        shutil.copyfile(traces / "sine" / "log.csv", tmp_path / name)
+    (tmp_path / "linked.csv").symlink_to(tmp_path / "out" / "residuals.csv")
+    (tmp_path / "out" / "open_loop.csv").write_text("axis: Z\ncurrent: {column: Z.i_q}\nposition: {column: Z.x_a}\n")
+    (tmp_path / "out" / "summary.json").write_text(json.dumps({"files": ["log.csv", "result.csv"]}))
+    friction = load_machine(MACHINE).axes["Z"].friction
+    lines = {name: Line(value) for name, value in friction.parameters().items()}
+    (tmp_path / "out" / "friction.yaml").write_text(friction_text(lines, {}, [], name="friction.yaml"))
+    (tmp_path / "scenario.yaml").write_text(
+        f"name: s\nmachine: {MACHINE}\nmotions: [{{kind: dwell, duration: 10 ms}}]\n"
+        "set: {machine.axes.Z.friction: out/friction.yaml}\n"
+    )
+    before = contents(tmp_path)
+
+    def far_enough(*given: Any, **more: Any) -> Any:
+        raise InputError("far enough")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("FEEDSIM_FMUS", str(fmus))
+    monkeypatch.setattr("feedsim.cli.identify._options", far_enough)
+    machine = [] if "--machine" in words else ["--machine", str(MACHINE)]
+    code = main(["identify", *words, *machine, "--axis", "Z", "--out", "out", "--quiet"])
+    captured = capfd.readouterr()
+    assert re.search(message, captured.err), captured.err
+    assert code == (2 if message == "far enough" else 4)
+    assert contents(tmp_path) == before
 
 
 # --- the steps, with stages that are made up -------------------------------------------------------------------------

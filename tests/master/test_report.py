@@ -363,6 +363,19 @@ def test_foreign_summary_removes_nothing(tmp_path: Path) -> None:
     assert victim.exists()
 
 
+def test_friction_outlives_the_results_that_it_came_with(tmp_path: Path) -> None:
+    """Curves of an identification go with it; friction.yaml may be named by a scenario by now."""
+    curves = ["plateaus.csv", "residuals.csv", "open_loop.csv", "figures/stribeck.png"]
+    (tmp_path / "figures").mkdir()
+    for name in ("friction.yaml", *curves):
+        (tmp_path / name).write_text("x")
+    (tmp_path / "summary.json").write_text(json.dumps({"files": ["friction.yaml", *curves]}))
+    report.write(small_run(), {}, tmp_path)
+    assert not [name for name in curves if (tmp_path / name).exists()]
+    assert (tmp_path / "friction.yaml").read_text() == "x"
+    assert "friction.yaml" not in json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["files"]
+
+
 # -- check before the simulation --------------------------------------------------------------------------------------
 
 

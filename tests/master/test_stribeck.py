@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -171,3 +172,29 @@ def test_refusals() -> None:
 def test_the_same_seed_gives_the_same_result() -> None:
     first, second = (stribeck.stationary(made(noise=1e-2, seed=9), seed=4) for _ in range(2))
     assert [e.value for e in first.estimates.values()] == [e.value for e in second.estimates.values()]
+
+
+@pytest.mark.parametrize(("name", "value"), [("beta", 1.5), ("v_log", 0.5)])
+@pytest.mark.parametrize("noise", [1e-4, 1e-3])
+def test_a_shape_that_is_held_wrongly_is_told(name: str, value: float, noise: float) -> None:
+    plateaus = made(p={**TRUE, name: value}, noise=noise, seed=2)
+    told = [warning for warning in stribeck.stationary(plateaus).warnings if "beyond their own noise" in warning]
+    assert len(told) == 1
+    assert told[0].endswith(f"the curve fits the plateaus to their noise: --free {name}")
+    freed = stribeck.stationary(plateaus, free=(name,))
+    # No other start finds another value; three digits are written.
+    assert f"with {name} free ({freed.estimates[name].value:.3g})" in told[0]
+    assert abs(freed.estimates[name].value - value) < 4 * freed.estimates[name].sigma
+    assert not said(freed, "--free")
+    # What is held by request is not put into question.
+    assert not said(stribeck.stationary(plateaus, hold={"beta": 1.0, "v_log": 3.0}), "--free")
+
+
+@pytest.mark.parametrize("scatter", [1.0, 5.0], ids=["noise", "beyond"])
+def test_scatter_is_no_shape(scatter: float) -> None:
+    for seed in range(20):
+        plateaus = made(noise=scatter * 1e-3, seed=seed)
+        plateaus = [replace(plateau, sigma=plateau.sigma / scatter) for plateau in plateaus]
+        found = stribeck.stationary(plateaus)
+        assert said(found, "beyond their own noise") or scatter == 1.0
+        assert not said(found, "--free"), seed

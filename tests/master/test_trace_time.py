@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.identify.grid import stretches
+from feedsim.identify.even_time import stretches
 from feedsim.identify.read import read_records
 from feedsim.identify.record import EVEN
 from record_helpers import ANGLE, DIGITS, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from feedsim import analysis, cosim, nc, scenario
 from feedsim.analysis.compensation import compensate
 from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.identify import Options, identify
 from feedsim.identify.bounds import bounds
-from feedsim.identify.identify import Options, identify
 from feedsim.identify.level import curve
 from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate, Identification

@@ -18,7 +18,6 @@ from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import CircleTest, Friction, Recording, Scenario
 from feedsim.trace import Trace
-from feedsim.trace.trace import suggest
 
 Progress = Callable[[str, int, int], None]
 
@@ -64,6 +63,7 @@ class Compensation:
         delays: axis -> delay of the feedforward behind the speed setpoint n_ffw [s].
         feedforward: A.M_ff [N.m] per axis at the control cycle.
         before, after: the runs without and with compensation.
+        left_before, left_after: what is left on the turn of either.
         figures: "before.G", "after.glitch_X" ... as of a circle test, "before.dip_X" ..., "X.delay" ...
         table: what errors cost; empty where it was not asked for.
         warnings: what a user should know before believing the result, a sentence each.
@@ -76,6 +76,8 @@ class Compensation:
     feedforward: Trace
     before: Run
     after: Run
+    left_before: Quality
+    left_after: Quality
     figures: Mapping[str, Figure]
     table: tuple[Variation, ...]
     warnings: tuple[str, ...]
@@ -113,6 +115,14 @@ def moving_axes(program: Program) -> tuple[str, ...]:
     return tuple(axis for axis, x in program.x_s.items() if np.ptp(x) > RESTING)
 
 
+def check_moves(what: str, axis: str, program: Program) -> None:
+    """Raise InputError, which begins with `what`, unless the program moves `axis`."""
+    axes = moving_axes(program)
+    if axis not in axes:
+        known = f"no axis {axis!r}" if axis not in program.n_ffw else f"axis {axis} rests"
+        raise InputError(f"{what}: {known}; the axes that move are {', '.join(axes)}")
+
+
 def compensate(
     scenario: Scenario,
     program: Program,
@@ -142,12 +152,10 @@ def compensate(
     axes = moving_axes(program)
     for what, named in (("friction", frictions), ("delay", delays)):
         for axis in named or ():
-            if axis not in axes:
-                known = f"no axis {axis!r}{suggest(axis, axes)}" if axis not in program.n_ffw else f"{axis} rests"
-                raise InputError(f"{what} of axis {axis}: {known}; the axes that move are {', '.join(axes)}")
+            check_moves(f"{what} of axis {axis}", axis, program)
     machine = scenario.machine
     used = {axis: (frictions or {}).get(axis, machine.axes[axis].friction) for axis in axes}
-    lags = _lags(scenario, [axis for axis in axes if axis not in (delays or {})])
+    lags = lags_of(scenario, [axis for axis in axes if axis not in (delays or {})])
     applied = {axis: (delays or {})[axis] if axis not in lags else lags[axis].delay for axis in axes}
     plain = _fully_recorded(scenario, turn)
 
@@ -159,6 +167,7 @@ def compensate(
         before = run(plain, program=program, fmus=fmus, progress=told("without compensation"))
         after = run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
         variations = _table(scenario, program, turn, used, applied, law, fmus=fmus, progress=progress) if table else ()
+    left_before, left_after = (quality(result.trace, turn) for result in (before, after))
     T_c = machine.cycles.T_c
     feedforward = Trace(
         np.arange(len(next(iter(torque.values()))), dtype=np.float64) * T_c,
@@ -173,7 +182,11 @@ def compensate(
         feedforward=feedforward,
         before=before,
         after=after,
-        figures=_figures(turn, before, after, lags, applied, torque),
+        left_before=left_before,
+        left_after=left_after,
+        figures=_circle_figures(turn, "before", "without", before, left_before)
+        | _circle_figures(turn, "after", "with", after, left_after)
+        | _feedforward_figures(lags, applied, torque),
         table=variations,
         warnings=(*dict.fromkeys((*before.warnings, *after.warnings)), *_doubts(applied)),
     )
@@ -197,14 +210,15 @@ def _dip(measured: Contour, axis: str) -> float:
     )
 
 
-def _lags(scenario: Scenario, axes: Sequence[str]) -> dict[str, Lag]:
+def lags_of(scenario: Scenario, axes: Sequence[str]) -> dict[str, Lag]:
+    """Axis -> lags of its drive. Raises InputError where the parameters of a drive do not tell them."""
     lags: dict[str, Lag] = {}
     problems = []
     for axis in axes:
         try:
             lags[axis] = lag_of(scenario.machine.axes[axis], scenario.machine.cycles)
         except InputError as error:
-            problems.append(f"axis {axis}: {error}; give the delay of its compensation (--delay {axis}=...)")
+            problems.append(f"axis {axis}: {error}; give the delay of its compensation")
     if problems:
         raise InputError.of(f"{scenario.file}: the delay of the compensation is not known", problems)
     return lags
@@ -277,28 +291,26 @@ def _varied(friction: Friction, names: Sequence[str], factor: float) -> Friction
     return friction.model_copy(update=values)
 
 
-def _figures(
-    turn: Turn,
-    before: Run,
-    after: Run,
-    lags: Mapping[str, Lag],
-    delays: Mapping[str, float],
-    torque: Mapping[str, Array],
+def _circle_figures(turn: Turn, name: str, words: str, result: Run, left: Quality) -> dict[str, Figure]:
+    """Figures of the turn of a run. name: ahead of the keys; words: "without" or "with", for the meanings."""
+    found = circularity(result.trace, turn)
+    for axis, dip in left.dip.items():
+        found[f"dip_{axis}"] = Figure(
+            dip * 1e6,
+            "um",
+            f"lowest radius deviation within +-45 deg of where {axis} reverses, less the median, by the linear "
+            "scales: too much compensation leaves a dip",
+        )
+    return {
+        f"{name}.{key}": replace(figure, meaning=f"{words} compensation: {figure.meaning}")
+        for key, figure in found.items()
+    }
+
+
+def _feedforward_figures(
+    lags: Mapping[str, Lag], delays: Mapping[str, float], torque: Mapping[str, Array]
 ) -> dict[str, Figure]:
     figures: dict[str, Figure] = {}
-    for name, words, result in (("before", "without", before), ("after", "with", after)):
-        found = circularity(result.trace, turn)
-        for axis, dip in quality(result.trace, turn).dip.items():
-            found[f"dip_{axis}"] = Figure(
-                dip * 1e6,
-                "um",
-                f"lowest radius deviation within +-45 deg of where {axis} reverses, less the median, by the linear "
-                "scales: too much compensation leaves a dip",
-            )
-        figures |= {
-            f"{name}.{key}": replace(figure, meaning=f"{words} compensation: {figure.meaning}")
-            for key, figure in found.items()
-        }
     for axis, delay in delays.items():
         if axis in lags:
             lag = lags[axis]

@@ -20,7 +20,7 @@ def run(options: Namespace) -> None:
     directory: Path = options.out or Path("results") / options.scenario.stem
     program = nc.plan(plan)
     analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
-    report.check_writable(directory)
+    report.check_writable(directory, report.input_paths(plan))
     with tqdm(
         desc=plan.name, unit=" cycles", unit_scale=True, leave=False, disable=options.quiet or not sys.stderr.isatty()
     ) as bar:

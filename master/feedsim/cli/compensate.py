@@ -5,16 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 from argparse import BooleanOptionalAction, Namespace
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import add_fmus, add_overrides
+from feedsim.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from feedsim.analysis.compensation import Progress
-    from feedsim.scenario import Friction
+    from feedsim.nc import Program
+    from feedsim.scenario import Friction, Scenario
 
 DESCRIPTION = """Run a circle without and with friction compensation. A friction model, driven by the speed setpoint
 with the lag of the axis, gives a torque that is added to the torque setpoint of every axis that moves. Without
@@ -79,11 +79,11 @@ def compensate(options: Namespace) -> None:
     directory: Path = options.out or Path("results") / f"compensate_{options.scenario.stem}"
     program = nc.plan(plan)
     analysis.circle_task(plan, program)
-    axes = analysis.moving_axes(program)
-    files, frictions = _frictions(options.frictions, axes)
-    delays = _delays(options.delays, axes)
-    report.check_compensation_writable(directory)
-    with _bar(options.quiet) as progress:
+    files, frictions = _frictions(options.frictions, program)
+    delays = _delays(options.delays, program)
+    _check_lags(plan, [axis for axis in analysis.moving_axes(program) if axis not in delays])
+    report.check_compensation_writable(directory, [*report.input_paths(plan), *files.values()])
+    with progress_bar(options.quiet, "it") as progress:
         result = analysis.compensate(
             plan,
             program,
@@ -101,8 +101,9 @@ def compensate(options: Namespace) -> None:
         print(f"{plan.name}: friction compensation -> {directory / 'report.html'}\n  {line}")
 
 
-def _frictions(texts: Sequence[str], axes: Sequence[str]) -> tuple[Mapping[str, Path], Mapping[str, Friction]]:
+def _frictions(texts: Sequence[str], program: Program) -> tuple[Mapping[str, Path], Mapping[str, Friction]]:
     """Axis -> file, and axis -> what is in it."""
+    from feedsim.analysis.compensation import check_moves
     from feedsim.errors import InputError
     from feedsim.scenario.friction_file import read_friction
 
@@ -111,54 +112,40 @@ def _frictions(texts: Sequence[str], axes: Sequence[str]) -> tuple[Mapping[str, 
         axis, equals, file = text.partition("=")
         if not (equals and axis and file):
             raise InputError(f"--friction {text}: AXIS=FILE.yaml is needed, such as Z=friction_z.yaml")
-        _moves(f"--friction {text}", axis, axes)
+        check_moves(f"--friction {text}", axis, program)
+        if axis in files:
+            raise InputError(f"--friction {text}: {axis} is given twice")
         files[axis] = Path(file)
     return files, {axis: read_friction(file) for axis, file in files.items()}
 
 
-def _delays(texts: Sequence[str], axes: Sequence[str]) -> Mapping[str, float]:
+def _delays(texts: Sequence[str], program: Program) -> Mapping[str, float]:
     """Axis -> delay [s]; one without an axis is that of all, and one with it counts more."""
     from feedsim import units
+    from feedsim.analysis.compensation import check_moves, moving_axes
     from feedsim.errors import InputError
 
-    common: dict[str, float] = {}
-    single: dict[str, float] = {}
+    given: dict[str, float] = {}  # "" is for all axes
     for text in texts:
         axis, equals, value = text.rpartition("=")
         if equals:
-            _moves(f"--delay {text}", axis, axes)
+            check_moves(f"--delay {text}", axis, program)
+        if axis in given:
+            raise InputError(f"--delay {text}: {f'that of {axis}' if equals else 'that of all axes'} is given twice")
         try:
-            delay = units.parse(value, "s", "4.2 ms")
+            given[axis] = units.parse(value, "s", "4.2 ms")
         except InputError as error:
             raise InputError(f"--delay {text}: {error}") from None
-        if equals:
-            single[axis] = delay
-        else:
-            common = dict.fromkeys(axes, delay)
-    return common | single
+    common = dict.fromkeys(moving_axes(program), given.pop("")) if "" in given else {}
+    return common | given
 
 
-def _moves(option: str, axis: str, axes: Sequence[str]) -> None:
+def _check_lags(scenario: Scenario, axes: Sequence[str]) -> None:
+    """Raise InputError, with the option that helps, where the drive does not tell the delay."""
+    from feedsim.analysis.compensation import lags_of
     from feedsim.errors import InputError
 
-    if axis not in axes:
-        raise InputError(f"{option}: no axis {axis!r} moves in this scenario; those that do are {', '.join(axes)}")
-
-
-@contextmanager
-def _bar(quiet: bool) -> Iterator[Progress]:
-    """A progress bar that names what is being done."""
-    from tqdm import tqdm
-
-    said = ""
-    with tqdm(unit_scale=True, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
-
-        def progress(what: str, done: int, total: int) -> None:
-            nonlocal said
-            if what != said:
-                said = what
-                bar.reset(total)
-                bar.set_description(what)
-            bar.update(done - bar.n)
-
-        yield progress
+    try:
+        lags_of(scenario, axes)
+    except InputError as error:
+        raise InputError(f"{error} (--delay AXIS=VALUE)", error.problems) from None

@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 import sys
 from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import add_fmus, add_overrides
+from feedsim.cli.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
-    from feedsim.analysis.campaign import Plan, Progress
+    from feedsim.analysis.campaign import Plan
     from feedsim.analysis.responses import Overlay
     from feedsim.analysis.truncation import Truncation
     from feedsim.scenario import Machine
@@ -125,9 +125,10 @@ def frf(options: Namespace) -> None:
     wanted = responses.names(axes, tool=options.tool)
     overlays, warnings = _overlays(options.overlays, wanted)
     warnings += doubts
-    report.check_frf_writable(directory)
+    inputs = [*(file for _, file in subject.files), *(overlay.file for overlay in overlays)]
+    report.check_frf_writable(directory, inputs)
 
-    with _bar(options.quiet) as progress:
+    with progress_bar(options.quiet, " cycles") as progress:
         progress("closed form", 0, 1)
         system = linear.LinearSystem(machine, modes)
         result = linear.evaluate(system, axes)
@@ -265,22 +266,3 @@ def _unstable(poles: int) -> str:
         f"the control loops are unstable: {poles} growing solution(s) of the closed system. The figures of loops "
         "presume stable ones, and nothing was measured"
     )
-
-
-@contextmanager
-def _bar(quiet: bool) -> Iterator[Progress]:
-    """A progress bar that names what is being done."""
-    from tqdm import tqdm
-
-    said = ""
-    with tqdm(unit=" cycles", unit_scale=True, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
-
-        def progress(what: str, done: int, total: int) -> None:
-            nonlocal said
-            if what != said:
-                said = what
-                bar.reset(total)
-                bar.set_description(what)
-            bar.update(done - bar.n)
-
-        yield progress

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from math import nan, pi
@@ -15,9 +14,10 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import add_fmus
+from feedsim.cli.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
-    from feedsim.identify.identify import Options, Progress
+    from feedsim.identify import Options
     from feedsim.identify.read import Provenance, Recorded
     from feedsim.identify.result import Estimate
     from feedsim.scenario import Subject
@@ -97,19 +97,19 @@ def identify(options: Namespace) -> None:
     """Read, identify, write."""
     from feedsim import report
     from feedsim.cosim.friction_law import FrictionLaw
-    from feedsim.identify.identify import identify as identified
+    from feedsim.identify import identify as identified
     from feedsim.identify.names import named_apart
     from feedsim.scenario import load_subject
 
     subject = load_subject(options.machine) if options.machine is not None else None
-    with _bar(options.quiet) as progress:
+    with progress_bar(options.quiet) as progress:
         begin = perf_counter()
         recorded = _read(options, subject, progress)
         reading = {"reading": perf_counter() - begin}
         sources = [each.provenance for each in recorded]
         axis = _axis(options, sources)
         directory: Path = options.out or Path("results") / f"identify_{axis.lower()}"
-        report.check_identification_writable(directory)
+        report.check_identification_writable(directory, _inputs(options, subject))
         records = named_apart(recorded)
         with FrictionLaw(options.fmus) as law:
             known = _options(options, axis, sources, subject)
@@ -148,6 +148,13 @@ def _read(options: Namespace, subject: Subject | None, progress: Progress) -> li
     return recorded
 
 
+def _inputs(options: Namespace, subject: Subject | None) -> list[Path]:
+    """Files that are read."""
+    files = [*options.traces]
+    files += [options.columns] if options.columns is not None else []
+    return files + [file for _, file in subject.files] if subject is not None else files
+
+
 def _axis(options: Namespace, sources: Sequence[Provenance]) -> str:
     from feedsim.errors import InputError
 
@@ -165,7 +172,7 @@ def _axis(options: Namespace, sources: Sequence[Provenance]) -> str:
 def _options(options: Namespace, axis: str, sources: Sequence[Provenance], subject: Subject | None) -> Options:
     """What the command line, the mapping and the machine say, in this order."""
     from feedsim.errors import InputError
-    from feedsim.identify.identify import STAGES, Options
+    from feedsim.identify import STAGES, Options
     from feedsim.structure.modes import checked_modes
 
     pitches = {source.pitch: source.file for source in sources if source.pitch is not None}
@@ -238,6 +245,8 @@ def _hold(texts: Sequence[str]) -> dict[str, float]:
         if name not in KINDS or name in ("J", "delay"):
             known = ", ".join(name for name in KINDS if name not in ("J", "delay"))
             raise InputError(f"--hold {text}: no parameter {name!r}; there are {known}")
+        if name in held:
+            raise InputError(f"--hold {text}: {name} is given twice; a parameter keeps one value")
         held[name] = _quantity("hold", value, KINDS[name].unit, whole=text)
     return held
 
@@ -274,22 +283,3 @@ def _settings(options: Namespace) -> Mapping[str, str]:
         "stages": "" if options.stages == "both" else options.stages,
     }
     return {name: value for name, value in given.items() if value}
-
-
-@contextmanager
-def _bar(quiet: bool) -> Iterator[Progress]:
-    """A progress bar that names what is being done."""
-    from tqdm import tqdm
-
-    said = ""
-    with tqdm(unit="", leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
-
-        def progress(what: str, done: int, total: int) -> None:
-            nonlocal said
-            if what != said:
-                said = what
-                bar.reset(total)
-                bar.set_description(what)
-            bar.update(done - bar.n)
-
-        yield progress

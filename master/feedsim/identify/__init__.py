@@ -1,1 +1,20 @@
-"""Friction parameters from traces."""
+"""Friction of an axis from recorded traces: records, both stages of identification, and what they find."""
+
+from feedsim.identify.identify import Progress, identify
+from feedsim.identify.options import STAGES, Options
+from feedsim.identify.read import Provenance, Recorded, read_records
+from feedsim.identify.record import Record
+from feedsim.identify.result import Estimate, Identification
+
+__all__ = [
+    "STAGES",
+    "Estimate",
+    "Identification",
+    "Options",
+    "Progress",
+    "Provenance",
+    "Record",
+    "Recorded",
+    "identify",
+    "read_records",
+]

@@ -15,7 +15,7 @@ F_S moves by as much as F_C, and all else is held. The step refuses itself where
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import ceil, inf, isfinite, nan, sqrt
 from typing import Any, Protocol
 
@@ -27,7 +27,7 @@ from feedsim.identify.fit import Fit, Parameter, Residuals, fit
 from feedsim.identify.level import level
 from feedsim.identify.parameters import FRICTION
 from feedsim.identify.record import Record
-from feedsim.identify.result import NORMAL_95, Estimate
+from feedsim.identify.result import NORMAL_95, Balance, Drift, Estimate
 from feedsim.identify.torque import Law, RecordTorque, deflection
 
 Array = NDArray[np.float64]
@@ -63,61 +63,6 @@ class FreeAxis(Protocol):
         z: float = 0.0,
         substeps: int = 1,
     ) -> tuple[Array, Array]: ...
-
-
-@dataclass(frozen=True, eq=False)
-class Drift:
-    """One record in open loop.
-
-    Attributes:
-        time (N,) [s]; angle (N,): recorded, from the start on [rad].
-        before, after: (N,) recorded less reached angle [rad]; after with what was tried where the step was refused.
-    """
-
-    record: str
-    time: Array
-    angle: Array
-    before: Array
-    after: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Balance:
-    """What the step found.
-
-    Attributes:
-        estimates: all that were given; where it was applied, with the new F_C, F_S and M_0. Their standard deviation is
-            no less than what puts the value before at the end of the interval of 95 %: two criteria disagree by that.
-        applied: whether the values are new. reason: why not; empty where they are.
-        records: names of those that it looked at.
-        position: rms of the angle in open loop [rad], before and after; torque: rms of the torque residual [N.m] at the
-            rows of stage 2, before and after. After is what was tried where it was refused; nan where nothing was.
-        I_P: lead [m/rad], nan where it was not given.
-        changes: F_C, F_S and M_0 before and after (what was tried where it was refused); empty where nothing was tried.
-        drifts: the records in open loop; empty where nothing was tried.
-        applies: False where all records are of sines, which the step is not meant for.
-    """
-
-    estimates: Mapping[str, Estimate]
-    applied: bool
-    reason: str
-    records: tuple[str, ...] = ()
-    position: tuple[float, float] = (nan, nan)
-    torque: tuple[float, float] = (nan, nan)
-    I_P: float = nan
-    changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    drifts: tuple[Drift, ...] = ()
-    applies: bool = True
-
-    @property
-    def position_at_slide(self) -> tuple[float, float]:
-        """Rms of the position in open loop [m], before and after."""
-        return self.position[0] * self.I_P, self.position[1] * self.I_P
-
-    @property
-    def torque_change(self) -> float:
-        """What it costs in the rms of the torque residual [N.m]."""
-        return self.torque[1] - self.torque[0]
 
 
 def balanced(

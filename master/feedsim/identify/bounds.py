@@ -29,13 +29,11 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.identify.fit import correlation, inverse
 from feedsim.identify.record import Record
-from feedsim.identify.torque import Law, RecordTorque
+from feedsim.identify.torque import START_PRIOR, STARTS, Law, RecordTorque
 
 Array = NDArray[np.float64]
 
 DIFFERENCE = 1e-4  # of the scale: the law is smooth but for kinks that move with the parameters
-STARTS = ("z", "c")  # state at a record's begin, as shares
-START_PRIOR = {"z": 3**-0.5, "c": 12**-0.5}  # standard deviation of what may lie anywhere within its range
 UNIT_SCALE = {"delay": 1e-4, "M_0": 1e-2, "asymmetry": 1e-2, "z": 1e-1, "c": 1e-1}
 
 

@@ -20,7 +20,6 @@ Residuals = Callable[[Mapping[str, float]], Array]
 # nothing: below it lies the error of the differences that the Jacobian is made of.
 SILENT = 1e-8
 AT_BOUND = 1e-6  # of the scale: what counts as sitting at a bound
-AGREE = 1e-3  # relative cost by which two starts may differ and still have found the same minimum
 
 
 @dataclass(frozen=True)
@@ -114,11 +113,9 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """How one start did: where it began and ended (by name), half the sum of squares there, evaluations of the model.
+    """How one start did: half the sum of squares where it ended, evaluations of the model.
     failure: why it was given up; empty where it arrived."""
 
-    began: Mapping[str, float]
-    ended: Mapping[str, float]
     cost: float
     evaluations: int
     failure: str = ""
@@ -134,7 +131,6 @@ class Fit:
             the variance inf and no covariance with others.
         residuals: (N,) at the solution, without the prior's rows. jacobian: (N, P), likewise.
         cost: half the sum of squares, prior included.
-        variance: sum of squares of the residuals / (N - P): 1 expected where they came normalised.
         at_bound: parameters that sit at a bound. silent: those that the data do not tell.
         starts: in the order they were made; the first is the one given.
     """
@@ -145,7 +141,6 @@ class Fit:
     residuals: Array
     jacobian: Array
     cost: float
-    variance: float
     at_bound: tuple[str, ...]
     silent: tuple[str, ...]
     starts: tuple[Start, ...]
@@ -173,11 +168,6 @@ class Fit:
         """Of the model, over all starts."""
         return sum(start.evaluations for start in self.starts)
 
-    @property
-    def agreeing(self) -> int:
-        """Number of starts that ended at the same minimum."""
-        return sum(not start.failure and start.cost <= self.cost * (1 + AGREE) + 1e-300 for start in self.starts)
-
 
 def fit(
     residuals: Residuals,
@@ -188,7 +178,6 @@ def fit(
     seed: int = 0,
     normalised: bool = True,
     difference: float = 1e-6,
-    central: bool = False,
     tolerance: float = 1e-10,
     limit: int = 100,
 ) -> Fit:
@@ -200,8 +189,8 @@ def fit(
         starts: how many in all; the further ones are drawn with `seed`.
         normalised: the residuals have unit variance, and the covariance is (J^T J)^-1. If not, it is multiplied by the
             residual variance.
-        difference: step of the differences, of the scale (of the value where log). central: two evaluations per
-            parameter while searching; the covariance always comes from central differences.
+        difference: step of the differences, of the scale (of the value where log), to one side while
+            searching; the covariance comes from central ones.
         tolerance: of cost, step and gradient. limit: steps per start.
 
     Raises InputError: no parameters, a name twice, fewer residuals than parameters, no start arrives.
@@ -216,7 +205,7 @@ def fit(
     made: list[tuple[Start, Array | None]] = []
     for k in range(max(starts, 1)):
         begin = np.array([p.start if k == 0 else p.draw(random) for p in parameters])
-        made.append(_run(problem, begin, central=central, tolerance=tolerance, limit=limit))
+        made.append(_run(problem, begin, tolerance=tolerance, limit=limit))
     arrived = [(start.cost, position) for start, position in made if position is not None]
     if not arrived:
         raise InputError(f"fit: none of {len(made)} start(s) arrives: {made[0][0].failure}")
@@ -284,20 +273,19 @@ class _Problem:
         return np.column_stack(columns)
 
 
-def _run(problem: _Problem, begin: Array, *, central: bool, tolerance: float, limit: int) -> tuple[Start, Array | None]:
+def _run(problem: _Problem, begin: Array, *, tolerance: float, limit: int) -> tuple[Start, Array | None]:
     """One start, and where it ended (None: nowhere)."""
     problem.evaluations = 0
     first = np.array(
         [p.inward(min(max(x, p.lower), p.upper)) for p, x in zip(problem.parameters, map(float, begin), strict=True)]
     )
-    began = problem.values(first)
     try:
         if len(problem(first)) < len(first):
             raise InputError(f"{len(problem(first))} residuals cannot tell {len(first)} parameters")
         found = least_squares(
             problem,
             first,
-            jac=lambda position: problem.jacobian(position, central),
+            jac=lambda position: problem.jacobian(position, central=False),
             bounds=(problem.lower, problem.upper),
             ftol=tolerance,
             xtol=tolerance,
@@ -305,10 +293,10 @@ def _run(problem: _Problem, begin: Array, *, central: bool, tolerance: float, li
             max_nfev=limit,
         )
     except InputError as error:
-        return Start(began, began, inf, problem.evaluations, str(error)), None
+        return Start(inf, problem.evaluations, str(error)), None
     position = _onto_bounds(problem, found.x)
     cost = 0.5 * float(np.sum(problem(position) ** 2))
-    return Start(began, problem.values(position), cost, problem.evaluations), position
+    return Start(cost, problem.evaluations), position
 
 
 def _onto_bounds(problem: _Problem, position: Array) -> Array:
@@ -336,7 +324,6 @@ def _conclude(problem: _Problem, position: Array, cost: float, starts: tuple[Sta
         residuals,
         everything[:own] / slopes,
         cost,
-        variance,
         tuple(name for name, at in zip(problem.names, edge, strict=True) if at),
         tuple(name for name, quiet in zip(problem.names, silent, strict=True) if quiet),
         starts,

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import nan
 from time import perf_counter
 
 import numpy as np
 
 from feedsim.errors import InputError
-from feedsim.identify.balance import Balance, FreeAxis, balanced
+from feedsim.identify.balance import FreeAxis, balanced
 from feedsim.identify.flexible import with_structure
 from feedsim.identify.inertia import Inertia, inertia
-from feedsim.identify.level import QUANTITIES
 from feedsim.identify.motion import motion
+from feedsim.identify.options import Options
 from feedsim.identify.output_error import dynamic
-from feedsim.identify.parameters import FRICTION, KINDS, PRE_SLIDING, USUAL
+from feedsim.identify.parameters import CONSTANT_SPEED, FRICTION, KINDS, PRE_SLIDING, USUAL
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
 from feedsim.identify.result import (
     NORMAL_95,
+    Balance,
     Correlation,
     Dynamic,
     Estimate,
@@ -33,52 +34,15 @@ from feedsim.identify.result import (
 from feedsim.identify.stretches import Part, parts
 from feedsim.identify.stribeck import stationary
 from feedsim.identify.torque import Law
-from feedsim.structure import Modes
 
 Progress = Callable[[str, int, int], None]  # what is being done, how many of its steps are done, of how many
 
-STAGES = (1, 2)
 ORDER = (*FRICTION, "M_0", "J", "delay")
 # Pre-sliding of an axis without a word from its records: bristles that give 5 mrad at break-away and relax in 2.5 ms.
 USUAL_DEFLECTION, USUAL_RELAXATION = 5e-3, 2.5e-3
 INERTIA_OFF, CERTAIN = 0.1, 4.0  # relative, standard deviations: a given inertia that is off by both is worth a warning
 # What a parameter is held at where no stage tells it and no machine was named: no effect.
 NO_EFFECT = {"F_log": 0.0, "sigma_2": 0.0, "asymmetry": 0.0, "W": 0.0, "gamma": 1.0, "v_s": 0.6}
-
-
-@dataclass(frozen=True)
-class Options:
-    """What is known and what is wanted.
-
-    Attributes:
-        axis: its name. I_P: lead [m/rad].
-        J: inertia seen at the motor [kg.m2], `given`; None: estimated from accelerating parts.
-        modes: of the machine whose J_tot is given: what its structure takes beyond J dn/dt is known then.
-        delay: of the torque channel [s]; None: estimated.
-        hold: name -> SI value that a parameter keeps. free: names that are estimated although they are usually held.
-        fallback: name -> SI value, for what the records do not tell: the friction of the machine so far.
-        stages: 1 stationary friction, 2 pre-sliding.
-        seed: of the random starts.
-    """
-
-    axis: str
-    I_P: float
-    J: Estimate | None = None
-    modes: Modes | None = None
-    delay: float | None = None
-    hold: Mapping[str, float] = field(default_factory=dict)
-    free: tuple[str, ...] = ()
-    fallback: Mapping[str, float] = field(default_factory=dict)
-    stages: tuple[int, ...] = STAGES
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        known = (*FRICTION, "M_0")
-        for name in (*self.hold, *self.free):
-            if name not in known:
-                raise InputError(f"no parameter {name!r}; there are {', '.join(known)}")
-            if name in self.hold and name in self.free:
-                raise InputError(f"{name} cannot be held and free at once")
 
 
 def identify(
@@ -186,7 +150,7 @@ class _Run:
             )
             return None
         self.progress("stage 1: Stribeck curve", 0, 1)
-        hold, free = self._held(QUANTITIES)
+        hold, free = self._held(CONSTANT_SPEED)
         try:
             return stationary(found, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
         except InputError as error:

@@ -20,17 +20,12 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.identify.averages import white
 from feedsim.identify.fit import correlation
+from feedsim.identify.parameters import KINDS, RIGID
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate
+from feedsim.identify.runs import runs
 
 Array = NDArray[np.float64]
-
-QUANTITIES = {
-    "J": ("kg.m2", "inertia seen by the motor"),
-    "sigma_2": ("N.m.s/rad", "viscous coefficient"),
-    "F_C": ("N.m", "Coulomb torque"),
-    "M_0": ("N.m", "constant load against the motor torque"),
-}
 
 
 @dataclass(frozen=True)
@@ -139,15 +134,14 @@ def _stretches(record: Record, length: float, slow: float, settings: Filter) -> 
     speed = _smooth_speed(record, settings)
     moving = np.abs(speed) > slow
     moving[1:] &= np.sign(speed[1:]) == np.sign(speed[:-1])
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], moving.astype(np.int8), [0]])))
     found = []
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in runs(moving):
         if end - begin < size:
             continue
-        part = slice(int(begin), int(end))
+        part = slice(begin, end)
         step = max(size // settings.overlap, 1)
         side = float(np.sign(speed[(begin + end) // 2]))
-        count = len(range(0, int(end - begin) - size + 1, step))
+        count = len(range(0, end - begin - size + 1, step))
         columns = [
             _apply(to_acceleration, signal[part], step),
             _apply(to_speed, signal[part], step),
@@ -178,14 +172,14 @@ def _smooth_speed(record: Record, settings: Filter) -> Array:
 
 def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     """Ordinary least squares with a covariance for correlated residuals."""
-    names, held, said = list(QUANTITIES), {}, []
+    names, held, said = list(RIGID), {}, []
     columns = np.vstack([stretch.columns for stretch in stretches])
     torque = np.concatenate([stretch.torque for stretch in stretches])
     if np.ptp(columns[:, 2]) == 0:
         names.remove("M_0")
         held["M_0"] = "motion in one direction only does not tell it from friction"
         said.append("motion in one direction only: the constant load is taken for friction")
-    chosen = [list(QUANTITIES).index(name) for name in names]
+    chosen = [RIGID.index(name) for name in names]
     scale = np.linalg.norm(columns[:, chosen], axis=0)
     scaled = columns[:, chosen] / np.where(scale > 0, scale, 1.0)
     strength = np.linalg.svd(scaled, compute_uv=False)
@@ -202,7 +196,8 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     values, covariance = values / scale, covariance / np.outer(scale, scale)
     sigma = np.sqrt(np.diag(covariance))
     estimates = {}
-    for name, (unit, meaning) in QUANTITIES.items():
+    for name in RIGID:
+        unit, meaning = KINDS[name].unit, KINDS[name].meaning
         if name in held:
             estimates[name] = Estimate(name, 0.0, unit, meaning, status="undetermined", reason=held[name])
             continue

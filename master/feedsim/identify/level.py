@@ -9,19 +9,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# name -> (unit, meaning), in the order in which they are shown.
-QUANTITIES = {
-    "F_C": ("N.m", "Coulomb torque"),
-    "F_S": ("N.m", "static torque"),
-    "v_s": ("rad/s", "Stribeck speed"),
-    "beta": ("1", "Stribeck exponent"),
-    "F_log": ("N.m", "factor of the logarithmic rise"),
-    "v_log": ("rad/s", "reference speed of the logarithmic rise"),
-    "sigma_2": ("N.m.s/rad", "viscous coefficient"),
-    "asymmetry": ("1", "direction dependence of the static level"),
-    "M_0": ("N.m", "constant load against the motor torque"),
-}
-
 
 def level(values: Mapping[str, float], speed: Array) -> Array:
     """(K,) static level at |speed| without asymmetry [N.m]: sigma_0 g of Eq. 7 (Wiesauer, Bleicher, CIRP CMMO 2021)."""

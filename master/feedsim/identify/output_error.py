@@ -202,7 +202,7 @@ def _base(known: _Known, with_prior: bool, with_delay: bool) -> list[str]:
 def _first_weights(model: RecordTorque) -> Array:
     """Noise of the recorded torque per stretch [N.m], from its differences."""
     levels = [noise_of(model.record.torque[part.rows]) for part in model.parts]
-    return np.asarray(np.maximum(levels, 1e-2 * _rms(model)), dtype=np.float64)
+    return np.asarray(np.maximum(levels, 1e-2 * model.recorded_rms()), dtype=np.float64)
 
 
 def _weights(fine: Sequence[RecordTorque], found: Solution, before: Sequence[Array]) -> list[Array]:
@@ -213,11 +213,6 @@ def _weights(fine: Sequence[RecordTorque], found: Solution, before: Sequence[Arr
         levels = np.array([spread(residual[model.stretch == k]) for k in range(len(weight))])
         made.append(np.hypot(levels, FLOOR * float(np.sqrt(np.mean(model.measured**2)))))
     return made
-
-
-def _rms(model: RecordTorque) -> Array:
-    squares = np.bincount(model.stretch, model.measured**2) / np.bincount(model.stretch)
-    return np.asarray(np.sqrt(np.maximum(squares, 1e-30)), dtype=np.float64)
 
 
 def _told(

@@ -2,39 +2,84 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
+
+from feedsim import units
+from feedsim.errors import InputError
+from feedsim.scenario import Friction
+from feedsim.scenario.fields import Quantity
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A parameter's unit and meaning; lower, upper: physically possible (no negative damping, no negative friction)."""
+    """A parameter's unit and meaning.
+
+    lower, upper: physically possible (no negative damping, no negative friction), the ends included. above: the end
+    that is not.
+    """
 
     unit: str
     meaning: str
     lower: float = -inf
     upper: float = inf
+    above: float = -inf
+
+    @property
+    def range(self) -> str:
+        """In words."""
+        low, high = units.show(self.lower, self.unit), units.show(self.upper, self.unit)
+        if self.above > -inf:
+            return f"more than {units.show(self.above, self.unit)}"
+        if self.lower == -inf:
+            return "any finite value"
+        return f"at least {low}" if self.upper == inf else f"from {low} to {high}"
+
+    def check(self, what: str, value: float) -> None:
+        """Raises InputError, which begins with `what`: the value is not finite or not possible."""
+        if not (isfinite(value) and self.lower <= value <= self.upper and value > self.above):
+            raise InputError(f"{what} {units.show(value, self.unit)}; allowed: {self.range}")
+
+
+def _friction(name: str, meaning: str) -> Kind:
+    """Unit and range are those of the key in machine files: what is estimated can be written into one."""
+    annotation = next(note for note in Friction.model_fields[name].metadata if isinstance(note, Quantity))
+    return Kind(annotation.unit, meaning, annotation.minimum, annotation.maximum, annotation.above)
 
 
 KINDS = {
-    "sigma_0": Kind("N.m/rad", "bristle stiffness", 0.0),
-    "sigma_1": Kind("N.m.s/rad", "bristle damping", 0.0),
-    "W": Kind("rad", "width of the engaging zone", 0.0),
-    "gamma": Kind("1", "share of the bristle stiffness engaged at once after a reversal", 0.0, 1.0),
-    "F_C": Kind("N.m", "Coulomb friction", 0.0),
-    "F_S": Kind("N.m", "static friction", 0.0),
-    "v_s": Kind("rad/s", "Stribeck speed", 0.0),
-    "beta": Kind("1", "Stribeck exponent", 0.0),
-    "F_log": Kind("N.m", "logarithmic rise of the friction", 0.0),
-    "v_log": Kind("rad/s", "reference speed of the logarithmic rise", 0.0),
-    "sigma_2": Kind("N.m.s/rad", "viscous friction", 0.0),
-    "asymmetry": Kind("1", "direction dependence of the friction", -1.0, 1.0),
+    "sigma_0": _friction("sigma_0", "bristle stiffness"),
+    "sigma_1": _friction("sigma_1", "bristle damping"),
+    "W": _friction("W", "width of the engaging zone"),
+    "gamma": _friction("gamma", "share of the bristle stiffness engaged at once after a reversal"),
+    "F_C": _friction("F_C", "Coulomb friction"),
+    "F_S": _friction("F_S", "static friction"),
+    "v_s": _friction("v_s", "Stribeck speed"),
+    "beta": _friction("beta", "Stribeck exponent"),
+    "F_log": _friction("F_log", "logarithmic rise of the friction"),
+    "v_log": _friction("v_log", "reference speed of the logarithmic rise"),
+    "sigma_2": _friction("sigma_2", "viscous friction"),
+    "asymmetry": _friction("asymmetry", "direction dependence of the friction"),
     "M_0": Kind("N.m", "constant load against the motor torque"),
-    "J": Kind("kg.m2", "inertia", 0.0),
-    "delay": Kind("s", "delay of the torque channel against the motion"),
+    "J": Kind("kg.m2", "inertia", above=0.0),
+    # Wide against the offsets between the channels of one log; what is beyond is a wrong unit, or two logs.
+    "delay": Kind("s", "delay of the torque channel against the motion", -20e-3, 20e-3),
 }
 
 FRICTION = ("sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "v_s", "beta", "F_log", "v_log", "asymmetry", "W", "gamma")
 PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma")
+# What plateaus tell, in the order in which it is shown; and all of it that stage 2 takes over.
+CONSTANT_SPEED = ("F_C", "F_S", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
 STATIONARY = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0")
-USUAL = {"beta": 1.0, "v_log": 3.0}  # held unless they are freed: no record of friction alone tells them well
+RIGID = ("J", "sigma_2", "F_C", "M_0")  # of a rigid axis with Coulomb and viscous friction
+# Held unless they are freed: no record of friction alone tells them well.
+USUAL: Mapping[str, float] = {"beta": 1.0, "v_log": 3.0}
+
+
+def check_held(hold: Mapping[str, float]) -> None:
+    """Raises InputError: a value outside its physical range, or F_S below F_C."""
+    for name, value in hold.items():
+        KINDS[name].check(f"{name} is held at", value)
+    if "F_S" in hold and "F_C" in hold and hold["F_S"] < hold["F_C"]:
+        raise InputError(f"F_S is held at {hold['F_S']:g} N.m, below F_C at {hold['F_C']:g} N.m; allowed: at least F_C")

@@ -7,12 +7,14 @@ from itertools import pairwise
 from math import ceil, hypot, inf, sqrt
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from feedsim.identify.averages import derivative, mean, resolution, white, window
 from feedsim.identify.record import Record
 from feedsim.identify.result import Plateau
+from feedsim.identify.runs import runs
 
 Array = NDArray[np.float64]
 
@@ -154,8 +156,7 @@ def _candidates(motion: _Motion, search: Search) -> list[tuple[int, int]]:
     inside[: half + 1] = inside[len(inside) - half - 1 :] = False
     # A change of sign parts two stretches even if noise hides what lies between.
     inside[1:] &= np.sign(blocks[1:]) == np.sign(blocks[:-1])
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(np.int8), [0]])))
-    return _joined([(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)], blocks, rows)
+    return _joined(runs(inside), blocks, rows)
 
 
 def _joined(parts: list[tuple[int, int]], blocks: Array, rows: int) -> list[tuple[int, int]]:
@@ -179,10 +180,16 @@ def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float, s
     if last - first < least:
         return ""
     speed = float(np.median(motion.blocks[first:last]))
-    allowed = 0.5 * search.change * abs(speed) + CERTAIN * motion.noise(motion.rows)
+    noise = CERTAIN * motion.noise(motion.rows)
+    if abs(speed) <= noise:  # joined across a stretch that may be at rest
+        return "the speed drifts"
+    allowed = 0.5 * search.change * abs(speed) + noise
     near = np.flatnonzero(np.abs(motion.blocks[first:last] - speed) <= allowed)
+    # Of an even number of blocks in coarse steps the median may lie between two of them, and near to none.
+    if len(near) < 0.5 * (last - first):
+        return "the speed drifts"
     begin, end = first + int(near[0]), first + int(near[-1]) + 1
-    if len(near) < 0.5 * (last - first) or not _steady(motion, begin, end, search):
+    if not _steady(motion, begin, end, search):
         return "the speed drifts"
     end -= ceil(search.margin / interval)
     earliest = begin + max(ceil(search.settle_time / interval), _travelled(motion, begin, end, search))
@@ -202,6 +209,8 @@ def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float, s
         if motion.direct
         else derivative(weights, motion.signal[start:end], interval, 1)
     )
+    if abs(mean_speed - speed) > allowed:
+        return "the speed drifts"
     return Plateau(
         record.name,
         float(record.time[start]),
@@ -222,7 +231,28 @@ def _steady(motion: _Motion, begin: int, end: int, search: Search) -> bool:
         return False
     means = [motion.speed(int(a), int(b)) for a, b in pairwise(bounds)]
     noise = CERTAIN * np.sqrt(2) * motion.noise(int(bounds[1] - bounds[0]))
-    return bool(np.ptp(means) <= search.change * abs(float(np.mean(means))) + noise)
+    allowed = search.change * abs(float(np.mean(means)))
+    return bool(np.ptp(means) <= allowed + noise) and _bend(motion, begin, end) <= allowed
+
+
+def _bend(motion: _Motion, begin: int, end: int) -> float:
+    """Range of the speed's parabola over rows begin <= i < end beyond its own noise [rad/s], least squares.
+
+    In coarse steps of the angle quarters show no crest of a sine; all rows together do.
+    """
+    rows, order = end - begin, 2 if motion.direct else 3
+    place = np.linspace(-1.0, 1.0, rows)
+    found = legendre.legfit(place, motion.signal[begin:end], order)
+    left = float(np.std(motion.signal[begin:end] - legendre.legval(place, found)))
+    # Coefficients of Legendre polynomials on many even points are independent, of variance (2 k + 1) / rows.
+    sigmas = left * np.sqrt((2 * np.arange(order + 1) + 1) / rows)
+    if motion.direct:
+        ranges, shape, scale = np.array([0.0, 2.0, 1.5]), found, 1.0
+    else:  # ranges of the derivatives of P_2 and P_3
+        ranges, shape = np.array([0.0, 0.0, 6.0, 7.5]), legendre.legder(found)
+        scale = 2 / ((rows - 1) * motion.interval)
+    noise = CERTAIN * float(np.linalg.norm(ranges * sigmas))
+    return scale * (float(np.ptp(legendre.legval(place, shape))) - noise)
 
 
 def _travelled(motion: _Motion, begin: int, end: int, search: Search) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import pi
@@ -11,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from feedsim.errors import InputError
-from feedsim.identify.grid import stretches
+from feedsim.identify.even_time import stretches
 from feedsim.identify.record import Array, Record
 from feedsim.identify.signals import Channel, Chosen, choose
 from feedsim.scenario import Columns, Machine
@@ -28,6 +29,10 @@ SLOPE = 0.05
 AGAINST = 0.1
 # Share of the kinetic energy that a record may lose from its first to its last row to be asked that question.
 BRAKED = 0.1
+# Names of columns that hold a known load; "workload" or "payload" are not.
+LOAD_NAME = re.compile(
+    r"(?<![a-z])load|pulse|disturbance|(?<![a-z])external[ _.-]*force|(?<![a-z])ext[ _.-]+force", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
@@ -121,7 +126,8 @@ def read_records(
         )
         for piece in pieces
     )
-    warnings = (*chosen.notes, *drive.warnings, *gaps, *_doubts(path, records))
+    unread = _unread_load(recording, chosen)
+    warnings = (*chosen.notes, *unread, *drive.warnings, *gaps, *_doubts(path, records))
     return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings))
 
 
@@ -182,6 +188,27 @@ def _which(chosen: Chosen, machine: Machine | None) -> str:
     if machine is not None and not chosen.axis:
         return f"; which axis of {machine.name} is it: {', '.join(machine.axes)}?"
     return ""
+
+
+def _unread_load(recording: Recording, chosen: Chosen) -> Iterator[str]:
+    """Columns of full length whose names speak of a disturbance, while no load is read."""
+    used = {channel.column for channel in chosen.channels.values()}
+    if "load" in chosen.channels:
+        return
+    for name in recording.names:
+        if name in used or not LOAD_NAME.search(name):
+            continue
+        try:
+            recording.read([*used, name])
+        except InputError:
+            continue  # cells that are no numbers, or of another length: no signal of this trace
+        unit = recording.units[name]
+        guess = "N" if re.search(r"(?:^|[^A-Za-z])N$", name) else "N.m"
+        given = "" if unit else f", unit: {guess}"
+        yield (
+            f"{recording.header}: {name!r} may be a known load, and is not read; mapping: load: {{column: {name}"
+            f"{given}}}. It counts against the motor: sign: -1 where it helps it"
+        )
 
 
 def _motor_side(channels: Mapping[str, Channel], signals: Mapping[str, Array], drive: _Drive) -> dict[str, Array]:

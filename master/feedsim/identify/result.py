@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import nan
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from feedsim.identify.balance import Balance
 
 Array = NDArray[np.float64]
 
@@ -83,7 +80,7 @@ class Stationary:
         speeds (K,), torque (K,), sigma (K,): the curve |M_fr| over |n| without asymmetry, and its standard deviation.
         range: lowest and highest speed of the plateaus [rad/s].
         rms: residual of the plateaus [N.m].
-        worst_curve: largest relative deviation of a plateau's friction from the curve.
+        worst_curve: largest deviation of a plateau's friction from the curve, over the curve [1].
     """
 
     plateaus: tuple[Plateau, ...]
@@ -104,9 +101,10 @@ class Stretch:
     """A stretch of motion that stage 2 was fitted to.
 
     Attributes:
-        kind: "sine" (amplitude [m at the scale, rad at the motor] and frequency are known) or "motion".
+        kind: "sine" or "motion".
         time [s], angle [rad], speed [rad/s], measured: torque less inertia and load [N.m], model: friction law [N.m].
-        amplitude: half the range of the motor angle [rad]; frequency [Hz], nan where it is no sine.
+        amplitude: of the motor angle [rad]; of a sine that of its fundamental, else half the range. frequency: of a
+            sine [Hz], else nan.
         weight: standard deviation that the residuals were divided by [N.m].
     """
 
@@ -147,6 +145,56 @@ class Dynamic:
     without_delay: Mapping[str, float] = field(default_factory=dict)
     advice: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """One record driven in open loop by its torque (balance.py).
+
+    Attributes:
+        time (N,) [s]; angle (N,): recorded, from the start on [rad].
+        before, after: (N,) recorded less reached angle [rad]; after with what was tried where the step was refused.
+    """
+
+    record: str
+    time: Array
+    angle: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """What the position in open loop says of F_C and M_0 (balance.py).
+
+    Attributes:
+        estimates: all that were given; where it was applied, with the new F_C, F_S and M_0. Their standard deviation is
+            no less than what puts the value before at the end of the interval of 95 %: two criteria disagree by that.
+        applied: whether the values are new. reason: why not; empty where they are.
+        records: names of those that it looked at.
+        position: rms of the angle in open loop [rad], before and after; torque: rms of the torque residual [N.m] at the
+            rows of stage 2, before and after. After is what was tried where it was refused; nan where nothing was.
+        I_P: lead [m/rad], nan where it was not given.
+        changes: F_C, F_S and M_0 before and after (what was tried where it was refused); empty where nothing was tried.
+        drifts: the records in open loop; empty where nothing was tried.
+        applies: False where all records are of sines, which the step is not meant for.
+    """
+
+    estimates: Mapping[str, Estimate]
+    applied: bool
+    reason: str
+    records: tuple[str, ...] = ()
+    position: tuple[float, float] = (nan, nan)
+    torque: tuple[float, float] = (nan, nan)
+    I_P: float = nan
+    changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    drifts: tuple[Drift, ...] = ()
+    applies: bool = True
+
+    @property
+    def position_at_slide(self) -> tuple[float, float]:
+        """Rms of the position in open loop [m], before and after."""
+        return self.position[0] * self.I_P, self.position[1] * self.I_P
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,21 +9,23 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.identify.bounds import START_PRIOR, STARTS
 from feedsim.identify.fit import Fit, Parameter, Prior, fit
 from feedsim.identify.parameters import KINDS
-from feedsim.identify.torque import RecordTorque
+from feedsim.identify.torque import START_PRIOR, STARTS, RecordTorque
 
 Array = NDArray[np.float64]
 
 # F_S moves as its excess over F_C: F_S >= F_C then is a bound like any other.
 EXCESS = "excess"
 LOGARITHMIC = ("sigma_0", "W", "v_s")  # known by their order of magnitude at first, and above 0
-DECADES = {"sigma_0": 2.0, "W": 1.5, "v_s": 1.5}  # that they may move either way from their start
 SCALES = {"delay": 1e-4, "asymmetry": 0.1}
-DELAYS = (-5e-3, 20e-3)  # [s] of the torque channel against the motion's
+# Bounds of the search, within what is physical (KINDS).
+DECADES = {"sigma_0": 2.0, "W": 1.5, "v_s": 1.5}  # either way from their start, which is of the right order
+DELAYS = (-5e-3, 20e-3)  # [s]: filters and buses make the torque late; what makes it early is less
 MOST_EXCESS = 2.0  # of the friction: static friction beyond three times Coulomb's is none
 MOST_ASYMMETRY = 0.6  # beyond, it plays the constant load's part
+LEAST_SHARE = 1e-3  # of the start: the law and the scales divide by F_C, beta, v_log and J
+LEAST_GAMMA = 1e-3  # at 0 nothing is engaged at a reversal, and sigma_0 acts on nothing
 REACH = {"z": 1.0, "c": 0.5}
 
 
@@ -145,21 +147,20 @@ def _parameter(name: str, begin: Mapping[str, float]) -> Parameter:
     start = begin[name]
     if name in LOGARITHMIC:
         span = 10 ** DECADES[name]
-        return Parameter(name, start, start / span, start * span, log=True)
+        return Parameter(name, start, *_within(name, start / span, start * span), log=True)
+    lower, upper = -inf, inf
     if name == "delay":
-        return Parameter(name, start, *DELAYS, scale=SCALES[name])
-    kind = KINDS[outer(name)]
-    lower, upper = (0.0, inf) if name == EXCESS else (kind.lower, kind.upper)
-    if name == "J":
-        lower = 1e-3 * start
-    if name in ("F_C", "beta", "v_log"):
-        lower = 1e-3 * start  # the law divides by them
-    if name == "asymmetry":
+        lower, upper = DELAYS
+    elif name in ("F_C", "beta", "v_log", "J"):
+        lower = LEAST_SHARE * start
+    elif name == "asymmetry":
         lower, upper = -MOST_ASYMMETRY, MOST_ASYMMETRY
-    if name == "gamma":
-        lower = 1e-3
-    if name == EXCESS:
-        upper = MOST_EXCESS * max(begin["F_C"], begin["F_S"])
+    elif name == "gamma":
+        lower = LEAST_GAMMA
+    elif name == EXCESS:
+        lower, upper = 0.0, MOST_EXCESS * max(begin["F_C"], begin["F_S"])
+    if name != EXCESS:
+        lower, upper = _within(name, lower, upper)
     scale = {
         "sigma_1": max(abs(start), 1e-4 * begin["sigma_0"]),
         "sigma_2": max(abs(start), 1e-4 * begin["F_C"]),
@@ -169,6 +170,11 @@ def _parameter(name: str, begin: Mapping[str, float]) -> Parameter:
         "gamma": 1.0,
     }.get(name, SCALES.get(name))
     return Parameter(name, start, lower, upper, scale=scale)
+
+
+def _within(name: str, lower: float, upper: float) -> tuple[float, float]:
+    """Bounds, no wider than physical."""
+    return max(lower, KINDS[name].lower), min(upper, KINDS[name].upper)
 
 
 def spread(residual: Array) -> float:

@@ -109,16 +109,10 @@ def _damped(models: Sequence[RecordTorque], trial: dict[str, float], free: bool)
     for sigma_1 in (0.0, 1.0) if free else (trial["sigma_1"],):
         trial["sigma_1"] = sigma_1
         ends.append(
-            np.concatenate([model.residual(trial, 0.0, 0.0) / _power(model)[model.stretch] for model in models])
+            np.concatenate([model.residual(trial, 0.0, 0.0) / model.recorded_rms()[model.stretch] for model in models])
         )
     if not free:
         return float(np.sum(ends[0] ** 2))
     slope = ends[1] - ends[0]
     trial["sigma_1"] = max(0.0, -float(slope @ ends[0]) / max(float(slope @ slope), 1e-300))
     return float(np.sum((ends[0] + trial["sigma_1"] * slope) ** 2))
-
-
-def _power(model: RecordTorque) -> Array:
-    """(stretches,) RMS of the recorded torque [N.m]."""
-    squares = np.bincount(model.stretch, model.measured**2) / np.bincount(model.stretch)
-    return np.asarray(np.sqrt(np.maximum(squares, 1e-300)), dtype=np.float64)

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 
 from feedsim.identify.motion import Motion
 from feedsim.identify.record import Record
+from feedsim.identify.runs import runs
 
 Array = NDArray[np.float64]
 
@@ -57,13 +58,8 @@ def parts(record: Record, motion: Motion) -> tuple[Part, ...]:
     """
     speed = motion.coarse()
     moving = _moving(record, motion, speed)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], moving.astype(np.int8), [0]])))
     angle = np.asarray(motion.speed.antiderivative()(motion.time), dtype=np.float64)
-    found = [
-        _part(motion, speed, angle, int(first), int(last))
-        for first, last in zip(edges[::2], edges[1::2], strict=True)
-        if last - first >= SHORTEST
-    ]
+    found = [_part(motion, speed, angle, first, last) for first, last in runs(moving) if last - first >= SHORTEST]
     return tuple(found)
 
 

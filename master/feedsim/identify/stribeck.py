@@ -7,22 +7,32 @@ from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, f
 
 from feedsim.errors import InputError
 from feedsim.identify import doubts
 from feedsim.identify.doubts import Points
 from feedsim.identify.fit import Fit, Parameter, correlation, fit
-from feedsim.identify.level import QUANTITIES, curve, torque
+from feedsim.identify.level import curve, torque
+from feedsim.identify.parameters import CONSTANT_SPEED, KINDS, USUAL, check_held
 from feedsim.identify.result import Correlation, Estimate, Plateau, Stationary, Status
 
 Array = NDArray[np.float64]
 
-USUAL: Mapping[str, float] = {"beta": 1.0, "v_log": 3.0}  # held unless freed
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6
 DOUBTFUL = 0.95  # probability of a smaller chi^2 from which on plateaus count as scattering more than their noise
-CLEAR = 0.99  # the same, of the drop that a Stribeck effect must bring
+CLEAR = 0.99  # the same, of the drop that a Stribeck effect, or a shape that is else held, must bring
+HALF = 0.5  # of the sum of squares: what lies below is worth to free a parameter that is held by default
+SHAPED: Mapping[str, str] = {"beta": "v_s", "v_log": "F_log"}  # held by default -> without which it has no effect
+
+# Bounds of the search, within what is physical: beyond them plateaus tell nothing, and the solver goes astray.
+V_S = 20.0, 2.0  # below the lowest speed, above the highest: a Stribeck effect that is over before, or no end of it
+V_LOG = 1e-2, 1e2  # likewise: a logarithm all along, or a straight line
+BETA = 0.2, 4.0  # flatter, the peak has no end within decades of speed; steeper, it is a step
+ASYMMETRY = -0.5, 0.5  # beyond, it plays the constant load's part
+MOST_TORQUE = 2.0  # of the largest measured: no part of the friction, and no load, is more
+LEAST_F_C = 1e-3  # of the largest torque: what is reported is relative to it
 
 # The fit moves F_C and rise = F_S - F_C >= 0 in place of F_S: F_C <= F_S is a bound then.
 ORDER = ("F_C", "rise", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
@@ -31,7 +41,7 @@ ORDER = ("F_C", "rise", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry",
 def stationary(
     plateaus: Sequence[Plateau],
     *,
-    hold: Mapping[str, float] = USUAL,
+    hold: Mapping[str, float] | None = None,
     free: Sequence[str] = (),
     seed: int = 0,
     I_P: float | None = None,
@@ -39,7 +49,7 @@ def stationary(
     """Friction over speed from plateaus.
 
     Args:
-        hold: name -> value of what is not estimated, on top of `USUAL`; any of the estimates' names.
+        hold: name -> value of what is not estimated, on top of `USUAL`; any of the estimates' names. None: nothing.
         free: names of `hold` and `USUAL` that are estimated nevertheless.
         seed: of the further starts. I_P: lead [m/rad], for advice in mm/min.
 
@@ -48,21 +58,25 @@ def stationary(
     depends on position, temperature) get a share of their torque added to their standard deviation, as large as makes
     the residuals plausible (R. Paule, J. Mandel, J. Res. NBS 87, 1982): the confidence intervals tell it then.
 
-    Raises InputError: no plateau; a name that is none; F_S held below F_C.
+    Raises InputError: no plateau; a name that is none; a value held outside its physical range, or F_S below F_C.
     """
     if not plateaus:
         raise InputError(
             "no plateau of constant speed: stationary friction needs stretches of at least 0.4 s (0.15 s settle) at "
             "constant speed, best 12 speeds from 10 to 20000 mm/min in both directions"
         )
-    held = {name: value for name, value in {**USUAL, **hold}.items() if name not in free}
-    for name in (*hold, *free):
-        if name not in QUANTITIES:
-            raise InputError(f"{name} is no parameter of stationary friction: {', '.join(QUANTITIES)}")
+    asked = hold or {}
+    for name in (*asked, *free):
+        if name not in CONSTANT_SPEED:
+            raise InputError(f"{name} is no parameter of stationary friction: {', '.join(CONSTANT_SPEED)}")
+    held = {name: value for name, value in {**USUAL, **asked}.items() if name not in free}
+    check_held(held)
     points = Points.of(plateaus)
     problem = _Problem(points, held, seed)
     found, reasons, extra = problem.solve()
-    return _conclude(tuple(plateaus), points, problem, found, reasons, extra, I_P)
+    usual = [name for name in USUAL if name in held and name not in asked]
+    better = _better(problem, found, reasons, usual) if extra > 0 else ""
+    return _conclude(tuple(plateaus), points, problem, found, reasons, extra, better, I_P)
 
 
 class _Problem:
@@ -71,8 +85,6 @@ class _Problem:
     def __init__(self, points: Points, given: Mapping[str, float], seed: int) -> None:
         self.points, self.given, self.seed = points, dict(given), seed
         self.usual = _guess(points)
-        if "F_S" in given and "F_C" in given and given["F_S"] < given["F_C"]:
-            raise InputError(f"F_S is held at {given['F_S']:g} N.m, below F_C at {given['F_C']:g} N.m")
 
     def solve(self) -> tuple[Fit, dict[str, str], float]:
         """The fit that stands, why what is held, and the share of the torque that plateaus scatter by besides noise."""
@@ -158,25 +170,27 @@ class _Problem:
         """Bounds and the range of further starts, from what the plateaus span."""
         points = self.points
         top, fast, slow = float(np.max(np.abs(points.torque))), float(points.speeds[-1]), float(points.speeds[0])
+        least, most = 0.0 if name == "rise" else KINDS[name].lower, MOST_TORQUE * top
         if name == "v_s":
-            return Parameter(name, start, slow / 20, 2 * fast, scatter=(slow, max(fast / 3, 2 * slow)), log=True)
+            scatter = slow, max(fast / 3, 2 * slow)
+            return Parameter(name, start, slow / V_S[0], V_S[1] * fast, scatter=scatter, log=True)
         if name == "v_log":
-            return Parameter(name, start, 1e-2 * slow, 1e2 * fast, scatter=(slow, fast * 1.01), log=True)
+            return Parameter(name, start, V_LOG[0] * slow, V_LOG[1] * fast, scatter=(slow, fast * 1.01), log=True)
         if name == "beta":
-            return Parameter(name, start, 0.2, 4.0, scatter=(0.5, 2.0), log=True)
+            return Parameter(name, start, *BETA, scatter=(0.5, 2.0), log=True)
         if name == "asymmetry":
-            return Parameter(name, start, -0.5, 0.5, 0.1, scatter=(-0.05, 0.05))
+            return Parameter(name, start, *ASYMMETRY, 0.1, scatter=(-0.05, 0.05))
         if name == "M_0":
-            return Parameter(name, start, -2 * top, 2 * top, 0.1 * top, scatter=(-0.05 * top, 0.05 * top))
+            return Parameter(name, start, -most, most, 0.1 * top, scatter=(-0.05 * top, 0.05 * top))
         if name == "sigma_2":
-            return Parameter(name, start, 0.0, 2 * top / fast, 0.1 * top / fast, scatter=(0.0, 0.5 * top / fast))
+            return Parameter(name, start, least, most / fast, 0.1 * top / fast, scatter=(0.0, 0.5 * top / fast))
         if name == "F_C":
             # Held F_S is an upper bound: the rise must not be negative.
-            highest = min(2 * top, self.given.get("F_S", 2 * top))
+            highest = min(most, self.given.get("F_S", most))
             return Parameter(
-                name, min(start, highest), 1e-3 * top, highest, 0.3 * top, scatter=(0.2 * top, min(top, highest))
+                name, min(start, highest), LEAST_F_C * top, highest, 0.3 * top, scatter=(0.2 * top, min(top, highest))
             )
-        return Parameter(name, start, 0.0, 2 * top, 0.1 * top, scatter=(0.0, 0.5 * top))
+        return Parameter(name, start, least, most, 0.1 * top, scatter=(0.0, 0.5 * top))
 
 
 def _guess(points: Points) -> dict[str, float]:
@@ -199,6 +213,39 @@ def _guess(points: Points) -> dict[str, float]:
     }
 
 
+def _better(problem: _Problem, found: Fit, reasons: Mapping[str, str], usual: Sequence[str]) -> str:
+    """What estimating one of the values held by default would gain, for the warning of scatter; "": nothing clear.
+
+    It counts where the plateaus are met to their noise then, or the sum of squares more than halves, and the drop is
+    none that one more parameter brings in noise (F test: the noise's size is in doubt here).
+    """
+    count, moved = len(problem.points.speed), list(found.names)
+    freedom = count - len(moved) - 1
+    if freedom < 1:
+        return ""
+    before = 2 * problem.fit(moved, reasons, 0.0, STARTS, found).cost
+    gains: list[tuple[float, str]] = []
+    for name in usual:
+        if SHAPED[name] not in moved:
+            continue
+        given = {key: value for key, value in problem.given.items() if key != name}
+        trial = _Problem(problem.points, given, problem.seed)
+        free = [key for key in ORDER if key in (*moved, name)]
+        freed = trial.fit(free, reasons, 0.0, STARTS, found)
+        after = 2 * freed.cost
+        fits = after <= chi2.ppf(DOUBTFUL, freedom)
+        clear = before - after > f.ppf(CLEAR, 1, freedom) * after / freedom
+        if name in freed.at_bound or not clear or not (fits or after < HALF * before):
+            continue
+        gain = (
+            "the curve fits the plateaus to their noise"
+            if fits
+            else f"the sum of squares falls to {100 * after / before:.2g} %"
+        )
+        gains.append((after, f"; with {name} free ({freed[name]:.3g}) {gain}: --free {name}"))
+    return min(gains)[1] if gains else ""
+
+
 def _conclude(
     plateaus: tuple[Plateau, ...],
     points: Points,
@@ -206,6 +253,7 @@ def _conclude(
     found: Fit,
     reasons: Mapping[str, str],
     extra: float,
+    better: str,
     I_P: float | None,
 ) -> Stationary:
     """Everything that is reported."""
@@ -220,16 +268,20 @@ def _conclude(
     sigma = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
     told = {"F_S" if name == "rise" else name: reason for name, reason in reasons.items()}
     estimates = {}
-    for name, (unit, meaning) in QUANTITIES.items():
+    for name in CONSTANT_SPEED:
+        kind = KINDS[name]
         status: Status = "estimated" if name in names else "undetermined" if name in told else "held"
         reason = told.get(name, "" if status == "estimated" else "held at a given or usual value")
-        estimates[name] = Estimate(name, values[name], unit, meaning, float(sigma.get(name, nan)), status, reason)
+        estimates[name] = Estimate(
+            name, values[name], kind.unit, kind.meaning, float(sigma.get(name, nan)), status, reason
+        )
     said = doubts.warnings(points, found, matrix, names, I_P)
     said += [f"{name} is not estimated but held at {values[name]:.4g}: {reason}" for name, reason in told.items()]
     if extra > 0:
         said.append(
             f"plateaus scatter about the curve by {100 * extra:.2g} % of their torque beyond their own noise (friction "
             "that depends on position or temperature, or a shape the model has not); the confidence intervals hold it"
+            + better
         )
     speeds = np.geomspace(points.speeds[0], points.speeds[-1], SPEEDS) if len(points.speeds) > 1 else points.speeds
     away = points.torque - torque(values, points.speed)

@@ -15,6 +15,8 @@ from feedsim.identify.stretches import Part, parts
 
 Array = NDArray[np.float64]
 
+STARTS = ("z", "c")  # state at a record's begin, as shares
+START_PRIOR = {"z": 3**-0.5, "c": 12**-0.5}  # standard deviation of what may lie anywhere within its range
 KEPT = 4  # results of the law kept per record: a difference quotient of another record's start asks for the same again
 
 
@@ -57,6 +59,11 @@ class RecordTorque:
         self.measured = record.torque[self.rows]
         self._law: dict[tuple[float, ...], Array] = {}
         self._moved: dict[float, tuple[Array, Array, Array, Array]] = {}
+
+    def recorded_rms(self) -> Array:
+        """(stretches,) RMS of the recorded torque [N.m]; never 0, as it is divided by."""
+        squares = np.bincount(self.stretch, self.measured**2) / np.bincount(self.stretch)
+        return np.asarray(np.sqrt(np.maximum(squares, 1e-30)), dtype=np.float64)
 
     def friction(self, values: Mapping[str, float], z: float, c: float) -> Array:
         """(rows,) friction torque [N.m] without its viscous part."""

@@ -13,6 +13,7 @@ from feedsim.report.identify.summary import table_lines as identification_table
 from feedsim.report.identify.summary import terminal_warnings as identification_warnings
 from feedsim.report.identify.write import check_identification_writable, write_identification
 from feedsim.report.machine.write import check_machine_writable, write_machine
+from feedsim.report.provenance import input_paths
 from feedsim.report.summary import Run, summary_line
 from feedsim.report.write import check_writable, write
 
@@ -30,6 +31,7 @@ __all__ = [
     "identification_headline",
     "identification_table",
     "identification_warnings",
+    "input_paths",
     "open_loop_line",
     "rigid_line",
     "summary_line",

@@ -38,6 +38,15 @@ class ArchiveUse:
 
 def input_files(scenario: Scenario) -> list[InputFile]:
     """Scenario, machine and further YAML files, table of modes, recordings; each once."""
+    return hashed(_inputs(scenario))
+
+
+def input_paths(scenario: Scenario) -> list[Path]:
+    """Where the files of :func:`input_files` are."""
+    return [path for _, path in _inputs(scenario)]
+
+
+def _inputs(scenario: Scenario) -> list[tuple[str, Path]]:
     named = [(place or "scenario", path) for place, path in scenario.files]
     named.append(("modes", scenario.machine.modes))
     if scenario.machine.plant is not None:
@@ -45,7 +54,7 @@ def input_files(scenario: Scenario) -> list[InputFile]:
     named += [
         ("recorded setpoints", motion.file) for motion in scenario.motions if isinstance(motion, MeasuredSetpoints)
     ]
-    return hashed(named)
+    return named
 
 
 def hashed(files: Sequence[tuple[str, Path]]) -> list[InputFile]:

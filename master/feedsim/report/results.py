@@ -13,18 +13,20 @@ from feedsim.errors import OutputError
 from feedsim.report.style import Picture
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
-# What a report of any kind leaves besides report.html and summary.json, which every one replaces.
+# What a report of any kind leaves besides report.html and summary.json, which every one replaces; the next one takes
+# away what it does not write itself. Not friction.yaml: scenarios and machine files may name it.
 _OWN_FILE = re.compile(
     rf"{FIGURES}/[\w-]+\.(png|svg|gif)|result\.csv|log\.csv|frf(_measured)?\.csv|(residuals|open_loop|plateaus)\.csv"
     r"|(uncompensated|feedforward|compensation)\.csv"
 )
 
 
-def check_place(directory: Path | str, files: Sequence[str]) -> None:
+def check_place(directory: Path | str, files: Sequence[str], inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless ``directory`` can be created, or can be written to where it is there already.
 
-    files: names of the files that are to be written besides the figures. Leaves nothing behind. Meant to be called
-    before a simulation, whose result would else be lost.
+    files: names of the files that may be written besides the figures. inputs: files that are read; none of them may be
+    among those, nor among the files of an earlier result that would be removed. Leaves nothing behind. Meant to be
+    called before a simulation, whose result would else be lost.
     """
     directory = Path(directory)
     existing = _existing(directory)
@@ -35,6 +37,10 @@ def check_place(directory: Path | str, files: Sequence[str]) -> None:
             raise OutputError(
                 f"{directory / name}: is in the way of a result {'directory' if name == FIGURES else 'file'}"
             )
+    for fate, names in (("replaced", files), ("removed", _stale(directory, files))):
+        for name in names:
+            if any(_same(directory / name, path) for path in inputs):
+                raise OutputError(f"{directory / name}: is an input and would be {fate}; take another directory")
     with _as_output_error(directory), tempfile.TemporaryDirectory(prefix=".feedsim-", dir=existing):
         pass
 
@@ -48,8 +54,9 @@ def write_results(
     """Write the figures and whatever ``fill`` writes; returns the paths.
 
     fill: called with an empty directory, in which it makes ``files``, and with the names of all files and figures.
-    Everything is made in a temporary directory beside the target and moved when complete; files of an earlier run are
-    replaced, and put back if moving fails. Raises OutputError.
+    Everything is made in a temporary directory beside the target and moved when complete; files of an earlier result,
+    of whatever kind, are replaced, those that this one has not are removed, and both are put back if moving fails. Only
+    friction.yaml of an identification stays: scenarios and machine files may name it. Raises OutputError.
     """
     directory = Path(directory)
     check_place(directory, files)
@@ -75,6 +82,13 @@ def write_text(file: Path, text: str) -> None:
 def _existing(directory: Path) -> Path:
     """``directory``, or the nearest folder above it that is there already."""
     return next(path for path in (directory.absolute(), *directory.absolute().parents) if path.exists())
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False  # one of them is not there
 
 
 def _stale(directory: Path, names: Sequence[str]) -> list[str]:

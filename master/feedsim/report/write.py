@@ -20,9 +20,12 @@ RESULT, LOG = "result.csv", "log.csv"
 FILES = (RESULT, REPORT, SUMMARY)
 
 
-def check_writable(directory: Path | str) -> None:
-    """Raise OutputError unless the results of a run can be written to ``directory``; leaves nothing behind."""
-    check_place(directory, (*FILES, LOG))
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless a run's results can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(directory, (*FILES, LOG), inputs)
 
 
 def write(run: Run, figures: Mapping[str, Figure], directory: Path | str) -> tuple[Path, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from feedsim.analysis.compensation import Compensation, Quality, quality
+from feedsim.analysis.compensation import Compensation, Quality
 from feedsim.report.parts import inputs_part
 from feedsim.report.provenance import InputFile, axis_parameters, hashed
 from feedsim.report.summary import summary as summary_of_run
@@ -18,10 +18,9 @@ Row = tuple[str, float, str, Quality]
 
 def rows_of(compensation: Compensation) -> list[Row]:
     """What is compensated with, its error with unit, and what is left: first nothing, then the set as it is."""
-    turn = compensation.turn
     return [
-        ("none", 0.0, "", quality(compensation.before.trace, turn)),
-        ("as computed", 0.0, "", quality(compensation.after.trace, turn)),
+        ("none", 0.0, "", compensation.left_before),
+        ("as computed", 0.0, "", compensation.left_after),
         *((each.what, each.change, each.unit, each.quality) for each in compensation.table),
     ]
 

@@ -19,9 +19,12 @@ RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE = "result.csv", "uncompensated.csv", "
 FILES = (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, REPORT, SUMMARY)
 
 
-def check_compensation_writable(directory: Path | str) -> None:
-    """Raise OutputError unless the results can be written to ``directory``; leaves nothing behind."""
-    check_place(directory, FILES)
+def check_compensation_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(directory, FILES, inputs)
 
 
 def write_compensation(

@@ -21,9 +21,12 @@ from feedsim.trace.response_csv import write_response
 CURVES, MEASURED = "frf.csv", "frf_measured.csv"
 
 
-def check_frf_writable(directory: Path | str) -> None:
-    """Raise OutputError unless the results can be written to ``directory``; leaves nothing behind."""
-    check_place(directory, (CURVES, MEASURED, REPORT, SUMMARY))
+def check_frf_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(directory, (CURVES, MEASURED, REPORT, SUMMARY), inputs)
 
 
 def write_frf(subject: Subject, responses: Responses, directory: Path | str) -> tuple[Path, ...]:

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.identify.balance import Balance
-from feedsim.identify.result import Identification
+from feedsim.identify.result import Balance, Identification
 from feedsim.report.tables import table
 from feedsim.report.words import minus, typeset
 from feedsim.trace.csv import quoted, shortest

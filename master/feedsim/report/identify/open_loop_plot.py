@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from feedsim.identify.balance import Balance
-from feedsim.identify.result import Identification
+from feedsim.identify.result import Balance, Identification
 from feedsim.report.labels import heading, legend_above
 from feedsim.report.style import BLUE, INK, MUTED, VERMILLION, Picture, drawing, finish, thinned
 

@@ -20,9 +20,12 @@ PLATEAUS, RESIDUALS, OPEN_LOOP = "plateaus.csv", "residuals.csv", "open_loop.csv
 REMARK_WIDTH, REMARK_LINES = 100, 3  # fits the narrowest figure
 
 
-def check_identification_writable(directory: Path | str) -> None:
-    """Raise OutputError unless the results can be written to ``directory``; leaves nothing behind."""
-    check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY))
+def check_identification_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs)
 
 
 def write_identification(account: Account, directory: Path | str) -> tuple[Path, ...]:

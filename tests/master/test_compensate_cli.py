@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,9 +17,11 @@ import pytest
 import yaml
 from test_report import Page
 
-from feedsim.analysis import compensation
+from feedsim.analysis import Figure, compensation
 from feedsim.cli import main
 from feedsim.errors import SimulationError
+from feedsim.report.compensate.page import _um
+from feedsim.report.compensate.summary import table_csv
 from feedsim.trace import read_csv
 from report_helpers import contents
 
@@ -70,9 +74,12 @@ def test_everything_is_written_and_told(done: tuple[Process, Path]) -> None:
     first, second = process.stdout.splitlines()
     assert first == f"X-Z circle: friction compensation -> {Path('out') / 'report.html'}"
     assert second.startswith("  G 8.19 -> 0.8")
+    numbers = re.findall(r"-> (\S+) um", second)
+    assert len(numbers) == 3
+    assert all(number == f"{float(number):.3g}" for number in numbers), second
     files = set(contents(folder / "out"))
     assert files == {
-        *("result.csv", "uncompensated.csv", "feedforward.csv", "compensation.csv", "summary.json", "report.html"),
+        *("result.csv", "uncompensated.csv", "feedforward.csv", "summary.json", "report.html"),
         *(f"figures/compensation-{stem}.png" for stem in ("contour", "reversals", "torque")),
     }
     assert set(summary_of(folder)["files"]) == files
@@ -116,16 +123,37 @@ def test_curves_can_be_read_back(done: tuple[Process, Path]) -> None:
     )
 
 
-def test_table_without_errors_has_both_runs(done: tuple[Process, Path]) -> None:
-    with (done[1] / "out" / "compensation.csv").open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert [row["compensation"] for row in rows] == ["none", "as computed"]
-    figures = summary_of(done[1])["figures"]
-    for row, run in zip(rows, ("before", "after"), strict=True):
-        assert float(row["G [um]"]) == pytest.approx(figures[f"{run}.G"]["value"], rel=1e-5)
+def test_without_the_table_there_is_none(done: tuple[Process, Path]) -> None:
+    out = done[1] / "out"
+    assert not (out / "compensation.csv").exists()
+    assert "What errors cost" not in (out / "report.html").read_text(encoding="utf-8")
+    assert summary_of(done[1])["compensation"]["errors"] == []
+
+
+def test_table_has_both_runs_and_the_errors() -> None:
+    made: Any = SimpleNamespace(
+        turn=SimpleNamespace(axes=("X", "Z")),
+        left_before=compensation.Quality(8e-6, {"X": 4e-6, "Z": 7e-6}, {"X": -1e-6, "Z": -2e-6}),
+        left_after=compensation.Quality(4e-9, {"X": 1e-9, "Z": 2e-9}, {"X": -1e-9, "Z": -3e-9}),
+    )
+    wrong = compensation.Quality(1e-6, {"X": 0.0, "Z": 1e-6}, {"X": 0.0, "Z": 0.0})
+    made.table = (compensation.Variation("delay", 0.5, "ms", wrong),)
+    rows = list(csv.DictReader(table_csv(made).splitlines()))
+    assert [row["compensation"] for row in rows] == ["none", "as computed", "delay"]
+    assert [row["error"] for row in rows] == ["0", "0", "0.5"]
+    for row, left in zip(rows, (made.left_before, made.left_after, wrong), strict=True):
+        assert float(row["G [um]"]) == pytest.approx(1e6 * left.G, rel=1e-5)
         for axis in ("X", "Z"):
-            assert float(row[f"peak_{axis} [um]"]) == pytest.approx(figures[f"{run}.glitch_{axis}"]["value"], rel=1e-5)
-            assert float(row[f"dip_{axis} [um]"]) == pytest.approx(figures[f"{run}.dip_{axis}"]["value"], rel=1e-5)
+            assert float(row[f"peak_{axis} [um]"]) == pytest.approx(1e6 * left.peak[axis], rel=1e-5)
+            assert float(row[f"dip_{axis} [um]"]) == pytest.approx(1e6 * left.dip[axis], rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(8.188, "8.19"), (0.82, "0.82"), (0.0042, "0.004"), (0.01, "0.01"), (0.0, "0.00"), (2e-5, "2×10⁻⁵")],
+)
+def test_cards_never_round_to_nothing(value: float, shown: str) -> None:
+    assert _um(Figure(value, "um", "")) == shown
 
 
 def test_report_shows_what_counts(done: tuple[Process, Path]) -> None:

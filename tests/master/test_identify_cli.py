@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -91,6 +92,18 @@ def test_everything_is_written_and_told(done: Done, traces: Path) -> None:
     assert [line.split()[0] for line in lines[2:17]] == list(ORDER)
     assert any(line.startswith("  constant load M_0 0.2") for line in lines)
     assert lines[-1].endswith(f"machine.axes.Z.friction={Path('results') / 'identify_z' / 'friction.yaml'}")
+
+
+def test_a_path_with_blanks_can_be_pasted(
+    traces: Path, fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = [str(traces / "constant" / "log.csv"), "--axis", "Z", "--machine", str(MACHINE), "--stages", "1"]
+    assert main(["identify", *words, "--out", "my results", "--fmus", str(fmus)]) == 0
+    line = capsys.readouterr().out.splitlines()[-1]
+    given = f"machine.axes.Z.friction={Path('my results') / 'friction.yaml'}"
+    assert line == f"  use: feedsim run SCENARIO.yaml --set '{given}'"
+    assert shlex.split(line)[-1] == given
 
 
 def test_parameters_are_those_of_the_axis(done: Done, traces: Path) -> None:

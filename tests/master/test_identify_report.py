@@ -391,7 +391,7 @@ class TestFigures:
         spread = tuple(replace(p, record=f"piece {k % 5}") for k, p in enumerate(stage.plateaus))
         picture = plateaus_picture(self.found, replace(stage, plateaus=spread), many)
         assert picture is not None
-        assert "2 more record(s)" in picture.caption
+        assert "2 more records with plateaus are not shown" in picture.caption
 
     def test_loops_show_each_move_once(self) -> None:
         stage = self.found.dynamic
@@ -424,7 +424,7 @@ class TestFigures:
         assert "not taken" not in picture.caption
         many = open_loop_picture(self.found, replace(once, drifts=once.drifts * 4, applied=False))
         assert many is not None
-        assert "1 further records are not shown" in many.caption
+        assert "1 further record is not shown" in many.caption
         assert "What was tried was not taken." in many.caption
         assert open_loop_picture(self.found, replace(once, drifts=())) is None
 

@@ -89,6 +89,50 @@ def test_rest_ramps_and_sines_are_no_plateaus() -> None:
     assert any("drifts" in why for _, _, why in find(Record("x", time, 2.0 + noise, None, ramp), J).refused)
 
 
+# Amplitude [m], frequency [Hz], periods: from pre-sliding to sliding, crests of 0.1 s and of 0.4 s.
+SINES = ((200e-6, 1.0, 4), (200e-6, 0.6, 3), (100e-6, 2.0, 6), (20e-6, 5.0, 12), (5e-6, 10.0, 20), (500e-6, 5.0, 8))
+
+
+@pytest.mark.parametrize("rate", [250, 500, 1000])
+@pytest.mark.parametrize(
+    "step", [(1e-8, 0.0), (1e-7, 0.0), (1e-6, 0.0), (0.0, 0.01)], ids=["10 nm", "100 nm", "1 um", "0.01 rad/s"]
+)
+def test_sines_in_coarse_steps_are_no_plateaus(step: tuple[float, float], rate: int) -> None:
+    for seed in range(30):
+        random = np.random.default_rng(seed)
+        position, speed = [np.zeros(rate // 5)], [np.zeros(rate // 5)]
+        for index in random.permutation(len(SINES)):
+            size, frequency, periods = SINES[index]
+            size, frequency = size * np.exp(0.5 * random.standard_normal()), frequency * random.uniform(0.8, 1.2)
+            phase = 2 * np.pi * frequency / rate * (np.arange(int(periods * rate / frequency)) + random.random())
+            position.append(size * np.sin(phase))
+            speed.append(2 * np.pi * frequency * size / I_P * np.cos(phase))
+        x, n = np.concatenate(position), np.concatenate(speed)
+        torque = 2 * np.tanh(n) + 0.01 * random.standard_normal(len(n))
+        angle = np.round(x / step[0]) * step[0] / I_P if step[0] else None
+        coarse = np.round(n / step[1]) * step[1] if step[1] else None
+        assert plateaus(Record("x", np.arange(len(n)) / rate, torque, angle, coarse), J) == (), seed
+
+
+@pytest.mark.parametrize("rate", [250, 500, 1000])
+def test_plateaus_in_coarse_steps_of_speed_are_found(record: Record, rate: int) -> None:
+    assert record.speed is not None
+    time = np.arange(record.time[0], record.time[-1], 1 / rate)
+    speed, torque = (np.interp(time, record.time, signal) for signal in (record.speed, record.torque))
+    found = plateaus(Record("x", time, torque, None, np.round(speed / 0.01) * 0.01), J)
+    assert [np.sign(p.speed) for p in found] == [1, -1] * 12
+
+
+@pytest.mark.parametrize("rate", [250, 500, 1000])
+@pytest.mark.parametrize("step", [1e-8, 1e-7, 1e-6], ids=["10 nm", "100 nm", "1 um"])
+def test_plateaus_in_coarse_steps_are_found(record: Record, step: float, rate: int) -> None:
+    assert record.angle is not None
+    time = np.arange(record.time[0], record.time[-1], 1 / rate)
+    angle, torque = (np.interp(time, record.time, signal) for signal in (record.angle, record.torque))
+    found = plateaus(Record("x", time, torque, np.round(angle * I_P / step) * step / I_P, None), J)
+    assert [np.sign(p.speed) for p in found] == [1, -1] * 12
+
+
 def test_a_torque_that_has_not_settled_is_left_out_or_refused() -> None:
     time = np.arange(2000) * 2e-3
     speed = np.where((time > 0.5) & (time < 3.5), 5.0, 0.0)

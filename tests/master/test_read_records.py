@@ -256,3 +256,36 @@ def test_emps() -> None:
     residual = (force[step:-step] - expected)[moving]
     # Of forces up to 152 N ripple, sensor and what friction the law lacks leave 2.1 N rms; a wrong sign gives 100 N.
     assert np.sqrt(np.mean(residual**2)) < 3
+
+
+# --- columns that are left --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("pulses_N", "load: {column: pulses_N, unit: N}"),
+        ("LOAD torque [N.m]", "load: {column: LOAD torque}"),
+        ("Disturbance", "load: {column: Disturbance, unit: N.m}"),
+        ("external force [N]", "load: {column: external force}"),
+    ],
+)
+def test_a_load_that_is_not_read_is_told(tmp_path: Path, name: str, line: str) -> None:
+    path = simple(tmp_path / "a.csv", **{name: np.ones(500)})
+    columns = "position: {column: ActPos}\ntorque: {column: ActTorque}\npitch: 20 mm\n"
+    (said,) = read_records(path, mapped(tmp_path, columns)).provenance.warnings
+    assert f"a.csv:1: {name.split(' [')[0]!r} may be a known load, and is not read; mapping: {line}" in said
+    assert "sign: -1 where it helps it" in said
+    # The line serves as it stands.
+    found = read_records(path, mapped(tmp_path, columns + line + "\n"))
+    assert found.provenance.warnings == ()
+    assert only(found).load is not None
+
+
+def test_names_that_are_no_load_and_columns_of_another_length(tmp_path: Path) -> None:
+    columns = "position: {column: ActPos}\ntorque: {column: ActTorque}\npitch: 20 mm\n"
+    path = simple(tmp_path / "a.csv", **{"download": np.ones(500), "ext": np.ones(500), "download_rate": np.ones(500)})
+    assert read_records(path, mapped(tmp_path, columns)).provenance.warnings == ()
+    for count, told in ((500, 1), (7, 0)):
+        path = mat(tmp_path / "a.mat", pulses_N=np.ones(count))
+        assert len(read_records(path, mapped(tmp_path, EMPS_LIKE)).provenance.warnings) == told

@@ -198,3 +198,10 @@ def test_scatter_is_no_shape(scatter: float) -> None:
         found = stribeck.stationary(plateaus)
         assert said(found, "beyond their own noise") or scatter == 1.0
         assert not said(found, "--free"), seed
+
+
+def test_a_shape_that_leaves_scatter_is_told_by_the_sum_of_squares() -> None:
+    plateaus = made(p={**TRUE, "beta": 1.5}, noise=1e-3, seed=3)
+    found = stribeck.stationary([replace(plateau, sigma=plateau.sigma / 3) for plateau in plateaus])
+    assert said(found, "the sum of squares falls to")
+    assert said(found, "--free beta")

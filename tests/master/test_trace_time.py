@@ -1,4 +1,4 @@
-"""Time of recorded traces: jitter, gaps, refusals of rows; and what is worth a warning."""
+"""Time of recorded traces: jitter, gaps, refusals of rows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from feedsim.errors import InputError
 from feedsim.identify.even_time import stretches
 from feedsim.identify.read import read_records
 from feedsim.identify.record import EVEN
-from record_helpers import ANGLE, DIGITS, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table
+from record_helpers import DIGITS, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table
 
 REST = "torque: {column: ActTorque}\n"
 
@@ -62,8 +62,29 @@ def test_gaps_make_pieces(tmp_path: Path) -> None:
     assert found.provenance.warnings == (
         f"{path}:102: rows are missing between 0.198 and 0.3 s, and at 2 more places (about 109 in all); the pieces "
         "are taken as records of their own",
-        "1 single row between gaps left out",
+        "1 fragment of fewer than 8 rows beside gaps left out (1 row)",
     )
+
+
+@pytest.mark.parametrize("rows", [2, 3, 7])
+def test_fragments_between_gaps_do_not_cost_the_file(tmp_path: Path, rows: int) -> None:
+    """Between two gaps, at the end, and uneven: too short to be a record, no reason to refuse the others."""
+    kept = np.r_[0:100, 150 : 150 + rows, 200:320, 400 : 400 + rows]
+    time = TIME.copy()
+    time[151] += 0.0006
+    path = table(tmp_path / "a.csv", {"t [s]": time[kept], "n [rad/s]": SPEED[kept], "M [Nm]": TORQUE[kept]})
+    found = read_records(path, mapped(tmp_path, "speed: {column: n}\ntorque: {column: M}\n"))
+    assert [len(record) for record in found.records] == [100, 120]
+    assert found.provenance.warnings[1] == f"2 fragments of fewer than 8 rows beside gaps left out ({2 * rows} rows)"
+
+
+def test_fragments_alone_are_no_record() -> None:
+    with pytest.raises(InputError, match="f:2: no 8 rows follow one another without a gap"):
+        stretches(TIME[np.r_[0:7, 10:17, 30:37]], place)
+    (piece, _), _said = stretches(TIME[np.r_[0:8, 10:18]], place)
+    assert len(piece.time) == 8
+    (short,), none = stretches(TIME[:3], place)
+    assert (len(short.time), none) == (3, ())
 
 
 @pytest.mark.parametrize(
@@ -92,37 +113,3 @@ def test_cells_of_other_columns_do_not_matter(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", {"t [s]": TIME, "n [rad/s]": SPEED, "M [Nm]": TORQUE, "note": TIME})
     path.write_text(path.read_text().replace("0.006\n", "\n"))
     assert len(only(read_records(path, mapped(tmp_path, "speed: {column: n}\ntorque: {column: M}\n")))) == 500
-
-
-# --- what is worth a warning ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("factor", "said"), [(1.0, None), (-1.0, "-1 times"), (2.0, "2 times"), (1.03, None), (1.08, "1.08 times")]
-)
-def test_a_speed_that_is_not_the_position_s(tmp_path: Path, factor: float, said: str | None) -> None:
-    noise = 1e-4 * np.random.default_rng(1).standard_normal(500)  # of an encoder
-    path = table(
-        tmp_path / "a.csv", {"t": TIME, "a [rad]": ANGLE + noise, "n [rad/s]": factor * SPEED, "M [Nm]": TORQUE}
-    )
-    columns = mapped(tmp_path, "position: {column: a}\nspeed: {column: n}\ntorque: {column: M}\n")
-    warnings = [text for text in read_records(path, columns).provenance.warnings if "slope of the position" in text]
-    assert len(warnings) == (said is not None)
-    assert said is None or f"the recorded speed is {said} the slope" in warnings[0]
-
-
-def test_a_torque_that_brakes(tmp_path: Path) -> None:
-    path = simple(tmp_path / "a.csv", **{"ActTorque [Nm]": -TORQUE})
-    rest = "position: {column: ActPos}\npitch: 20 mm\n"
-    warnings = read_records(path, mapped(tmp_path, rest + REST)).provenance.warnings
-    assert warnings == (
-        f"{path}: the torque is against the motion on average; its sign, or that of the motion, is not right",
-    )
-    turned = mapped(tmp_path, rest + "torque: {column: ActTorque, sign: -1}\n")
-    assert read_records(path, turned).provenance.warnings == ()
-
-
-def test_a_stop_that_was_cut_out_is_no_fault(tmp_path: Path) -> None:
-    speed = np.linspace(100, 0, 500)
-    path = table(tmp_path / "a.csv", {"t": TIME, "n [rad/s]": speed, "M [Nm]": -5 + 0.01 * (100 - speed)})
-    assert read_records(path, mapped(tmp_path, "speed: {column: n}\ntorque: {column: M}\n")).provenance.warnings == ()

@@ -129,7 +129,7 @@ def read(path: str | Path) -> Measured:
     time, reference, position, command = (np.asarray(content[name], dtype=np.float64) for name in ("t", *COLUMNS))
     cycles = float(time[-1] - time[0]) / (len(time) - 1) / T
     every = round(cycles)
-    # 1e-3: the time of the log counts 20 ns too many per second and more
+    # 1e-3: more than the rounding of a log's clock, less than what would put a row of 1 s of record onto another
     if every < 1 or abs(cycles / every - 1) > 1e-3:
         raise ValueError(f"{path}: logged every {cycles * T * 1e3:.6g} ms; multiples of {T * 1e3:g} ms can be compared")
     return Measured(reference, position, float(content["gtau"]) * command, every)
@@ -146,20 +146,24 @@ def closed_loop(measured: Measured, parameters: Parameters, fmus: Path, folder: 
     The run begins at rest, a run-in ahead of the record, and its origin is its own: the position counts from the
     reference. A torque shown at t_k+1 is the one that was held since t_k.
     """
+    following, force = _follow(measured, parameters, fmus, folder)
+    settled = measured.time >= SETTLING
+    return (
+        rms((following - (measured.position - measured.reference))[settled]),
+        rms((force - measured.force)[settled]),
+    )
+
+
+def _follow(measured: Measured, parameters: Parameters, fmus: Path, folder: Path) -> tuple[Floats, Floats]:
+    """Position less reference [m] and force [N], each (N,), of the three units at the record's instants."""
     setpoints = folder / "setpoints.csv"
     rows = [f"{t!r},{x!r}" for t, x in zip(measured.time.tolist(), measured.reference.tolist(), strict=True)]
     setpoints.write_text("\n".join(["time [s],X.x_s [m]", *rows, ""]), encoding="utf-8")
     changes = [f"motions.1.file={setpoints}", RECORDED, *parameters.changes(folder)]
     found = run(load(SCENARIO, changes), fmus=fmus)
-    trace = found.trace
     at = _begin(found.program) + measured.every * np.arange(len(measured))
-    settled = measured.time >= SETTLING
-    following = trace["X.x_a"][at] - trace["X.x_s"][at]
-    force = trace["X.M_a"][at + 1] / I_P
-    return (
-        rms((following - (measured.position - measured.reference))[settled]),
-        rms((force - measured.force)[settled]),
-    )
+    trace = found.trace
+    return trace["X.x_a"][at] - trace["X.x_s"][at], trace["X.M_a"][at + 1] / I_P
 
 
 def _begin(program: Program) -> int:

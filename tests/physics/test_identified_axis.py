@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cramer_rao import Known, least
 from numpy.typing import NDArray
 
 from feedsim import analysis, cosim, nc, scenario
 from feedsim.analysis.compensation import compensate
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.identify import Options, identify
-from feedsim.identify.bounds import bounds
 from feedsim.identify.level import curve
 from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate, Identification
@@ -73,6 +73,12 @@ def logs(runs: dict[str, cosim.Run], axis: str, noise: float = 0.0, delay: float
         angle, setpoint = (log[f"{axis}.{name}"] / described.I_P for name in ("x_a", "x_s"))
         made.append(Record(kind, log.time, torque, angle=angle, speed=log[f"{axis}.n_a"], setpoint=setpoint))
     return made
+
+
+def moving_rms(record: Record) -> float:
+    """Of the torque [N.m] while the setpoint moves."""
+    assert record.setpoint is not None
+    return float(np.sqrt(np.mean(record.torque[np.gradient(record.setpoint) != 0] ** 2)))
 
 
 def found(records: list[Record], law: FrictionLaw, axis: str, delay: float | None = None) -> Identification:
@@ -137,11 +143,13 @@ def test_an_unknown_delay_is_told_and_costs_sigma_1_little(
     values = true | {"M_0": 0.0, "J": MODES.J_tot("Z"), "delay": LATE}
     first = noisy[0].stationary
     assert first is not None
-    told = first.correlation.names
-    known = {name: float(np.sqrt(first.covariance[k, k])) for k, name in enumerate(told)}
-    names = ("sigma_0", "sigma_1", "W", "gamma", "delay", *told)
-    bound = bounds(logs(runs["Z"], "Z", 0.0, LATE)[1:], law, values, names, share=0.05, known=known)
-    assert np.sqrt(np.mean(off**2)) < 2 * bound.sigma("delay")
+    record = logs(runs["Z"], "Z", 0.0, LATE)[1]
+    known = Known(first.correlation.names, first.covariance)
+    bound = least(
+        law, record, values, ("sigma_0", "sigma_1", "W", "gamma", "delay"), 0.05 * moving_rms(record), [known]
+    )
+    # 1.3: 20 seeds tell a root mean square to 16 %; seen is 1.17
+    assert np.sqrt(np.mean(off**2)) < 1.3 * bound["delay"]
     assert abs(np.mean([errors(result)["sigma_1"] for result in noisy])) < 0.02
 
 
@@ -161,12 +169,13 @@ def test_intervals_hold_what_they_promise(noisy: list[Identification]) -> None:
 
 
 def test_without_the_modes_a_heavy_bed_is_taken_for_friction(
-    runs: dict[str, dict[str, cosim.Run]], law: FrictionLaw
+    quiet: dict[str, Identification], runs: dict[str, dict[str, cosim.Run]], law: FrictionLaw
 ) -> None:
-    """X rocks its bed at 22 Hz: at 10 Hz it is 4 % heavier than J_tot, which costs the bristles several per cent."""
+    """X rocks its bed at 22 Hz: at 10 Hz it is 4 % heavier than J_tot, which costs sigma_1 6 %."""
     J = Estimate("J", MODES.J_tot("X"), "kg.m2", "inertia", status="given")
     result = identify(logs(runs["X"], "X"), law, Options("X", MACHINE.axes["X"].I_P, J=J))
-    assert abs(errors(result)["sigma_1"]) > 0.01
+    assert 0.04 < abs(errors(result)["sigma_1"]) < 0.08
+    assert abs(errors(quiet["X"])["sigma_1"]) < 1e-3
 
 
 def circle(frictions: dict[str, Friction], fmus: Path) -> dict[str, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
@@ -131,7 +132,8 @@ def identify(options: Namespace) -> None:
             print(f"  advice: {advice}")
         if hint := report.constant_load_hint(account):
             print(f"  {hint}")
-        print(f"  use: feedsim run SCENARIO.yaml --set machine.axes.{axis}.friction={directory / 'friction.yaml'}")
+        setting = shlex.quote(f"machine.axes.{axis}.friction={directory / 'friction.yaml'}")
+        print(f"  use: feedsim run SCENARIO.yaml --set {setting}")
 
 
 def _read(options: Namespace, subject: Subject | None, progress: Progress) -> list[Recorded]:

@@ -15,6 +15,8 @@ from feedsim.identify.record import EVEN, Array
 GAP = 1.75
 # More gaps than that, and than that share of all steps, are no gaps but uneven time: a clock of too few digits.
 MOST_GAPS, SHARE_OF_GAPS = 10, 0.05
+# Rows between gaps that make a stretch: fewer tell neither a motion nor whether they are even.
+LEAST_ROWS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +34,8 @@ def stretches(time: Array, row: Callable[[int], str]) -> tuple[tuple[Stretch, ..
     time: (N,) [s]; row: where a row of that index stands, for messages.
 
     The usual step is the median. A step of more than GAP of it is a gap. Between gaps every instant must lie within
-    EVEN of a step of the even grid through the first and the last one, which then takes its place. Stretches of a
-    single row are left out.
+    EVEN of a step of the even grid through the first and the last one, which then takes its place. Where there are
+    gaps, fragments of fewer than LEAST_ROWS rows are left out.
 
     Returns the stretches and what there is to say about gaps.
 
@@ -52,15 +54,15 @@ def stretches(time: Array, row: Callable[[int], str]) -> tuple[tuple[Stretch, ..
     if len(breaks) > max(MOST_GAPS, SHARE_OF_GAPS * len(steps)):
         raise _uneven(time, breaks[0] + 1, usual, float(time[-1] - time[0]) / len(steps), row)
     edges = [0, *(i + 1 for i in breaks), len(time)]
-    found, alone = [], 0
+    found, dropped = [], []
     for first, last in pairwise(edges):
-        if last - first < 2:
-            alone += 1
+        if breaks and last - first < LEAST_ROWS:
+            dropped.append(last - first)
             continue
         found.append(_even(time, first, last, row))
     if not found:
-        raise InputError(f"{row(0)}: no two rows follow one another without a gap")
-    return tuple(found), tuple(_gaps(time, breaks, usual, alone, row))
+        raise InputError(f"{row(0)}: no {LEAST_ROWS} rows follow one another without a gap")
+    return tuple(found), tuple(_gaps(time, breaks, usual, dropped, row))
 
 
 def _even(time: Array, first: int, last: int, row: Callable[[int], str]) -> Stretch:
@@ -85,7 +87,7 @@ def _uneven(time: Array, at: int, usual: float, mean: float, row: Callable[[int]
     )
 
 
-def _gaps(time: Array, breaks: list[int], usual: float, alone: int, row: Callable[[int], str]) -> list[str]:
+def _gaps(time: Array, breaks: list[int], usual: float, dropped: list[int], row: Callable[[int], str]) -> list[str]:
     if not breaks:
         return []
     first = breaks[0]
@@ -95,4 +97,10 @@ def _gaps(time: Array, breaks: list[int], usual: float, alone: int, row: Callabl
         + (f", and at {len(breaks) - 1} more place{'s'[: len(breaks) > 2]}" if len(breaks) > 1 else "")
         + f" (about {missing} in all); the pieces are taken as records of their own"
     )
-    return [text] + ([f"{alone} single row{'s'[: alone > 1]} between gaps left out"] if alone else [])
+    if not dropped:
+        return [text]
+    left_out = (
+        f"{len(dropped)} fragment{'s'[: len(dropped) > 1]} of fewer than {LEAST_ROWS} rows beside gaps left out "
+        f"({sum(dropped)} row{'s'[: sum(dropped) > 1]})"
+    )
+    return [text, left_out]

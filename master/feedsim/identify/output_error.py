@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, nan
 
 import numpy as np
@@ -14,12 +14,22 @@ from feedsim.identify.advice import advice
 from feedsim.identify.determined import GOES_WITH, Verdict, verdict
 from feedsim.identify.fit import Prior, correlation
 from feedsim.identify.motion import noise_of
+from feedsim.identify.motion_noise import motion_covariance
 from feedsim.identify.parameters import KINDS, PRE_SLIDING, STATIONARY, USUAL
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
 from feedsim.identify.search import Search, Solution, joined, spread
 from feedsim.identify.starts import grid, sliding
 from feedsim.identify.torque import Law, RecordTorque, deflection, models
+from feedsim.identify.worth import (
+    LEAST_EXPLAINED,
+    LEAST_REVERSALS,
+    LEAST_ROWS,
+    explained,
+    has_sines,
+    reversals,
+    turnover_rows,
+)
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -45,6 +55,7 @@ REFINEMENTS = (
 # Where all speeds are far above the usual v_log the logarithm is a constant to them, and what friction gains with speed
 # falls to sigma_2 alone. It then bends at a BEND-th of the typical speed.
 FAR_ABOVE, BEND = 10.0, 3.0
+ROUGH = 2.0  # times the deviation by the torque's noise that the motion's makes of it: worth a warning
 LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant load to be told apart
 
 
@@ -160,6 +171,8 @@ def _known(
         unknown.discard("M_0")
     if delay is not None:
         held["delay"] = "given", ""
+    elif (turns := reversals(fine)) < LEAST_REVERSALS:
+        held["delay"] = "undetermined", f"{turns} reversal{'s'[: turns != 1]} only, {LEAST_REVERSALS} tell it"
     values |= hold
     held |= {name: ("given", "") for name in hold}
     values |= sliding(fine, values, unknown - set(hold))
@@ -251,6 +264,11 @@ def _refined(
     if group == ("asymmetry",) and not {"F_log", "v_s"} & set(base):
         held["asymmetry"] = "undetermined", "friction that hardly depends on speed leaves it a constant load"
         return found, base
+    general = not has_sines(search.models)
+    if general and {"sigma_1", "W"} & set(added) and (rows := turnover_rows(search.models, found)) < LEAST_ROWS:
+        reason = f"bristles turn over within {rows:.0f} rows of the log"
+        held |= dict.fromkeys(added, ("undetermined", reason))
+        return found, base
     values = dict(found.values)
     if "sigma_1" in added:
         values["sigma_1"] = 1e-2 * values["sigma_0"] * deflection(values)
@@ -270,7 +288,8 @@ def _refined(
     tried = search.solve(tried.values, tried.states, [*base, *added], tolerance=1e-6, limit=30)
     judged = verdict(tried, added)
     gain = search.cost(found) - search.cost(tried)
-    if judged is None and gain >= WORTH * len(added):
+    share = explained(search.models, found, tried) if general else 1.0
+    if judged is None and gain >= WORTH * len(added) and share >= LEAST_EXPLAINED:
         for name in added:
             held.pop(name, None)
         return tried, [*base, *added]
@@ -279,7 +298,10 @@ def _refined(
         reasons = dict.fromkeys(added, rest) | judged.reasons
     else:
         with_it = f"with {' and '.join(added)}" if len(added) > 1 else "with it"
-        reasons = dict.fromkeys(added, f"the residual hardly falls {with_it} (sum of squares by {gain:.1f})")
+        little = (
+            f"sum of squares by {gain:.1f}" if share >= LEAST_EXPLAINED else f"by {100 * share:.2g} % of the torque"
+        )
+        reasons = dict.fromkeys(added, f"the residual hardly falls {with_it} ({little})")
     held |= {name: ("undetermined", reasons[name]) for name in added}
     return found, base
 
@@ -294,7 +316,15 @@ def _result(
     prior: Stationary | None,
 ) -> Dynamic:
     names = tuple(name for name in KINDS if name in base)
+    by_torque = np.sqrt(np.diag(found.covariance(names)))
+    more = motion_covariance(fine, found.fit, found.values, found.states, search.weights)
+    found = replace(found, fit=replace(found.fit, covariance=found.fit.covariance + more))
     covariance = found.covariance(names)
+    rough = [
+        name
+        for name, sigma, alone in zip(names, np.sqrt(np.diag(covariance)), by_torque, strict=True)
+        if name in PRE_SLIDING and sigma > ROUGH * alone
+    ]
     sigma = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     estimates = {}
     for name, kind in KINDS.items():
@@ -322,7 +352,18 @@ def _result(
         rms,
         without,
         advice(pieces, estimates, without, deflection(found.values), I_P),
-        _doubts(held, prior),
+        (*_doubts(held, prior), *_rough(rough, fine)),
+    )
+
+
+def _rough(names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
+    """A warning where the recorded motion, not the torque, limits what is told."""
+    if not names:
+        return ()
+    sources = sorted({"position" if model.motion.source == "angle" else "speed" for model in fine})
+    return (
+        f"noise or steps of the recorded {' and '.join(sources)} limit {', '.join(names)}, more than the torque's; "
+        "smoothing them rounds reversals, which the intervals do not hold",
     )
 
 

@@ -66,6 +66,7 @@ COARSE = 0.2  # share of a speed that the noise of a block may have (CERTAIN of 
 SLOWEST = 1e-5  # of the highest speed: what is slower counts as rest
 GAP = 5  # blocks that an interruption lasts at most
 ALIKE = 0.1  # relative difference of speed on both sides of an interruption
+DWELL = 0.1  # of its own duration that a stretch in coarse steps of speed may have in the next step on both sides
 FEWEST = 20  # rows that a mean and its correlation can be had from
 
 
@@ -189,7 +190,7 @@ def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float, s
     if len(near) < 0.5 * (last - first):
         return "the speed drifts"
     begin, end = first + int(near[0]), first + int(near[-1]) + 1
-    if not _steady(motion, begin, end, search):
+    if not _steady(motion, begin, end, search) or _crest(motion, begin, end, search):
         return "the speed drifts"
     end -= ceil(search.margin / interval)
     earliest = begin + max(ceil(search.settle_time / interval), _travelled(motion, begin, end, search))
@@ -253,6 +254,20 @@ def _bend(motion: _Motion, begin: int, end: int) -> float:
         scale = 2 / ((rows - 1) * motion.interval)
     noise = CERTAIN * float(np.linalg.norm(ranges * sigmas))
     return scale * (float(np.ptp(legendre.legval(place, shape))) - noise)
+
+
+def _crest(motion: _Motion, begin: int, end: int, search: Search) -> bool:
+    """Whether a speed in steps coarser than what may change seems constant only: a crest, parabola over time, spends at
+    least 0.2 times as long in the next step on either side of it; a plateau is left at once."""
+    if not motion.direct:
+        return False
+    step, rows = resolution(motion.signal), end - begin
+    level = float(np.median(motion.signal[begin:end]))
+    if not search.change * abs(level) < step < 0.75 * abs(level):  # else fine, or the next step is rest
+        return False
+    sides = motion.signal[max(begin - rows, 0) : begin], motion.signal[end : end + rows]
+    spent = [np.count_nonzero(np.abs(np.abs(side - level) / step - 1) < 0.5) for side in sides]
+    return bool(min(spent) > DWELL * rows)
 
 
 def _travelled(motion: _Motion, begin: int, end: int, search: Search) -> int:

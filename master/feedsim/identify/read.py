@@ -15,20 +15,13 @@ from feedsim.errors import InputError
 from feedsim.identify.even_time import stretches
 from feedsim.identify.record import Array, Record
 from feedsim.identify.signals import Channel, Chosen, choose
+from feedsim.identify.signs import checked
 from feedsim.scenario import Columns, Machine
 from feedsim.scenario.fields import no_axis
 from feedsim.trace import Recording, read_recording
 
 # Values given twice are the same up to the rounding of what people write.
 SAME = 1e-9
-# Share by which a recorded speed may differ from the slope of the position before it is worth a word: a wrong pitch,
-# gear or unit is far off; what the screw gives between motor and scale is about 1 % in small motions.
-SLOPE = 0.05
-# Correlation of torque and speed below which the torque brakes; friction makes it positive, noise and delays of
-# channels at small motions spread it around 0.
-AGAINST = 0.1
-# Share of the kinetic energy that a record may lose from its first to its last row to be asked that question.
-BRAKED = 0.1
 # Names of columns that hold a known load; "workload" or "payload" are not.
 LOAD_NAME = re.compile(
     r"(?<![a-z])load|pulse|disturbance|(?<![a-z])external[ _.-]*force|(?<![a-z])ext[ _.-]+force", re.IGNORECASE
@@ -96,10 +89,10 @@ def read_records(
         counts (with a warning), since currents are logged in different amplitudes; a pitch that differs is refused.
 
     The motor's angle is position/I_P with I_P = pitch/(2 pi), the torque K_t i_q or F I_P. Records are pieces without
-    gaps; nothing is resampled (see grid.stretches).
+    gaps; nothing is resampled (see even_time.stretches).
 
     Raises InputError with file and line: what cannot be read, columns that are missing or not clear, units, time that
-    is not even, pitch or torque constant that is needed and not given.
+    is not even, pitch or torque constant that is needed and not given, a sign or unit wrong beyond doubt (signs.py).
     """
     path = Path(path)
     recording = read_recording(path)
@@ -127,7 +120,7 @@ def read_records(
         for piece in pieces
     )
     unread = _unread_load(recording, chosen)
-    warnings = (*chosen.notes, *unread, *drive.warnings, *gaps, *_doubts(path, records))
+    warnings = (*chosen.notes, *unread, *drive.warnings, *gaps, *checked(path, records))
     return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings))
 
 
@@ -228,47 +221,6 @@ def _motor_side(channels: Mapping[str, Channel], signals: Mapping[str, Array], d
 
     names = {"position": "angle", "current": "torque", "force": "torque"}
     return {names.get(role, role): turned(role) for role in channels if role != "time"}
-
-
-def _doubts(path: Path, records: tuple[Record, ...]) -> Iterator[str]:
-    """What is worth a look: a speed that is not the position's, a torque that does not drive."""
-    slopes = [(record, _slope(record)) for record in records if len(record) > 2]
-    if both := [(a, b) for _, (a, b) in slopes if b > 0]:
-        ratio = sum(a for a, _ in both) / sum(b for _, b in both)
-        if abs(ratio - 1) > SLOPE:
-            yield (
-                f"{path}: the recorded speed is {ratio:.4g} times the slope of the position; sign, unit, pitch or gear "
-                "of one of both is not right"
-            )
-    power = size = 0.0
-    for record in records:
-        speed = record.speed
-        if speed is None:
-            assert record.angle is not None
-            speed = np.gradient(record.angle, record.interval)
-        energy = speed**2
-        if energy[-1] < energy[0] - BRAKED * np.max(energy):
-            continue  # a motion that is cut off while it was braked
-        net = record.torque if record.load is None else record.torque - record.load
-        net, speed = net - np.mean(net), speed - np.mean(speed)
-        power += float(np.dot(net, speed))
-        size += float(np.sqrt(np.dot(net, net) * np.dot(speed, speed)))
-    if power < -AGAINST * size:
-        yield f"{path}: the torque is against the motion on average; its sign, or that of the motion, is not right"
-
-
-def _slope(record: Record) -> tuple[float, float]:
-    """Sums whose ratio is recorded speed over slope of the position (least squares); the second 0 where one lacks.
-
-    Means over intervals are compared, in which an encoder's noise is least.
-    """
-    if record.angle is None or record.speed is None:
-        return 0.0, 0.0
-    count = max(1, len(record) // 200)
-    steps = (record.angle[count:] - record.angle[:-count]) / (count * record.interval)
-    sums = np.concatenate([[0.0], np.cumsum((record.speed[1:] + record.speed[:-1]) / 2)])
-    means = (sums[count:] - sums[:-count]) / count
-    return float(np.dot(means, steps)), float(np.dot(steps, steps))
 
 
 def _provenance(

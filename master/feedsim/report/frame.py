@@ -28,10 +28,12 @@ h2 { font-size: 1.2rem; margin: 2.2rem 0 .7rem; }
 h3 { font-size: 1rem; margin: 1.4rem 0 .4rem; }
 p { margin: .3rem 0; }
 .muted, figcaption, footer { color: var(--muted); }
-.keys { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: .7rem; margin: 1.2rem 0; }
-.key { background: var(--card); border: 1px solid var(--grid); border-radius: 8px; padding: .6rem .85rem; }
-.key b { display: block; font-size: 1.35rem; font-weight: 650; white-space: nowrap;
+.keys { display: grid; grid-template-columns: repeat(auto-fill, minmax(12rem, 1fr)); gap: .7rem; margin: 1.2rem 0; }
+.key { background: var(--card); border: 1px solid var(--grid); border-radius: 8px; padding: .6rem .85rem;
+  min-width: 0; overflow-wrap: anywhere; }
+.key b { display: block; font-size: 1.35rem; font-weight: 650; line-height: 1.3;
   font-variant-numeric: tabular-nums; }
+.key b small { font-size: .72em; font-weight: 500; }
 .key b.words { font-size: 1rem; line-height: 2.03rem; }
 .key span { color: var(--muted); font-size: .88rem; }
 figure { margin: 1rem 0 2rem; }
@@ -144,10 +146,18 @@ def _tiles(tiles: Sequence[Tile]) -> str:
         title = escape(tile.meaning, quote=True)
         words = ' class="words"' if tile.value[-1:].isalpha() and not any(c.isdigit() for c in tile.value) else ""
         cards.append(
-            f'<div class="key" title="{title}"><b{words}>{escape(tile.value)}</b>'
+            f'<div class="key" title="{title}"><b{words}>{_with_unit(tile.value)}</b>'
             f"<span>{escape(tile.label)}</span></div>"
         )
     return f'<div class="keys">{"".join(cards)}</div>' if cards else ""
+
+
+def _with_unit(value: str) -> str:
+    """HTML of a value, its unit in smaller print."""
+    number, blank, unit = value.rpartition(" ")
+    if not any(c.isdigit() for c in number) or any(c.isdigit() for c in unit.rstrip("²³")):
+        return escape(value)
+    return f"{escape(number)}{blank}<small>{escape(unit)}</small>"
 
 
 def _warnings(warnings: Sequence[str]) -> str:

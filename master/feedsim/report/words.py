@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from decimal import Decimal
 
 from feedsim.analysis import Figure
 
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SMALL = Decimal("1e-4")  # below which a number is written with a power of ten
 DISPLAY_UNITS = {"um": "µm", "1": ""}
 NOT_DETERMINED = "not determined"
 
@@ -28,6 +31,24 @@ def display_unit(unit: str) -> str:
 def minus(text: str) -> str:
     """A number with a minus sign in place of the hyphen."""
     return text.replace("-", "−")
+
+
+def powers(text: str) -> str:
+    """Numbers of a text that are smaller than SMALL, digit by digit, with a power of ten: 1.47×10⁻⁵."""
+
+    def written(match: re.Match[str]) -> str:
+        number = Decimal(match[0])
+        if not 0 < abs(number) < SMALL:
+            return match[0]
+        mantissa, _, exponent = f"{number:e}".partition("e")
+        return f"{mantissa}×10{str(int(exponent)).translate(SUPERSCRIPTS)}"
+
+    return re.sub(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", written, text)
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """ "1 stretch", "2 stretches"; many: plural where an s alone does not make it."""
+    return f"{number} {one if number == 1 else many or f'{one}s'}"
 
 
 def typeset(text: str) -> str:

@@ -14,7 +14,7 @@ from feedsim.report.provenance import axis_parameters
 from feedsim.report.run_tables import motions_table, provenance
 from feedsim.report.style import Picture
 from feedsim.report.tables import figures_table, files_table, table
-from feedsim.report.words import display_unit, minus, typeset
+from feedsim.report.words import display_unit, minus, powers, typeset
 
 
 def page(compensation: Compensation, files: dict[str, Path], pictures: Sequence[Picture]) -> str:
@@ -28,7 +28,7 @@ def page(compensation: Compensation, files: dict[str, Path], pictures: Sequence[
         tiles=list(_tiles(compensation)),
         main=[
             *(picture_section(picture) for picture in pictures),
-            _table(compensation),
+            _table(compensation) if compensation.table else "",
             _sets(compensation, files),
             figures_table(compensation.figures),
             motions_table(compensation.after),
@@ -53,7 +53,9 @@ def _tiles(compensation: Compensation) -> Iterable[Tile]:
 
 
 def _um(figure: Figure) -> str:
-    return minus(f"{figure.value:.2f}")
+    """To 0.01 um; what is smaller to its first digit."""
+    small = 0 < abs(figure.value) < 0.01
+    return minus(powers(f"{figure.value:.1g}" if small else f"{figure.value:.2f}"))
 
 
 def _table(compensation: Compensation) -> str:

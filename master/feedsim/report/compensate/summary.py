@@ -90,4 +90,5 @@ def summary_line(compensation: Compensation) -> str:
     """G and glitches before and after, in one line."""
     keys = ["G", *(f"glitch_{axis}" for axis in compensation.turn.axes)]
     figures = compensation.figures
-    return ", ".join(f"{key} {figures[f'before.{key}'].value:.3g} -> {figures[f'after.{key}']}" for key in keys)
+    pairs = ((key, figures[f"before.{key}"], figures[f"after.{key}"]) for key in keys)
+    return ", ".join(f"{key} {before.value:.3g} -> {after.value:.3g} {after.unit}" for key, before, after in pairs)

@@ -30,8 +30,8 @@ def check_compensation_writable(directory: Path | str, inputs: Sequence[Path] = 
 def write_compensation(
     compensation: Compensation, files: Mapping[str, Path], directory: Path | str
 ) -> tuple[Path, ...]:
-    """Write the runs with (result.csv) and without compensation, feedforward.csv, compensation.csv, summary.json,
-    report.html and figures; returns the paths.
+    """Write the runs with (result.csv) and without compensation, feedforward.csv, compensation.csv (where there is a
+    table), summary.json, report.html and figures; returns the paths.
 
     files: axis -> file that its compensation's friction comes from. Files of an earlier run are replaced. Raises
     OutputError.
@@ -44,8 +44,10 @@ def write_compensation(
         write_csv(fresh / RESULT, compensation.after.trace)
         write_csv(fresh / UNCOMPENSATED, compensation.before.trace)
         write_csv(fresh / FEEDFORWARD, compensation.feedforward)
-        write_text(fresh / TABLE, table_csv(compensation))
+        if compensation.table:
+            write_text(fresh / TABLE, table_csv(compensation))
         write_text(fresh / REPORT, page(compensation, dict(files), pictures))
         write_text(fresh / SUMMARY, to_json(summary(compensation, files, names)))
 
-    return write_results(directory, FILES, pictures, fill)
+    files_written = [name for name in FILES if name != TABLE or compensation.table]
+    return write_results(directory, files_written, pictures, fill)

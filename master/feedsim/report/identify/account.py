@@ -35,6 +35,8 @@ SYMBOLS = {
     "delay": "delay",
 }
 MM_PER_MIN = 60e3  # per m/s
+LEAST_SPEEDS = 3  # that make a curve
+SAME_SPEED = 1.05  # ratio up to which two speeds are one: that of a direction and of the other, or of a repetition
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +102,17 @@ def curve_error(stage: Stationary) -> float:
     if not np.any(inside):
         inside[:] = True
     return float(NORMAL_95 * np.max(stage.sigma[inside] / np.abs(stage.torque[inside])))
+
+
+def speeds_of(stage: Stationary) -> int:
+    """Number of distinct speeds of the plateaus, whatever their direction."""
+    sizes = np.sort([abs(plateau.speed) for plateau in stage.plateaus])
+    return int(1 + np.count_nonzero(sizes[1:] > SAME_SPEED * sizes[:-1])) if len(sizes) else 0
+
+
+def is_curve(stage: Stationary) -> bool:
+    """Whether there are enough speeds to speak of a curve and of its error."""
+    return speeds_of(stage) >= LEAST_SPEEDS
 
 
 def at_slide(name: str, I_P: float) -> tuple[float, str] | None:

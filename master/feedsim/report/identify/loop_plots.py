@@ -23,6 +23,7 @@ from feedsim.report.style import (
     finish,
     thinned,
 )
+from feedsim.report.words import counted
 
 MOST_LOOPS = 6
 COLUMNS = 3
@@ -55,7 +56,7 @@ def loops_picture(found: Identification, stage: Dynamic, over: Over) -> Picture 
                 room.set_ylabel("friction torque [N·m]")
             legend_above(room)
         left = len(stage.stretches) - len(shown)
-        more = f" {left} further stretches are not shown." if left else ""
+        more = f" {counted(left, 'further stretch is', 'further stretches are')} not shown." if left else ""
         about = ", about its middle" if over == "position" else ""
         caption = (
             f"Axis {found.axis}: motor torque less inertia and known load{about}, with the friction model driven by "

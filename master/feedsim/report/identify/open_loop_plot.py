@@ -5,6 +5,7 @@ from __future__ import annotations
 from feedsim.identify.result import Balance, Identification
 from feedsim.report.labels import heading, legend_above
 from feedsim.report.style import BLUE, INK, MUTED, VERMILLION, Picture, drawing, finish, thinned
+from feedsim.report.words import counted
 
 MOST = 3  # records side by side
 
@@ -36,7 +37,7 @@ def open_loop_picture(found: Identification, balance: Balance) -> Picture | None
         rooms[1, 0].set_ylabel("recorded less open loop [mm]")
         before, end = (mm * rms for rms in balance.position)
         left = len(balance.drifts) - len(drifts)
-        more = f" {left} further records are not shown." if left else ""
+        more = f" {counted(left, 'further record is', 'further records are')} not shown." if left else ""
         fate = "" if balance.applied else " What was tried was not taken."
         caption = (
             f"Axis {found.axis}: position from the start on, recorded and of a rigid axis that the recorded torque "

@@ -12,9 +12,11 @@ from feedsim.report.identify.account import (
     at_slide,
     curve_error,
     interval_text,
+    is_curve,
     relative_text,
     remark_text,
     shown_unit,
+    speeds_of,
     unit_text,
     value_text,
 )
@@ -24,7 +26,7 @@ from feedsim.report.identify.open_loop import open_loop_section
 from feedsim.report.parts import software
 from feedsim.report.style import Picture
 from feedsim.report.tables import files_table, pairs_table, table
-from feedsim.report.words import minus, typeset
+from feedsim.report.words import counted, minus, powers, typeset
 
 LEADING = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "sigma_0", "sigma_1", "W", "gamma", "M_0", "J", "delay")
 HEADS = [
@@ -69,17 +71,25 @@ def page(account: Account, pictures: Sequence[Picture]) -> str:
 def _tiles(account: Account) -> Iterator[Tile]:
     found = account.found
     if (stage := found.stationary) is not None:
-        text = f"±{100 * curve_error(stage):.2g} %"
-        yield Tile(text, "error of the curve (95 %)", "largest half width of the 95 % band of the Stribeck curve")
+        alone = "" if found.prior else ", stage 1 alone"
+        if is_curve(stage):
+            text = f"±{100 * curve_error(stage):.2g} %"
+            meaning = f"largest half width of the 95 % band of the Stribeck curve{alone}"
+            yield Tile(text, f"error of the curve (95 %){alone}", meaning)
+        else:
+            count = counted(speeds_of(stage), "speed")
+            yield Tile("no curve", f"{count}, three make a curve", "distinct speeds of the plateaus")
         deviation = f"{100 * stage.worst_curve:.2g} %"
-        yield Tile(deviation, "worst plateau", "largest relative deviation of a plateau's friction from the curve")
+        yield Tile(
+            deviation, f"worst plateau{alone}", "largest relative deviation of a plateau's friction from the curve"
+        )
     for name in LEADING:
         estimate = found.estimates.get(name)
         if estimate is None or estimate.status not in ("estimated", "given"):
             continue
         factor, unit = shown_unit(estimate)
         label = f"{name}, {estimate.meaning}" + (f" (±{relative_text(estimate)})" if relative_text(estimate) else "")
-        value = f"{minus(value_text(estimate, factor))} {unit_text(unit)}".strip()
+        value = f"{minus(powers(value_text(estimate, factor)))} {unit_text(unit)}".strip()
         yield Tile(value, typeset(label), typeset(estimate.meaning))
     if found.dynamic is not None:
         text = f"{found.dynamic.rms:.3g} N·m"
@@ -139,8 +149,9 @@ def _rigid(account: Account) -> str:
 def _row(estimate: Estimate, I_P: float) -> str:
     factor, unit = shown_unit(estimate)
     slide = at_slide(estimate.name, I_P)
-    there = (minus(value_text(estimate, slide[0])), unit_text(slide[1])) if slide else ("", "")
-    numbers = (minus(value_text(estimate, factor)), minus(interval_text(estimate, factor)), relative_text(estimate))
+    there = (minus(powers(value_text(estimate, slide[0]))), unit_text(slide[1])) if slide else ("", "")
+    texts = (value_text(estimate, factor), interval_text(estimate, factor))
+    numbers = (*(minus(powers(text)) for text in texts), relative_text(estimate))
     value, interval, relative = (f'<td class="number">{text}</td>' for text in numbers)
     return (
         f"<tr><td><code>{escape(estimate.name)}</code></td><td>{escape(typeset(estimate.meaning))}</td>{value}"

@@ -11,9 +11,22 @@ import numpy as np
 from feedsim.identify.level import torque as motor_torque
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Identification, Plateau, Stationary
-from feedsim.report.identify.account import MM_PER_MIN, curve_error
+from feedsim.report.identify.account import MM_PER_MIN, curve_error, is_curve, speeds_of
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, VERMILLION, Array, Picture, drawing, finish, thinned
+from feedsim.report.style import (
+    BLUE,
+    GREEN,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    Array,
+    Picture,
+    drawing,
+    finish,
+    thinned,
+)
+from feedsim.report.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,21 +38,21 @@ MOST_RECORDS = 3  # with plateaus, that are shown over time
 
 
 def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
-    """Friction over speed with its 95 % band, the plateaus of both directions, and how far they are from the curve."""
+    """Friction over speed with its 95 % band, the plateaus of both directions, and how far they are from the curve.
+
+    Where stage 1 did not enter the estimates, the curve of the set that is delivered stands beside it.
+    """
     values = {name: each.value for name, each in stage.estimates.items()}
     load, asymmetry = values["M_0"], values["asymmetry"]
-    lag = 100 * curve_error(stage)
+    curve, alone = is_curve(stage), "" if found.prior else " of stage 1 alone"
     with drawing(9.6, 6.4) as figure:
         main, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [2.6, 1]})
         half = NORMAL_95 * stage.sigma
-        main.fill_between(
-            stage.speeds, stage.torque - half, stage.torque + half, color=GREEN, alpha=0.25, linewidth=0,
-            label="95 % band",
-        )  # fmt: skip
-        main.plot(stage.speeds, stage.torque, color=GREEN, label="curve", zorder=3)
-        below.fill_between(
-            stage.speeds, -100 * half / stage.torque, 100 * half / stage.torque, color=GREEN, alpha=0.25, linewidth=0
-        )
+        if curve:
+            band: dict[str, Any] = {"color": GREEN, "alpha": 0.25, "linewidth": 0}
+            main.fill_between(stage.speeds, stage.torque - half, stage.torque + half, label="95 % band", **band)
+            below.fill_between(stage.speeds, -100 * half / stage.torque, 100 * half / stage.torque, **band)
+        main.plot(stage.speeds, stage.torque, color=GREEN, label="curve" if found.prior else "stage 1 alone", zorder=3)
         below.axhline(0.0, color=GREEN, linewidth=1.4)
         for sign, colour, marker, word in DIRECTIONS:
             chosen = [p for p in stage.plateaus if p.speed * sign > 0]
@@ -49,19 +62,27 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
             friction = np.array([sign * (p.torque - load) for p in chosen])
             spread = NORMAL_95 * np.array([p.sigma for p in chosen])
             style = {"fmt": marker, "color": colour, "markersize": 5.5, "elinewidth": 0.9, "capsize": 2, "zorder": 4}
-            main.errorbar(speed, friction, spread, label=f"plateaus, {word} direction", **style)
+            main.errorbar(
+                speed,
+                friction,
+                spread,
+                label=f"plateaus, {word} direction" if found.prior else f"plateaus, {'+' if sign > 0 else '−'}",
+                **style,
+            )
             expected = _of_direction(values, sign, speed)
             if asymmetry:
                 dashes = {"color": colour, "linewidth": 0.9, "linestyle": (0, (4, 2)), "zorder": 2}
                 main.plot(stage.speeds, _of_direction(values, sign, stage.speeds), **dashes)
             below.errorbar(speed, 100 * (friction / expected - 1), 100 * spread / expected, **style)
+        if not found.prior:
+            _delivered(main, found, stage.speeds)
         main.set_xscale("log")
         main.set_ylim(bottom=0)
         main.set_ylabel("friction torque [N·m]")
         below.set_ylabel("deviation [%]")
         below.set_xlabel("motor speed [rad/s]")
         _feed_axis(main, found.I_P)
-        main.set_title(f"Axis {found.axis}: friction over speed, known to ±{lag:.2g} % (95 %)", pad=TITLE_PAD)
+        main.set_title(stribeck_title(found, stage), pad=TITLE_PAD)
         _legend(main)
         slide = main.secondary_yaxis("right", functions=(lambda M: M / found.I_P, lambda F: F * found.I_P))
         slide.set_ylabel("at the slide [N]")
@@ -69,9 +90,29 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
             "Motor torque of every plateau less the constant load, over the amount of its speed; bars: 95 % of the "
             "mean's scatter. Below: deviation from the curve"
             + (" of its direction (dashed), which the direction dependence shifts" if asymmetry else "")
-            + f"; shaded: 95 % band of the curve. Largest deviation of a plateau {100 * stage.worst_curve:.2g} %."
+            + (f"; shaded: 95 % band of the curve{alone}" if curve else "")
+            + f". Largest deviation of a plateau {100 * stage.worst_curve:.2g} %."
+            + ("" if found.prior else " Identified set: the friction that is delivered, which stage 1 did not enter.")
         )
         return finish(figure, "stribeck", "Stribeck curve", caption)
+
+
+def stribeck_title(found: Identification, stage: Stationary) -> str:
+    """What is shown, and how well the curve is known."""
+    known = f"known to ±{100 * curve_error(stage):.2g} % (95 %)"
+    if not is_curve(stage):
+        known = f"no curve: {counted(speeds_of(stage), 'speed')}"
+    return f"Axis {found.axis}: friction over speed{'' if found.prior else ', stage 1 alone'}, {known}"
+
+
+def _delivered(axes: Axes, found: Identification, speeds: Array) -> None:
+    """The set that is delivered, in both directions."""
+    values = {name: each.value for name, each in found.estimates.items()}
+    # A load that no stage tells is not in the set; it is taken off the curve in any case.
+    values.setdefault("M_0", 0.0)
+    for sign, mark, dashes in ((1, "+", "solid"), (-1, "−", (0, (1.5, 1.5)))):
+        style: dict[str, Any] = {"color": PURPLE, "linewidth": 1.3, "linestyle": dashes, "zorder": 3}
+        axes.plot(speeds, _of_direction(values, sign, speeds), label=f"identified set, {mark}", **style)
 
 
 def plateaus_picture(found: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:
@@ -93,19 +134,25 @@ def plateaus_picture(found: Identification, stage: Stationary, records: Sequence
                 room.axhline(0.0, color=MUTED, linewidth=0.8)
                 room.margins(x=0.01)
             _levels(torque, own)
-            heading(torque, f"{record.name}: {len(own)} plateaus")
+            heading(torque, f"{record.name}: {counted(len(own), 'plateau')}")
             torque.set_ylabel("torque [N·m]")
             speed.set_ylabel("speed [mm/min]")
             _decades(speed, _smallest(own, found.I_P))
             speed.set_xlabel("time [s]")
             legend_above(torque)
         left = sum(1 for number in count.values() if number) - len(shown)
-        more = f" {left} more record(s) with plateaus are not shown." if left > 0 else ""
+        more = _not_shown(left)
         caption = (
             "Shaded: stretches at constant speed whose mean torque (line) counts as friction. Speeds of several "
             f"decades are drawn logarithmically in both directions.{more}"
         )
         return finish(figure, "plateaus", "Plateaus found in the traces", caption)
+
+
+def _not_shown(left: int) -> str:
+    if left <= 0:
+        return ""
+    return f" {counted(left, 'more record')} with plateaus {'is' if left == 1 else 'are'} not shown."
 
 
 def _levels(axes: Axes, plateaus: Sequence[Plateau]) -> None:

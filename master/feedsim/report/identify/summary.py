@@ -15,13 +15,16 @@ from feedsim.report.identify.account import (
     at_slide,
     curve_error,
     interval_text,
+    is_curve,
     relative_text,
     remark_text,
     shown_unit,
+    speeds_of,
     value_text,
 )
 from feedsim.report.identify.open_loop import open_loop_part
 from feedsim.report.parts import inputs_part, machine_part, software
+from feedsim.report.words import counted
 from feedsim.trace.csv import quoted, shortest
 
 FORMAT = 1
@@ -110,13 +113,15 @@ def headline(account: Account) -> str:
     if (stage := found.stationary) is not None:
         low, high = (n * found.I_P * 60e3 for n in stage.range)
         what = "curve" if found.prior else "curve of stage 1 alone"
-        parts.append(
-            f"{what} within {100 * curve_error(stage):.2g} % (95 %) from "
-            f"{float(f'{low:.3g}'):g} to {high:.5g} mm/min, "
-            f"{len(stage.plateaus)} plateaus"
+        within = (
+            f"{what} within {100 * curve_error(stage):.2g} % (95 %) from {float(f'{low:.3g}'):g} to {high:.5g} mm/min"
         )
+        plateaus = counted(len(stage.plateaus), "plateau")
+        no_curve = f"no curve: {counted(speeds_of(stage), 'speed')}"
+        parts.append(f"{within if is_curve(stage) else no_curve}, {plateaus}")
     if (dynamic := found.dynamic) is not None:
-        parts.append(f"pre-sliding from {len(dynamic.stretches)} stretches, residual {dynamic.rms:.2g} N.m rms")
+        stretches = counted(len(dynamic.stretches), "stretch", "stretches")
+        parts.append(f"pre-sliding from {stretches}, residual {dynamic.rms:.2g} N.m rms")
     return "; ".join(parts) or "neither plateaus nor reversals"
 
 
@@ -164,12 +169,17 @@ def _curve(found: Identification) -> dict[str, Any] | None:
     if stage is None:
         return None
     return {
-        "error": {"value": _finite(curve_error(stage)), "unit": "1", "meaning": "largest half width of its 95 % band"},
+        "error": {
+            "value": _finite(curve_error(stage)) if is_curve(stage) else None,
+            "unit": "1",
+            "meaning": "largest half width of its 95 % band",
+        },
         "worst_plateau": {"value": _finite(stage.worst_curve), "unit": "1", "meaning": "largest relative deviation"},
         "rms": {"value": _finite(stage.rms), "unit": "N.m", "meaning": "residual of the plateaus"},
         "used": found.prior,
         "warnings": list(stage.warnings),
         "plateaus": len(stage.plateaus),
+        "distinct_speeds": speeds_of(stage),
         "speeds": {"value": list(stage.range), "unit": "rad/s"},
         "correlation": {
             "names": list(stage.correlation.names),

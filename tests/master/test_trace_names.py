@@ -85,9 +85,10 @@ def test_a_log_without_what_is_needed(tmp_path: Path) -> None:
 def test_names_of_drives(tmp_path: Path, machine: Machine, position: str, speed: str, torque: str) -> None:
     scale = 1e3 * machine.axes["Z"].pitch * 60 / (2 * pi) if "mm/min" in speed else 30 / pi
     scale = 1.0 if "rad/s" in speed else scale
+    place = 1e3 * machine.axes["Z"].I_P * ANGLE
     path = table(
         tmp_path / "a.csv",
-        {"Time [ms]": 1e3 * TIME, "X ActPos [mm]": TIME, position: ANGLE, speed: SPEED * scale, torque: TORQUE},
+        {"Time [ms]": 1e3 * TIME, "X ActPos [mm]": TIME, position: place, speed: SPEED * scale, torque: TORQUE},
     )
     if "r0078" in torque:  # a bracket with an index is no unit
         assert "column 'r0078' has no unit; give it: unit: A; mapping: current: {column: r0078, unit: A}" in refusal(
@@ -95,7 +96,7 @@ def test_names_of_drives(tmp_path: Path, machine: Machine, position: str, speed:
         )
         return
     record = only(read_records(path, axis="Z", machine=machine))
-    np.testing.assert_allclose(record.angle, ANGLE * 1e-3 / machine.axes["Z"].I_P, **DIGITS)
+    np.testing.assert_allclose(record.angle, ANGLE, **DIGITS)
     np.testing.assert_allclose(record.speed, SPEED, **DIGITS)
     is_current = torque.endswith("[A]")
     np.testing.assert_allclose(record.torque, TORQUE * (machine.axes["Z"].drive.K_t if is_current else 1), **DIGITS)

@@ -92,7 +92,12 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
             + (" of its direction (dashed), which the direction dependence shifts" if asymmetry else "")
             + (f"; shaded: 95 % band of the curve{alone}" if curve else "")
             + f". Largest deviation of a plateau {100 * stage.worst_curve:.2g} %."
-            + ("" if found.prior else " Identified set: the friction that is delivered, which stage 1 did not enter.")
+            + (
+                ""
+                if found.prior
+                else " Identified set: the friction that is delivered, which stage 1 did not enter, with its constant "
+                "load less stage 1's."
+            )
         )
         return finish(figure, "stribeck", "Stribeck curve", caption)
 
@@ -106,13 +111,20 @@ def stribeck_title(found: Identification, stage: Stationary) -> str:
 
 
 def _delivered(axes: Axes, found: Identification, speeds: Array) -> None:
-    """The set that is delivered, in both directions."""
+    """The set that is delivered, in both directions.
+
+    The plateaus have stage 1's constant load taken off, the set has its own: the difference belongs to the curves, else
+    a load that asymmetry stands for would look like a misfit.
+    """
     values = {name: each.value for name, each in found.estimates.items()}
     # A load that no stage tells is not in the set; it is taken off the curve in any case.
     values.setdefault("M_0", 0.0)
+    first = found.stationary.estimates.get("M_0") if found.stationary is not None else None
+    more = values["M_0"] - first.value if first is not None else 0.0
     for sign, mark, dashes in ((1, "+", "solid"), (-1, "−", (0, (1.5, 1.5)))):
         style: dict[str, Any] = {"color": PURPLE, "linewidth": 1.3, "linestyle": dashes, "zorder": 3}
-        axes.plot(speeds, _of_direction(values, sign, speeds), label=f"identified set, {mark}", **style)
+        shown = _of_direction(values, sign, speeds) + sign * more
+        axes.plot(speeds, shown, label=f"identified set, {mark}", **style)
 
 
 def plateaus_picture(found: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:

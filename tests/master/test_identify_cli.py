@@ -30,7 +30,6 @@ from feedsim.scenario.friction_file import Line, friction_text, read_friction
 from feedsim.trace import write_csv
 from identification_helpers import (
     I_P,
-    M_0,
     TRUE,
     J,
     dynamic,
@@ -400,4 +399,3 @@ def test_names_take_as_many_folders_as_needed(tmp_path: Path) -> None:
     assert distinct(files) == ("a/x/log.csv", "b/x/log.csv", "sine.csv")
     with pytest.raises(InputError, match="given twice"):
         distinct([*files, tmp_path / "a" / ".." / "sine.csv"])
-    assert M_0 == 0.25

@@ -84,6 +84,16 @@ def test_steps_of_the_position_widen_the_intervals(law: FrictionLaw) -> None:
     assert not any("steps of the recorded" in text for text in exact.warnings)
 
 
+def test_half_a_row_late_is_taken_for_damping(law: FrictionLaw) -> None:
+    """What a trace's speed must not be: the difference of two positions, half a row behind the motion."""
+    log = record(law, sines(), 2e-3, TRUE)
+    assert log.angle is not None
+    behind = np.concatenate([[0.0], np.diff(log.angle)]) / log.interval
+    late = Record("log", log.time, log.torque, speed=behind)
+    assert abs(fitted(law, log).estimates["sigma_1"].value / 0.8 - 1) < 0.01
+    assert 0.15 < fitted(law, late).estimates["sigma_1"].value / 0.8 - 1 < 0.3
+
+
 def test_strokes_invent_no_refinements(law: FrictionLaw) -> None:
     """Coulomb and viscous friction with bristles that turn over in two rows: nothing else may be found."""
     true = TRUE | {"W": 0.0, "gamma": 1.0, "sigma_0": 3e5, "sigma_1": 5.0}

@@ -29,8 +29,8 @@ DIFFERENCES = 4  # order of the differences that noise is read from: what is lef
 class Motion:
     """Speed of one axis as a piecewise polynomial, and instants to look at it.
 
-    What shifts the motion by half a sampling interval is taken for bristle damping: speeds held between samples at
-    500 Hz put it 19 % high, differences of two positions 26 % off. A spline through the samples shifts nothing.
+    What shifts the motion by half a sampling interval is taken for bristle damping: differences of two positions at
+    500 Hz put it 15 to 30 % high. A spline through the samples shifts nothing.
 
     Attributes:
         time: (N,) [s] of the record.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from feedsim.identify.result import Estimate, Identification
+from feedsim.identify.result import NORMAL_95, Estimate, Identification
 from feedsim.report.frame import Tile, frame, picture_section
 from feedsim.report.identify.account import (
     Account,
@@ -178,7 +178,7 @@ def _stretches(account: Account) -> str:
     known = ""
     if stage.without_delay:
         parts = [
-            f"{name} ±{100 * 1.96 * sigma / abs(stage.estimates[name].value):.2g} %"
+            f"{name} ±{100 * NORMAL_95 * sigma / abs(stage.estimates[name].value):.2g} %"
             for name, sigma in stage.without_delay.items()
             if name in stage.estimates and stage.estimates[name].value
         ]

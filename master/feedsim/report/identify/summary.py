@@ -11,6 +11,7 @@ import numpy as np
 
 from feedsim.identify.result import Estimate, Identification
 from feedsim.report.identify.account import (
+    MM_PER_MIN,
     Account,
     at_slide,
     curve_error,
@@ -111,7 +112,7 @@ def headline(account: Account) -> str:
     """How well curve and pre-sliding are known, in one line."""
     found, parts = account.found, []
     if (stage := found.stationary) is not None:
-        low, high = (n * found.I_P * 60e3 for n in stage.range)
+        low, high = (n * found.I_P * MM_PER_MIN for n in stage.range)
         what = "curve" if found.prior else "curve of stage 1 alone"
         within = (
             f"{what} within {100 * curve_error(stage):.2g} % (95 %) from {float(f'{low:.3g}'):g} to {high:.5g} mm/min"

@@ -54,6 +54,11 @@ $(VENV)/.dev: $(VENV)/.run requirements-dev.lock
 	$(PIP) install -r requirements-dev.lock
 	@touch $@
 
+$(VENV)/.importers: $(VENV)/.dev requirements-importers.lock
+	@echo "installing other simulators to try the units in (requirements-importers.lock)"
+	$(PIP) install -r requirements-importers.lock
+	@touch $@
+
 $(VENV)/.compiler: $(VENV)/.run requirements-zig.lock
 	@echo "no C compiler found: installing zig from PyPI (requirements-zig.lock)"
 	$(PIP) install -r requirements-zig.lock
@@ -107,8 +112,9 @@ test-sanitize-scenario: $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu)) ## a
 	    $(PY) -c 'import feedsim, sys; result = feedsim.run(feedsim.load_scenario(sys.argv[1])); print(sys.argv[1], "under sanitisers: clean,", len(result.trace), "rows")' \
 	    scenarios/z_positioning.yaml; fi
 
-test-python: fmus $(VENV)/.dev
-	$(PY) -m pytest
+# A file of tests stays together on one core: its fixtures are made once.
+test-python: fmus $(VENV)/.importers
+	$(PY) -m pytest -n auto --dist loadfile
 
 reference: $(VENV)/.dev ## make the pinned reference CSVs anew, from scipy
 	$(PY) tests/reference/make_reference.py
@@ -148,6 +154,7 @@ lock: ## resolve the dependencies of pyproject.toml anew
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group build -o requirements.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --group zig -o requirements-zig.lock
+	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group importers -c requirements-dev.lock -o requirements-importers.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --no-deps pyproject.toml --extra ansys -c requirements.lock -o requirements-ansys.lock
 
 clean: ## remove what was built, keep the environment

@@ -2,6 +2,7 @@
 #
 #   PYTHON    interpreter that makes the virtual environment (3.11 or newer)        default python3
 #   CC        C compiler; without one on the machine, zig from PyPI is fetched      default cc, gcc or clang
+#   ZIG       zig's C compiler for `make fmus-all` and `make test-platforms`         default from PyPI, into .venv
 #   RESULTS   where `make run` leaves its results                                    default results
 
 PYTHON  ?= python3
@@ -11,7 +12,7 @@ VENV    := .venv
 PY      := $(VENV)/bin/python
 PIP     := $(PY) -m pip --disable-pip-version-check --quiet
 
-UNITS   := plant controller friction
+UNITS   := plant controller friction setpoint
 FMUS    := $(UNITS:%=fmus/%.fmu)
 SCENARIOS := z_positioning xz_circle
 
@@ -24,13 +25,15 @@ CC := "$(CURDIR)/$(PY)" -m ziglang cc
 COMPILER := $(VENV)/.compiler
 endif
 export CC
+ZIG ?= "$(CURDIR)/$(PY)" -m ziglang cc
+ZIG_HERE := $(if $(filter file,$(origin ZIG)),$(VENV)/.compiler)
 # Small matrices by the thousand: threads for linear algebra only wait for one another.
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-sanitize test-sanitize-scenario test-valgrind fmus lint format reference check-reference bench pose-study identification-study lock ansys clean
+.PHONY: help run test test-c test-python test-importers test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all lint format reference check-reference bench worst-case pose-study identification-study lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-16s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -60,7 +63,7 @@ $(VENV)/.importers: $(VENV)/.dev requirements-importers.lock
 	@touch $@
 
 $(VENV)/.compiler: $(VENV)/.run requirements-zig.lock
-	@echo "no C compiler found: installing zig from PyPI (requirements-zig.lock)"
+	@echo "installing zig from PyPI, a C compiler for every platform (requirements-zig.lock)"
 	$(PIP) install -r requirements-zig.lock
 	@touch $@
 
@@ -73,9 +76,9 @@ ansys: $(VENV)/.ansys ## install the optional reader of ANSYS .full files
 
 # --- the units -----------------------------------------------------------------------------------------------------
 
-fmus: $(FMUS) ## build the three FMUs into fmus/
+fmus: $(FMUS) ## build the four FMUs into fmus/
 
-PACKAGER := $(wildcard src/fmi2/packager/*.py)
+PACKAGER := $(wildcard src/fmi2/packager/*.py src/fmi2/terminals/*)
 SHELL_SOURCES := $(wildcard src/fmi2/*.[ch] src/fmi2/standard/*.h)
 
 fmus/%.fmu: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml LICENSE
@@ -83,7 +86,25 @@ fmus/%.fmu: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml
 
 fmus/friction.fmu: $(wildcard src/friction_fmu/*.*)
 fmus/controller.fmu: $(wildcard src/controller_fmu/*.*)
+fmus/setpoint.fmu: $(wildcard src/setpoint_fmu/*.* src/setpoint_fmu/resources/*)
 fmus/plant.fmu: $(wildcard src/plant_fmu/*.* src/plant_fmu/resources/*) scenarios/machines/test_centre/modes.csv
+# Archives carry the reference results of their unit.
+$(FMUS): tests/reference/integrators.md
+$(foreach unit,$(UNITS),$(eval fmus/$(unit).fmu: $(wildcard tests/reference/$(unit)/*.* tests/reference/$(unit)/held/*.*)))
+
+# Built aside and copied into fmus/ last: `make fmus` leaves them there while they are newer than their sources, and
+# builds for this machine alone when they are not; `make fmus-all` puts those of all platforms back.
+ALL_FMUS := $(UNITS:%=$(BUILD)/fmus-all/%.fmu)
+
+fmus-all: $(ALL_FMUS) ## build the FMUs for Linux, Windows and macOS into fmus/, with zig (minutes at the first time)
+	@set -e; mkdir -p fmus; for built in $(ALL_FMUS); do fmu=fmus/$${built##*/}; \
+	    if [ $$built -nt $$fmu ] || ! cmp -s $$built $$fmu; then cp $$built $$fmu.part && mv $$fmu.part $$fmu; fi; echo "$$fmu holds all platforms"; done
+
+$(BUILD)/fmus-all/%.fmu: $(VENV)/.run $(ZIG_HERE) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml LICENSE
+	$(PY) src/fmi2/packager build $* --platforms all --cc '$(ZIG)' --out $@ --build-dir $(BUILD)/fmus-all
+
+$(foreach unit,$(UNITS),$(eval $(BUILD)/fmus-all/$(unit).fmu: $(wildcard src/$(unit)_fmu/*.* src/$(unit)_fmu/resources/*)))
+$(BUILD)/fmus-all/plant.fmu: scenarios/machines/test_centre/modes.csv
 
 # --- run -----------------------------------------------------------------------------------------------------------
 
@@ -116,14 +137,25 @@ test-sanitize-scenario: $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu)) ## a
 test-python: fmus $(VENV)/.importers
 	$(PY) -m pytest -n auto --dist loadfile
 
-reference: $(VENV)/.dev ## make the pinned reference CSVs anew, from scipy
+test-platforms: $(ALL_FMUS) $(VENV)/.dev ## the FMUs of all platforms: Windows under Wine, ARM under qemu, files for macOS
+	ZIG='$(ZIG)' FEEDSIM_PLATFORM_FMUS=$(BUILD)/fmus-all $(PY) -m pytest -s tests/platforms
+
+# Other people's simulators and validators. What cannot be installed is skipped; the summary at the end says what and why.
+test-importers: fmus $(VENV)/.importers ## the units in FMPy, ecos, libcosim, fmucontainer, Maestro; three validators
+	$(PY) tests/importers/install.py $(BUILD)/importers
+	FEEDSIM_IMPORTERS=$(BUILD)/importers $(PY) -m pytest tests/importers
+
+reference: $(VENV)/.dev ## make the pinned reference CSVs anew, from scipy and the monolithic implementation
 	$(PY) tests/reference/make_reference.py
 
-check-reference: fmus $(VENV)/.run ## compare the units' outputs with the pinned reference CSVs
-	$(PY) tests/reference/check_reference.py
+check-reference: fmus $(VENV)/.run ## compare all units and both scenarios with the pinned reference CSVs
+	$(PY) tests/reference/check_reference.py --junit $(BUILD)/check-reference.xml
 
 bench: fmus $(VENV)/.run ## measure the units and the master loop
 	$(PY) benchmarks/cycle.py
+
+worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets
+	$(PY) benchmarks/worst_case.py
 
 pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full model (some minutes; docs/position-dependence.md)
 	$(PY) benchmarks/pose_grid.py
@@ -133,7 +165,7 @@ identification-study: fmus $(VENV)/.run ## how far identified parameters can be 
 
 # --- keep ----------------------------------------------------------------------------------------------------------
 
-C_FILES := $(foreach folder,src/fmi2 src/plant_fmu src/controller_fmu src/friction_fmu tests/unit_c tests/unit_c/toy_unit \
+C_FILES := $(foreach folder,src/fmi2 $(UNITS:%=src/%_fmu) tests/unit_c tests/unit_c/toy_unit tests/platforms \
     tests/reference/monolithic benchmarks,$(wildcard $(folder)/*.[ch]))
 
 lint: $(VENV)/.dev ## style, types, formatting

@@ -14,6 +14,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import fmpy
+
 from feedsim import cosim, scenario
 from feedsim.cosim.unit import Archive
 
@@ -43,7 +45,7 @@ def unit_cost(program: Path, name: str) -> tuple[float, float]:
     """Median ns per step of `name`: (doStep alone, with set, set slope and get around it)."""
     driven, amplitude, read, _ = CASES[name]
     with Archive(cosim.fmus_directory() / f"{name}.fmu") as archive:
-        library = next((archive.directory / "binaries").glob(f"*/{name}.*"))
+        library = archive.directory / "binaries" / fmpy.platform / f"{name}{fmpy.sharedLibraryExtension}"
         variables = archive.variables
         command = [
             str(program), str(library), name, archive.guid, (archive.directory / "resources").as_uri(), str(STEPS),

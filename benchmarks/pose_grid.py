@@ -73,12 +73,14 @@ def load(folder: Path, start: float, end: float, feed: float, rest: float) -> Sc
     return scenario.load(file, [f"machine.pose.{AXIS}={start!r} m"])
 
 
-def packed(machine: Machine, grid: PoseGrid, folder: Path) -> Path:
-    """The plant archive of a machine with a grid of poses."""
+def packed(machine: Machine, grid: PoseGrid, folder: Path, fmus: Path | None = None) -> Path:
+    """The plant archive of a machine with a grid of poses, made from the one in the folder `fmus` (default: that of the
+    built archives)."""
     out, poses = folder / f"plant{len(grid.cells)}.fmu", folder / "poses.bin"
     write_poses(poses, grid)
     pose = {axis: machine.pose[axis] for axis in machine.axes}
-    pack(cosim.fmus_directory() / "plant.fmu", out, modes=machine.modes, pose=pose, poses=poses, trial=False)
+    base = (fmus or cosim.fmus_directory()) / "plant.fmu"
+    pack(base, out, modes=machine.modes, pose=pose, poses=poses, trial=False)
     return out
 
 

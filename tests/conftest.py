@@ -6,14 +6,19 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-UNITS = ("plant", "controller", "friction")
+UNITS = ("plant", "controller", "friction", "setpoint")
 
 
 def _inputs() -> list[Path]:
     """Everything the archives are made from."""
     modes = ROOT / "scenarios" / "machines" / "test_centre" / "modes.csv"
-    folders = [ROOT / "src" / "fmi2", *(ROOT / "src" / f"{unit}_fmu" for unit in UNITS)]
-    kept = (".c", ".h", ".def", ".py", ".md", ".csv")
+    references = ROOT / "tests" / "reference"
+    folders = [
+        ROOT / "src" / "fmi2",
+        *(ROOT / "src" / f"{unit}_fmu" for unit in UNITS),
+        *(references / u for u in UNITS),
+    ]
+    kept = (".c", ".h", ".def", ".py", ".md", ".csv", ".svg", ".png", ".opt", ".yaml")
     sources = [path for folder in folders for path in folder.rglob("*") if path.suffix in kept]
     return [modes, ROOT / "pyproject.toml", ROOT / "LICENSE", *sources]
 
@@ -27,7 +32,7 @@ def _up_to_date(archives: list[Path]) -> bool:
 
 @pytest.fixture(scope="session")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with plant.fmu, controller.fmu and friction.fmu.
+    """Folder with the archives of all UNITS.
 
     The one that the environment variable FEEDSIM_FMUS names, else fmus/ where it is newer than its sources, else built
     for this session.

@@ -27,7 +27,7 @@ const char *fmi2GetVersion(void) {
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
     BEGIN(SetDebugLogging, "loggingOn = %d, nCategories = %.0f", loggingOn, (double)nCategories);
-    if (nCategories > 0 && !given(unit, categories, "the array of categories"))
+    if (!values_arrays(unit, nCategories, categories, categories))
         return fmi2Error;
     return log_select(unit, loggingOn != fmi2False, nCategories, categories) ? fmi2OK : fmi2Warning;
 }

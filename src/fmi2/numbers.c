@@ -1,6 +1,5 @@
 #include "numbers.h"
 
-#include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,6 +17,19 @@ static const char *digits(const char *text) {
     return text;
 }
 
+#define SEPARATOR_SIZE 16
+
+/* The decimal separator of the current locale, which may be more than one character: what is printed between two
+ * digits. localeconv() would tell it out of memory that all threads share. */
+static size_t separator_of_locale(char *separator) {
+    char printed[SEPARATOR_SIZE + 2];
+    const int length = snprintf(printed, sizeof printed, "%.1f", 0.0);
+    const size_t width = length > 2 && (size_t)length < sizeof printed ? (size_t)length - 2 : 0;
+    memcpy(separator, printed + 1, width);
+    separator[width] = '\0';
+    return width;
+}
+
 bool number_parse(const char *text, const char **end, double *value) {
     const char *whole = text + (*text == '+' || *text == '-');
     const char *point = digits(whole);
@@ -32,12 +44,13 @@ bool number_parse(const char *text, const char **end, double *value) {
             last = digits(power);
     }
 
-    /* strtod is exact, but expects the separator of the current locale, which may be more than one character. Whole
-     * numbers get one too: 12 is 12., 1e5 is 1.e5. */
-    const char *separator = localeconv()->decimal_point;
-    size_t head = (size_t)(point - text), tail = (size_t)(last - fraction), width = strlen(separator);
+    /* strtod is exact, but expects the separator of the current locale. Whole numbers get one too: 12 is 12., 1e5 is
+     * 1.e5. */
+    char separator[SEPARATOR_SIZE];
+    const size_t width = separator_of_locale(separator);
+    size_t head = (size_t)(point - text), tail = (size_t)(last - fraction);
     char copy[LONGEST];
-    if (head + width + tail >= sizeof copy)
+    if (width == 0 || head + width + tail >= sizeof copy)
         return false;
     memcpy(copy, text, head);
     memcpy(copy + head, separator, width);
@@ -63,9 +76,9 @@ char *number_text(char *text, double value) {
         if (strtod(text, NULL) == value)
             break;
     }
-    const char *separator = localeconv()->decimal_point;
-    size_t width = strlen(separator);
-    char *found = strstr(text, separator);
+    char separator[SEPARATOR_SIZE];
+    const size_t width = separator_of_locale(separator);
+    char *found = width > 0 ? strstr(text, separator) : NULL;
     if (found != NULL) {
         *found = '.';
         memmove(found + 1, found + width, strlen(found + width) + 1);

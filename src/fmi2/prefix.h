@@ -1,5 +1,5 @@
 /* Names that cross files inside a unit carry the unit's own prefix, so that several units link into one program. Each
- * unit's identity.h defines UNIT_NAME and nothing else. */
+ * unit's identity.h defines UNIT_NAME, and UNIT_RESOURCES where it has resource files. */
 #ifndef FEEDSIM_PREFIX_H
 #define FEEDSIM_PREFIX_H
 

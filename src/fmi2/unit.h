@@ -67,7 +67,7 @@ void unit_free(Unit *unit, void *memory);
 /* --- offered by the model ----------------------------------------------------------------------------------------- */
 
 typedef struct Model {
-    const char *identifier; /* "plant", "controller", "friction" */
+    const char *identifier; /* "plant", "controller", "friction", "setpoint" */
 
     /* The archive has resource files; load() checks that they are those of unit_resource_hash(). Without, the shell
      * sees to it that this is the hash of nothing. */

@@ -38,6 +38,8 @@ const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind)
 }
 
 bool values_arrays(Unit *unit, size_t count, const void *references, const void *values) {
+    if (count > MOST_ELEMENTS)
+        return unit_fail(unit, "no array has %.0f elements: was a negative number taken for a size?", (double)count);
     if (count > 0 && (references == NULL || values == NULL))
         return unit_fail(unit, "an array of %.0f elements is expected, not NULL", (double)count);
     return true;

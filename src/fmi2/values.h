@@ -3,6 +3,8 @@
 #ifndef FEEDSIM_VALUES_H
 #define FEEDSIM_VALUES_H
 
+#include <stdint.h>
+
 #include "fmi2Functions.h"
 #include "shell.h"
 
@@ -13,7 +15,10 @@ const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind)
 /* "F_S", or "X.M_a" for a row of axis X, written to name[VARIABLE_NAME_SIZE]; returns name. */
 char *values_name(const Unit *unit, const Variable *variable, char *name);
 
-/* An importer may pass NULL for an array of no elements only. */
+/* No memory holds more numbers than this. */
+#define MOST_ELEMENTS (SIZE_MAX / 2 / sizeof(double))
+
+/* Whether `count` elements can lie in both arrays. An importer may pass NULL for an array of no elements only. */
 bool values_arrays(Unit *unit, size_t count, const void *references, const void *values);
 
 bool values_get_real(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2Real values[]);

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fmu.unpacked import PLATFORM, UNITS, Archive, initialize, instantiate, unpack
-from packager import build, compile, resources, toolchain, variables
+from packager import build, compile, machine_tables, toolchain, variables
 
 
 def test_rebuilding_gives_the_same_bytes(unit: str, tmp_path: Path) -> None:
@@ -65,8 +65,10 @@ PROGRAM = """\
 
 #include "fmi2FunctionTypes.h"
 
-fmi2InstantiateTYPE plant_fmi2Instantiate, controller_fmi2Instantiate, friction_fmi2Instantiate;
-fmi2FreeInstanceTYPE plant_fmi2FreeInstance, controller_fmi2FreeInstance, friction_fmi2FreeInstance;
+fmi2InstantiateTYPE plant_fmi2Instantiate, controller_fmi2Instantiate, friction_fmi2Instantiate,
+    setpoint_fmi2Instantiate;
+fmi2FreeInstanceTYPE plant_fmi2FreeInstance, controller_fmi2FreeInstance, friction_fmi2FreeInstance,
+    setpoint_fmi2FreeInstance;
 
 static int try(fmi2InstantiateTYPE *instantiate, fmi2FreeInstanceTYPE *release, const char *guid) {
     const fmi2CallbackFunctions callbacks = {NULL, calloc, free, NULL, NULL};
@@ -78,17 +80,18 @@ static int try(fmi2InstantiateTYPE *instantiate, fmi2FreeInstanceTYPE *release, 
 }
 
 int main(int count, char **guids) {
-    if (count != 4)
+    if (count != 5)
         return 2;
     return try(plant_fmi2Instantiate, plant_fmi2FreeInstance, guids[1]) +
            try(controller_fmi2Instantiate, controller_fmi2FreeInstance, guids[2]) +
-           try(friction_fmi2Instantiate, friction_fmi2FreeInstance, guids[3]);
+           try(friction_fmi2Instantiate, friction_fmi2FreeInstance, guids[3]) +
+           try(setpoint_fmi2Instantiate, setpoint_fmi2FreeInstance, guids[4]);
 }
 """
 
 
 def test_all_units_link_into_one_program(fmus: Path, tmp_path: Path) -> None:
-    """Statically, each with its FMI2_FUNCTION_PREFIX; without resource files, hence with the embedded machine."""
+    """Statically, each with its FMI2_FUNCTION_PREFIX; without resource files, hence with those embedded."""
     objects: list[Path] = []
     guids: list[str] = []
     for unit in UNITS:
@@ -122,11 +125,11 @@ def test_all_units_link_into_one_program(fmus: Path, tmp_path: Path) -> None:
 def test_another_machine_needs_no_compiler(plant: Archive, tmp_path: Path) -> None:
     """The plant's binary as it is, with the resources and the GUID of a machine of one axis."""
     (tmp_path / "axes.csv").write_text("axis,x_0 [m]\nW,0.25\n", encoding="utf-8")
-    header = ",".join(resources.modes_header(["W"]))
+    header = ",".join(machine_tables.modes_header(["W"]))
     (tmp_path / "modes.csv").write_text(
         f"{header}\n0,0,0,2,0.01,0.01,0,0\n1,50,0.02,1,0.005,0.004,0,0\n", encoding="utf-8"
     )
-    given = resources.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
+    given = machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
     loaded = build.load(build.unit_directory("plant"), toolchain.find_compiler())
     repacked = tmp_path / "unpacked"
     shutil.copytree(plant.folder, repacked)

@@ -16,7 +16,7 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from fmu.unpacked import PLATFORM, ROOT, Archive, axes, declared, expected_variables, initialize, instantiate
+from fmu.unpacked import PLATFORM, RESOURCES, ROOT, Archive, axes, declared, expected_variables, initialize, instantiate
 
 # --- the archive as a file
 
@@ -43,10 +43,11 @@ def test_archive_has_its_parts_and_no_trace_of_this_machine(archive: Archive) ->
     expected = {"modelDescription.xml", "documentation/index.html", "documentation/licenses/license.txt"}
     expected |= {"sources/variables.json"}
     expected |= {f"binaries/{PLATFORM.folder}/{archive.unit}{PLATFORM.suffix}", "sources/fmi2Functions.h"}
-    expected |= {"resources/axes.csv", "resources/modes.csv"} if archive.unit == "plant" else set()
+    expected |= {f"resources/{name}" for name in RESOURCES.get(archive.unit, ()) if name.endswith(".csv")}
     assert expected <= set(names)
     assert {name.split("/")[0] for name in names} <= {
-        *("modelDescription.xml", "binaries", "documentation", "resources", "sources")
+        *("modelDescription.xml", "binaries", "documentation", "resources", "sources"),
+        *("model.png", "terminalsAndIcons", "extra"),
     }
 
 
@@ -137,7 +138,7 @@ def test_guid_is_the_hash_of_table_and_resources(archive: Archive) -> None:
     text = "".join("|".join(row[key] for key in keys) + "\n" for row in rows)
     packed = b"".join(
         path.read_bytes()
-        for path in (archive.folder / "resources" / name for name in ("axes.csv", "modes.csv", "poses.bin"))
+        for path in (archive.folder / "resources" / name for name in RESOURCES.get(archive.unit, ()))
         if path.exists()
     )
     halves = []
@@ -209,9 +210,9 @@ def test_archive_of_another_table_is_refused(archive: Archive) -> None:
         instantiate(archive, guid=_one_digit_off(archive.guid, 0))
 
 
-def test_archive_of_other_resources_is_refused(plant: Archive) -> None:
+def test_archive_of_other_resources_is_refused(archive: Archive) -> None:
     with pytest.raises(Exception, match="instantiate"):
-        instantiate(plant, guid=_one_digit_off(plant.guid, 17))
+        instantiate(archive, guid=_one_digit_off(archive.guid, 17))
 
 
 # What a unit exports besides the functions of the standard.
@@ -257,7 +258,7 @@ def test_documentation_is_whole_and_self_contained(archive: Archive) -> None:
     assert not re.search(r"<(script|link|img|iframe)\b", text)
     assert not re.search(r"@import|url\(", text)
     assert not re.search(r"""href=(?!"(https?:|mailto:|#))""", text)
-    assert "Start values are those of a synthetic default machine" in text
+    assert "of a synthetic default machine" in text
     licence = (ROOT / "LICENSE").read_text(encoding="utf-8")
     assert licence in (archive.folder / "documentation/licenses/license.txt").read_text(encoding="utf-8")
     assert "2-Clause BSD License" in (archive.folder / "documentation/licenses/fmi-headers.txt").read_text("utf-8")

@@ -46,6 +46,7 @@ def test_they_are_those_of_the_initial_values(archive: Archive) -> None:
             "controller": {("x_e", "x_s"), ("x_e", "x_a")},
             "friction": {("M_fr", "n_fr")},
             "plant": set(),
+            "setpoint": set(),
         }
         assert reacting == expected[archive.unit]
         both = slave.getDirectionalDerivative(unknown, known, list(point))

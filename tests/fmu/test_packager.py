@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from fmu.toy_table import GOOD, HEAD, read, toy
-from packager import archive, build, cli, compile, documentation, machine, resources, toolchain, variables
+from packager import archive, build, cli, compile, documentation, machine, machine_tables, toolchain, variables
 from packager.errors import CompilerError, InputError, OutputError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,10 +28,10 @@ AXIS_ROWS = HEAD + (
 )
 
 
-def read_resources(folder: Path, axes: str = AXES, modes: str = MODES) -> resources.Resources:
+def read_resources(folder: Path, axes: str = AXES, modes: str = MODES) -> machine_tables.MachineTables:
     (folder / "axes.csv").write_text(axes, encoding="utf-8", newline="")
     (folder / "modes.csv").write_text(modes, encoding="utf-8", newline="")
-    return resources.read(folder / "axes.csv", folder / "modes.csv")
+    return machine_tables.read(folder / "axes.csv", folder / "modes.csv")
 
 
 def test_axis_block_is_repeated_for_every_axis(tmp_path: Path, compiler: tuple[str, ...]) -> None:
@@ -62,9 +62,9 @@ def test_guid_covers_table_axes_and_modes(tmp_path: Path, compiler: tuple[str, .
 
 def test_resources_must_go_with_the_table(tmp_path: Path, compiler: tuple[str, ...]) -> None:
     given = read_resources(tmp_path)
-    with pytest.raises(InputError, match="needs axes"):
+    with pytest.raises(InputError, match="needs resources of the kind 'machine'"):
         variables.expand(read(tmp_path / "a", AXIS_ROWS, compiler), None)
-    with pytest.raises(InputError, match="no rows per axis"):
+    with pytest.raises(InputError, match="takes no resources"):
         variables.expand(read(tmp_path / "b", GOOD, compiler), given)
     with pytest.raises(InputError, match="no such row"):
         variables.expand(read(tmp_path / "c", AXIS_ROWS.replace("x_0", "x_1"), compiler), given)
@@ -118,14 +118,22 @@ def test_modes_may_have_their_columns_in_any_order(tmp_path: Path) -> None:
     assert read_resources(tmp_path, modes=turned).modes_csv == turned.encode()
 
 
+def test_unknown_kind_of_resources_is_named(tmp_path: Path, compiler: tuple[str, ...]) -> None:
+    unit = toy(tmp_path / "toy", AXIS_ROWS)
+    identity = unit / "identity.h"
+    identity.write_text(identity.read_text(encoding="utf-8").replace("machine", "maps"), encoding="utf-8")
+    with pytest.raises(InputError, match="toy: UNIT_RESOURCES is maps, known are machine, setpoints"):
+        build.load(unit, compiler)
+
+
 def test_missing_resource_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nowhere\.csv: cannot be read"):
-        resources.read(tmp_path / "nowhere.csv", tmp_path / "modes.csv")
+        machine_tables.read(tmp_path / "nowhere.csv", tmp_path / "modes.csv")
 
 
 def test_embedded_source_holds_the_files_to_the_byte(tmp_path: Path) -> None:
     given = read_resources(tmp_path)
-    text = resources.embedded_source(given).decode()
+    text = given.embedded_source().decode()
     arrays = re.findall(r"const unsigned char (\w+)\[\] = \{([^}]*)\}", text)
     assert {name: bytes(int(number) for number in body.split(",")) for name, body in arrays} == {
         "embedded_axes": AXES.encode(),
@@ -212,10 +220,14 @@ def test_no_compiler_at_all_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (["describe", "gearbox"], 2, "no unit 'gearbox' (units: controller, friction, plant"),
+        (["describe", "gearbox"], 2, "no unit 'gearbox' (units: controller, friction, plant, setpoint;"),
         (["describe", "friction", "--cc", "no-such-compiler"], 3, "no-such-compiler"),
         (["describe", "plant", "--modes", "nowhere.csv"], 2, "nowhere.csv"),
-        (["describe", "friction", "--axes", str(ROOT / "src/plant_fmu/resources/axes.csv")], 2, "no rows per axis"),
+        (
+            ["describe", "friction", "--axes", str(ROOT / "src/plant_fmu/resources/axes.csv")],
+            2,
+            "friction: takes no axes (it takes no files)",
+        ),
         (["build", "plant", "friction", "--out", "x.fmu"], 2, "--out is for one unit"),
         (["describe", "plant", "--poses", "nowhere.bin"], 2, "nowhere.bin: cannot be read"),
         (

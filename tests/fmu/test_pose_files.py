@@ -9,7 +9,7 @@ import pytest
 
 from fmu.pose_file import AXES, Grid, table
 from machine_helpers import modes_csv
-from packager import poses, resources
+from packager import machine_tables, poses
 from packager.errors import InputError
 
 
@@ -73,11 +73,11 @@ FAULTS: dict[str, tuple[bytes, str]] = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faulty_poses_are_refused(fault: str, tmp_path: Path) -> None:
     content, text = FAULTS[fault]
-    (tmp_path / "axes.csv").write_text(resources.axes_csv(dict.fromkeys(AXES, 0.0)).decode(), encoding="utf-8")
+    (tmp_path / "axes.csv").write_text(machine_tables.axes_csv(dict.fromkeys(AXES, 0.0)).decode(), encoding="utf-8")
     (tmp_path / "modes.csv").write_text(modes_csv(AXES), encoding="utf-8")
     (tmp_path / "poses.bin").write_bytes(content)
     with pytest.raises(InputError, match=rf"poses\.bin: .*{text}"):
-        resources.read(tmp_path / "axes.csv", tmp_path / "modes.csv", tmp_path / "poses.bin")
+        machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv", tmp_path / "poses.bin")
 
 
 def test_columns_of_a_transfer_are_checked_too() -> None:

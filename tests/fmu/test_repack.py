@@ -16,7 +16,7 @@ from fmu import test_archives as built
 from fmu.pose_file import AXES, Grid
 from fmu.unpacked import PLATFORM, ROOT, Archive, unpack
 from machine_helpers import modes_csv
-from packager import build, cli, resources, toolchain
+from packager import build, cli, machine_tables, toolchain
 from packager.errors import InputError
 from packager.machine import named
 from packager.repack import repack
@@ -80,8 +80,11 @@ def test_holds_what_it_was_given_and_keeps_the_rest(repacked: Archive, fmus: Pat
     for name in files:
         assert (repacked.folder / "resources" / name).read_bytes() == (given / name).read_bytes()
     changed = {"modelDescription.xml", "documentation/index.html", "sources/embedded_resources.c"}
+    changed |= {"terminalsAndIcons/terminalsAndIcons.xml"}  # terminals are the axes'
     with zipfile.ZipFile(fmus / "plant.fmu") as base, zipfile.ZipFile(repacked.path) as packed:
-        kept = [name for name in base.namelist() if not name.startswith("resources/") and name not in changed]
+        kept = [
+            name for name in base.namelist() if not name.startswith(("resources/", "extra/")) and name not in changed
+        ]
         assert f"binaries/{PLATFORM.folder}/plant{PLATFORM.suffix}" in kept
         assert {name: packed.read(name) for name in kept} == {name: base.read(name) for name in kept}
         assert {name for name in packed.namelist() if not name.startswith("resources/")} == {*kept, *changed}
@@ -123,19 +126,18 @@ def test_packing_again_leaves_nothing_of_the_machine_before(repacked: Archive, f
 
 
 def test_same_machine_gives_the_built_archive(plant: Archive, tmp_path: Path) -> None:
-    """All but the page of documentation, which does not know that the tables are those of the default machine."""
+    """All but the references and the page of documentation, which do not know that it is the default machine again."""
     out = tmp_path / "plant.fmu"
     tables = ["--axes", str(DEFAULT_AXES), "--modes", str(DEFAULT_MODES)]
     assert cli.main(["repack", str(plant.path), *tables, "--out", str(out)]) == 0
     with zipfile.ZipFile(plant.path) as base, zipfile.ZipFile(out) as packed:
-        assert packed.namelist() == base.namelist()
-        assert [name for name in base.namelist() if packed.read(name) != base.read(name)] == [
-            "documentation/index.html"
-        ]
+        kept = [name for name in base.namelist() if not name.startswith("extra/")]  # references are of built ones alone
+        assert packed.namelist() == kept
+        assert [name for name in kept if packed.read(name) != base.read(name)] == ["documentation/index.html"]
 
 
 def test_building_with_tables_gives_the_repacked_archive(repacked: Archive, tmp_path: Path) -> None:
-    """The binary is left out: it is that of `fmus`, which may have been built elsewhere."""
+    """Binaries are left out: they are those of `fmus`, which may have been built elsewhere and for more platforms."""
     given = repacked.path.parents[1]
     grid = given / "poses.bin"
     compiler = toolchain.find_compiler()
@@ -150,9 +152,10 @@ def test_building_with_tables_gives_the_repacked_archive(repacked: Archive, tmp_
     )
     build.build(unit, tmp_path / "plant.fmu", compiler)
     with zipfile.ZipFile(tmp_path / "plant.fmu") as first, zipfile.ZipFile(repacked.path) as second:
-        assert first.namelist() == second.namelist()
-        for name in first.namelist():
-            assert name.startswith("binaries/") or first.read(name) == second.read(name), name
+        names, packed = ([n for n in each.namelist() if not n.startswith("binaries/")] for each in (first, second))
+        assert names == packed
+        for name in names:
+            assert first.read(name) == second.read(name), name
 
 
 # --- simulated
@@ -184,7 +187,7 @@ def test_packed_tables_give_the_numbers_of_modes_file(fmus: Path, tmp_path: Path
     axes = ("X", "Y", "Z")
     (tmp_path / "modes.csv").write_text(modes_csv(axes), encoding="utf-8")
     (tmp_path / "axes.csv").write_text("axis,x_0 [m]\nX,0.25\nY,0.5\nZ,0.125\n", encoding="utf-8")
-    given = resources.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
+    given = machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
     repack(fmus / "plant.fmu", given, named(), tmp_path / "own.fmu")
     watch = ("Y.x_a", "Y.n_a", "Y.n_fr", "tool.x_Y", "tcp.x_Y", "X.x_a")
     start = {"modes_file": str(tmp_path / "modes.csv"), "X.x_0": 0.25, "Y.x_0": 0.5, "Z.x_0": 0.125}
@@ -200,7 +203,7 @@ def test_grid_of_equal_poses_changes_nothing(fmus: Path, tmp_path: Path) -> None
     for grid in (None, Grid(directions=[[0, 3, 0, 0.4, 0.5002, 0.6, 0.5001, 0.5004], [2, 2, 0, 0, 1, 0.5]]).content()):
         write_tables(tmp_path, grid)
         given.append(
-            resources.read(tmp_path / "axes.csv", tmp_path / "modes.csv", tmp_path / "poses.bin" if grid else None)
+            machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv", tmp_path / "poses.bin" if grid else None)
         )
     watch = ("X.x_a", "X.n_a", "tool.x_X", "W.x_a", "spindle_2.x_a", "pose.crossings")
     results = []
@@ -225,16 +228,21 @@ def test_binaries_of_other_platforms_are_kept(plant: Archive, tmp_path: Path) ->
     shutil.copy(plant.path, base)
     with zipfile.ZipFile(base, "a") as archive:
         archive.writestr(OTHER, b"another platform's")
-    given = resources.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
+    given = machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
     done = repack(base, given, named(), tmp_path / "both.fmu")
-    assert done.platforms == tuple(sorted((PLATFORM.folder, "aarch64-plan9")))
+    with zipfile.ZipFile(plant.path) as archive:
+        held = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
+    assert PLATFORM.folder in held
+    assert done.platforms == tuple(sorted((*held, "aarch64-plan9")))
     assert done.tried
     with zipfile.ZipFile(tmp_path / "both.fmu") as archive:
         assert archive.read(OTHER) == b"another platform's"
 
     with zipfile.ZipFile(plant.path) as whole, zipfile.ZipFile(base, "w") as foreign:
+        foreign.writestr(OTHER, b"another platform's")
         for name in whole.namelist():
-            foreign.writestr(OTHER if name.startswith("binaries/") else name, whole.read(name))
+            if not name.startswith("binaries/"):
+                foreign.writestr(name, whole.read(name))
     assert cli.main(["repack", str(base), *options, "--out", str(tmp_path / "foreign.fmu")]) == 0
     done = repack(base, given, named(), tmp_path / "foreign.fmu")
     assert done.platforms == ("aarch64-plan9",)
@@ -255,7 +263,7 @@ def altered(base: Path, out: Path, changes: dict[str, bytes | None]) -> Path:
 
 def test_unsuitable_bases_are_refused(plant: Archive, fmus: Path, tmp_path: Path) -> None:
     write_tables(tmp_path)
-    given = resources.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
+    given = machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
     carried = json.loads((plant.folder / "sources" / "variables.json").read_text(encoding="utf-8"))
 
     def with_table(**changes: object) -> Path:
@@ -270,7 +278,7 @@ def test_unsuitable_bases_are_refused(plant: Archive, fmus: Path, tmp_path: Path
         (lambda: tmp_path / "nowhere.fmu", r"nowhere\.fmu: cannot be read: No such file"),
         (lambda: tmp_path / "text.fmu", r"text\.fmu: not an archive, or damaged"),
         (lambda: tmp_path / "cut.fmu", r"cut\.fmu: not an archive, or damaged"),
-        (lambda: fmus / "friction.fmu", "friction: has no rows per axis"),
+        (lambda: fmus / "friction.fmu", "friction: takes no resources"),
         (lambda: altered(plant.path, tmp_path / "b.fmu", {"modelDescription.xml": None}), "has no modelDescription"),
         (lambda: altered(plant.path, tmp_path / "b.fmu", {"modelDescription.xml": b"<a"}), "cannot be read"),
         (lambda: altered(plant.path, tmp_path / "b.fmu", {"sources/variables.json": None}), "has no sources/variables"),
@@ -279,7 +287,7 @@ def test_unsuitable_bases_are_refused(plant: Archive, fmus: Path, tmp_path: Path
             lambda: altered(plant.path, tmp_path / "b.fmu", {"documentation/index.html": b"<p>"}),
             "has no part 'machine'",
         ),
-        (lambda: with_table(format=2), "has format 2, this packager reads format 1"),
+        (lambda: with_table(format=3), "has format 3, this packager reads format 2"),
         (lambda: with_table(scalars=[{"name": "a"}]), "not a table of variables: KeyError"),
         (lambda: with_table(scalars=["a"]), "not a table of variables: AttributeError"),
         (lambda: with_table(version=1), "must be texts"),
@@ -295,7 +303,7 @@ def test_unsuitable_bases_are_refused(plant: Archive, fmus: Path, tmp_path: Path
 def test_axis_named_like_a_group_is_refused(fmus: Path, tmp_path: Path) -> None:
     (tmp_path / "axes.csv").write_text("axis,x_0 [m]\ntool,0\n", encoding="utf-8")
     (tmp_path / "modes.csv").write_text(modes_csv(["tool"]), encoding="utf-8")
-    given = resources.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
+    given = machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv")
     with pytest.raises(InputError, match="an axis cannot be named tool"):
         repack(fmus / "plant.fmu", given, named(), tmp_path / "out.fmu")
 
@@ -319,7 +327,7 @@ def test_what_the_unit_refuses_is_not_packed(plant: Archive, fmus: Path, tmp_pat
     with pytest.raises(InputError, match="cannot be instantiated"):
         repack(
             base,
-            resources.read(tmp_path / "axes.csv", tmp_path / "modes.csv"),
+            machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv"),
             named(),
             tmp_path / "out.fmu",
         )

@@ -19,7 +19,9 @@ GOOD = HEAD + (
 
 def toy(folder: Path, rows: str) -> Path:
     folder.mkdir(exist_ok=True)
-    (folder / "identity.h").write_text("#ifndef ID_H\n#define ID_H\n#define UNIT_NAME toy\n#endif\n", encoding="utf-8")
+    kind = "#define UNIT_RESOURCES machine\n" if "AXIS_" in rows else ""
+    identity = f"#ifndef ID_H\n#define ID_H\n#define UNIT_NAME toy\n{kind}#endif\n"
+    (folder / "identity.h").write_text(identity, encoding="utf-8")
     (folder / "variables.def").write_text(rows, encoding="utf-8")
     return folder
 

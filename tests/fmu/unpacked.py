@@ -14,7 +14,7 @@ from fmpy.fmi2 import FMU2Slave
 from packager import compile
 
 ROOT = Path(__file__).resolve().parents[2]
-UNITS = ("plant", "controller", "friction")
+UNITS = ("plant", "controller", "friction", "setpoint")
 PLATFORM = compile.host_target()
 
 
@@ -99,6 +99,12 @@ def declared(unit: str) -> Iterator[dict[str, str]]:
         )
 
 
+RESOURCES = {
+    "plant": ("axes.csv", "modes.csv", "poses.bin"),
+    "setpoint": ("setpoints.csv",),
+}  # in the order of the hash
+
+
 def axes(path: Path = ROOT / "src/plant_fmu/resources/axes.csv") -> list[tuple[str, str]]:
     lines = path.read_text(encoding="utf-8").splitlines()
     return [(name, x_0) for name, x_0 in (line.split(",") for line in lines[1:])]
@@ -108,7 +114,14 @@ def expected_variables(archive: Archive) -> list[dict[str, str]]:
     """All variables in the order of their value references, for the axes that the archive holds."""
     rows = list(declared(archive.unit))
     found = [row for row in rows if not row["axis"]]
-    for axis, x_0 in axes(archive.folder / "resources" / "axes.csv") if archive.unit == "plant" else ():
+    resources = archive.folder / "resources"
+    named: list[tuple[str, str]] = []
+    if archive.unit == "plant":
+        named = axes(resources / "axes.csv")
+    elif archive.unit == "setpoint":
+        header = (resources / "setpoints.csv").read_text(encoding="utf-8").splitlines()[0]
+        named = [(axis, "") for axis in re.findall(r",(\w+)\.x_s \[m\]", header)]
+    for axis, x_0 in named:
         for row in (row for row in rows if row["axis"]):
             start = x_0 if row["name"] == "x_0" else row["start"]
             found.append(row | {"name": f"{axis}.{row['name']}", "start": start})

@@ -10,7 +10,21 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[2] / "master" / "feedsim"
 # A room may import the rooms below it.
-ORDER = ["cli", "report", "identify", "analysis", "cosim", "structure", "nc", "scenario", "trace", "units", "errors"]
+ORDER = [
+    "cli",
+    "report",
+    "identify",
+    "analysis",
+    "compare",
+    "ssp",
+    "cosim",
+    "structure",
+    "nc",
+    "scenario",
+    "trace",
+    "units",
+    "errors",
+]
 SOLE_USERS = {
     "fmpy": {"cosim/unit.py"},
     "ctypes": {"cosim/unit.py", "cosim/friction_law.py"},
@@ -20,7 +34,7 @@ SOLE_USERS = {
     "ruckig": {"nc"},
     "tqdm": {"cli"},
     "pyuff": {"trace/uff.py"},
-    "feedsim_packager": {"structure/pack.py"},
+    "feedsim_packager": {"structure/pack.py", "ssp/pack.py"},
 }
 
 

@@ -206,7 +206,7 @@ def test_archive_that_cannot_be_written_is_told(tmp_path: Path, fmus: Path) -> N
 
 def test_base_that_carries_no_table_is_refused(tmp_path: Path, fmus: Path) -> None:
     write_machine(tmp_path, {"Q": 0.1})
-    with pytest.raises(InputError, match="controller: has no rows per axis"):
+    with pytest.raises(InputError, match="controller: takes no resources"):
         pack(fmus / "controller.fmu", tmp_path / "x.fmu", modes=tmp_path / "modes.csv", pose={"Q": 0.1})
     with zipfile.ZipFile(fmus / "plant.fmu") as whole, zipfile.ZipFile(tmp_path / "old.fmu", "w") as old:
         for name in whole.namelist():

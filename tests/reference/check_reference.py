@@ -1,7 +1,6 @@
-"""Run each unit's archive over its reference cases and compare (`make check-reference`).
+"""Run every archive over its reference cases and both scenarios against theirs, and compare (`make check-reference`).
 
-The unit is stepped at the case's StepSize; each step gets the value of the inputs at its start and their slope, so that
-the unit sees exactly the piecewise linear inputs that the reference was computed for.
+The verdict is that of `feedsim compare`, with the tolerances that stand, each with its reason, beside the references.
 
 Exit code: 0 all the same, 1 something differs, 2 an archive is missing or cannot be used.
 """
@@ -10,182 +9,98 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import fmpy
 import numpy as np
-from fmpy.fmi2 import FMU2Slave
-from reference_files import HERE, UNITS, Case, Table, case_names, read_case
+import system
+from reference_files import HELD, HERE, Case, Table, all_cases, read_case
+from run_case import Unusable, simulate
+
+from feedsim import cosim, scenario
+from feedsim.compare import Comparison, compare_series, tolerances_of, unusable
+from feedsim.errors import FeedsimError
+from feedsim.report.compare.write import write_comparison
+from feedsim.trace import Series
 
 ARCHIVES = HERE.parents[1] / "fmus"
 
 
-@dataclass(frozen=True)
-class Tolerance:
-    """Allowed deviation: absolute [unit of the variable] plus relative to the largest magnitude of the column."""
-
-    absolute: float
-    relative: float = 0.0
+def _series(table: Table) -> Series:
+    return Series(table["time"], {name: values for name, values in table.items() if name != "time"})
 
 
-TOLERANCES: dict[str, dict[str, Tolerance]] = {
-    "friction": {
-        # the step is of second order: 6-9 uN.m over a circle's turn at 125 us
-        "M_fr": Tolerance(15e-6),
-        # the same torque error through the bristle stiffness, 300 N.m/rad
-        "z": Tolerance(5e-8),
-        # the travelled angle is exact for a linear speed: rounding of 16,000 additions
-        "c": Tolerance(1e-12),
-        # c over a width of 0.04 rad
-        "k": Tolerance(1e-10),
-        "lambda": Tolerance(1e-10),
-    },
-    # exact for linear inputs: rounding of 4,000 steps against one exponential per knot, and the file's 15 digits
-    "plant": {"": Tolerance(1e-15, 1e-12)},
-    # the same sampled arithmetic in another order: rounding, carried on by integrators and filters
-    "controller": {"": Tolerance(1e-12, 1e-10)},
-}
+def _compared(name: str, result: Table, reference: Table, path: Path) -> Comparison:
+    """`path` is the reference's file: its tolerances are beside it."""
+    return compare_series(_series(result), _series(reference), tolerances_of(path, None, ()), names=(name, str(path)))
 
 
-@dataclass(frozen=True)
-class Deviation:
-    """Largest deviation of one variable over one case."""
-
-    unit: str
-    case: str
-    variable: str
-    deviation: float
-    tolerance: float
-
-    @property
-    def same(self) -> bool:
-        """Within the tolerance; a deviation that is not a number is none."""
-        return self.deviation <= self.tolerance
-
-
-class Unusable(Exception):
-    """An archive that is missing, lacks a variable or reports an error."""
-
-
-def simulate(archive: Path, case: Case) -> Table:
-    """The unit's outputs at the reference's instants, which must be communication points."""
-    if not archive.is_file():
-        raise Unusable(f"{archive}: no such archive (make fmus builds it)")
+def check_case(archive: Path, case: Case, root: Path = HERE) -> Comparison:
+    """One case of a unit; an archive that cannot be used is told in what is returned."""
+    folder = root / case.unit / (HELD if case.held else "")
+    path = folder / f"{case.name}_ref.csv"
+    name = "/".join(part for part in (case.unit, HELD if case.held else "", case.name) if part)
     try:
-        with tempfile.TemporaryDirectory() as directory:
-            return _simulate(archive, case, directory)
-    except Unusable:
-        raise
-    except Exception as error:  # whatever fmpy or the unit raises, the archive cannot be used
-        raise Unusable(f"{archive.name}, case {case.name}: {error}") from error
+        return _compared(name, simulate(archive, case), case.reference, path)
+    except Unusable as error:
+        return unusable(name, str(path), str(error))
 
 
-def _simulate(archive: Path, case: Case, directory: str) -> Table:
-    fmpy.extract(str(archive), directory)
-    description = fmpy.read_model_description(str(archive))
-    variables = {variable.name: variable for variable in description.modelVariables}
-    inputs = [name for name in case.inputs if name != "time"]
-    outputs = [name for name in case.reference if name != "time"]
-    unknown = [name for name in (*inputs, *outputs, *case.parameters) if name not in variables]
-    if unknown:
-        raise Unusable(f"{archive.name}, case {case.name}: no variable {', '.join(unknown)}")
-    unit = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=directory,
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName=case.name,
-    )
-    unit.instantiate()
+def check_system(archives: Path, wanted: system.Scenario, root: Path = HERE, *overrides: str) -> Comparison:
+    """One scenario as `feedsim run` runs it, at the instants of its reference."""
+    name, path = f"{system.FOLDER}/{wanted.name}", system.path_of(wanted, root)
     try:
-        unit.setupExperiment(startTime=0.0, stopTime=case.stop)
-        _set_parameters(unit, variables, case)
-        unit.enterInitializationMode()
-        return _step(unit, variables, case, inputs, outputs)
-    finally:
-        unit.terminate()
-        unit.freeInstance()
+        loaded = scenario.load(
+            system.SCENARIOS / f"{wanted.name}.yaml", [f"recording.interval={wanted.every * 1e3:g} ms", *overrides]
+        )
+        trace = cosim.run(loaded, fmus=archives).trace
+    except FeedsimError as error:
+        return unusable(name, str(path), str(error))
+    reference = system.read(wanted, root)
+    # the program's last position cycle is the reference's too, the run may go on to the end of its dwell
+    count = min(len(trace.time), len(reference["time"]))
+    if np.max(np.abs(trace.time[:count] - reference["time"][:count])) > 1e-9:
+        return unusable(name, str(path), "the run was not recorded at the instants of the reference")
+    result = {"time": reference["time"][:count]} | {n: trace[n][:count] for n in wanted.variables}
+    return _compared(name, result, reference, path)
 
 
-def _set_parameters(unit: FMU2Slave, variables: dict[str, Any], case: Case) -> None:
-    for name, value in case.parameters.items():
-        reference = [variables[name].valueReference]
-        match variables[name].type:
-            case "Real":
-                unit.setReal(reference, [value])
-            case "Integer":
-                unit.setInteger(reference, [round(value)])
-            case "Boolean":
-                unit.setBoolean(reference, [bool(value)])
-
-
-def _step(unit: FMU2Slave, variables: dict[str, Any], case: Case, inputs: list[str], outputs: list[str]) -> Table:
-    steps = round(case.stop / case.step)
-    t = np.arange(steps + 1) * case.step
-    given = np.array([np.interp(t, case.inputs["time"], case.inputs[name]) for name in inputs])
-    slopes = np.diff(given, axis=1) / case.step
-    into = [variables[name].valueReference for name in inputs]
-    out = [variables[name].valueReference for name in outputs]
-    wanted = np.round(case.reference["time"] / case.step).astype(int)
-    if np.max(np.abs(wanted * case.step - case.reference["time"])) > 1e-9:
-        raise Unusable(f"case {case.name}: the reference has instants that are no multiples of the step {case.step} s")
-
-    unit.setReal(into, given[:, 0].tolist())
-    unit.exitInitializationMode()
-    rows = {0: unit.getReal(out)}
-    instants = set(wanted.tolist())
-    first_order = [1] * len(into)
-    for k in range(steps):
-        unit.setReal(into, given[:, k].tolist())
-        unit.setRealInputDerivatives(into, first_order, slopes[:, k].tolist())
-        unit.doStep(float(t[k]), case.step)
-        if k + 1 in instants:
-            rows[k + 1] = unit.getReal(out)
-    table = np.array([rows[k] for k in wanted])
-    return {"time": case.reference["time"]} | {name: table[:, i] for i, name in enumerate(outputs)}
-
-
-def compare(case: Case, result: Table) -> Iterator[Deviation]:
-    """Largest deviation of every variable of the reference."""
-    tolerances = TOLERANCES[case.unit]
-    for name, expected in case.reference.items():
-        if name == "time":
-            continue
-        tolerance = tolerances.get(name) or tolerances[""]
-        allowed = tolerance.absolute + tolerance.relative * float(np.max(np.abs(expected)))
-        # numpy's max hands a NaN on, and NaN is not within any tolerance
-        yield Deviation(case.unit, case.name, name, float(np.max(np.abs(result[name] - expected))), allowed)
-
-
-def check(archives: Path = ARCHIVES, root: Path = HERE) -> Iterator[Deviation]:
-    """All units over all cases; raises Unusable."""
-    for unit in UNITS:
-        for name in case_names(unit, root):
-            case = read_case(unit, name, root)
-            yield from compare(case, simulate(archives / f"{unit}.fmu", case))
+def check(archives: Path = ARCHIVES, root: Path = HERE) -> Iterator[Comparison]:
+    """All units over all their cases, then the scenarios, as far as `root` has references of them."""
+    for unit, name, held in all_cases(root):
+        yield check_case(archives / f"{unit}.fmu", read_case(unit, name, root, held=held), root)
+    for wanted in system.SYSTEMS:
+        if system.path_of(wanted, root).is_file():
+            yield check_system(archives, wanted, root)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    parser = argparse.ArgumentParser(description="Compare the units' outputs with the pinned reference results.")
+    parser = argparse.ArgumentParser(description="Compare the units and scenarios with the pinned reference results.")
     parser.add_argument("--fmus", type=Path, default=ARCHIVES, metavar="DIR", help="where the archives are")
     parser.add_argument("--cases", type=Path, default=HERE, metavar="DIR", help="where the reference results are")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML too")
+    parser.add_argument("--report", type=Path, metavar="FILE", help="write them as HTML, with what is outside drawn")
+    parser.add_argument("--verbose", action="store_true", help="every variable, not the worst alone")
     options = parser.parse_args(arguments)
-    print(f"{'unit':11s}{'case':20s}{'variable':10s}{'deviation':>12s}{'tolerance':>12s}")
-    different = 0
+    found: list[Comparison] = []
+    for comparison in check(options.fmus, options.cases):
+        found.append(comparison)
+        print(f"{comparison.result:32s}{comparison.line}", file=sys.stderr if comparison.exit_code == 2 else sys.stdout)
+        for variable in comparison.variables if options.verbose or comparison.exit_code == 1 else ():
+            print(f"    {variable.name:12s}{variable.verdict:12s}{variable.line}")
+    if not found:
+        print(f"check_reference: no reference results in {options.cases}", file=sys.stderr)
+        return 2
     try:
-        for row in check(options.fmus, options.cases):
-            verdict = "" if row.same else "  differs"
-            different += not row.same
-            print(f"{row.unit:11s}{row.case:20s}{row.variable:10s}{row.deviation:12.2e}{row.tolerance:12.2e}{verdict}")
-    except Unusable as error:
+        write_comparison(found, html=options.report, xml=options.junit)
+    except FeedsimError as error:
         print(f"check_reference: {error}", file=sys.stderr)
         return 2
-    print("all the same" if different == 0 else f"{different} variables differ")
-    return 0 if different == 0 else 1
+    code = max(comparison.exit_code for comparison in found)
+    different = sum(not comparison.same for comparison in found)
+    print(f"{len(found)} comparisons: " + ("all the same" if code == 0 else f"{different} not the same"))
+    return code
 
 
 if __name__ == "__main__":

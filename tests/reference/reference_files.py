@@ -1,21 +1,24 @@
 """Files of a reference case, after the FMI cross-check rules 4.1: <case>_in.csv, <case>_ref.csv and <case>_ref.opt.
 
 CSV: first column "time" [s], double-quoted header of exact variable names, no row of units. Inputs run linearly between
-the rows. An addition to the rules: <case>_par.csv with the columns "name","value" sets parameters.
+the rows. Additions to the rules: <case>_par.csv with the columns "name","value" sets parameters; held/<case>_ref.csv is
+what comes out where the importer holds every input over a step of StepSize; <case>_modes.csv is a table of modes that
+the plant takes instead of its archive's (parameter modes_file).
 """
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 HERE = Path(__file__).parent
-UNITS = ("friction", "plant", "controller")
+UNITS = ("friction", "plant", "controller", "setpoint")
+HELD = "held"
 
 Table = dict[str, NDArray[np.float64]]
 
@@ -32,16 +35,25 @@ class Case:
     inputs: Table
     parameters: Mapping[str, float] = field(default_factory=dict)
     reference: Table = field(default_factory=dict)
+    start: float = 0.0
+    held: bool = False  # inputs held over each step, instead of linear between their rows
+    modes: Path | None = None  # table of modes that replaces the archive's own
+
+    @property
+    def moving(self) -> bool:
+        """An input changes, so that holding it over a step makes a difference to a continuous unit."""
+        return any(np.ptp(values) > 0 for name, values in self.inputs.items() if name != "time")
 
 
-def _write_table(path: Path, table: Table) -> None:
-    # 15 digits: 1e-15 m on a position of 1 m, below what two ways of computing it agree to
+def write_table(path: Path, table: Table, digits: int = 15) -> None:
+    """Write a CSV. 15 digits: 1e-15 m on a position of 1 m, below what two ways of computing it agree to."""
     header = ",".join(f'"{name}"' for name in table)
-    rows = (",".join(format(value + 0.0, ".15g") for value in row) for row in zip(*table.values(), strict=True))
+    rows = (",".join(format(value + 0.0, f".{digits}g") for value in row) for row in zip(*table.values(), strict=True))
     path.write_text("\n".join([header, *rows]) + "\n", encoding="ascii", newline="\n")
 
 
-def _read_table(path: Path) -> Table:
+def read_table(path: Path) -> Table:
+    """Read a CSV by its columns."""
     with path.open(encoding="ascii", newline="") as stream:
         rows = list(csv.reader(stream))
     values = np.array(rows[1:], dtype=float)
@@ -51,28 +63,31 @@ def _read_table(path: Path) -> Table:
 def write_inputs(case: Case, root: Path = HERE) -> Case:
     """Write the inputs; return the case with the inputs as they stand in the file, rounded to its digits."""
     directory = root / case.unit
-    directory.mkdir(exist_ok=True)
+    directory.mkdir(parents=True, exist_ok=True)
     path = directory / f"{case.name}_in.csv"
-    _write_table(path, case.inputs)
+    if case.inputs:
+        write_table(path, case.inputs)
     parameters = directory / f"{case.name}_par.csv"
     if case.parameters:
         lines = [f'"{name}",{value!r}' for name, value in case.parameters.items()]
         parameters.write_text("\n".join(['"name","value"', *lines]) + "\n", encoding="ascii", newline="\n")
     else:
         parameters.unlink(missing_ok=True)
-    options = {"StartTime": 0.0, "StopTime": case.stop, "StepSize": case.step, "RelTol": case.rel_tol}
+    options = {"StartTime": case.start, "StopTime": case.stop, "StepSize": case.step, "RelTol": case.rel_tol}
     text = "".join(f"{key},{value!r}\n" for key, value in options.items())
     (directory / f"{case.name}_ref.opt").write_text(text, encoding="ascii", newline="\n")
-    return Case(case.unit, case.name, case.stop, case.step, case.rel_tol, _read_table(path), case.parameters)
+    return replace(case, inputs=read_table(path) if case.inputs else {})
 
 
 def write_reference(case: Case, reference: Table, root: Path = HERE) -> None:
-    """Write the reference results of a case."""
-    _write_table(root / case.unit / f"{case.name}_ref.csv", reference)
+    """Write the reference results of a case, below held/ where its inputs are held."""
+    directory = root / case.unit / (HELD if case.held else "")
+    directory.mkdir(parents=True, exist_ok=True)
+    write_table(directory / f"{case.name}_ref.csv", reference)
 
 
-def read_case(unit: str, name: str, root: Path = HERE) -> Case:
-    """Read a whole case back."""
+def read_case(unit: str, name: str, root: Path = HERE, *, held: bool = False) -> Case:
+    """Read a whole case back, with the results for linear or for held inputs."""
     directory = root / unit
     lines = (directory / f"{name}_ref.opt").read_text(encoding="ascii").split()
     options = {key: float(value) for key, value in (line.split(",") for line in lines)}
@@ -81,18 +96,30 @@ def read_case(unit: str, name: str, root: Path = HERE) -> Case:
     if path.exists():
         with path.open(encoding="ascii", newline="") as stream:
             parameters = {row["name"]: float(row["value"]) for row in csv.DictReader(stream)}
+    inputs, modes = directory / f"{name}_in.csv", directory / f"{name}_modes.csv"
     return Case(
-        unit,
-        name,
-        options["StopTime"],
-        options["StepSize"],
-        options["RelTol"],
-        _read_table(directory / f"{name}_in.csv"),
-        parameters,
-        _read_table(directory / f"{name}_ref.csv"),
+        unit=unit,
+        name=name,
+        start=options["StartTime"],
+        stop=options["StopTime"],
+        step=options["StepSize"],
+        rel_tol=options["RelTol"],
+        inputs=read_table(inputs) if inputs.exists() else {},
+        parameters=parameters,
+        reference=read_table(directory / (HELD if held else "") / f"{name}_ref.csv"),
+        held=held,
+        modes=modes if modes.exists() else None,
     )
 
 
-def case_names(unit: str, root: Path = HERE) -> list[str]:
-    """Names of the pinned cases of a unit."""
-    return sorted(path.name.removesuffix("_ref.csv") for path in (root / unit).glob("*_ref.csv"))
+def case_names(unit: str, root: Path = HERE, *, held: bool = False) -> list[str]:
+    """Names of the pinned cases of a unit; with `held`, of those that have results for held inputs."""
+    directory = root / unit / (HELD if held else "")
+    return sorted(path.name.removesuffix("_ref.csv") for path in directory.glob("*_ref.csv"))
+
+
+def all_cases(root: Path = HERE) -> list[tuple[str, str, bool]]:
+    """Unit, name and `held` of every pinned reference of a unit."""
+    return [
+        (unit, name, held) for unit in UNITS for held in (False, True) for name in case_names(unit, root, held=held)
+    ]

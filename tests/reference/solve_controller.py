@@ -32,6 +32,8 @@ DEFAULTS: dict[str, float] = {
     "reference_model": 1,
     "omega_0": 915.3,
     "D": 1.214,
+    "T_ref": 0,
+    "speed_window": 0,
     "M_max": 80,
     "filter_1.type": 1,
     "filter_1.f": 602,
@@ -81,6 +83,8 @@ class Cascade:
         self.filters = [self._setpoint_filter(f"filter_{i}") for i in range(1, 5) if p.get(f"filter_{i}.type", 0)]
         lag = cont2discrete(([1.0], [max(p["T_sym"], 1e-12), 1.0]), p["T_pos"], method="foh")
         self.lag_b, self.lag_a = np.ravel(lag[0]), np.ravel(lag[1])
+        self.dead = [0.0] * (math.ceil(p["T_ref"] / p["T_c"]) + 2)  # n_s of the last cycles, oldest first
+        self.measured: list[float] = []  # x_a of the last `speed_window` cycles, oldest first
         self.x_history = [x_s_start] * 64
         self.n_history = [0.0] * 64
         self.lag_input = self.lag_output = x_s_start
@@ -120,12 +124,26 @@ class Cascade:
         feedforward = p["k_ffw"] * p["I_P"] * self._delayed(self.n_history, p["T_dyn"])
         self.n_old, self.n_new = self.n_new, (p["K_v"] * (delayed - x_a) + feedforward) / p["I_P"]
 
+    def _late(self, n_s: float) -> float:
+        """n_s behind the reference model's dead time: linear between the cycles."""
+        self.dead = [*self.dead[1:], n_s]
+        age = np.arange(len(self.dead))[::-1] * self.p["T_c"]
+        return float(np.interp(self.p["T_ref"], age[::-1], self.dead[::-1]))
+
+    def _measured_speed(self, x_a: float, n_a: float) -> float:
+        """The motor's speed, or the mean speed of the scale over `speed_window` cycles."""
+        window = round(self.p["speed_window"])
+        if window == 0:
+            return n_a
+        self.measured = [*(self.measured or [x_a] * window), x_a][-window - 1 :]
+        return (x_a - self.measured[0]) / (window * self.p["T_c"] * self.p["I_P"])
+
     def _speed(self, n_a: float, n_add: float, M_add: float) -> float:
         p = self.p
         j = self.k % self.ratio
         n_s = self.n_old + (self.n_new - self.n_old) * (j + 1) / self.ratio if p["ramp_speed_setpoint"] else self.n_new
         n_s += n_add
-        n_ref = self.reference(n_s) if p["reference_model"] else n_s
+        n_ref = self.reference(self._late(n_s)) if p["reference_model"] else n_s
         share = p["T_c"] / p["T_n"] if p["speed_integrator"] else 0.0
         self.integral += p["K_p"] * share * (n_ref - n_a)
         wanted = p["K_p"] * (n_s - n_a) + self.integral + M_add
@@ -140,7 +158,10 @@ class Cascade:
         error = np.array([0.0, M / p["K_t"]]) - self.i
         self.current_integral = self.current_integral + p["current.K_p"] * p["T_c"] / p["current.T_n"] * error
         decoupling = np.array([-w * p["L_q"] * self.i[1], w * p["L_d"] * self.i[0] + w * self.psi])
-        return np.asarray(p["current.K_p"] * error + self.current_integral + decoupling)
+        wanted = np.asarray(p["current.K_p"] * error + self.current_integral + decoupling)
+        realised = wanted * min(1.0, p["u_max"] / max(float(np.linalg.norm(wanted)), 1e-300))
+        self.current_integral = self.current_integral + p["T_c"] / p["current.T_n"] * (realised - wanted)
+        return np.asarray(realised)
 
     def _motor(self, n_a: float) -> None:
         p = self.p
@@ -155,7 +176,7 @@ class Cascade:
         p = self.p
         if self.k % self.ratio == 0:
             self._position(x_s, n_ffw, x_a)
-        M = self._speed(n_a, n_add, M_add)
+        M = self._speed(self._measured_speed(x_a, n_a), n_add, M_add)
         for setpoint_filter in self.filters:
             M = setpoint_filter(M)
         self.k += 1
@@ -180,7 +201,10 @@ def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
     cycles = math.ceil(case.stop / T_c - 1e-9)
     t = np.arange(cycles + 1) * T_c
     names = ("x_s", "n_ffw", "x_a", "n_a", "n_add", "M_add")
-    given = {n: np.interp(t, case.inputs["time"], case.inputs[n]) for n in names if n in case.inputs}
+    # a sample within a step finds what was set at the step's start, where inputs are held
+    seen_at = np.floor(t / case.step + 1e-9) * case.step if case.held else t
+    given = {n: np.interp(seen_at, case.inputs["time"], case.inputs[n]) for n in names if n in case.inputs}
+    given.setdefault("n_ffw", np.zeros_like(t))
     cascade = Cascade(case.parameters, float(given["x_s"][0]))
     torque, seen = [0.0], [dict.fromkeys((*OBSERVABLES, "i_d", "i_q"), 0.0)]
     for k in range(cycles):

@@ -43,22 +43,41 @@ def engagement(p: Mapping[str, float], z: float, c: float) -> tuple[float, float
 
 
 def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
-    """The named outputs every `every` seconds; every sampling instant must be a knot of the input."""
+    """The named outputs every `every` seconds; every sampling instant must be a knot of the input.
+
+    Where the case's inputs are held, they must have a row at every step: the speed of a row holds until the next one,
+    for which Eq. 6 has a closed form, and the outputs at a row still belong to the speed ahead of it.
+    """
     p = DEFAULTS | dict(case.parameters)
     time, speed = case.inputs["time"], case.inputs["n_fr"]
     z = c = 0.0
     rows: list[tuple[float, ...]] = []
     for i, (t, n) in enumerate(zip(time, speed, strict=True)):
         if abs(t / every - round(t / every)) < 1e-6:
-            g = steady_deflection(p, n, math.copysign(1, n))
-            rate = n - abs(n) / g * z
-            engaged, k = engagement(p, z, c)
-            torque = k * p["sigma_0"] * z + p["sigma_1"] * rate + p["sigma_2"] * n
-            rows.append((t, torque, z, c, k, engaged))
-        if i + 1 < len(time):
+            rows.append((t, *_shown(p, speed[max(i - 1, 0)] if case.held else n, z, c)))
+        if i + 1 < len(time) and case.held:
+            z, c = _held(p, z, c, n, time[i + 1] - t)
+        elif i + 1 < len(time):
             z, c = _interval(p, z, c, n, speed[i + 1], time[i + 1] - t)
     table = dict(zip(("time", "M_fr", "z", "c", "k", "lambda"), np.array(rows).T, strict=True))
     return {name: table[name] for name in ("time", *outputs)}
+
+
+def _shown(p: Mapping[str, float], n: float, z: float, c: float) -> tuple[float, ...]:
+    """M_fr [N.m], z, c, k and lambda at the speed n [rad/s]."""
+    rate = n - abs(n) / steady_deflection(p, n, math.copysign(1, n)) * z
+    engaged, k = engagement(p, z, c)
+    return k * p["sigma_0"] * z + p["sigma_1"] * rate + p["sigma_2"] * n, z, c, k, engaged
+
+
+def _held(p: Mapping[str, float], z: float, c: float, n: float, h: float) -> tuple[float, float]:
+    """z and c after h seconds at the constant speed n: Eq. 6 is linear then."""
+    half = p["W"] / 2
+    c = min(max(c + n * h, -half), half)
+    if n == 0:
+        return z, c
+    g, side = steady_deflection(p, n, math.copysign(1, n)), math.copysign(1, n)
+    return side * g + (z - side * g) * math.exp(-abs(n) * h / g), c
 
 
 def _interval(p: Mapping[str, float], z: float, c: float, n0: float, n1: float, h: float) -> tuple[float, float]:

@@ -21,8 +21,11 @@ def _transition(A: NDArray[np.float64], B: NDArray[np.float64], h: float) -> tup
 
 
 def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
-    """The named outputs every `every` seconds; the knots of the inputs must be evenly spaced."""
-    default = machine()
+    """The named outputs every `every` seconds; the knots of the inputs must be evenly spaced.
+
+    Where the case's inputs are held, the value of a row holds until the next one.
+    """
+    default = machine(case.modes) if case.modes else machine()
     omega = 2 * np.pi * default.frequency
     modes = len(omega)
     # omega q instead of q for the elastic modes: entries of like size, and the exponential keeps its digits
@@ -45,7 +48,8 @@ def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
     step, by_value, by_slope = _transition(A, B, h)
     states = np.zeros((len(time), 2 * modes))
     for i in range(len(time) - 1):
-        states[i + 1] = step @ states[i] + by_value @ u[i] + by_slope @ ((u[i + 1] - u[i]) / h)
+        slope = np.zeros_like(u[i]) if case.held else (u[i + 1] - u[i]) / h
+        states[i + 1] = step @ states[i] + by_value @ u[i] + by_slope @ slope
 
     q, v = states[:, :modes] / scale, states[:, modes:]
     available: Table = {}

@@ -5,117 +5,15 @@
  *
  * Knows no variable: it sets and reads whatever value references answer. Exits with 1 where a call fails that must not,
  * or where a replay from a saved state is not identical to the last bit. */
-#include <dlfcn.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "fmi2FunctionTypes.h"
+#include "loaded.h"
 
-enum { INSTANCES = 3, ROUNDS = 2, MOST = 4096 };
-
-/* The functions of the library, by their types in the standard's header. */
-#define FUNCTIONS(F)                                                                                                   \
-    F(GetVersion);                                                                                                     \
-    F(GetTypesPlatform);                                                                                               \
-    F(SetDebugLogging);                                                                                                \
-    F(Instantiate);                                                                                                    \
-    F(FreeInstance);                                                                                                   \
-    F(SetupExperiment);                                                                                                \
-    F(EnterInitializationMode);                                                                                        \
-    F(ExitInitializationMode);                                                                                         \
-    F(Terminate);                                                                                                      \
-    F(Reset);                                                                                                          \
-    F(GetReal);                                                                                                        \
-    F(GetInteger);                                                                                                     \
-    F(GetBoolean);                                                                                                     \
-    F(GetString);                                                                                                      \
-    F(SetReal);                                                                                                        \
-    F(SetInteger);                                                                                                     \
-    F(SetBoolean);                                                                                                     \
-    F(SetString);                                                                                                      \
-    F(GetFMUstate);                                                                                                    \
-    F(SetFMUstate);                                                                                                    \
-    F(FreeFMUstate);                                                                                                   \
-    F(SerializedFMUstateSize);                                                                                         \
-    F(SerializeFMUstate);                                                                                              \
-    F(DeSerializeFMUstate);                                                                                            \
-    F(GetDirectionalDerivative);                                                                                       \
-    F(SetRealInputDerivatives);                                                                                        \
-    F(GetRealOutputDerivatives);                                                                                       \
-    F(DoStep);                                                                                                         \
-    F(CancelStep);                                                                                                     \
-    F(GetStatus);                                                                                                      \
-    F(GetRealStatus);                                                                                                  \
-    F(GetIntegerStatus);                                                                                               \
-    F(GetBooleanStatus);                                                                                               \
-    F(GetStringStatus);
-#define MEMBER(name) fmi2##name##TYPE *name
-static struct {
-    FUNCTIONS(MEMBER)
-} fmu;
-
-static int faults;
-
-static void must(bool good, const char *what) {
-    if (!good) {
-        printf("failed: %s\n", what);
-        faults++;
-    }
-}
-#define MUST(call) must((call) == fmi2OK, #call)
-
-static void tell(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
-                 fmi2String message, ...) {
-    (void)environment;
-    printf("%s [%s, %d] %s\n", instance, category, (int)status, message);
-}
-
-static void *symbol(void *library, const char *name) {
-    void *found = dlsym(library, name);
-    if (found == NULL) {
-        printf("%s is missing\n", name);
-        faults++;
-    }
-    return found;
-}
-
-/* A function pointer out of an object pointer: POSIX allows it, ISO C has no cast for it. */
-#define FIND(name)                                                                                                     \
-    do {                                                                                                               \
-        void *found = symbol(library, "fmi2" #name);                                                                   \
-        memcpy(&fmu.name, &found, sizeof found);                                                                       \
-    } while (0)
-
-/* --- what the unit has: found by asking */
-
-typedef struct Interface {
-    fmi2ValueReference reals[MOST], inputs[MOST], outputs[MOST];
-    size_t real_count, input_count, output_count;
-} Interface;
-
-/* An instance between two steps tells them apart: Real variables can be read, Real inputs take a slope, Real outputs
- * give one. */
-static void explore(fmi2Component c, Interface *found) {
-    const int order = 1;
-    double value;
-    memset(found, 0, sizeof *found);
-    MUST(fmu.SetDebugLogging(c, fmi2True, 1,
-                             (const fmi2String[]){"logEvents"})); /* no errors: they are the answer here */
-    for (fmi2ValueReference vr = 0; vr < MOST; vr++) {
-        if (fmu.GetReal(c, &vr, 1, &value) != fmi2OK)
-            continue;
-        found->reals[found->real_count++] = vr;
-        if (fmu.GetRealOutputDerivatives(c, &vr, 1, &order, &value) == fmi2OK)
-            found->outputs[found->output_count++] = vr;
-        value = 0;
-        if (fmu.SetRealInputDerivatives(c, &vr, 1, &order, &value) == fmi2OK)
-            found->inputs[found->input_count++] = vr;
-    }
-    MUST(fmu.SetDebugLogging(c, fmi2False, 0, NULL));
-}
+enum { INSTANCES = 3, ROUNDS = 2 };
 
 /* --- a life */
 
@@ -187,14 +85,8 @@ int main(int count, char *arguments[]) {
     }
     int steps = count > 4 ? atoi(arguments[4]) : 2000;
     double h = count > 5 ? atof(arguments[5]) : 125e-6;
-    void *library = dlopen(arguments[1], RTLD_NOW | RTLD_LOCAL);
-    if (library == NULL) {
-        printf("%s\n", dlerror());
+    if (!load(arguments[1]))
         return 2;
-    }
-    FUNCTIONS(FIND)
-    if (faults > 0)
-        return 1;
 
     static Interface unit;
     fmi2CallbackFunctions callbacks = {tell, calloc, free, NULL, NULL};
@@ -231,6 +123,5 @@ int main(int count, char *arguments[]) {
     }
     printf("%s: %zu Real variables, %zu inputs, %zu outputs; %d steps, %d faults\n", arguments[1], unit.real_count,
            unit.input_count, unit.output_count, steps, faults);
-    dlclose(library);
     return faults > 0;
 }

@@ -1,11 +1,11 @@
-/* The three units linked into one program, as targets without dynamic loading do it: every function of the FMI carries
- * its unit's prefix, and nothing else may clash. Arguments: GUIDs of friction, controller and plant, resources of the
- * plant. */
+/* The units linked into one program, as targets without dynamic loading do it: every function of the FMI carries
+ * its unit's prefix, and nothing else may clash. Arguments: GUID and resources of each unit, in the order
+ * of UNITS. */
 #include <stdio.h>
 
 #include "fmi2FunctionTypes.h"
 
-#define UNITS(U) U(friction) U(controller) U(plant)
+#define UNITS(U) U(friction) U(controller) U(plant) U(setpoint)
 
 #define DECLARE(unit)                                                                                                  \
     extern fmi2InstantiateTYPE unit##_fmi2Instantiate;                                                                 \
@@ -34,16 +34,19 @@ static const struct {
     fmi2FreeInstanceTYPE *release;
 } units[] = {UNITS(ROW)};
 
+enum { COUNT = sizeof units / sizeof *units };
+
 int main(int count, char *arguments[]) {
-    if (count != 5)
+    if (count != 1 + 2 * COUNT)
         return 2;
     int good = 0;
-    for (int i = 0; i < 3; i++) {
-        fmi2Component c = units[i].instantiate(units[i].name, fmi2CoSimulation, arguments[i + 1], arguments[4], NULL,
-                                               fmi2False, fmi2False);
+    for (int i = 0; i < COUNT; i++) {
+        const char *guid = arguments[1 + 2 * i], *resources = arguments[2 + 2 * i];
+        fmi2Component c =
+            units[i].instantiate(units[i].name, fmi2CoSimulation, guid, resources, NULL, fmi2False, fmi2False);
         /* each binary knows its own GUID, so a mix-up does not get past this */
-        fmi2Component wrong = units[(i + 1) % 3].instantiate("wrong", fmi2CoSimulation, arguments[i + 1], arguments[4],
-                                                             NULL, fmi2False, fmi2False);
+        fmi2Component wrong =
+            units[(i + 1) % COUNT].instantiate("wrong", fmi2CoSimulation, guid, resources, NULL, fmi2False, fmi2False);
         if (c == NULL || wrong != NULL)
             continue;
         if (units[i].set_up(c, fmi2False, 0, 0, fmi2False, 0) == fmi2OK && units[i].enter(c) == fmi2OK &&
@@ -51,6 +54,6 @@ int main(int count, char *arguments[]) {
             good++;
         units[i].release(c);
     }
-    printf("three units in one program: %d passed, %d failed\n", good, 3 - good);
-    return good != 3;
+    printf("%d units in one program: %d passed, %d failed\n", COUNT, good, COUNT - good);
+    return good != COUNT;
 }

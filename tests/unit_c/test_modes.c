@@ -1,4 +1,5 @@
-/* Mode and axis tables (src/plant_fmu/modes.c, axes.c, csv.c): what is read, and what every fault is answered with. */
+/* Mode and axis tables (src/plant_fmu/modes.c, axes.c, src/fmi2/csv.c): what is read, and what every fault is answered
+ * with. */
 #include <locale.h>
 #include <stdlib.h>
 #include <string.h>

@@ -10,14 +10,6 @@
  * need be installed. (Where some are, they are tried as well: see installed_locales.) */
 static const char *locale_separator = ".";
 
-static struct lconv *stub_localeconv(void) {
-    static struct lconv conventions;
-    conventions = *localeconv();
-    if (strcmp(locale_separator, ".") != 0)
-        conventions.decimal_point = (char *)locale_separator;
-    return &conventions;
-}
-
 static double stub_strtod(const char *text, char **end) {
     char copy[1024];
     const char *found = strstr(text, locale_separator);
@@ -39,14 +31,11 @@ static int stub_snprintf(char *text, size_t size, const char *format, ...) {
     return snprintf(text, size, "%.*s%s%s", (int)(point - copy), copy, locale_separator, point + 1);
 }
 
-#undef localeconv /* a C library may have macros of these names */
-#undef strtod
+#undef strtod /* a C library may have macros of these names */
 #undef snprintf
-#define localeconv stub_localeconv
 #define strtod stub_strtod
 #define snprintf stub_snprintf
 #include "numbers.c"
-#undef localeconv
 #undef strtod
 #undef snprintf
 

@@ -247,6 +247,12 @@ static void arrays_that_are_missing(void) {
     CHECK(fmi2SerializedFMUstateSize(c, NULL, NULL) == fmi2Error);
     CHECK(fmi2SerializeFMUstate(c, donated, NULL, 0) == fmi2Error);
     CHECK(fmi2DeSerializeFMUstate(c, NULL, 0, NULL) == fmi2Error);
+    /* -1 for a size: nothing is read */
+    CHECK(fmi2GetReal(c, &vr, (size_t)-1, &value) == fmi2Error);
+    CHECK_CONTAINS(log.message, "fmi2GetReal: no array has 18446744073709551");
+    CHECK(fmi2SetReal(c, &vr, (size_t)-1, &value) == fmi2Error);
+    CHECK(fmi2SetDebugLogging(c, fmi2True, (size_t)-1, (const fmi2String[]){"logAll"}) == fmi2Error);
+    CHECK_CONTAINS(log.message, "fmi2SetDebugLogging: no array has ");
     CHECK(fmi2GetReal(c, NULL, 0, NULL) == fmi2OK);
     CHECK(fmi2SetReal(c, NULL, 0, NULL) == fmi2OK);
     CHECK(fmi2GetRealStatus(c, fmi2LastSuccessfulTime, NULL) == fmi2Discard);

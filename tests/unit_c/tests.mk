@@ -8,6 +8,7 @@
 # it. The directories of those sources are searched for headers. $(TOY) stands for the shell with the toy unit.
 
 BUILD  ?= build
+UNITS  ?= friction controller plant setpoint
 PY     ?= python3
 UNIT_C  := tests/unit_c
 C_BUILD := $(BUILD)/tests
@@ -31,8 +32,10 @@ SOURCES_test_free_axis := $(filter-out %/model.c,$(wildcard src/friction_fmu/*.c
 
 SOURCES_test_modal := src/plant_fmu/modal.c
 SOURCES_test_cells := $(addprefix src/plant_fmu/,cells.c modal.c)
-SOURCES_test_poses := $(addprefix src/plant_fmu/,csv.c modes.c poses.c) src/fmi2/numbers.c src/fmi2/text.c
-SOURCES_test_modes := $(addprefix src/plant_fmu/,axes.c csv.c modes.c) src/fmi2/numbers.c src/fmi2/text.c
+SOURCES_test_poses := $(addprefix src/plant_fmu/,modes.c poses.c) $(addprefix src/fmi2/,csv.c numbers.c text.c)
+SOURCES_test_modes := $(addprefix src/plant_fmu/,axes.c modes.c) $(addprefix src/fmi2/,csv.c numbers.c text.c)
+
+SOURCES_test_setpoints := src/setpoint_fmu/setpoints.c $(addprefix src/fmi2/,csv.c numbers.c text.c)
 
 SOURCES_test_controller_delay   := $(addprefix src/controller_fmu/,delay.c lag.c measured_speed.c)
 SOURCES_test_controller_drive   := $(filter-out %/model.c,$(wildcard src/controller_fmu/*.c))
@@ -86,14 +89,14 @@ test-c: $(C_TESTS:%=$(C_BUILD)/plain/%) ## the C tests
 
 # --- whole units ---------------------------------------------------------------------------------------------------
 
-PACKED := $(foreach unit,friction controller plant,$(C_BUILD)/packed/$(unit).unpacked)
+PACKED := $(foreach unit,$(UNITS),$(C_BUILD)/packed/$(unit).unpacked)
 
 $(C_BUILD)/packed/%.unpacked: fmus/%.fmu
 	@rm -rf $(@:.unpacked=) && mkdir -p $(@:.unpacked=)
 	@$(PY) -m zipfile -e $< $(@:.unpacked=)
 	@touch $@
 
-$(C_BUILD)/%/lifecycle: $(UNIT_C)/lifecycle.c src/fmi2/standard/fmi2FunctionTypes.h
+$(C_BUILD)/%/lifecycle: $(UNIT_C)/lifecycle.c $(UNIT_C)/loaded.h src/fmi2/standard/fmi2FunctionTypes.h
 	@mkdir -p $(@D)
 	$(CC) $(C_FLAGS) -D_POSIX_C_SOURCE=200809L $(FLAGS_$*) -Isrc/fmi2/standard $< -ldl -lm -o $@
 
@@ -103,7 +106,7 @@ $(C_BUILD)/sanitized/%.so: $(C_BUILD)/packed/%.unpacked
 	$(CC) -std=c99 -ffp-contract=off $(FLAGS_sanitized) -fPIC -shared -fvisibility=hidden -I$(<:.unpacked=)/sources \
 	    $(<:.unpacked=)/sources/*.c -lm -o $@
 
-# The same with prefixed functions, three units in one program.
+# The same with prefixed functions, all units in one program.
 $(C_BUILD)/sanitized/%.objects: $(C_BUILD)/packed/%.unpacked
 	@rm -rf $(@:.objects=) && mkdir -p $(@:.objects=)
 	@set -e; for source in $(<:.unpacked=)/sources/*.c; do \
@@ -111,20 +114,23 @@ $(C_BUILD)/sanitized/%.objects: $(C_BUILD)/packed/%.unpacked
 	        -I$(<:.unpacked=)/sources -c $$source -o $(@:.objects=)/$$(basename $$source .c).o; done
 	@touch $@
 
-$(C_BUILD)/sanitized/one_program: $(UNIT_C)/one_program.c $(foreach unit,friction controller plant,$(C_BUILD)/sanitized/$(unit).objects)
-	$(CC) $(C_FLAGS) $(FLAGS_sanitized) -Isrc/fmi2/standard $< $(foreach unit,friction controller plant,$(C_BUILD)/sanitized/$(unit)/*.o) -lm -o $@
+$(C_BUILD)/sanitized/one_program: $(UNIT_C)/one_program.c $(foreach unit,$(UNITS),$(C_BUILD)/sanitized/$(unit).objects)
+	$(CC) $(C_FLAGS) $(FLAGS_sanitized) -Isrc/fmi2/standard $< $(foreach unit,$(UNITS),$(C_BUILD)/sanitized/$(unit)/*.o) -lm -o $@
 
 GUID_OF = $$(sed -n 's/.*guid="\([^"]*\)".*/\1/p' $(C_BUILD)/packed/$(1)/modelDescription.xml | head -n 1)
 
-test-sanitize: $(C_TESTS:%=$(C_BUILD)/sanitized/%) $(foreach unit,friction controller plant,$(C_BUILD)/sanitized/$(unit).so) \
+test-sanitize: $(C_TESTS:%=$(C_BUILD)/sanitized/%) $(foreach unit,$(UNITS),$(C_BUILD)/sanitized/$(unit).so) \
     $(C_BUILD)/sanitized/lifecycle $(C_BUILD)/sanitized/one_program ## the C tests and the units under sanitisers
 	@$(if $(FLAGS_sanitized),,echo "the compiler has no sanitisers: running without";) $(RUN_C_TESTS)
-	@set -e; for unit in friction controller plant; do \
+	@set -e; for unit in $(UNITS); do \
 	    $(C_BUILD)/sanitized/lifecycle $(C_BUILD)/sanitized/$$unit.so "$(call GUID_OF,$$unit)" $(C_BUILD)/packed/$$unit/resources; done
-	@$(C_BUILD)/sanitized/one_program "$(call GUID_OF,friction)" "$(call GUID_OF,controller)" "$(call GUID_OF,plant)" $(C_BUILD)/packed/plant/resources
+	@$(C_BUILD)/sanitized/one_program $(foreach unit,friction controller plant setpoint,"$(call GUID_OF,$(unit))" $(C_BUILD)/packed/$(unit)/resources)
+
+# An archive may hold binaries of other platforms as well.
+HOST_FOLDER = $(shell cd src/fmi2 && $(abspath $(PY)) -c 'from packager import targets; print(targets.host_target().folder)')
 
 test-valgrind: $(C_BUILD)/plain/lifecycle $(PACKED) ## leak check of the units as packed
 	@if ! command -v valgrind >/dev/null 2>&1; then echo "valgrind is not installed: leak check left out"; exit 0; fi; \
-	set -e; for unit in friction controller plant; do \
-	    valgrind --quiet --leak-check=full --error-exitcode=1 $< $(C_BUILD)/packed/$$unit/binaries/*/$$unit.so \
+	set -e; for unit in $(UNITS); do \
+	    valgrind --quiet --leak-check=full --error-exitcode=1 $< $(C_BUILD)/packed/$$unit/binaries/$(HOST_FOLDER)/$$unit.so \
 	        "$(call GUID_OF,$$unit)" $(C_BUILD)/packed/$$unit/resources; done

@@ -1,7 +1,8 @@
 """Command line: ``feedsim COMMAND``. Commands, messages, progress, exit codes; all else is in the rooms below.
 
 Exit codes: 0 done; 1 an error of feedsim itself (please report it); 2 bad input or usage; 3 a unit failed during the
-simulation; 4 the results could not be written; 130 interrupted (143 and 129: by SIGTERM and SIGHUP).
+simulation; 4 the results could not be written; 130 interrupted (143 and 129: by SIGTERM and SIGHUP). `feedsim compare`
+has codes of its own: 0 same, 1 different, 2 unusable for whatever reason.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from feedsim.cli import compensate, frf, identify, machine
+from feedsim.cli import compare, compensate, frf, identify, machine, ssp
 from feedsim.cli.options import add_fmus, add_overrides
 
 EPILOG = """exit codes:
   0 done    1 internal error    2 bad input or usage    3 a unit failed    4 results cannot be written
   130 interrupted (143, 129: by SIGTERM, SIGHUP)
+  feedsim compare: 0 same    1 different    2 unusable
 
 examples:
   feedsim run scenarios/z_positioning.yaml --out results/z
@@ -30,6 +32,9 @@ examples:
   feedsim frf scenarios/machines/test_centre --axes X,Z
   feedsim identify results/identify_z_constant/log.csv --axis Z --machine scenarios/machines/test_centre
   feedsim compensate scenarios/xz_circle.yaml
+  feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
+  feedsim run xz_circle.ssp
+  feedsim compare result.csv reference.csv --tol 1e-6 --report compare.html
 """
 
 
@@ -44,7 +49,9 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"feedsim {_version()}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
 
-    run = commands.add_parser("run", help="run a scenario; write result.csv, summary.json, report.html and figures")
+    run = commands.add_parser(
+        "run", help="run a scenario or an SSP; write result.csv, summary.json, report.html and figures"
+    )
     _add_scenario(run)
     run.add_argument(
         "--out",
@@ -54,18 +61,24 @@ def parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
 
-    validate = commands.add_parser("validate", help="check a scenario, its machine and its motion without running it")
+    validate = commands.add_parser(
+        "validate", help="check a scenario or an SSP, its machine and its motion without running it"
+    )
     _add_scenario(validate)
 
     machine.add_commands(commands)
     frf.add_command(commands)
     identify.add_command(commands)
     compensate.add_command(commands)
+    ssp.add_command(commands)
+    compare.add_command(commands)
 
     schema = commands.add_parser(
-        "schema", help="print the JSON Schema of scenario, machine, structure or mapping files, for editors"
+        "schema", help="print the JSON Schema of scenario, machine, structure, mapping or tolerance files, for editors"
     )
-    schema.add_argument("kind", nargs="?", choices=("scenario", "machine", "structure", "columns"), default="scenario")
+    schema.add_argument(
+        "kind", nargs="?", choices=("scenario", "machine", "structure", "columns", "tolerances"), default="scenario"
+    )
 
     convert = commands.add_parser(
         "convert",
@@ -95,7 +108,9 @@ def _version() -> str:
 
 def _add_scenario(command: argparse.ArgumentParser) -> None:
     add_fmus(command)
-    command.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="scenario file (docs/scenarios.md)")
+    command.add_argument(
+        "scenario", type=Path, metavar="SCENARIO", help="scenario file (docs/scenarios.md), or SSP (docs/ssp.md)"
+    )
     add_overrides(command, "machine.axes.Z.friction.F_C='1.8 N.m'")
 
 
@@ -109,8 +124,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _end_cleanly_on_signals()
     try:
         action = getattr(options, "action", None) or getattr(commands, options.command)
-        action(options)
-        sys.stdout.flush()
+        code = action(options)
+        if sys.stdout is not None:  # closed by a reader that has gone
+            sys.stdout.flush()
     except FeedsimError as error:
         print(f"feedsim: {error}", file=sys.stderr)
         return error.exit_code
@@ -124,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"feedsim: {error.filename or 'standard output'}: {error.strerror}", file=sys.stderr)
         sys.stdout = None
         return 4
-    return 0
+    return code if isinstance(code, int) else 0
 
 
 def _end_cleanly_on_signals() -> None:

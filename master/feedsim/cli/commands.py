@@ -6,6 +6,7 @@ import json
 import sys
 from argparse import Namespace
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from feedsim.errors import InputError
@@ -14,24 +15,29 @@ from feedsim.errors import InputError
 def run(options: Namespace) -> None:
     from tqdm import tqdm
 
-    from feedsim import analysis, cosim, nc, report, scenario
+    from feedsim import analysis, cosim, report
+    from feedsim.cli.ssp import subject
 
-    plan = scenario.load(options.scenario, options.overrides)
     directory: Path = options.out or Path("results") / options.scenario.stem
-    program = nc.plan(plan)
-    analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
-    report.check_writable(directory, report.input_paths(plan))
-    with tqdm(
-        desc=plan.name, unit=" cycles", unit_scale=True, leave=False, disable=options.quiet or not sys.stderr.isatty()
-    ) as bar:
+    with subject(options) as (plan, program, fmus, told):
+        analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
+        report.check_writable(directory, report.input_paths(plan))
+        with tqdm(
+            desc=plan.name,
+            unit=" cycles",
+            unit_scale=True,
+            leave=False,
+            disable=options.quiet or not sys.stderr.isatty(),
+        ) as bar:
 
-        def progress(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done - bar.n)
+            def progress(done: int, total: int) -> None:
+                bar.total = total
+                bar.update(done - bar.n)
 
-        result = cosim.run(plan, program=program, fmus=options.fmus, progress=progress)
-    figures = analysis.evaluate(result)
-    report.write(result, figures, directory)
+            result = cosim.run(plan, program=program, fmus=fmus, progress=progress)
+        result = replace(result, warnings=told(result.warnings))
+        figures = analysis.evaluate(result)
+        report.write(result, figures, directory)
     _warn(result.warnings)
     if not options.quiet:
         print(f"{plan.name}: {report.summary_line(result, figures)} -> {directory}")
@@ -43,12 +49,12 @@ def _warn(warnings: Iterable[str]) -> None:
 
 
 def validate(options: Namespace) -> None:
-    from feedsim import analysis, cosim, nc, scenario
+    from feedsim import analysis, cosim
+    from feedsim.cli.ssp import subject
 
-    checked = scenario.load(options.scenario, options.overrides)
-    program = nc.plan(checked)
-    analysis.check(checked, program)
-    _warn(cosim.check(checked, program, fmus=options.fmus))
+    with subject(options) as (checked, program, fmus, told):
+        analysis.check(checked, program)
+        _warn(told(cosim.check(checked, program, fmus=fmus)))
     motions = f"{len(checked.motions)} motion{'s'[: len(checked.motions) != 1]}"
     print(f"{options.scenario}: valid; {motions}, {program.time[-1]:.4g} s on {checked.machine.name}")
 

@@ -1,5 +1,6 @@
 """Results as a person wants them: curves as CSV, summary.json, report.html and figures/*.png."""
 
+from feedsim.report.compare.write import check_comparison_writable, write_comparison
 from feedsim.report.compensate.summary import summary_line as compensation_summary_line
 from feedsim.report.compensate.write import check_compensation_writable, write_compensation
 from feedsim.report.frf.summary import summary_line as frf_summary_line
@@ -20,6 +21,7 @@ from feedsim.report.write import check_writable, write
 __all__ = [
     "Account",
     "Run",
+    "check_comparison_writable",
     "check_compensation_writable",
     "check_frf_writable",
     "check_identification_writable",
@@ -36,6 +38,7 @@ __all__ = [
     "rigid_line",
     "summary_line",
     "write",
+    "write_comparison",
     "write_compensation",
     "write_frf",
     "write_identification",

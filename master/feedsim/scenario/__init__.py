@@ -12,6 +12,7 @@ from feedsim.scenario.motion import Arc, Circle, Column, Dwell, MeasuredSetpoint
 from feedsim.scenario.schema import json_schema
 from feedsim.scenario.structure import Damping, DampingStep, Structure
 from feedsim.scenario.subject import Subject, load_subject
+from feedsim.scenario.tolerances import ToleranceFile, load_tolerances
 
 __all__ = [
     "Arc",
@@ -50,6 +51,7 @@ __all__ = [
     "SpeedRange",
     "Structure",
     "Subject",
+    "ToleranceFile",
     "json_schema",
     "load",
     "load_columns",
@@ -57,5 +59,6 @@ __all__ = [
     "load_machine",
     "load_structure",
     "load_subject",
+    "load_tolerances",
     "moved_axes",
 ]

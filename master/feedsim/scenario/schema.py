@@ -1,4 +1,4 @@
-"""JSON Schema of scenario, machine, structure and mapping files, for editors."""
+"""JSON Schema of scenario, machine, structure, mapping and tolerance files, for editors."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ if TYPE_CHECKING:
 
     from feedsim.scenario.fields import Quantity
 
+Kind = Literal["scenario", "machine", "structure", "columns", "tolerances"]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def json_schema(kind: Literal["scenario", "machine", "structure", "columns"] = "scenario") -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of a scenario, machine or structure file, or of a mapping of a trace's columns.
+def json_schema(kind: Kind = "scenario") -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a scenario, machine or structure file, of a mapping of a trace's columns, or of
+    tolerances.
 
     It knows keys, words and the spelling of quantities; it cannot know limits of quantities nor what needs two places
     to be seen together. What it refuses, load() refuses too.
@@ -25,11 +27,14 @@ def json_schema(kind: Literal["scenario", "machine", "structure", "columns"] = "
     from feedsim.scenario.columns import Columns
     from feedsim.scenario.machine import Machine
     from feedsim.scenario.model import Scenario
+    from feedsim.scenario.tolerances import ToleranceFile
 
     if kind == "structure":
         schema = _structure_schema()
     else:
-        models: dict[str, type[BaseModel]] = {"scenario": Scenario, "machine": Machine, "columns": Columns}
+        models: dict[str, type[BaseModel]] = {
+            "scenario": Scenario, "machine": Machine, "columns": Columns, "tolerances": ToleranceFile,
+        }  # fmt: skip
         schema = models[kind].model_json_schema()
     definitions: dict[str, Any] = schema.pop("$defs")
     for group in (*definitions.values(), schema):
@@ -46,6 +51,9 @@ def json_schema(kind: Literal["scenario", "machine", "structure", "columns"] = "
     if kind == "columns":
         short = [{"type": "string", "pattern": rf"^\s*{units.NUMBER}"}, {"type": "number"}]
         definitions["Factor"] = {"anyOf": [*short, definitions["Factor"]]}
+    if kind == "tolerances":
+        amount = definitions["VariableTolerance"]["properties"]["value"]["anyOf"][:2]
+        definitions["VariableTolerance"] = {"anyOf": [*amount, {"const": "ignore"}, definitions["VariableTolerance"]]}
     return {
         "$schema": DIALECT,
         "title": f"feedsim {kind} file",

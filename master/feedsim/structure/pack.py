@@ -59,18 +59,18 @@ def pack(
         InputError: a file is not what it should be, or the unit refuses the machine.
         OutputError: `out` cannot be written.
     """
-    from feedsim_packager import errors, repack, resources
+    from feedsim_packager import errors, machine_tables, repack
     from feedsim_packager.machine import named
+    from feedsim_packager.resources import File
 
     if isinstance(modes, Modes):
         with tempfile.TemporaryDirectory(prefix="feedsim-") as folder:
             written = Path(folder) / "modes.csv"
             write_modes(written, modes)
             return pack(base, out, modes=written, pose=pose, poses=poses, name=name, note=note, trial=trial)
-    File = resources.File
     try:
-        given = resources.check(
-            File("axes.csv", resources.axes_csv(pose)),
+        given = machine_tables.check(
+            File("axes.csv", machine_tables.axes_csv(pose)),
             File.at(modes),
             File.at(poses) if poses is not None else None,
         )

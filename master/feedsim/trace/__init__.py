@@ -4,18 +4,22 @@ from feedsim.trace.csv import read_csv, write_csv
 from feedsim.trace.files import written_whole
 from feedsim.trace.mat import convert_mat, read_mat
 from feedsim.trace.recording import Recording, read_recording
+from feedsim.trace.series import Series, as_series, read_series
 from feedsim.trace.setpoints import read_setpoints
 from feedsim.trace.trace import Array, Trace, matching
 
 __all__ = [
     "Array",
     "Recording",
+    "Series",
     "Trace",
+    "as_series",
     "convert_mat",
     "matching",
     "read_csv",
     "read_mat",
     "read_recording",
+    "read_series",
     "read_setpoints",
     "write_csv",
     "written_whole",

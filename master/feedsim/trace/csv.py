@@ -11,7 +11,7 @@ import codecs
 import csv
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -26,6 +26,8 @@ from feedsim.trace.trace import Array, Trace, check_name, check_unit, suggest
 
 _HEADER = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?")
 _SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
+# Heads of the columns, and where they stand -> names and units; InputError.
+Header = Callable[[Sequence[str], str], tuple[tuple[str, ...], tuple[str, ...]]]
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def read_csv(
     """
     path = Path(path)
     table = read_table(path)
-    at = _time_index(table, time)
+    at = time_index(table, time)
     wanted = (
         [i for i in range(len(table.names)) if i != at] if columns is None else [table.index(name) for name in columns]
     )
@@ -68,7 +70,7 @@ def read_csv(
     if table.decimal_comma:
         mark = decimal_mark([table.columns[i] for i in used], table.lines, table.where)
     values = {i: numbers(table.columns[i], mark, table.lines, table.where, table.names[i]) for i in used}
-    seconds = _seconds(table, at, values[at], time_unit)
+    seconds = seconds_of(table, at, values[at], time_unit)
     if (wrong := np.flatnonzero(np.diff(seconds) <= 0)).size:
         row = int(wrong[0]) + 1
         raise InputError(
@@ -108,8 +110,11 @@ def quoted(cell: str) -> str:
     return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',;"') else cell
 
 
-def read_table(path: Path) -> Table:
-    """Cells of a file under its header. InputError with file and line."""
+def read_table(path: Path, split: Header | None = None) -> Table:
+    """Cells of a file under its header. InputError with file and line.
+
+    split: takes the heads of the columns apart into names and units; default: name [unit], each name once.
+    """
     lines = io.StringIO(_text(path), newline="")
     first = lines.readline()
     separator = ""
@@ -133,7 +138,7 @@ def read_table(path: Path) -> Table:
     header, body, body_lines = rows[header_line - 1], rows[header_line:], numbers_of_lines[header_line:]
     if not header[-1].strip() and all(len(row) == len(header) and not row[-1].strip() for row in body):
         header, body = header[:-1], [row[:-1] for row in body]  # every line ends with a separator
-    names, header_units = _header(header, f"{path}:{header_line}")
+    names, header_units = (split or _header)(header, f"{path}:{header_line}")
     if not body:
         raise InputError(f"{path}:{header_line}: no rows below the header")
     for line, row in zip(body_lines, body, strict=True):
@@ -202,7 +207,7 @@ def _header(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[st
     return tuple(names), tuple(found)
 
 
-def _time_index(table: Table, name: str | None) -> int:
+def time_index(table: Table, name: str | None) -> int:
     if name is not None:
         return table.index(name)
     for usual in ("time", "t"):
@@ -222,7 +227,7 @@ def _time_index(table: Table, name: str | None) -> int:
     return 0
 
 
-def _seconds(table: Table, at: int, values: Array, given: str | None) -> Array:
+def seconds_of(table: Table, at: int, values: Array, given: str | None) -> Array:
     unit = table.units[at] or given or "s"
     try:
         factor = units.factor(unit, "s")

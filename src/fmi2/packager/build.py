@@ -1,22 +1,38 @@
 """A unit's folder -> its archive: every step in order."""
 
+import os
 import tempfile
+import time
 import tomllib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from . import archive, carried, compile, description, documentation, resources, table, trial, variables
-from .errors import InputError
+from . import (
+    archive,
+    carried,
+    compile,
+    description,
+    documentation,
+    kinds,
+    reference,
+    table,
+    terminals,
+    trial,
+    variables,
+)
+from .errors import CompilerError, InputError
 from .machine import Machine, named
 from .resources import Resources
 from .table import Table
+from .targets import Target
 from .variables import Variable
 
 SHELL = Path(__file__).resolve().parent.parent  # src/fmi2
 PROJECT = SHELL.parent.parent
 STANDARD = SHELL / "standard"
-DEFAULT_MODES = PROJECT / "scenarios" / "machines" / "test_centre" / "modes.csv"
+REFERENCES = PROJECT / "tests" / "reference"
 EMBEDDED = "embedded_resources.c"
 CARRIED = carried.PATH.removeprefix("sources/")
 
@@ -59,8 +75,9 @@ class Result:
     path: Path
     size: int  # bytes
     guid: str
-    platform: str
-    glibc: str | None
+    platforms: tuple[str, ...]  # folders under binaries/
+    glibc: str | None  # newest that a Linux binary needs
+    tried: bool  # instantiated here; not where there is no binary for this platform, or extra flags were in use
     warnings: tuple[str, ...]
 
 
@@ -79,20 +96,17 @@ def load(
     directory: Path,
     compiler: Sequence[str],
     *,
-    axes: Path | None = None,
-    modes: Path | None = None,
-    poses: Path | None = None,
     name: str = "",
     note: str = "",
+    **files: Path | None,
 ) -> Unit:
-    """Read and check a unit. `axes`, `modes` and `poses` replace the default resources of a unit with rows per axis;
-    `name` and `note` say what machine they are of."""
+    """Read and check a unit. `files` replace those of its resources that it has in its folder, by the names of kinds.py
+    (axes, modes, poses; setpoints); `name` and `note` say what machine or motion they are of."""
     rows = table.read(directory, (SHELL, STANDARD), compiler)
-    given = None
-    if rows.axis_rows or axes or modes or poses:
-        given = resources.read(axes or directory / "resources" / "axes.csv", modes or DEFAULT_MODES, poses)
+    own_files = {option: path for option, path in files.items() if path is not None}
+    given = kinds.of_unit(rows.unit, rows.resources, directory, own_files)
     version, warnings = _version()
-    own = any((axes, modes, poses, name, note))
+    own = any((own_files, name, note))
     return Unit(
         directory=directory,
         table=rows,
@@ -101,7 +115,9 @@ def load(
         sources=_sources(directory, given) | {CARRIED: carried.dump(rows, version)},
         guid=variables.guid(rows, given),
         version=version,
-        machine=named(name, note) if own else Machine(default=True),
+        machine=replace(
+            named(name, note) if own else Machine(default=True), noun=given.noun if given else Machine.noun
+        ),
         warnings=warnings,
     )
 
@@ -131,41 +147,108 @@ def _sources(directory: Path, given: Resources | None) -> dict[str, bytes]:
             found[path.name] = path
     if problems:
         raise InputError(f"{directory}: file names must differ, as the archive's sources folder is flat", problems)
-    embedded = {EMBEDDED: resources.embedded_source(given)} if given else {}
+    embedded = {EMBEDDED: given.embedded_source()} if given else {}
     return {name: path.read_bytes() for name, path in found.items()} | embedded
 
 
-def build(unit: Unit, out: Path, compiler: Sequence[str], build_directory: Path | None = None) -> Result:
-    """Compile and pack `unit` into `out`. `build_directory` keeps what was staged; without it nothing stays."""
-    target = compile.host_target()
+def build(
+    unit: Unit,
+    out: Path,
+    compiler: Sequence[str],
+    build_directory: Path | None = None,
+    *,
+    targets: Sequence[Target] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Result:
+    """Compile and pack `unit` into `out`. `build_directory` keeps what was staged; without it nothing stays.
+
+    `targets`: platforms for which it is compiled, checked to run on machines other than this one; without, for this
+    machine by its own compiler. `progress` is told in a line of every library that is ready.
+    """
     name = unit.table.unit
     with tempfile.TemporaryDirectory(prefix="packager-") as temporary:
         stage = (build_directory or Path(temporary)) / name
-        sources = stage / "sources"
-        sources.mkdir(parents=True, exist_ok=True)
-        for path in sources.iterdir():
-            if path.name not in unit.sources and path.suffix in (".c", ".h", ".def"):
-                path.unlink()  # left from an earlier build; it would be found by #include
-        for file_name, content in unit.sources.items():
-            (sources / file_name).write_bytes(content)
-        library = compile.compile_library(
-            name, sources, unit.c_files, stage / "binaries" / target.folder, compiler, target
-        )
-        if not library.instrumented:
-            packed = unit.resources.files() if unit.resources else {}
-            trial.check(stage / library.path, name, unit.guid, packed, stage)
+        _stage(unit, stage / "sources")
+        libraries = _compile(unit, stage, compiler, targets, progress)
+        tried = _try(unit, stage, libraries)
     pages, warnings = _documentation(unit)
+    pictures, more_warnings = terminals.files(unit.directory, unit.variables)
+    warnings += more_warnings
     content = archive.pack(
         {
             "modelDescription.xml": unit.description(),
-            library.path: library.content,
+            **{library.path: library.content for library in libraries},
             **{f"sources/{file_name}": content for file_name, content in unit.sources.items()},
             **(unit.resources.files() if unit.resources else {}),
             **pages,
+            **pictures,
+            **_references(unit),
         }
     )
     archive.write(out, content)
-    return Result(out, len(content), unit.guid, target.folder, library.glibc, (*unit.warnings, *warnings))
+    glibc = compile.newest_glibc(b"".join(library.content for library in libraries))
+    platforms = tuple(library.path.split("/")[1] for library in libraries)
+    return Result(out, len(content), unit.guid, platforms, glibc, tried, (*unit.warnings, *warnings))
+
+
+def _references(unit: Unit) -> dict[str, bytes]:
+    """Pinned reference results, which are of the project's own units with their default resources."""
+    name = unit.table.unit
+    if not unit.machine.default or unit.directory.resolve() != PROJECT / "src" / f"{name}_fmu":
+        return {}
+    return reference.files(REFERENCES / name, unit.variables)
+
+
+def _stage(unit: Unit, sources: Path) -> None:
+    sources.mkdir(parents=True, exist_ok=True)
+    for path in sources.iterdir():
+        if path.name not in unit.sources and path.suffix in (".c", ".h", ".def"):
+            path.unlink()  # left from an earlier build; it would be found by #include
+    for file_name, content in unit.sources.items():
+        (sources / file_name).write_bytes(content)
+
+
+def _compile(
+    unit: Unit,
+    stage: Path,
+    compiler: Sequence[str],
+    targets: Sequence[Target] | None,
+    progress: Callable[[str], None] | None,
+) -> list[compile.Library]:
+    """A library per target, in their order; several are compiled at the same time."""
+    name = unit.table.unit
+
+    def one(target: Target) -> compile.Library:
+        begun = time.monotonic()
+        library = compile.compile_library(
+            name,
+            stage / "sources",
+            unit.c_files,
+            stage / "binaries" / target.folder,
+            compiler,
+            target,
+            for_others=targets is not None,
+        )
+        if progress:
+            progress(f"{name}: {target.folder} ready after {time.monotonic() - begun:.1f} s")
+        return library
+
+    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        return list(pool.map(one, targets if targets is not None else [compile.host_target()]))
+
+
+def _try(unit: Unit, stage: Path, libraries: Sequence[compile.Library]) -> bool:
+    """Instantiate the library for this machine once; False where there is none that can be loaded here."""
+    try:
+        host = compile.host_target()
+    except CompilerError:
+        return False
+    for library in libraries:
+        if library.path.split("/")[1] == host.folder and not library.instrumented:
+            packed = unit.resources.files() if unit.resources else {}
+            trial.check(stage / library.path, unit.table.unit, unit.guid, packed, stage)
+            return True
+    return False
 
 
 def _documentation(unit: Unit) -> tuple[dict[str, bytes], list[str]]:

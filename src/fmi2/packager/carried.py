@@ -8,7 +8,7 @@ from .errors import InputError
 from .table import Row, Table
 
 PATH = "sources/variables.json"
-_FORMAT = 1
+_FORMAT = 2
 
 
 def dump(table: Table, version: str) -> bytes:
@@ -18,6 +18,7 @@ def dump(table: Table, version: str) -> bytes:
         "unit": table.unit,
         "version": version,
         "summary": table.summary,
+        "resources": table.resources,
         "scalars": [asdict(row) for row in table.scalars],
         "axis_rows": [asdict(row) for row in table.axis_rows],
     }
@@ -30,14 +31,15 @@ def load(content: bytes, where: str) -> tuple[Table, str]:
         read = json.loads(content)
         if read["format"] != _FORMAT:
             raise InputError(f"{where}: has format {read['format']!r}, this packager reads format {_FORMAT}")
-        texts = [read[key] for key in ("unit", "version", "summary")]
+        texts = [read[key] for key in ("unit", "version", "summary", "resources")]
         if not all(isinstance(text, str) for text in texts):
-            raise TypeError("unit, version and summary must be texts")
-        unit, version, summary = texts
+            raise TypeError("unit, version, summary and resources must be texts")
+        unit, version, summary, kind = texts
         scalars, axis_rows = (tuple(map(_row, read[key])) for key in ("scalars", "axis_rows"))
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{where}: not a table of variables: {type(error).__name__}: {error}") from error
-    return Table(unit=unit, summary=summary, scalars=scalars, axis_rows=axis_rows), version
+    table = Table(unit=unit, summary=summary, scalars=scalars, axis_rows=axis_rows, resources=kind)
+    return table, version
 
 
 def _row(read: dict[str, Any]) -> Row:

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import build, repack, resources
+from . import build, kinds, repack, targets
 from .compile import EXTRA_FLAGS
 from .errors import InputError, PackagerError
 from .machine import named
@@ -33,28 +33,35 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     common = argparse.ArgumentParser(add_help=False)
-    common.add_argument("--axes", type=Path, help="axes.csv of the machine (plant only; default: the unit's own)")
-    common.add_argument("--modes", type=Path, help="modes.csv of the machine (plant only; default: test_centre)")
-    _add_machine(common)
+    _add_resources(common)
     common.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
     packing = commands.add_parser("build", parents=[common], help="compile and pack units")
-    packing.add_argument("unit", nargs="+", metavar="UNIT", help="plant, controller, friction, or a unit's folder")
+    packing.add_argument(
+        "unit", nargs="+", metavar="UNIT", help="plant, controller, friction, setpoint, or a unit's folder"
+    )
     packing.add_argument("--out", type=Path, help="archive to write (default: fmus/UNIT.fmu); for one UNIT")
+    packing.add_argument(
+        "--platforms",
+        help=f"platforms to compile for, of {', '.join(targets.ALL)}, separated by commas, or all; more than this "
+        "machine's own need zig. Checked to run on machines other than this one (default: this machine's, unchecked)",
+    )
     packing.add_argument("--build-dir", type=Path, help="keep staged sources and library in this folder")
     describing = commands.add_parser("describe", parents=[common], help="print modelDescription.xml")
-    describing.add_argument("unit", metavar="UNIT", help="plant, controller, friction, or a unit's folder")
-    repacking = commands.add_parser("repack", help="pack another machine into a plant's archive; needs no compiler")
+    describing.add_argument("unit", metavar="UNIT", help="plant, controller, friction, setpoint, or a unit's folder")
+    repacking = commands.add_parser("repack", help="pack another machine or motion into an archive; needs no compiler")
     repacking.add_argument("base", type=Path, metavar="BASE.fmu", help="archive whose binaries and sources are taken")
-    repacking.add_argument("--axes", type=Path, required=True, help="axes.csv of the machine")
-    repacking.add_argument("--modes", type=Path, required=True, help="modes.csv of the machine")
-    _add_machine(repacking)
+    _add_resources(repacking)
     repacking.add_argument("--out", type=Path, required=True, help="archive to write")
     return parser
 
 
-def _add_machine(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--poses", type=Path, help="poses.bin of the machine: modes of a grid of poses (plant only)")
-    parser.add_argument("--name", default="", help="name of the machine, for the description and the documentation")
+def _add_resources(parser: argparse.ArgumentParser) -> None:
+    for kind_name, kind in kinds.KINDS.items():
+        for name, option in kind.options.items():
+            parser.add_argument(
+                f"--{name}", type=Path, help=f"{option.help}; only for a unit with resources of the kind '{kind_name}'"
+            )
+    parser.add_argument("--name", default="", help="name of the machine or motion, for description and documentation")
     parser.add_argument("--note", default="", help="a remark that goes with the name")
 
 
@@ -73,12 +80,16 @@ def _load(name: str, compiler: Sequence[str], options: argparse.Namespace) -> bu
     return build.load(
         build.unit_directory(name),
         compiler,
-        axes=options.axes,
-        modes=options.modes,
-        poses=options.poses,
         name=options.name,
         note=options.note,
+        **_given(options),
     )
+
+
+def _given(options: argparse.Namespace) -> dict[str, Path]:
+    """The resource files that were given, by the names of their options."""
+    files = {name: getattr(options, name) for kind in kinds.KINDS.values() for name in kind.options}
+    return {name: path for name, path in files.items() if path is not None}
 
 
 def _describe(options: argparse.Namespace) -> None:
@@ -90,18 +101,32 @@ def _describe(options: argparse.Namespace) -> None:
 def _build(options: argparse.Namespace) -> None:
     if options.out and len(options.unit) > 1:
         raise InputError(f"--out is for one unit, but {len(options.unit)} are given: {', '.join(options.unit)}")
+    platforms = None if options.platforms is None else targets.named(options.platforms)
     compiler = find_compiler(options.cc)
+    if platforms and len(platforms) > 1:
+        print(
+            f"compiling for {', '.join(target.folder for target in platforms)}; what a platform's C library needs, zig "
+            "compiles when it is first used: up to some minutes, once",
+            file=sys.stderr,
+        )
     for name in options.unit:
         unit = _load(name, compiler, options)
         out = options.out or build.PROJECT / "fmus" / f"{unit.table.unit}.fmu"
-        result = build.build(unit, out, compiler, options.build_dir)
+        result = build.build(
+            unit, out, compiler, options.build_dir, targets=platforms, progress=_tell if platforms else None
+        )
         _warn(result.warnings)
         glibc = f", needs glibc {result.glibc}" if result.glibc else ""
-        print(f"{result.path}: {result.size / 1024:.0f} KiB, {result.platform}{glibc}, guid {result.guid}")
+        listed = ", ".join(result.platforms)
+        print(f"{result.path}: {result.size / 1024:.0f} KiB, {listed}{glibc}, guid {result.guid}")
+
+
+def _tell(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
 
 
 def _repack(options: argparse.Namespace) -> None:
-    given = resources.read(options.axes, options.modes, options.poses)
+    given = kinds.from_files(_given(options))
     result = repack.repack(options.base, given, named(options.name, options.note), options.out)
     platforms = ", ".join(result.platforms) or "no binaries"
     trial = "" if result.tried else "; not tried, as it has no binary for this platform"

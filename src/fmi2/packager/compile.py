@@ -1,15 +1,17 @@
-"""Flat sources folder -> shared library for the platform this runs on."""
+"""Flat sources folder -> shared library for a platform, checked for what importers there need."""
 
 import os
-import platform
 import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import toolchain
+from . import portable, toolchain, universal
 from .errors import CompilerError
+from .targets import Target, host_target
+
+__all__ = ["EXTRA_FLAGS", "FLAGS", "Library", "compile_library", "host_target", "newest_glibc"]
 
 FLAGS = (
     *("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off"),
@@ -17,29 +19,6 @@ FLAGS = (
     *("-Wall", "-Wextra", "-Wconversion", "-Wshadow"),
 )
 EXTRA_FLAGS = "FEEDSIM_CFLAGS"  # environment: e.g. "-fsanitize=address,undefined -g"
-
-# Oldest glibc the Linux binaries shall run with. zig links against any version; gcc and clang against the host's, where
-# exp, log and pow bind to GLIBC_2.29 since their re-implementation there.
-OLDEST_GLIBC = "2.17"
-
-
-@dataclass(frozen=True)
-class Target:
-    """A platform: its folder under binaries/, the library's suffix, its name for zig."""
-
-    folder: str
-    suffix: str
-    zig: str
-
-
-# FMI 2.0 names x86-64 folders; other processors use the tuples of FMI 3.0.
-TARGETS = {
-    ("Linux", "x86_64"): Target("linux64", ".so", f"x86_64-linux-gnu.{OLDEST_GLIBC}"),
-    ("Linux", "aarch64"): Target("aarch64-linux", ".so", f"aarch64-linux-gnu.{OLDEST_GLIBC}"),
-    ("Darwin", "x86_64"): Target("darwin64", ".dylib", "x86_64-macos"),
-    ("Darwin", "arm64"): Target("aarch64-darwin", ".dylib", "aarch64-macos"),
-    ("Windows", "AMD64"): Target("win64", ".dll", "x86_64-windows-gnu"),
-}
 
 
 @dataclass(frozen=True)
@@ -53,40 +32,57 @@ class Library:
     glibc: str | None
 
 
-def host_target() -> Target:
-    """The platform this runs on; CompilerError where FMI has no name for it."""
-    host = (platform.system(), platform.machine())
-    if host not in TARGETS:
-        known = ", ".join(" ".join(each) for each in TARGETS)
-        raise CompilerError(f"no binaries folder is known for {' '.join(host)} (known: {known})")
-    return TARGETS[host]
-
-
 def compile_library(
-    unit: str, sources: Path, names: Sequence[str], output: Path, compiler: Sequence[str], target: Target
+    unit: str,
+    sources: Path,
+    names: Sequence[str],
+    output: Path,
+    compiler: Sequence[str],
+    target: Target,
+    *,
+    for_others: bool = False,
 ) -> Library:
     """Compile `names` (C files in the folder `sources`) into `output`/<unit><suffix>.
 
     Compiled in the folder itself, by relative names: no path of the machine gets into the library, so the same sources
-    and compiler give the same bytes.
+    and compiler give the same bytes. `for_others`: the library shall run on machines other than this one, and is
+    refused where it would not (`portable.problems`).
+
+    Raises:
+        CompilerError: the compiler refused the sources or cannot make code for `target`, or the library lacks a
+            function of the FMI.
     """
     output.mkdir(parents=True, exist_ok=True)
     library = output.resolve() / f"{unit}{target.suffix}"
     extra = shlex.split(os.environ.get(EXTRA_FLAGS, ""))
-    command = [*compiler, *_target_flags(compiler, target), *FLAGS, f"-ffile-prefix-map={sources.resolve()}=sources"]
-    command += [*_link_flags(target, library.name, stripped=not extra), *extra]
-    command += [*sorted(names), "-o", str(library), "-lm"]
-    toolchain.run(command, sources)
-    content = library.read_bytes()
+    if not toolchain.is_zig(compiler) and target != host_target():
+        raise CompilerError(
+            f"{unit}, {target.folder}: {shlex.join(compiler)} compiles for this machine alone; zig compiles for all "
+            "(make fmus-all, or --cc 'python -m ziglang cc')"
+        )
+    parts = []
+    for processor in target.zig:
+        part = output.resolve() / processor / library.name if len(target.zig) > 1 else library
+        part.parent.mkdir(exist_ok=True)
+        command = [*toolchain.for_target(compiler, processor), *FLAGS]
+        command += [f"-ffile-prefix-map={sources.resolve()}=sources"]
+        command += [*_link_flags(compiler, target, library.name, stripped=not extra), *extra]
+        command += [*sorted(names), "-o", str(part), "-lm"]
+        toolchain.run(command, sources)
+        parts.append(part.read_bytes())
+    content = universal.join(parts) if len(parts) > 1 else parts[0]
+    library.write_bytes(content)
+    if not extra:
+        own = portable.own_functions(unit, sources)
+        machine = [str(sources.resolve()), str(output.resolve())]
+        if Path.home().parent != Path.home():  # where compilers keep what they have compiled
+            machine.append(f"{Path.home()}{os.sep}")
+        if problems := portable.problems(content, target, own=own, for_others=for_others, machine=machine):
+            raise CompilerError("\n  ".join((f"{unit}, {target.folder}: no library that importers can use", *problems)))
     return Library(f"binaries/{target.folder}/{library.name}", content, bool(extra), newest_glibc(content))
 
 
-def _target_flags(compiler: Sequence[str], target: Target) -> list[str]:
-    named = any(part.startswith(("-target", "--target")) for part in compiler)
-    return ["-target", target.zig] if toolchain.is_zig(compiler) and not named else []
-
-
-def _link_flags(target: Target, name: str, stripped: bool) -> list[str]:
+def _link_flags(compiler: Sequence[str], target: Target, name: str, stripped: bool) -> list[str]:
     flags = ["-shared"]
     if target.suffix == ".so":
         flags.append("-Wl,--build-id=none")
@@ -94,7 +90,8 @@ def _link_flags(target: Target, name: str, stripped: bool) -> list[str]:
             flags.append("-Wl,--no-undefined")
     if target.suffix == ".dylib":
         flags.append(f"-Wl,-install_name,@rpath/{name}")
-    elif stripped:
+    # Apple's linker takes no -s and needs none: it names object files in a library only where they were made with -g.
+    if stripped and (target.suffix != ".dylib" or toolchain.is_zig(compiler)):
         flags.append("-s")
     return flags
 

@@ -1,6 +1,7 @@
 """Variables -> modelDescription.xml (FMI 2.0, co-simulation)."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree as ET
 
@@ -110,13 +111,18 @@ def _text(value: bool | int | float) -> str:
 
 
 def _display_units(rows: Iterable[Row]) -> dict[str, list[str]]:
-    """unit -> its display units, both in order of their first use; a unit is not its own display unit."""
-    found: dict[str, list[str]] = {}
+    """unit -> its display units; a unit is not its own display unit.
+
+    Units in order of their first use, display units with the one of most variables first: there are importers that show
+    all values of a unit in its first one (FMPy's plots).
+    """
+    found: dict[str, Counter[str]] = {}
     for row in rows:
-        names = found.setdefault(row.unit, [])
-        if row.display_unit not in (row.unit, *names):
-            names.append(row.display_unit)
-    return found
+        found.setdefault(row.unit, Counter())[row.display_unit] += 1
+    return {
+        unit: [name for name, _ in names.most_common() if name != unit]  # equally many: in order of their first use
+        for unit, names in found.items()
+    }
 
 
 def _add_units(root: ET.Element, rows: Sequence[Row]) -> None:

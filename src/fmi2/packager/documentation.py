@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from . import terminals
 from .errors import InputError
 from .machine import Machine
 from .resources import Resources
@@ -36,7 +37,13 @@ cc -std=c99 -O2 -ffp-contract=off -fPIC -shared -fvisibility=hidden *.c -lm -o {
 """
 
 
-_SYNTHETIC = "<p>Start values are those of a synthetic default machine; no existing machine has them.</p>\n"
+_SYNTHETIC = "Start values are those of a synthetic default machine; no existing machine has them."
+
+_CONNECT = (
+    "<p>Inputs and outputs that belong together. Connect a terminal to the one of the same name (behind the axis) of "
+    "the unit on its other side, which has an output for each input here and the other way round, of the same names. "
+    "Tools that know terminals find them in terminalsAndIcons/terminalsAndIcons.xml.</p>\n"
+)
 
 _HEADERS = """
 The files fmi2Functions.h, fmi2FunctionTypes.h and fmi2TypesPlatform.h in sources/ are part of the FMI standard and
@@ -92,20 +99,26 @@ def _marked_parts(variables: Sequence[Variable], resources: Resources | None, ma
     """What the page says of the machine, between its marks."""
     parts = {
         "machine": _about(resources, machine) if resources and not machine.default else "",
-        "variables": (_SYNTHETIC if machine.default else "") + _variable_table(variables),
+        "variables": _terminal_table(variables)
+        + "<h2>Variables</h2>\n"
+        + (_synthetic(resources) if machine.default else "")
+        + _variable_table(variables),
     }
     return {part: text.join(_MARKS[part]) for part, text in parts.items()}
 
 
 def _about(resources: Resources, machine: Machine) -> str:
-    name = f"the machine <strong>{html.escape(machine.name)}</strong>" if machine.name else "a machine of its own"
+    noun = resources.noun.lower()
+    name = f"the {noun} <strong>{html.escape(machine.name)}</strong>" if machine.name else f"a {noun} of its own"
     note = f"<p>{html.escape(machine.note)}</p>\n" if machine.note else ""
-    axes = ", ".join(f"{axis.name} at {axis.x_0:.9g} m" for axis in resources.axes)
-    grid = " Its modes follow the axes by the grid of poses in resources/poses.bin." if resources.poses_bin else ""
     return (
-        f"<p>This archive holds {name}. Its axes: {axes}.{grid} Numbers that the text below gives for the default "
-        f"machine are not this machine's.</p>\n{note}"
+        f"<p>This archive holds {name}. {html.escape(resources.summary())} Numbers that the text below gives for the "
+        f"default {noun} are not this {noun}'s.</p>\n{note}"
     )
+
+
+def _synthetic(resources: Resources | None) -> str:
+    return f"<p>{resources.default_note if resources else _SYNTHETIC}</p>\n"
 
 
 def _licence_of(header: str) -> str:
@@ -123,7 +136,6 @@ def _index(table: Table, body: str, parts: Mapping[str, str], licence: str | Non
         f"<style>\n{_STYLE}</style>\n</head>\n<body>\n",
         parts["machine"],
         body,
-        "<h2>Variables</h2>\n",
         parts["variables"],
         "<h2>Building from the sources</h2>\n",
         "<p>The folder <code>sources</code> is complete; the C files to compile are listed in modelDescription.xml, ",
@@ -161,6 +173,24 @@ def _without_relative_links(tokens: Sequence["Token"]) -> list["Token"]:
         if token.type == "link_close":
             relative = False
     return kept
+
+
+def _terminal_table(variables: Sequence[Variable]) -> str:
+    """Inputs and outputs as they are connected; empty where none belong together."""
+    found = terminals.find(variables)
+    if not found:
+        return ""
+    by_name = {variable.name: variable.row for variable in variables}
+    rows = []
+    for terminal in found:
+        inputs, outputs = (
+            ", ".join(f"<code>{name}</code>" for name in terminal.members.values() if by_name[name].causality == wanted)
+            for wanted in ("input", "output")
+        )
+        cells = (f"<code>{terminal.name}</code>", html.escape(terminal.description), inputs, outputs)
+        rows.append(f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>\n")
+    heads = "".join(f"<th>{head}</th>" for head in ("Terminal", "What it is", "Inputs", "Outputs"))
+    return f"<h2>Connections</h2>\n{_CONNECT}<table>\n<tr>{heads}</tr>\n{''.join(rows)}</table>\n"
 
 
 def _variable_table(variables: Sequence[Variable]) -> str:

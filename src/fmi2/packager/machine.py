@@ -1,4 +1,4 @@
-"""What an archive says in words of the machine in it."""
+"""What an archive says in words of what is in it: a machine, a motion."""
 
 from dataclasses import dataclass
 
@@ -7,20 +7,22 @@ from .errors import InputError
 
 @dataclass(frozen=True)
 class Machine:
-    """Name and note of the machine, empty where there is none. `default`: it is the synthetic default machine."""
+    """Name and note of the machine (or of the motion), empty where there is none. `default`: it is the synthetic
+    default machine (or belongs to it); `noun`: what the name is one of."""
 
     name: str = ""
     note: str = ""
     default: bool = False
+    noun: str = "Machine"
 
     def sentence(self) -> str:
         """The machine as a description ends with it; empty without a name and a note."""
-        parts = [f"Machine: {self.name}" if self.name else "", self.note]
+        parts = [f"{self.noun}: {self.name}" if self.name else "", self.note]
         return ". ".join(part.rstrip(".") for part in parts if part)
 
 
 def named(name: str = "", note: str = "") -> Machine:
-    """A machine of the user's; white space counts as one space. Raises InputError for what no XML can hold."""
+    """A machine (or motion) of the user's; white space counts as one. Raises InputError for what no XML can hold."""
     return Machine(_line("name", name), _line("note", note))
 
 

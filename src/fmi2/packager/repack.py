@@ -1,4 +1,4 @@
-"""An archive -> the same unit with another machine's resources; no compiler, no sources.
+"""An archive -> the same unit with other resources (a machine's, a motion's); no compiler, no sources.
 
 The binaries of the archive (of any platform) are kept as they are: which axes a machine has is data to them. What says
 which machine it is comes anew: resources, GUID, modelDescription.xml, the embedded copy, the page of documentation.
@@ -7,11 +7,11 @@ which machine it is comes anew: resources, GUID, modelDescription.xml, the embed
 import re
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from . import archive, carried, compile, description, documentation, resources, trial, variables
+from . import archive, carried, compile, description, documentation, reference, terminals, trial, variables
 from .errors import CompilerError, InputError
 from .machine import Machine
 from .resources import Resources
@@ -33,7 +33,7 @@ class Repacked:
 
 
 def repack(base: Path, given: Resources, machine: Machine, out: Path, *, trial_run: bool = True) -> Repacked:
-    """Pack the unit of the archive `base` with the machine `given` into `out`, which may be `base` itself.
+    """Pack the unit of the archive `base` with the resources `given` into `out`, which may be `base` itself.
 
     `trial_run`: instantiate what was packed, where `base` has a binary for this platform.
 
@@ -43,18 +43,20 @@ def repack(base: Path, given: Resources, machine: Machine, out: Path, *, trial_r
     """
     files = archive.read(base)
     table, version = _table(files, base)
+    machine = replace(machine, noun=given.noun)
     listed = variables.expand(table, given)
     guid = variables.guid(table, given)
     page = f"{base}: {documentation.INDEX}"
     renewed = {
-        EMBEDDED: resources.embedded_source(given),
+        EMBEDDED: given.embedded_source(),
         documentation.INDEX: documentation.for_machine(
             files.get(documentation.INDEX, b""), listed, given, machine, page
         ),
         **given.files(),
     }
     kept = {path: content for path, content in files.items() if not path.startswith("resources/")}
-    packed = kept | renewed
+    kept = reference.without(kept)  # they are of the resources that go
+    packed = kept | renewed | terminals.describe(listed, kept)
     sources = [path.removeprefix("sources/") for path in packed if re.fullmatch(r"sources/[^/]+\.c", path)]
     packed[DESCRIPTION] = description.describe(
         table, listed, guid=guid, version=version, sources=sources, machine=machine

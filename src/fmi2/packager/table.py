@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from . import toolchain, units
+from . import targets, toolchain, units
 from .errors import InputError
 
 KINDS = ("REAL", "INTEGER", "BOOLEAN", "STRING")
@@ -69,6 +69,7 @@ class Table:
     summary: str  # first sentence of the comment that opens variables.def
     scalars: tuple[Row, ...]
     axis_rows: tuple[Row, ...]
+    resources: str = ""  # kind of its resource files (kinds.py), by UNIT_RESOURCES of identity.h; "" without any
 
     def fingerprint_text(self) -> str:
         """The text whose hash is the first half of the GUID; table.c of the shell makes the same from VariableInfo."""
@@ -93,7 +94,10 @@ _DRIVER = """\
                 min_text, max_text, depends, text)
 #define FEEDSIM_TEXT(x) #x
 #define FEEDSIM_EXPANDED(x) FEEDSIM_TEXT(x)
-feedsim_mark FEEDSIM_EXPANDED(UNIT_NAME) FEEDSIM_EXPANDED(STRING_SIZE)
+#ifndef UNIT_RESOURCES
+#define UNIT_RESOURCES
+#endif
+feedsim_mark FEEDSIM_EXPANDED(UNIT_NAME) FEEDSIM_EXPANDED(STRING_SIZE) FEEDSIM_EXPANDED(UNIT_RESOURCES)
 #include "variables.def"
 """
 _COLUMNS = 13  # strings of a feedsim_row
@@ -116,12 +120,13 @@ def read(unit_directory: Path, include: Sequence[Path], compiler: Sequence[str])
         driver = Path(temporary, "driver.c")
         driver.write_text(_DRIVER, encoding="utf-8")
         folders = [f"-I{folder.resolve()}" for folder in (unit_directory, *include)]
-        text = toolchain.run([*compiler, "-std=c99", "-E", "-P", *folders, driver.name], Path(temporary))
+        preprocessor = toolchain.for_target(compiler, targets.LINUX64.zig[0])  # any: a table is the same on all
+        text = toolchain.run([*preprocessor, "-std=c99", "-E", "-P", *folders, driver.name], Path(temporary))
 
     body = text.partition("feedsim_mark")[2]
-    match = re.match(r'\s*"(\w+)"\s*"\(?(\d+)\)?"', body)
+    match = re.match(r'\s*"(\w+)"\s*"\(?(\d+)\)?"\s*"(\w*)"', body)
     if match is None:
-        raise InputError(f"{unit_directory}: identity.h must define UNIT_NAME as a plain word")
+        raise InputError(f"{unit_directory}: identity.h must define UNIT_NAME (and UNIT_RESOURCES) as a plain word")
     rows, problems = _parse(body[match.end() :])
     problems += check(rows, string_size=int(match[2]))
     summary = _summary(path.read_text(encoding="utf-8"), match[1])
@@ -134,6 +139,7 @@ def read(unit_directory: Path, include: Sequence[Path], compiler: Sequence[str])
         summary=summary,
         scalars=tuple(row for row in rows if not row.per_axis),
         axis_rows=tuple(row for row in rows if row.per_axis),
+        resources=match[3],
     )
 
 

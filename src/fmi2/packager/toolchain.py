@@ -39,6 +39,16 @@ def is_zig(command: Sequence[str]) -> bool:
     return any(Path(part).stem in ("zig", "ziglang") for part in command)
 
 
+def for_target(command: Sequence[str], target: str) -> list[str]:
+    """The compiler with zig's flags for compiling for `target`; as it is where it is not zig, or names a target itself.
+
+    zig without a target looks for the C library of this machine, asking the compilers that it finds there, which now
+    and then fails on a busy machine.
+    """
+    named = any(part.startswith(("-target", "--target")) for part in command)
+    return [*command, "-target", target] if is_zig(command) and not named else [*command]
+
+
 def run(command: Sequence[str], directory: Path) -> str:
     """Run a compiler command in `directory` and return its standard output; raises CompilerError with its messages."""
     # Messages in English. Not by LC_ALL=C: zig comes as a Python program, which could then not start from a folder with

@@ -26,17 +26,27 @@ def expand(table: Table, resources: Resources | None) -> tuple[Variable, ...]:
     Axis i's row r has the reference len(scalars) + i * len(axis_rows) + r (table.h). In `depends`, an axis row's name
     of an input of its own block means the same axis.
     """
-    axes = resources.axes if resources else ()
-    if bool(table.axis_rows) != bool(axes):
+    kind = resources.kind if resources else ""
+    if table.resources != kind:
         raise InputError(
-            f"{table.unit}: has rows per axis, so it needs axes.csv and modes.csv"
-            if table.axis_rows
-            else f"{table.unit}: has no rows per axis, so it takes no axes.csv and modes.csv"
+            f"{table.unit}: has resources of the kind '{table.resources}', those given are of the kind '{kind}'"
+            if table.resources and kind
+            else f"{table.unit}: needs resources of the kind '{table.resources}'"
+            if table.resources
+            else f"{table.unit}: takes no resources (given are those of the kind '{kind}')"
         )
-    if axes and not any((row.name, row.kind, row.unit) == ("x_0", "REAL", "m") for row in table.axis_rows):
-        raise InputError(f"{table.unit}: axes.csv gives x_0 [m], but the table has no such row per axis")
+    axes = resources.axis_names if resources else ()
+    if bool(table.axis_rows) != bool(axes):
+        has = "rows per axis, but no resources that name the axes" if table.axis_rows else "no rows per axis"
+        raise InputError(f"{table.unit}: has {has}")
+    started = resources.columns if resources else {}
+    for name, unit in started.items():
+        if not any((row.name, row.kind, row.unit) == (name, "REAL", unit) for row in table.axis_rows):
+            raise InputError(
+                f"{table.unit}: its resources give {name} [{unit}], but the table has no such row per axis"
+            )
     groups = {row.name.partition(".")[0] for row in table.scalars if "." in row.name}
-    if taken := [axis.name for axis in axes if axis.name in groups]:
+    if taken := [axis for axis in axes if axis in groups]:
         raise InputError(f"{table.unit}: an axis cannot be named {taken[0]}, which is a group of variables already")
     scalar_references = {row.name: i for i, row in enumerate(table.scalars)}
     rows: list[tuple[Row, str, str, dict[str, int]]] = [
@@ -46,8 +56,8 @@ def expand(table: Table, resources: Resources | None) -> tuple[Variable, ...]:
         base = len(table.scalars) + i * len(table.axis_rows)
         references = scalar_references | {row.name: base + r for r, row in enumerate(table.axis_rows)}
         for row in table.axis_rows:
-            start = repr(axis.x_0) if row.name == "x_0" else row.start
-            rows.append((row, f"{axis.name}.{row.name}", start, references))
+            start = resources.start(axis, row.name) if resources and row.name in started else row.start
+            rows.append((row, f"{axis}.{row.name}", start, references))
     count = Counter(name for _, name, _, _ in rows)
     if doubled := [name for name in count if count[name] > 1]:
         raise InputError(table.unit, [f"variable {name} would exist {count[name]} times" for name in doubled])

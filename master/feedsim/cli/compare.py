@@ -1,0 +1,271 @@
+"""feedsim compare: results against references, for people and for CI."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import traceback
+from argparse import Namespace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from feedsim.compare import Comparison, Options, Tolerances, Variable
+
+DESCRIPTION = """Compare results of any simulator, or measured records, with references: every row of the result must
+lie in a tube of tolerance, in value and in time, around the reference. Columns of the reference that the result lacks
+count as different; further columns of the result do not matter."""
+EPILOG = """exit codes:
+  0 same    1 different    2 unusable: a file, a column, a unit or an option is wrong, or nothing can be compared
+
+examples:
+  feedsim compare result.csv reference.csv --tol 1e-6
+  feedsim compare result.csv reference.csv --tol 1e-6 --tol "*.x_a=2 nm" --tol "*.M_a=1e-3 N.m,1 ms" --report out.html
+  feedsim compare results/ references/ --junit compare.xml
+  feedsim compare ecos.csv reference.csv --column "plant::*=*"
+  feedsim compare results/emps/result.csv DATA_EMPS.mat --reference-columns emps/columns.yaml --axis X \\
+      --shift estimate --tol "X.x_a=0.1 mm" --tol "X.M_a=ignore"
+"""
+MOST_LINES = 10
+
+
+def add_command(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add ``compare`` to the commands."""
+    command = subparsers.add_parser(
+        "compare",
+        help="compare results of any simulator with references; exit code 0 same, 1 different, 2 unusable",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_argument(
+        "files", type=Path, nargs="+", metavar="RESULT REFERENCE", help="CSV files in turn, or two folders"
+    )
+    limits = command.add_argument_group("tolerances")
+    limits.add_argument(
+        "--tol",
+        action="append",
+        default=[],
+        metavar="[PATTERN=]VALUE[,TIME]",
+        help="1e-6 (of the range of the reference), '2 nm', '1 ms' (in time) or both, for all variables or those of a "
+        "pattern: '*.M_a=1e-3 N.m,1 ms'; several times, later ones count more (default: 1e-3)",
+    )
+    limits.add_argument(
+        "--tolerances",
+        type=Path,
+        metavar="FILE.yaml",
+        help="tolerance file (default: the reference's own beside it, docs/comparing.md)",
+    )
+    which = command.add_argument_group("columns")
+    which.add_argument(
+        "--column",
+        action="append",
+        default=[],
+        metavar="RESULT=REFERENCE",
+        help="column of the result that is called otherwise; with * on both sides all such: 'plant.*=*'",
+    )
+    which.add_argument("--only", action="append", default=[], metavar="PATTERN", help="compare these variables only")
+    which.add_argument("--ignore", action="append", default=[], metavar="PATTERN", help="do not compare these")
+    which.add_argument("--common", action="store_true", help="columns that the result lacks are left out, not missing")
+    which.add_argument(
+        "--hold", action="append", default=[], metavar="PATTERN", help="hold their values between rows, without ramps"
+    )
+    for whose in ("", "reference-"):
+        side = "reference" if whose else "result"
+        which.add_argument(
+            f"--{whose}unit",
+            action="append",
+            default=[],
+            metavar="PATTERN=UNIT",
+            help=f"unit of the {side}'s columns whose header tells none",
+        )
+        which.add_argument(f"--{whose}time", metavar="NAME[:UNIT]", help=f"time column of the {side}")
+        which.add_argument(
+            f"--{whose}columns",
+            type=Path,
+            metavar="MAPPING.yaml",
+            help=f"mapping, where the {side} is a drive's record",
+        )
+    which.add_argument("--axis", metavar="NAME", help="axis of a drive's record")
+    which.add_argument("--machine", type=Path, metavar="MACHINE-or-SCENARIO", help="gives pitch and torque constant")
+    span = command.add_argument_group("time")
+    span.add_argument("--from", dest="start", metavar="TIME", help="compare from this instant on, such as '0.1 s'")
+    span.add_argument("--to", dest="end", metavar="TIME", help="compare up to this instant")
+    span.add_argument(
+        "--shift", metavar="TIME", default="0 s", help="added to the result's time, such as '0.5 ms', or 'estimate'"
+    )
+    span.add_argument("--max-shift", metavar="TIME", default="50 ms", help="largest estimated shift (default: 50 ms)")
+    span.add_argument("--max-gap", metavar="TIME", help="longest step between rows of the result (default: any)")
+    span.add_argument(
+        "--at",
+        choices=("auto", "result", "reference"),
+        default="auto",
+        help="whose instants are looked at (auto: the result's, unless the reference has clearly fewer rows)",
+    )
+    out = command.add_argument_group("output")
+    out.add_argument("--report", type=Path, metavar="FILE.html", help="report with the violated bands")
+    out.add_argument("--junit", type=Path, metavar="FILE.xml", help="JUnit XML for CI servers")
+    out.add_argument("--json", type=Path, metavar="FILE.json", help="all figures")
+    out.add_argument("--all", action="store_true", help="list every variable, not only those outside")
+    out.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    command.set_defaults(action=compare)
+
+
+def compare(options: Namespace) -> int:
+    """Compare, tell, write; the exit code. Whatever goes wrong is 2: 1 says that results differ."""
+    from feedsim.errors import FeedsimError
+
+    try:
+        comparisons, durations = _compared(options)
+        code = max(each.exit_code for each in comparisons)
+        from feedsim import report
+
+        report.write_comparison(
+            comparisons, html=options.report, xml=options.junit, json=options.json, durations=durations
+        )
+    except FeedsimError as error:
+        print(f"feedsim: {error}", file=sys.stderr)
+        return 2
+    except Exception:  # a fault of our own must not look like a difference
+        traceback.print_exc()
+        return 2
+    try:
+        if not options.quiet:
+            # Of many pairs those that are the same take one line.
+            full = options.all or len(comparisons) == 1
+            print("\n".join(line for each in comparisons for line in _lines(each, options.all, full)))
+            for line in (*_unused(comparisons, options.tolerances), *_sum(comparisons)):
+                print(line)
+            sys.stdout.flush()
+    except OSError:
+        sys.stdout = None  # who read has gone, or the disk is full; the code still counts
+    for each in comparisons:
+        if each.verdict == "unusable" and options.quiet:
+            print(f"feedsim: {each.result}: {each.line}", file=sys.stderr)
+    return code
+
+
+def _compared(options: Namespace) -> tuple[list[Comparison], list[float]]:
+    from feedsim import report
+    from feedsim.compare import pairs_of, unusable
+    from feedsim.errors import InputError
+
+    pairs = pairs_of(options.files)
+    inputs = [path for pair in pairs for path in pair]
+    inputs += [path for path in (options.tolerances, options.columns, options.reference_columns) if path is not None]
+    report.check_comparison_writable(
+        [path for path in (options.report, options.junit, options.json) if path is not None], inputs
+    )
+    choice = _options(options)
+    found, durations = [], []
+    for result, reference in pairs:
+        begin = perf_counter()
+        try:
+            comparison = _pair(options, choice, result, reference)
+        except InputError as error:
+            comparison = unusable(result, reference, str(error))
+        found.append(comparison)
+        durations.append(perf_counter() - begin)
+    return found, durations
+
+
+def _pair(options: Namespace, choice: Options, result: Path, reference: Path) -> Comparison:
+    from dataclasses import replace
+
+    from feedsim import units
+    from feedsim.cli.compare_record import read_side
+    from feedsim.compare import compare_series, estimated_shift, tolerances_of
+
+    tolerances: Tolerances = tolerances_of(reference, options.tolerances, options.tol)
+    ours = read_side(result, options.time, options.columns, options)
+    theirs = read_side(reference, options.reference_time, options.reference_columns, options)
+    if options.shift == "estimate":
+        most = units.parse(options.max_shift, "s")
+        choice = replace(choice, shift=estimated_shift(ours, theirs, most, choice))
+    return compare_series(ours, theirs, tolerances, choice, names=(str(result), str(reference)))
+
+
+def _options(options: Namespace) -> Options:
+    from feedsim import units
+    from feedsim.compare import Options, Tolerances
+
+    Tolerances.parse(options.tol)  # a typing error is told before anything is read
+    columns = [_halves(text, "--column", "RESULT=REFERENCE") for text in options.column]
+
+    def instant(text: str | None) -> float | None:
+        return None if text is None else units.parse(text, "s", "0.1 s")
+
+    def units_of(texts: list[str], option: str) -> dict[str, str]:
+        pairs = dict(_halves(text, option, "PATTERN=UNIT") for text in texts)
+        for unit in pairs.values():
+            units.unit(unit)
+        return pairs
+
+    return Options(
+        columns=columns,
+        only=options.only,
+        ignore=options.ignore,
+        units=units_of(options.unit, "--unit"),
+        reference_units=units_of(options.reference_unit, "--reference-unit"),
+        hold=options.hold,
+        start=instant(options.start),
+        end=instant(options.end),
+        shift=0.0 if options.shift == "estimate" else instant(options.shift) or 0.0,
+        common=options.common,
+        max_gap=instant(options.max_gap),
+        at=options.at,
+    )
+
+
+def _halves(text: str, option: str, expected: str) -> tuple[str, str]:
+    from feedsim.errors import InputError
+
+    left, equals, right = (part.strip() for part in text.partition("="))
+    if not (left and equals and right):
+        raise InputError(f"{option} {text!r}: {expected} is needed")
+    return left, right
+
+
+def _lines(comparison: Comparison, everything: bool, notes: bool) -> list[str]:
+    """What the terminal shows of a pair; notes: although it is the same."""
+    found = [f"{comparison.result} against {comparison.reference}: {comparison.line}"]
+    if comparison.shift:
+        from feedsim.compare import seconds
+
+        found.append(f"  shifted by {seconds(comparison.shift)}")
+    ranked = sorted(comparison.variables, key=lambda each: (-each.ratio, each.verdict == "same"))
+    shown = [each for each in ranked if everything or each.verdict != "same"]
+    cut = shown if everything else shown[:MOST_LINES]
+    width = max((len(each.name) for each in cut), default=0)
+    found += [f"  {each.name:<{width}}  {_variable_line(each)}" for each in cut]
+    if len(shown) > len(cut):
+        found.append(f"  and {len(shown) - len(cut)} more; --all lists them")
+    return found + [f"  note: {note}" for note in comparison.notes if notes or not comparison.same]
+
+
+def _variable_line(variable: Variable) -> str:
+    outside = f"; outside in {variable.outside} of {variable.rows} rows" if variable.outside else ""
+    return f"{variable.verdict}: {variable.line}{outside}"
+
+
+def _unused(comparisons: list[Comparison], given: Path | None) -> list[str]:
+    """Patterns of a tolerance file that match in none of the references it serves."""
+    from feedsim.compare.files import beside
+
+    by_file: dict[Path, list[set[str]]] = {}
+    for each in comparisons:
+        if (file := given or beside(Path(each.reference))) is not None and each.variables:
+            by_file.setdefault(file, []).append(set(each.unused))
+    return [
+        f"note: {file}: the tolerance for {pattern!r} matches no column"
+        for file, patterns in by_file.items()
+        for pattern in sorted(set.intersection(*patterns))
+    ]
+
+
+def _sum(comparisons: list[Comparison]) -> list[str]:
+    if len(comparisons) == 1:
+        return []
+    counts = [(sum(each.verdict == kind for each in comparisons), kind) for kind in ("same", "different", "unusable")]
+    return [f"{len(comparisons)} comparisons: " + ", ".join(f"{number} {kind}" for number, kind in counts if number)]

@@ -1,0 +1,31 @@
+"""Results against references: a tube of tolerance in value and in time around every variable."""
+
+from feedsim.compare.compare import compare
+from feedsim.compare.files import Clock, compare_files, compare_series, pairs_of, tolerances_of, unusable
+from feedsim.compare.options import Options
+from feedsim.compare.shift import estimated_shift
+from feedsim.compare.tolerance import DEFAULT, Tolerance, Tolerances
+from feedsim.compare.tube import along, bounds
+from feedsim.compare.verdict import EXIT_CODES, Comparison, Curves, Variable, seconds
+
+__all__ = [
+    "DEFAULT",
+    "EXIT_CODES",
+    "Clock",
+    "Comparison",
+    "Curves",
+    "Options",
+    "Tolerance",
+    "Tolerances",
+    "Variable",
+    "along",
+    "bounds",
+    "compare",
+    "compare_files",
+    "compare_series",
+    "estimated_shift",
+    "pairs_of",
+    "seconds",
+    "tolerances_of",
+    "unusable",
+]

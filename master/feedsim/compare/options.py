@@ -1,0 +1,109 @@
+"""Which columns are compared with which, in which units and over which time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from typing import Literal
+
+from feedsim.errors import InputError
+from feedsim.trace.trace import suggest
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a result and a reference are laid over each other.
+
+    columns          (result's name, reference's name); `*` in both: ("plant.*", "*")
+    only, ignore     patterns of reference's names that are compared, and that are not
+    units            pattern -> unit of result's columns whose header does not tell it; reference_units likewise
+    hold             patterns of columns that hold their values between rows
+    start, end       [s] of the reference's time; None: all of it
+    shift            added to the result's time [s]
+    common           columns that the result lacks are left out, not missing
+    max_gap          longest step between rows of the result [s]; None: any
+    at               whose instants are looked at: "result", "reference" (the result is interpolated there), or "auto":
+                     the result's unless the reference has clearly fewer rows, as between its rows it tells nothing
+    """
+
+    columns: Sequence[tuple[str, str]] = ()
+    only: Sequence[str] = ()
+    ignore: Sequence[str] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    reference_units: Mapping[str, str] = field(default_factory=dict)
+    hold: Sequence[str] = ()
+    start: float | None = None
+    end: float | None = None
+    shift: float = 0.0
+    common: bool = False
+    max_gap: float | None = None
+    at: Literal["auto", "result", "reference"] = "auto"
+
+
+def chosen(names: Sequence[str], options: Options) -> list[str]:
+    """Reference's names that are asked for. InputError: a pattern that matches nothing."""
+    for pattern in (*options.only, *options.ignore):
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise InputError(f"the reference has no column {pattern!r}{suggest(pattern, names)}")
+    return [name for name in names if (not options.only or _any(name, options.only)) and not _any(name, options.ignore)]
+
+
+def sources(result: Sequence[str], reference: Sequence[str], options: Options) -> dict[str, str]:
+    """Reference's name -> the result's column that is compared with it.
+
+    InputError: a renaming that matches nothing, or gives two columns one name.
+    """
+    found: dict[str, str] = {}
+    for theirs, ours in options.columns:
+        pattern, target = _renaming(theirs, ours)
+        renamed = {match.expand(target): name for name in result if (match := pattern.fullmatch(name))}
+        if not renamed:
+            raise InputError(f"--column {theirs}={ours}: the result has no column {theirs!r}{suggest(theirs, result)}")
+        if "*" not in ours and ours not in reference:
+            raise InputError(
+                f"--column {theirs}={ours}: the reference has no column {ours!r}{suggest(ours, reference)}"
+            )
+        for name, source in renamed.items():
+            if found.get(name, source) != source:
+                raise InputError(f"--column: both {found[name]!r} and {source!r} of the result would be {name!r}")
+            found[name] = source
+    return {name: found.get(name, name) for name in reference if name in found or name in result}
+
+
+def missing(name: str, result: Sequence[str]) -> str:
+    """That a reference's column is not in the result, and what could be meant."""
+    alike = [each for each in result if re.fullmatch(rf".*[.:/|]{re.escape(name)}", each)]
+    if len(alike) == 1:
+        prefix = alike[0].removesuffix(name)
+        return f"the result has no column {name!r}; is it {alike[0]!r}? Then --column '{prefix}*=*'"
+    return f"the result has no column {name!r}{suggest(name, result)}"
+
+
+def unit_of(name: str, units: Mapping[str, str]) -> str:
+    """Unit that is given for a column; "" without."""
+    return next((unit for pattern, unit in reversed(list(units.items())) if fnmatchcase(name, pattern)), "")
+
+
+def unmatched(patterns: Iterable[str], names: Sequence[str]) -> list[str]:
+    """Patterns that match no name."""
+    return [pattern for pattern in patterns if not any(fnmatchcase(name, pattern) for name in names)]
+
+
+def _any(name: str, patterns: Iterable[str]) -> bool:
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _renaming(theirs: str, ours: str) -> tuple[re.Pattern[str], str]:
+    """Pattern of the result's names and what the reference calls them."""
+    if theirs.count("*") != ours.count("*"):
+        raise InputError(f"--column {theirs}={ours}: as many * on either side are needed")
+    if not theirs or not ours:
+        raise InputError(f"--column {theirs}={ours}: RESULT=REFERENCE is needed, for example plant.*=*")
+    pattern = "(.*)".join(re.escape(part) for part in theirs.split("*"))
+    parts = ours.split("*")
+    target = parts[0].replace("\\", r"\\") + "".join(
+        rf"\g<{i}>" + part.replace("\\", r"\\") for i, part in enumerate(parts[1:], 1)
+    )
+    return re.compile(pattern), target

@@ -1,0 +1,254 @@
+"""An SSP file -> scenario, program and archives that feedsim runs: the same as where the file came from."""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feedsim import units
+from feedsim.cosim.unit import Archive
+from feedsim.errors import InputError
+from feedsim.nc import Program, Recorded, Segment, plan
+from feedsim.nc.program import LONGEST
+from feedsim.scenario import Scenario, load
+from feedsim.ssp import archive, rebuilt, system_structure
+from feedsim.ssp.described import RECORDINGS, STRUCTURE
+from feedsim.ssp.pack import SETPOINTS_IN_ARCHIVE, Table, read_setpoints
+from feedsim.ssp.rebuilt import Parts
+from feedsim.ssp.roles import roles
+from feedsim.ssp.system_structure import Structure
+from feedsim.ssp.values import values
+from feedsim.structure.build import SAME_POSITION
+from feedsim.structure.pack import MODES_IN_ARCHIVE
+
+SUFFIX = ".ssp"
+WHOLE = 1e-6  # of a position cycle: a stop time this little behind an instant of the grid lies on it
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """What an SSP file asks for.
+
+    Attributes:
+        path: the SSP file.
+        program: the setpoints of the file's own table; its segments are the motions, where the annotation tells them.
+        fmus: folder with the file's own archives.
+        warnings: what a user should know, a sentence each.
+    """
+
+    scenario: Scenario
+    program: Program
+    path: Path
+    fmus: Path
+    warnings: tuple[str, ...]
+
+    def told(self, warnings: Iterable[str]) -> tuple[str, ...]:
+        """The file's own warnings and those of a run of it, which then speak of the file as well."""
+        return (*self.warnings, *(_named(warning, self.path, self.fmus) for warning in warnings))
+
+
+def is_ssp(path: Path) -> bool:
+    """Whether a file is meant as an SSP, by its name."""
+    return path.suffix.lower() == SUFFIX
+
+
+@contextmanager
+def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
+    """Read and check an SSP; what it unpacks to is removed when the block ends.
+
+    `overrides`: KEY=VALUE as for a scenario, for all but the motions, which the file has as setpoints.
+
+    Raises:
+        InputError: not a readable SSP, or not of the units of Fig. 2; lists what is wrong.
+    """
+    files = archive.read(path)
+    structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
+    with tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True) as name, ExitStack() as stack:
+        folder = Path(name)
+        archives = _archives(structure, files, folder, path, stack)
+        found = roles(structure, archives, str(path))
+        table = _table(archives[found.setpoint], f"{path}: {found.setpoint}")
+        parts = Parts(found, archives, values(structure, files, archives, str(path)), table)
+        if problems := rebuilt.faults(parts, str(path)):
+            raise InputError.of(str(path), problems)
+        own = rebuilt.annotation(structure.scenario, files, str(path))
+        _lay_out(folder, files, parts, path)
+        program = _sampled(parts, structure, path)
+        with _own_names(path, folder):
+            scenario, program, warnings = _with_motions(parts, own, program, path, folder, overrides)
+            yield Opened(scenario, program, path, folder, (*_jumps(scenario, program, path), *warnings))
+
+
+def _archives(
+    structure: Structure, files: Mapping[str, bytes], folder: Path, path: Path, stack: ExitStack
+) -> dict[str, Archive]:
+    """Component -> its archive, one for each source."""
+    problems: list[str] = []
+    by_source: dict[str, Archive] = {}
+    for component in structure.components:
+        source = component.source
+        if source in by_source:
+            continue
+        if archive.leads_out(source) or source not in files:
+            problems.append(f"{path}: component {component.name}: its source {source!r} is not in the file")
+            continue
+        unpacked = folder / "archives" / f"{len(by_source)}_{Path(source).name}"
+        unpacked.parent.mkdir(exist_ok=True)
+        unpacked.write_bytes(files[source])
+        try:
+            by_source[source] = stack.enter_context(Archive(unpacked))
+        except InputError as error:
+            problems.append(str(error).replace(str(unpacked), f"{path}: {source}"))
+    if not structure.components:
+        problems.append(f"{path}: {archive.STRUCTURE} has no components")
+    if problems:
+        raise InputError.of(str(path), problems)
+    return {component.name: by_source[component.source] for component in structure.components}
+
+
+def _table(setpoint: Archive, where: str) -> Table:
+    try:
+        content = (setpoint.directory / SETPOINTS_IN_ARCHIVE).read_bytes()
+    except OSError:
+        raise InputError(f"{where}: its archive has no {SETPOINTS_IN_ARCHIVE}") from None
+    return read_setpoints(content, f"{where}: {SETPOINTS_IN_ARCHIVE}")
+
+
+def _lay_out(folder: Path, files: Mapping[str, bytes], parts: Parts, path: Path) -> None:
+    """Put archives, modes, setpoints and recordings where the scenario's data look for them."""
+    roles = parts.roles
+    first = {
+        "plant": roles.plant,
+        "controller": next(iter(roles.controllers.values())),
+        "friction": next(iter(roles.frictions.values())),
+    }
+    for kind, component in first.items():
+        parts.archives[component].path.replace(folder / f"{kind}.fmu")
+    inside = {rebuilt.MODES: (roles.plant, MODES_IN_ARCHIVE), rebuilt.SETPOINTS: (roles.setpoint, SETPOINTS_IN_ARCHIVE)}
+    for name, (component, place) in inside.items():
+        try:
+            (folder / name).write_bytes((parts.archives[component].directory / place).read_bytes())
+        except OSError:
+            raise InputError(f"{path}: {component}: its archive has no {place}") from None
+    for name, content in files.items():
+        if name == STRUCTURE or name.startswith(f"{RECORDINGS}/"):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)
+
+
+def _sampled(parts: Parts, structure: Structure, path: Path) -> Program:
+    """What the controllers see of the setpoints: the rows at their position cycle, from start to stop."""
+    table, T_pos = parts.table, parts.T_pos
+    last = float(table.time[-1]) if structure.stop is None else structure.stop - structure.start
+    cycles = np.ceil(last / T_pos - WHOLE)
+    if not 1 <= cycles <= LONGEST:
+        raise InputError(f"{path}: it lasts {last:.6g} s, {cycles:.6g} position cycles; allowed: 1 to {LONGEST}")
+    time = np.arange(int(cycles) + 1, dtype=np.float64) * T_pos
+    rows = table.rows(time)
+    names = parts.roles.setpoints
+    return Program(
+        time,
+        {axis: table.x_s[name][rows] for axis, name in names.items()},
+        {axis: table.n_ffw[name][rows] for axis, name in names.items()},
+    )
+
+
+def _with_motions(
+    parts: Parts, own: Mapping[str, Any] | None, program: Program, path: Path, folder: Path, overrides: Sequence[str]
+) -> tuple[Scenario, Program, tuple[str, ...]]:
+    """The scenario, and the program with the annotation's motions as its segments, if they are those of the table."""
+    warnings: list[str] = []
+    if own is not None and "motions" in own:
+        before = _load(rebuilt.scenario_data(parts, own, path.stem, motions=True), folder, path)
+        planned = _planned(before, program)
+        if planned is not None and _same(planned.x_s, program.x_s):
+            scenario = _load(rebuilt.scenario_data(parts, own, path.stem, motions=True), folder, path, overrides)
+            changed = _planned(scenario, program) if overrides else planned
+            if changed is None or not (_same(changed.x_s, planned.x_s) and _same(changed.n_ffw, planned.n_ffw)):
+                raise InputError(
+                    f"{path}: {', '.join(f'--set {text}' for text in overrides)}: would change the setpoints, which "
+                    "the file has as a table; change the scenario and export it anew (feedsim ssp)"
+                )
+            _check_cycles(scenario, parts, path)
+            return scenario, Program(program.time, program.x_s, program.n_ffw, planned.segments), ()
+        warnings.append(
+            f"{path.name}: its setpoints are not those of the motions that it tells: they run as recorded ones, and "
+            "what was to be evaluated is not"
+        )
+    scenario = _load(rebuilt.scenario_data(parts, own, path.stem, motions=False), folder, path, overrides)
+    _check_cycles(scenario, parts, path)
+    axes = parts.roles.axes
+    segment = Segment(
+        kind="setpoints",
+        index=0,
+        start=0.0,
+        end=program.duration,
+        description=f"setpoints of {parts.roles.setpoint} in {path.name}",
+        origin={axis: float(program.x_s[axis][0]) for axis in axes},
+        target={axis: float(program.x_s[axis][-1]) for axis in axes},
+        axes=tuple(axis for axis in axes if np.any(program.x_s[axis] != program.x_s[axis][0])),
+        geometry=Recorded(begin=0.0, end=program.duration, file=path, axes=axes),
+    )
+    return scenario, Program(program.time, program.x_s, program.n_ffw, (segment,)), tuple(warnings)
+
+
+def _jumps(scenario: Scenario, program: Program, path: Path) -> list[str]:
+    """Warnings about axes that do not stand where their setpoints begin."""
+    return [
+        f"{path.name}: axis {axis} stands at {units.show(x_0, 'm')}, its setpoints begin at "
+        f"{units.show(float(program.x_s[axis][0]), 'm')}: it jumps there at once"
+        for axis, x_0 in scenario.machine.pose.items()
+        if abs(float(program.x_s[axis][0]) - x_0) > SAME_POSITION
+    ]
+
+
+def _check_cycles(scenario: Scenario, parts: Parts, path: Path) -> None:
+    if scenario.machine.cycles.T_pos != parts.T_pos or tuple(scenario.machine.axes) != parts.roles.axes:
+        raise InputError(f"{path}: neither axes nor position cycle can be changed: the file has a table of setpoints")
+
+
+def _load(data: Mapping[str, Any], folder: Path, path: Path, overrides: Sequence[str] = ()) -> Scenario:
+    file = folder / "scenario.yaml"
+    file.write_text(json.dumps(data, ensure_ascii=False, indent=1), encoding="utf-8")
+    scenario = load(file, overrides)
+    scenario._file, scenario._files = path, (("", path),)
+    scenario._origins = {place: _named(where, path, folder) for place, where in scenario._origins.items()}
+    return scenario
+
+
+def _planned(scenario: Scenario, program: Program) -> Program | None:
+    """The scenario's own setpoints, from where the table begins; None where its motions cannot be driven."""
+    pose = {axis: float(x_s[0]) for axis, x_s in program.x_s.items()}
+    try:
+        machine = scenario.machine.model_copy(update={"pose": pose})
+        return plan(scenario.model_copy(update={"machine": machine}))
+    except InputError:
+        return None
+
+
+def _same(some: Mapping[str, Any], others: Mapping[str, Any]) -> bool:
+    return set(some) == set(others) and all(np.array_equal(some[axis], others[axis]) for axis in some)
+
+
+@contextmanager
+def _own_names(path: Path, folder: Path) -> Iterator[None]:
+    """Let errors speak of the SSP, not of the folder that it was unpacked to."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(
+            _named(str(error), path, folder), [_named(problem, path, folder) for problem in error.problems]
+        ) from None
+
+
+def _named(text: str, path: Path, folder: Path) -> str:
+    text = re.sub(rf"{re.escape(str(folder / 'scenario.yaml'))}(:\d+)?", lambda _: str(path), text)
+    return text.replace(str(folder / "x")[:-1], f"{path}: ")

@@ -1,0 +1,198 @@
+"""A scenario's data from what an SSP holds: parameters of the units, and the annotation for what they cannot know."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from math import inf, nextafter, pi
+from typing import Any
+
+import numpy as np
+
+from feedsim.cosim.unit import Archive
+from feedsim.errors import InputError
+from feedsim.scenario.machine import FILTER_TYPES
+from feedsim.ssp.described import RECORDINGS, STRUCTURE
+from feedsim.ssp.pack import Table
+from feedsim.ssp.parameter_set import Value
+from feedsim.ssp.roles import Roles
+from feedsim.ssp.values import start_value
+
+FILTER_NAMES = {number: name for name, number in reversed(FILTER_TYPES.items())}
+MODES, SETPOINTS = "modes.csv", "setpoints.csv"  # beside the scenario's data
+# What the annotation may tell at its top.
+OWN_KEYS = ("name", "note", "machine", "motions", "coupling", "recording", "logging", "evaluate")
+MARGIN = 1e-3  # m, that an axis may travel beyond its setpoints where nobody tells how far
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The components' archives and parameters, by role."""
+
+    roles: Roles
+    archives: Mapping[str, Archive]
+    values: Mapping[str, Mapping[str, Value]]
+    table: Table
+
+    @property
+    def T_c(self) -> float:
+        return float(self._control("T_c"))
+
+    @property
+    def T_pos(self) -> float:
+        return float(self._control("T_pos"))
+
+    def _control(self, name: str) -> Value:
+        return self.values[next(iter(self.roles.controllers.values()))][name]
+
+
+def faults(parts: Parts, where: str) -> list[str]:
+    """What does not fit together although each part is right."""
+    roles, values = parts.roles, parts.values
+    found = []
+    for name in ("T_c", "T_pos"):
+        given = {control: values[control][name] for control in roles.controllers.values()}
+        if len(set(given.values())) > 1:
+            said = ", ".join(f"{control} {value!r} s" for control, value in given.items())
+            found.append(f"{where}: the controllers differ in {name}: {said}; all axes have one cycle here")
+    plant = values[roles.plant]
+    if plant.get("modes_file"):
+        found.append(f"{where}: {roles.plant}.modes_file: the modes are those inside plant.fmu; name no other file")
+    for axis, name in roles.setpoints.items():
+        if name not in parts.table.x_s:
+            found.append(f"{where}: axis {axis}: {roles.setpoint} has no setpoints of an axis {name!r}")
+    for kind in (roles.controllers, roles.frictions):
+        guids = {parts.archives[name].guid for name in kind.values()}
+        if len(guids) > 1:
+            found.append(f"{where}: {', '.join(kind.values())} are made from different archives ({', '.join(guids)})")
+    return found
+
+
+def annotation(text: str | None, files: Collection[str], where: str) -> dict[str, Any] | None:
+    """Data of the annotation; None where there is none. `files`: names of what the SSP holds.
+
+    Raises:
+        InputError: it is not what feedsim writes, or names a recording that the SSP does not hold.
+    """
+    if text is None:
+        return None
+    what = f"{where}: the annotation feedsim.scenario"
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise InputError(f"{what} is not readable JSON: {error}") from None
+    except RecursionError:
+        raise InputError(f"{what} is nested too deeply") from None
+    machine = data.get("machine") if isinstance(data, dict) else None
+    axes = machine.get("axes") if isinstance(machine, dict) else None
+    groups = [axes, machine.get("cycles"), machine.get("path")] if isinstance(machine, dict) else [None]
+    if not all(isinstance(group, dict) for group in (*groups, *(axes.values() if isinstance(axes, dict) else ()))):
+        raise InputError(f"{what} has no machine with cycles, path and axes")
+    unknown = [key for key in data if key not in OWN_KEYS]
+    motions = data.get("motions", [])
+    recordings = [motion["file"] for motion in motions if isinstance(motion, dict) and "file" in motion]
+    missing = [name for name in recordings if name not in files or not str(name).startswith(f"{RECORDINGS}/")]
+    if unknown or missing:
+        told = [f"{what} has the unknown key {key!r}" for key in unknown]
+        raise InputError.of(
+            what, told + [f"{what} names the recording {name!r}, which is not in it" for name in missing]
+        )
+    found: dict[str, Any] = data
+    return found
+
+
+def scenario_data(parts: Parts, own: Mapping[str, Any] | None, name: str, *, motions: bool) -> dict[str, Any]:
+    """Data of a scenario file. `own`: of the annotation. `motions`: whether its motions and evaluation are taken over,
+    or else the setpoints stand as recorded ones."""
+    roles = parts.roles
+    own = dict(own or {})
+    told = own.get("machine", {})
+    if not motions or "motions" not in own:
+        columns = {axis: {"column": f"{setpoint}.x_s"} for axis, setpoint in roles.setpoints.items()}
+        own["motions"] = [{"kind": "setpoints", "file": SETPOINTS, "columns": columns}]
+        own["evaluate"] = []
+    plant = parts.values[roles.plant]
+    axes = {}
+    for axis in roles.axes:
+        axes[axis] = _axis(parts, axis, told.get("axes", {}).get(axis, {}))
+    machine = {
+        "name": told.get("name", name),
+        "note": told.get("note", ""),
+        "modes": MODES,
+        "plant": "plant.fmu",
+        "pose": {axis: f"{plant[f'{axis}.x_0']!r} m" for axis in roles.axes},
+        "cycles": {"control": f"{parts.T_c!r} s", "position": f"{parts.T_pos!r} s"}
+        | told.get("cycles", {"interpolation": f"{parts.T_pos!r} s"}),
+        "path": told.get("path", {"jerk": "1000 m/s^3", "acceleration": "100 m/s^2"}),
+        "axes": axes,
+    }
+    if told.get("structure") == STRUCTURE:
+        machine["structure"] = STRUCTURE
+    return {**own, "name": own.get("name", name), "machine": machine}
+
+
+def _axis(parts: Parts, axis: str, told: Mapping[str, Any]) -> dict[str, Any]:
+    roles = parts.roles
+    control, contact = roles.controllers[axis], roles.frictions[axis]
+    plant = parts.values[roles.plant]
+    drive = _group(parts, control, leave=("T_c", "T_pos", "I_P"))
+    for key, inner in drive.items():
+        if key.startswith("filter_") and isinstance(inner, dict):
+            inner["type"] = FILTER_NAMES.get(inner["type"], inner["type"])
+            if inner["type"] == "off":  # what it would be is no part of the machine, unless somebody said so
+                started = {
+                    name: start_value(parts.archives[control], f"{key}.{name}") for name in inner if name != "type"
+                }
+                for name, value in started.items():
+                    if parts.values[control][f"{key}.{name}"] == value:
+                        del inner[name]
+    limits = _limits(parts.table, roles.setpoints[axis], float(plant[f"{axis}.x_0"]))
+    identified = told.get("friction", {})
+    return {
+        **limits,
+        **{key: value for key, value in told.items() if key in (*limits, "display_sign")},
+        "pitch": _pitch(float(parts.values[control]["I_P"]), told.get("pitch")),
+        "constant_load": f"{plant[f'{axis}.M_0']!r} N.m",
+        "drive": drive,
+        "friction": {**_group(parts, contact), **identified},
+    }
+
+
+def _group(parts: Parts, component: str, leave: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Parameters of a component as a machine file has them: nested, with their units."""
+    archive, group = parts.archives[component], dict[str, Any]()
+    for name, value in parts.values[component].items():
+        if name in leave:
+            continue
+        unit = archive.unit_of(name)
+        place = group
+        *above, last = name.split(".")
+        for key in above:
+            place = place.setdefault(key, {})
+        place[last] = f"{value!r} {unit}" if isinstance(value, float) and unit != "1" else value
+    return group
+
+
+def _pitch(I_P: float, told: Any) -> str:
+    """A pitch whose lead is I_P [m/rad] to the last bit, if there is one; the one that was told, where it still is."""
+    near = 2 * pi * I_P
+    candidates = [near, nextafter(near, inf), nextafter(near, -inf)]
+    if isinstance(told, str):
+        with suppress(ValueError):
+            candidates.insert(0, float(told.removesuffix(" m")))
+    best = min(candidates, key=lambda pitch: abs(pitch / (2 * pi) - I_P))
+    return f"{best!r} m"
+
+
+def _limits(table: Table, setpoint: str, x_0: float) -> dict[str, Any]:
+    """Limits of an axis that nobody tells: those that its setpoints reach."""
+    x_s = np.append(table.x_s[setpoint], x_0)
+    speed = np.abs(np.diff(x_s[:-1])) / table.cycle
+    acceleration = np.abs(np.diff(x_s[:-1], 2)) / table.cycle**2
+    return {
+        "travel": [f"{float(x_s.min()) - MARGIN!r} m", f"{float(x_s.max()) + MARGIN!r} m"],
+        "max_speed": f"{max(float(speed.max(initial=0.0)), 1e-3)!r} m/s",
+        "max_acceleration": f"{max(float(acceleration.max(initial=0.0)), 1e-3)!r} m/s^2",
+    }

@@ -1,0 +1,115 @@
+"""Every unit of the descriptions against pint: base units, factors, and the way a value goes to its display unit."""
+
+import math
+import re
+import shutil
+from pathlib import Path
+
+import pint
+import pytest
+
+from fmu.unpacked import Archive
+
+BASE = {"kg": "kilogram", "m": "meter", "s": "second", "A": "ampere", "rad": "radian"}
+
+
+class Registry:
+    """pint's own definitions and none of ours, but for the angle, which is a dimension as FMI has it: pint takes a
+    radian for the number 1, and 1 Hz for 1/s."""
+
+    def __init__(self, folder: Path) -> None:
+        shipped = Path(pint.__file__).parent
+        text = (shipped / "default_en.txt").read_text(encoding="utf-8")
+        for line, instead in (
+            ("radian = []", "radian = [angle]"),
+            ("hertz = 1 / second", "hertz = revolution / second"),
+        ):
+            assert text.count(line) == 1
+            text = text.replace(line, instead)
+        (folder / "units.txt").write_text(text, encoding="utf-8")
+        shutil.copy(shipped / "constants_en.txt", folder)
+        self.registry: pint.UnitRegistry[float] = pint.UnitRegistry(folder / "units.txt")
+
+    def quantity(self, unit: str, value: float = 1.0) -> "pint.Quantity[float]":
+        text = re.sub(r"(?<=[A-Za-z)])(?=\d)", "**", unit).replace(".", "*").replace("%", "percent")
+        text = text.replace("Ohm", "ohm")
+        return self.registry.Quantity(value, self.registry.parse_units(text) if text != "1" else "dimensionless")
+
+
+@pytest.fixture(scope="module")
+def registry(tmp_path_factory: pytest.TempPathFactory) -> Registry:
+    return Registry(tmp_path_factory.mktemp("pint"))
+
+
+def test_registry_keeps_angles_apart(registry: Registry) -> None:
+    assert registry.quantity("Hz").to("rad/s").magnitude == pytest.approx(2 * math.pi, rel=1e-15)
+    for angular in ("Hz", "rpm", "rad/s"):
+        with pytest.raises(pint.DimensionalityError):
+            registry.quantity(angular).to("1/s")
+
+
+def test_base_units_are_those_of_pint(archive: Archive, registry: Registry) -> None:
+    units = archive.description.findall("UnitDefinitions/Unit")
+    assert units
+    for unit in units:
+        base = unit.find("BaseUnit")
+        assert base is not None
+        found = {BASE[name]: int(power) for name, power in base.attrib.items() if name not in ("factor", "offset")}
+        expected = registry.quantity(unit.attrib["name"]).to_base_units()
+        exponents = {str(name): int(power) for name, power in dict(expected.unit_items()).items() if power}
+        assert found == exponents, unit.attrib["name"]
+        # pint rounds at every step of a conversion.
+        assert float(base.get("factor", "1")) == pytest.approx(expected.magnitude, rel=1e-14), unit.attrib["name"]
+        assert float(base.get("offset", "0")) == 0.0
+
+
+def test_display_units_are_those_of_pint(archive: Archive, registry: Registry) -> None:
+    """FMI 2.0.5, 2.2.2: value in the display unit = factor * value in the unit + offset."""
+    pairs = 0
+    for unit in archive.description.iterfind("UnitDefinitions/Unit"):
+        for display in unit.iterfind("DisplayUnit"):
+            factor, offset = float(display.attrib["factor"]), float(display.get("offset", "0"))
+            for value in (0.0, 0.7):
+                expected = (
+                    registry.quantity(unit.attrib["name"], value)
+                    .to(registry.quantity(display.attrib["name"]).units)
+                    .magnitude
+                )
+                assert factor * value + offset == pytest.approx(expected, rel=1e-14, abs=0), display.attrib["name"]
+            pairs += 1
+    assert pairs >= {"plant": 4, "controller": 7, "friction": 3, "setpoint": 2}[archive.unit]
+
+
+# What a person at a machine calls these quantities. SI units that are read as they are need no other.
+PEOPLES = {
+    "m": {"mm", "um", "nm"},
+    "rad": {"deg"},
+    "rad/s": {"rpm", "rad/s"},
+    "s": {"ms", "us", "s"},
+    "1/s": {"(m/min)/mm"},
+    "m/rad": {"mm/rad"},
+    "J": {"uJ"},
+    "H": {"mH"},
+    "1": {"1", "%"},
+}
+
+
+def test_values_are_shown_in_units_that_people_use(archive: Archive) -> None:
+    for name, element in archive.variables().items():
+        if element[0].tag == "Real":
+            unit = element[0].attrib["unit"]
+            assert element[0].get("displayUnit", unit) in PEOPLES.get(unit, {unit}), name
+
+
+def test_first_display_unit_is_the_one_that_most_variables_have(archive: Archive) -> None:
+    """FMPy's plots show all values of a unit in its first display unit: axis positions are in mm then, not in um."""
+    shown = [each[0].attrib for each in archive.variables().values() if each[0].tag == "Real"]
+    for unit in archive.description.iterfind("UnitDefinitions/Unit"):
+        names = [display.attrib["name"] for display in unit.iterfind("DisplayUnit")]
+        used = [
+            sum(each["unit"] == unit.attrib["name"] and each.get("displayUnit") == n for each in shown) for n in names
+        ]
+        assert used == sorted(used, reverse=True)
+        assert 0 not in used
+        if unit.attrib["name"] in ("m", "s"):
+            assert names[0] in ("mm", "ms"), names

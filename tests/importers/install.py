@@ -1,0 +1,74 @@
+"""Fetch what `make test-importers` needs beyond pip: Java and Maven (apt, as root only), Maestro and VDMCheck2 (Maven).
+
+    python tests/importers/install.py FOLDER
+
+What cannot be had is said, and is no failure: its tests are skipped with the reason.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from zipfile import ZipFile
+
+POM = Path(__file__).with_name("pom.xml")
+MAESTRO = "maestro-3.1.1-jar-with-dependencies.jar"
+# VDMCheck2 looks for its parts beside itself, under names without versions.
+VDMCHECK = ("vdmcheck2-1.1.3", "vdmj-4.5.0", "annotations-4.5.0", "xsd2vdm-1.1.3", "fmuReader-1.1.3")
+UNPACKED = {
+    "rule-model-1.1.3": "fmi2-rule-model/",
+    "static-model-1.1.3": "fmi2-static-model/",
+    "vdmcheck2-1.1.3": "fmi2schema/",
+}
+PACKAGES = {"java": "default-jre-headless", "mvn": "maven"}
+
+
+def main(folder: Path) -> int:
+    jars, vdmcheck = folder / "jars", folder / "vdmcheck"
+    needed = ["java"] if _complete(folder) else list(PACKAGES)
+    if any(not shutil.which(program) for program in needed):
+        _apt(needed)
+    if missing := [program for program in needed if not shutil.which(program)]:
+        return _left_out(f"{' and '.join(missing)} not found (Debian: {' '.join(PACKAGES[name] for name in missing)})")
+    if not _complete(folder):
+        jars.mkdir(parents=True, exist_ok=True)
+        goal = ("dependency:copy-dependencies", f"-DoutputDirectory={jars.resolve()}")
+        done = subprocess.run(["mvn", "-q", "-B", "-f", str(POM), *goal], capture_output=True, text=True)
+        if done.returncode:
+            return _left_out("Maven could not fetch them:\n" + (done.stdout + done.stderr).strip()[-500:])
+        _lay_out(jars, vdmcheck)
+        shutil.move(jars / MAESTRO, folder / MAESTRO)
+    return 0
+
+
+def _complete(folder: Path) -> bool:
+    return (folder / MAESTRO).is_file() and all((folder / "vdmcheck" / part).is_dir() for part in UNPACKED.values())
+
+
+def _apt(programs: list[str]) -> None:
+    """Debian's packages, where they may be installed."""
+    if shutil.which("apt-get") and hasattr(os, "geteuid") and os.geteuid() == 0:
+        wanted = [package for program, package in PACKAGES.items() if program in programs]
+        subprocess.run(["apt-get", "-qq", "update"], check=False)
+        subprocess.run(["apt-get", "-qq", "install", "-y", "--no-install-recommends", *wanted], check=False)
+
+
+def _lay_out(jars: Path, vdmcheck: Path) -> None:
+    vdmcheck.mkdir(exist_ok=True)
+    for name in VDMCHECK:
+        shutil.copy(jars / f"{name}.jar", vdmcheck / f"{name.rpartition('-')[0]}.jar")
+    for name, part in UNPACKED.items():
+        with ZipFile(jars / f"{name}.jar") as archive:
+            archive.extractall(vdmcheck, [member for member in archive.namelist() if member.startswith(part)])
+
+
+def _left_out(reason: str) -> int:
+    print(f"left out: Maestro and VDMCheck2: {reason}", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

@@ -1,0 +1,265 @@
+"""feedsim compare as a user and a CI server meet it: exit codes, what is told, report, JUnit XML, JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from compare_helpers import changed, wave, written
+from feedsim.cli import main
+from feedsim.trace import Series
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def reference(tmp_path: Path) -> Path:
+    return written(tmp_path / "reference.csv", wave())
+
+
+@pytest.fixture
+def off(tmp_path: Path) -> Path:
+    """Position 5 um off around 0.5 s, and no flag."""
+    whole = wave()
+    near = (whole.time > 0.45) & (whole.time < 0.55)
+    bump = changed(whole, Z__x_a=whole["Z.x_a"] + 5e-6 * near * np.cos(10 * np.pi * (whole.time - 0.5)))
+    return written(
+        tmp_path / "off.csv",
+        Series(bump.time, {n: bump[n] for n in ("Z.x_a", "Z.M_a")}, {"Z.x_a": "m", "Z.M_a": "N.m"}),
+    )
+
+
+def run(*words: str | Path) -> int:
+    return main(["compare", *map(str, words)])
+
+
+def test_exit_codes(reference: Path, off: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(reference, reference, "--tol", "0") == 0
+    assert "same: 3 variables" in capsys.readouterr().out
+    assert run(off, reference, "--common", "--tol", "*.x_a=6 um") == 0
+    assert run(off, reference, "--common", "--tol", "*.x_a=4 um") == 1
+    out = capsys.readouterr().out
+    assert "worst Z.x_a: off by 5e-06 m at 0.5 s, allowed 4e-06 m" in out
+    assert run(off, reference) == 1
+    assert "missing: Z.limited" in capsys.readouterr().out
+    assert run(tmp_path / "nix.csv", reference) == 2
+    assert run(off, reference, "--tol", "*.x_a=1 N.m", "--common") == 2
+    assert "unit 'N.m' is that of a torque" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--tol", "Z.x_a=2 furlong"], "unknown unit 'furlong'"),
+        (["--tol", "Z.x_a="], "no tolerance"),
+        (["--tolerances", "nix.yaml"], "nix.yaml"),
+        (["--column", "a"], "RESULT=REFERENCE is needed"),
+        (["--column", "a=Z.x_a"], "the result has no column 'a'"),
+        (["--only", "Y.*"], "the reference has no column 'Y.*'"),
+        (["--unit", "Z.x_a=parsec"], "unknown unit"),
+        (["--from", "1"], "has no unit"),
+        (["--from", "5 s"], "do not overlap"),
+        (["--shift", "3 mm"], "is a length"),
+        (["--time", "clock"], "no column 'clock'"),
+    ],
+)
+def test_options_that_are_wrong(
+    reference: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """2, and what is wrong is told; never 1."""
+    assert run(reference, reference, *words) == 2
+    told = capsys.readouterr()
+    assert message in told.out + told.err
+    assert "Traceback" not in told.err
+
+
+def test_usage_errors_and_faults_of_our_own_are_unusable(
+    reference: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(reference) == 2
+    with pytest.raises(SystemExit) as left:
+        run(reference, reference, "--nonsense")
+    assert left.value.code == 2
+    import feedsim.compare
+
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("a fault of our own")
+
+    monkeypatch.setattr(feedsim.compare, "compare_series", broken)
+    assert run(reference, reference) == 2
+    assert "a fault of our own" in capsys.readouterr().err
+
+
+def test_outputs_never_replace_inputs(reference: Path, off: Path, tmp_path: Path) -> None:
+    before = reference.read_bytes()
+    assert run(off, reference, "--report", reference) == 2
+    assert run(off, reference, "--junit", off) == 2
+    assert run(off, reference, "--junit", tmp_path / "x", "--json", tmp_path / "x") == 2
+    assert run(off, reference, "--report", tmp_path) == 2
+    assert reference.read_bytes() == before
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_reader_that_goes_away_does_not_change_the_code(reference: Path, off: Path) -> None:
+    reads, writes = os.pipe()
+    os.close(reads)
+    done = subprocess.run(
+        [sys.executable, "-c", "from feedsim.cli import entry; entry()", "compare", str(off), str(reference)],
+        env={**os.environ, "PYTHONPATH": str(ROOT / "master")}, stdout=writes, stderr=subprocess.PIPE, check=False,
+    )  # fmt: skip
+    os.close(writes)
+    assert (done.returncode, done.stderr) == (1, b"")
+
+
+def test_report(reference: Path, off: Path, tmp_path: Path) -> None:
+    report = tmp_path / "made" / "out.html"
+    assert run(off, reference, "--tol", "*.x_a=4 um", "--report", report, "--quiet") == 1
+    text = report.read_text(encoding="utf-8")
+    assert "<h1>Comparison: different</h1>" in text
+    assert '<figure id="comparison-1">' in text
+    assert "http://" not in text.replace("http://www.w3.org", "")
+    tiles = text[text.index('class="keys"') : text.index("</header>")]
+    for part in ("Z.x_a", "5×10⁻⁶", "4×10⁻⁶", "0.5"):
+        assert part in tiles
+    assert "the result has no column &#x27;Z.limited&#x27;" in text
+    same = tmp_path / "same.html"
+    assert run(reference, reference, "--report", same) == 0
+    assert "<h1>Comparison: same</h1>" in same.read_text(encoding="utf-8")
+
+
+def test_junit(reference: Path, off: Path, tmp_path: Path) -> None:
+    """What GitHub, GitLab and Jenkins read: testsuites, testsuite, testcase with classname and name, failure, error."""
+    xml = tmp_path / "out.xml"
+    nix = tmp_path / "nix.csv"
+    assert run(off, reference, reference, reference, nix, reference, "--tol", "1e-9", "--junit", xml, "--quiet") == 2
+    root = ElementTree.parse(xml).getroot()
+    assert root.tag == "testsuites"
+    assert len(root) == 3
+    totals = {"tests": 0, "failures": 0, "errors": 0}
+    for suite in root:
+        assert suite.tag == "testsuite"
+        assert {each.tag for each in suite} <= {"testcase", "system-out"}
+        cases = suite.findall("testcase")
+        assert all(case.get("name") and case.get("classname") and float(case.get("time", "x")) >= 0 for case in cases)
+        assert len({case.get("name") for case in cases}) == len(cases)
+        counts = {
+            "tests": len(cases),
+            "failures": len(suite.findall("testcase/failure")),
+            "errors": len(suite.findall("testcase/error")),
+        }
+        for name, count in counts.items():
+            assert suite.get(name) == str(count)
+            totals[name] += count
+    assert {name: int(root.get(name, "")) for name in totals} == totals
+    assert totals == {"tests": 4 + 4 + 1, "failures": 2, "errors": 1}
+    failures = {case.get("name"): case.find("failure") for case in root[0].findall("testcase")}
+    worst = failures["Z.x_a"]
+    assert worst is not None
+    assert "off by 5e-06 m at 0.5 s" in worst.get("message", "")
+    assert "outside in" in (worst.text or "")
+    assert failures["Z.limited"] is not None
+    assert failures["Z.M_a"] is None
+
+
+def test_json(reference: Path, off: Path, tmp_path: Path) -> None:
+    file = tmp_path / "out.json"
+    assert run(off, reference, "--json", file, "--tol", "0", "--quiet") == 1
+    found = json.loads(file.read_text(encoding="utf-8"))
+    assert found["verdict"] == "different"
+    (pair,) = found["comparisons"]
+    assert pair["worst"] == "Z.x_a"
+    x = pair["variables"][0]
+    assert (x["name"], x["verdict"], x["time"], x["allowed"]) == ("Z.x_a", "different", 0.5, 0.0)
+    assert x["deviation"] == pytest.approx(5e-6, abs=1e-16)
+    assert x["ratio"] is None  # infinite
+
+
+def test_folders(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    results, references = tmp_path / "results", tmp_path / "references"
+    for name in ("a.csv", "b.csv", "c.csv"):
+        written(references / name, wave())
+    written(results / "a.csv", wave())
+    written(results / "b.csv", changed(wave(), Z__M_a=wave()["Z.M_a"] + 0.02))
+    assert run(results, references) == 2
+    assert "3 comparisons: 1 same, 1 different, 1 unusable" in capsys.readouterr().out
+    written(results / "c.csv", wave())
+    report = tmp_path / "out.html"
+    assert run(results, references, "--report", report) == 1
+    text = report.read_text(encoding="utf-8")
+    assert "3 comparisons: different" in text
+    assert text.count("<figure") == 1
+    (references / "b.tolerances.yaml").write_text("variables: {'*.M_a': 0.1 N.m}", encoding="utf-8")
+    assert run(results, references) == 0
+
+
+def test_another_tools_columns_units_and_time(reference: Path, tmp_path: Path) -> None:
+    whole = wave()
+    theirs = Series(
+        whole.time * 1e3 + 2.5,
+        {"plant::Z.x_a": 1e3 * whole["Z.x_a"], "plant::Z.M_a": whole["Z.M_a"], "plant::Z.limited": whole["Z.limited"]},
+    )
+    heads = ["k_T", "plant::Z.x_a[REAL]", "plant::Z.M_a[REAL]", "plant::Z.limited[BOOL]"]
+    result = written(tmp_path / "tool.csv", theirs, heads=heads, separator=";")
+    words = ["--time", "k_T:ms", "--column", "plant::*=*", "--unit", "plant::*.x_a=mm", "--tol", "1e-9"]
+    assert run(result, reference, *words) == 1
+    assert run(result, reference, *words, "--shift", "-2.5 ms") == 0
+    assert run(result, reference, *words, "--ignore", "*.limited", "--shift", "estimate", "--tol", "1e-6") == 0
+
+
+def test_a_run_against_a_measured_record(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A drive's record with a mapping: scale in mm, current in A, a clock of its own."""
+    h, late = 1e-3, 0.0123
+    time = np.arange(2001) * h
+    x = 0.1 + 0.05 * np.sin(2 * np.pi * (time - late))
+    i_q = 3.0 * np.cos(2 * np.pi * (time - late)) / 2.0
+    mapping = tmp_path / "columns.yaml"
+    mapping.write_text(
+        "time: {column: t, unit: ms}\nposition: {column: enc, unit: mm}\ncurrent: {column: iq, unit: A, sign: -1}\n"
+        "pitch: 20 mm\ntorque_constant: 2 N.m/A\n",
+        encoding="utf-8",
+    )
+    record = tmp_path / "record.mat"
+    savemat(record, {"t": 1e3 * time, "enc": 1e3 * x, "iq": -i_q})
+    result = written(tmp_path / "result.csv", wave(4001))
+    words = [result, record, "--reference-columns", mapping, "--axis", "Z", "--tol", "1e-4"]
+    assert run(*words) == 1
+    capsys.readouterr()
+    assert run(*words, "--shift", "estimate") == 0
+    out = capsys.readouterr().out
+    assert "same: 2 variables" in out
+    assert "shifted by 12.3" in out
+    assert run(result, record) == 2
+    assert "a MAT file needs a mapping" in capsys.readouterr().out
+
+
+def test_rules_that_match_nothing_are_told(reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of the command line at once; of a file that serves several references only where it matches in none of them."""
+    assert run(reference, reference, "--tol", "Y.*=1 nm") == 0
+    assert "note: the tolerance for 'Y.*' matches no column" in capsys.readouterr().out
+    whole = wave()
+    other = written(tmp_path / "other.csv", Series(whole.time, {"Z.x_a": whole["Z.x_a"]}, {"Z.x_a": "m"}))
+    (tmp_path / "tolerances.yaml").write_text("variables: {'*.M_a': 1 N.m, 'Y.*': 1 nm}", encoding="utf-8")
+    assert run(reference, reference, other, other) == 0
+    out = capsys.readouterr().out
+    assert "tolerances.yaml: the tolerance for 'Y.*' matches no column" in out
+    assert "M_a'" not in out
+    assert "2 comparisons: 2 same" in out
+
+
+@pytest.mark.parametrize("unit", ["friction", "controller"])
+def test_the_script_for_integrators(unit: str, fmus: Path, tmp_path: Path) -> None:
+    """docs/comparing.md: the references in an archive through FMPy, with the tolerances that lie beside them."""
+    document = (ROOT / "docs" / "comparing.md").read_text(encoding="utf-8")
+    script = document.split("## In your own CI")[1].split("```python\n")[1].split("```")[0]
+    (tmp_path / "simulate.py").write_text(script, encoding="utf-8")
+    words = [str(fmus / f"{unit}.fmu"), f"references/{unit}", f"results/{unit}"]
+    subprocess.run([sys.executable, "simulate.py", *words], cwd=tmp_path, check=True, capture_output=True)
+    assert run(tmp_path / "results", tmp_path / "references") == 0

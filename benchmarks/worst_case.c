@@ -5,13 +5,15 @@
  * SCRIPT holds words: guid, resources (a URI, or -), h, steps; count of parameters and reference, value of each; count
  * of inputs and their references; then a row of values of the inputs per instant 0 .. steps, linear in between.
  *
- * MODE time      Runs the whole script REPEATS times from the same saved state and prints, per step, the shortest time
- * in ns: what the operating system does to a step differs from run to run, what the step does itself does not. A last
- * line holds median, 99.99th percentile and maximum of all steps of all runs. MODE cold      The same, caches filled
- * with something else ahead of every step that the file INDICES lists; prints the shortest times of those. MODE count
- * Runs once, the steps of INDICES through measured_step(), for callgrind to count instructions there. MODE confined
- * Runs once with all system calls but read and write forbidden (seccomp, strict: the process would be killed), and
- * prints how often the unit asked for memory. Linux only. */
+ * - time: runs the whole script REPEATS times from the same saved state and prints, per step, the shortest time in ns:
+ *   what the operating system does to a step differs from run to run, what the step does itself does not. A last line
+ *   holds median, 99.99th percentile and maximum of all steps of all runs, then median and maximum of the shortest
+ *   times, per step, that setting the inputs and their slopes took.
+ * - cold: the same, caches filled with something else ahead of every step that the file INDICES lists; prints the
+ *   shortest times of those.
+ * - count: runs once, the steps of INDICES through measured_step(), for callgrind to count instructions there.
+ * - confined: runs once with all system calls but read and write forbidden (seccomp, strict: the process would be
+ *   killed), and prints how often the unit asked for memory. Linux only. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdio.h>
@@ -186,8 +188,8 @@ static void fill_caches(unsigned char *memory) {
 static void time_steps(size_t repeats, const unsigned char *marks, unsigned char *flush) {
     fmi2FMUstate start = NULL;
     double *shortest = calloc(steps, sizeof *shortest), clock_cost = 1e9;
-    float *all = calloc(steps * repeats, sizeof *all);
-    if (shortest == NULL || all == NULL || save(unit, &start) != fmi2OK)
+    float *all = calloc(steps * repeats, sizeof *all), *setting = calloc(steps, sizeof *setting);
+    if (shortest == NULL || all == NULL || setting == NULL || save(unit, &start) != fmi2OK)
         fail("memory");
     for (int i = 0; i < 100000; i++) {
         const double begun = now_ns(), cost = now_ns() - begun;
@@ -198,7 +200,11 @@ static void time_steps(size_t repeats, const unsigned char *marks, unsigned char
         if (restore(unit, start) != fmi2OK)
             fail("fmi2SetFMUstate");
         for (size_t k = 0; k < steps; k++) {
+            const double set_out = now_ns();
             drive(k);
+            const float set_for = (float)(now_ns() - set_out - clock_cost);
+            if (r == 0 || set_for < setting[k])
+                setting[k] = set_for;
             if (flush != NULL && marks[k])
                 fill_caches(flush);
             const double begun = now_ns();
@@ -216,8 +222,9 @@ static void time_steps(size_t repeats, const unsigned char *marks, unsigned char
             printf("%zu %.0f\n", k, shortest[k]);
     const size_t count = steps * repeats;
     qsort(all, count, sizeof *all, ascending);
-    printf("all %.0f %.0f %.0f\n", (double)all[count / 2], (double)all[(size_t)((double)count * 0.9999)],
-           (double)all[count - 1]);
+    qsort(setting, steps, sizeof *setting, ascending);
+    printf("all %.0f %.0f %.0f %.0f %.0f\n", (double)all[count / 2], (double)all[(size_t)((double)count * 0.9999)],
+           (double)all[count - 1], (double)setting[steps / 2], (double)setting[steps - 1]);
 }
 
 static void run_confined(size_t repeats) {

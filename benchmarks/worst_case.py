@@ -1,11 +1,13 @@
 """Worst-case time of a unit's doStep, for real-time targets: demanding cases, the operating system's share taken out.
 
-Run by ``make worst-case``. Figures are of one machine; the instruction counts (where valgrind is installed) repeat
-exactly on any machine with the same binary.
+Run by ``make worst-case``; with ``--fifo CORE`` (Linux, with the right to it) the measuring program runs on that core
+with real-time priority (SCHED_FIFO), as a real-time target would have it. Figures are of one machine; the instruction
+counts (where valgrind is installed) repeat exactly on any machine with the same binary.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import platform
 import re
@@ -15,7 +17,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -51,14 +53,15 @@ class Case:
 
 @dataclass(frozen=True)
 class Cost:
-    """Times [ns] of one step: of all steps of all runs, of the slowest step by its shortest time over the runs."""
+    """Times [ns] of one step: of all steps of all runs, and of single steps by their shortest time over the runs."""
 
     median: float
     percentile: float  # 99.99 %
-    largest: float  # as it was, operating system included
+    largest: float  # longest that was observed, operating system included
     first: float  # the first step of a new instance, which computes what the step size needs; shortest of some starts
-    worst: float  # slowest other step
-    cold: float  # slowest with cold caches
+    worst: float  # largest of the other steps' shortest times
+    cold: float  # the same with cold caches
+    setting: tuple[float, float]  # inputs and slopes ahead of a step: median and largest of the shortest times
     instructions: tuple[int, int] | None  # of a usual step (median of some drawn at random) and of the slowest
 
 
@@ -138,9 +141,18 @@ def library(archive: Archive, unit: str) -> Path:
     return archive.directory / "binaries" / fmpy.platform / f"{unit}{fmpy.sharedLibraryExtension}"
 
 
-def run(program: Path, mode: str, binary: Path, script: Path, repeats: int, indices: Path | None = None) -> list[str]:
-    """What worst_case prints, by lines."""
-    command = [str(program), mode, str(binary), str(script), str(repeats), *([str(indices)] if indices else [])]
+def run(
+    program: Path,
+    mode: str,
+    binary: Path,
+    script: Path,
+    repeats: int,
+    indices: Path | None = None,
+    prefix: Sequence[str] = (),
+) -> list[str]:
+    """What worst_case prints, by lines. `prefix`: words of a command that runs it."""
+    words = [str(program), mode, str(binary), str(script), str(repeats), *([str(indices)] if indices else [])]
+    command = [*prefix, *words]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
 
 
@@ -164,15 +176,15 @@ def _instructions(program: Path, binary: Path, script: Path, indices: Path, fold
     return [counts[key] for key in sorted(counts)]
 
 
-def measure(program: Path, case: Case, folder: Path) -> Cost:
+def measure(program: Path, case: Case, folder: Path, prefix: Sequence[str] = ()) -> Cost:
     """Run the case in every mode."""
     with Archive(case.archive or cosim.fmus_directory() / f"{case.unit}.fmu") as archive:
         script, binary, marked = folder / "script.txt", library(archive, case.unit), folder / "indices.txt"
         write_script(script, case, archive)
-        lines = run(program, "time", binary, script, REPEATS)
+        lines = run(program, "time", binary, script, REPEATS, prefix=prefix)
         times = _times(lines)
-        first = min(_times(run(program, "time", binary, script, 1))[0] for _ in range(COLD))
-        median, percentile, largest = map(float, lines[-1].split()[1:])
+        first = min(_times(run(program, "time", binary, script, 1, prefix=prefix))[0] for _ in range(COLD))
+        median, percentile, largest, *setting = map(float, lines[-1].split()[1:])
         slowest = sorted(range(1, STEPS), key=lambda k: -times[k])[:SELECTED]
         usual = np.random.default_rng(1).choice(np.arange(1, STEPS), SELECTED, replace=False).tolist()
 
@@ -180,12 +192,13 @@ def measure(program: Path, case: Case, folder: Path) -> Cost:
             marked.write_text("\n".join(map(str, sorted(set(steps)))) + "\n", encoding="ascii")
             return marked
 
-        cold = max(_times(run(program, "cold", binary, script, COLD, mark(slowest + usual))).values())
+        cold_lines = run(program, "cold", binary, script, COLD, mark(slowest + usual), prefix)
         instructions = None
         if shutil.which("valgrind"):
             counted = [_instructions(program, binary, script, mark(steps), folder) for steps in (usual, slowest)]
             instructions = int(statistics.median(counted[0])), max(counted[0] + counted[1])
-    return Cost(median, percentile, largest, first, times[slowest[0]], cold, instructions)
+    cold = max(_times(cold_lines).values())
+    return Cost(median, percentile, largest, first, times[slowest[0]], cold, (setting[0], setting[1]), instructions)
 
 
 def cases(folder: Path) -> list[Case]:
@@ -201,6 +214,10 @@ def cases(folder: Path) -> list[Case]:
 
 
 def main() -> int:
+    parser = argparse.ArgumentParser(description="Worst-case time of a unit's doStep.")
+    parser.add_argument("--fifo", type=int, metavar="CORE", help="measure on this core with real-time priority")
+    core = parser.parse_args().fifo
+    prefix = [] if core is None else ["taskset", "-c", str(core), "chrt", "-f", "50"]
     with tempfile.TemporaryDirectory(prefix="feedsim-") as name:
         folder = Path(name)
         program = compile_harness(ROOT / "build" / "bench")
@@ -208,17 +225,19 @@ def main() -> int:
             f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores; {STEPS} steps of 125 us, {REPEATS} runs"
         )
         print(
-            "\n| unit | case | median | 99.99 % | longest of all | first step | worst step | ... with cold caches |",
+            "\n| unit | case | all steps: median | 99.99 % | longest observed | largest of the steps' shortest times "
+            "| ... with cold caches | first step | setting the inputs, median and largest |",
             end="",
         )
-        print(" instructions, usual and most |\n|---|---|---|---|---|---|---|---|---|")
+        print(" instructions, usual and most |\n|---|---|---|---|---|---|---|---|---|---|")
         for case in cases(folder):
             print(f"{case.unit}: {case.name}", end="\r", file=sys.stderr, flush=True)
-            cost = measure(program, case, folder)
-            times = (cost.median, cost.percentile, cost.largest, cost.first, cost.worst, cost.cold)
+            cost = measure(program, case, folder, prefix)
+            times = (cost.median, cost.percentile, cost.largest, cost.worst, cost.cold, cost.first)
+            setting = ", ".join(f"{time / 1e3:.2f} us" for time in cost.setting) if case.inputs else "-"
             counted = "-" if cost.instructions is None else "{:,}, {:,}".format(*cost.instructions)
             cells = " | ".join(f"{time / 1e3:.2f} us" for time in times)
-            print(f"| {case.unit} | {case.name} | {cells} | {counted} |", flush=True)
+            print(f"| {case.unit} | {case.name} | {cells} | {setting} | {counted} |", flush=True)
     return 0
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
 
-from feedsim import analysis, cosim, scenario
+from feedsim import analysis, cli, cosim, scenario, ssp
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = sorted(
@@ -22,6 +23,28 @@ def test_relative_links_exist(document: Path) -> None:
     for target in re.findall(r"\]\(([^)#\s]+)", document.read_text(encoding="utf-8")):
         if "://" not in target:
             assert (document.parent / target).exists(), f"{document.name} links to {target}"
+
+
+def test_commands_of_the_page_on_ssp_files(fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What they run is only opened, with what they set; one file, the smaller one, serves all."""
+    page = (ROOT / "docs" / "ssp.md").read_text(encoding="utf-8")
+    commands = [shlex.split(found) for found in re.findall(r"(?m)(?:^|`)feedsim ((?:ssp|run) [^`\n]*)", page)]
+    assert {command[0] for command in commands} == {"ssp", "run"}
+    assert sum("--set" in command for command in commands) == 2
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios", target_is_directory=True)
+    written = tmp_path / "z_positioning.ssp"
+    assert cli.main(["ssp", "scenarios/z_positioning.yaml", "--out", str(written)]) == 0
+    for command in commands:
+        options = cli.parser().parse_args(command)
+        if command[0] == "ssp":
+            scenario.load(options.scenario, options.overrides)
+            options.out.symlink_to(written)
+            continue
+        if options.scenario.name == "x.ssp":  # what the page calls any such file
+            options.scenario = written
+        with ssp.opened(options.scenario, options.overrides) as found:
+            assert found.scenario.machine.axes
 
 
 def test_figures_of_the_readme(fmus: Path) -> None:

@@ -123,6 +123,7 @@ KINDS = {
 }
 
 DIMENSIONLESS = "1"
+LONGEST_NUMBER = 1100  # characters; every double, written out, has less
 LONGEST = 60  # characters of a unit
 
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -247,7 +248,9 @@ def article(kind: str) -> str:
 
 
 def finite(number: str) -> float:
-    """The double nearest to `number`; InputError where it overflows."""
+    """The double nearest to `number`; InputError where it overflows, or has more digits than any double needs."""
+    if len(number) > LONGEST_NUMBER:
+        raise InputError(f"{number[:20]}... has {len(number)} characters; a number has at most {LONGEST_NUMBER}")
     value = float(number)
     if not isfinite(value):
         raise InputError(f"{number} is too large (largest is about 1.8e308)")

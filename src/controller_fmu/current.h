@@ -10,8 +10,6 @@
 #ifndef FEEDSIM_CURRENT_H
 #define FEEDSIM_CURRENT_H
 
-#include <stdbool.h>
-
 #include "pmsm.h"
 #include "prefix.h"
 
@@ -28,7 +26,7 @@ typedef struct CurrentController {
 typedef struct CurrentState {
     double I_d, I_q; /* integral parts [V] */
     double u_d, u_q; /* limited voltage computed at the last instant, for the cycle after the present one [V] */
-    bool limited;    /* at the last instant */
+    int limited;     /* at the last instant; 0 or not, see speed.h */
 } CurrentState;
 
 /* K_p [V/A] >= 0, T_n [s] > 0, amplitude limit u_max [V] >= 0, cycle T_c [s]. */

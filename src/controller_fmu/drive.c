@@ -8,19 +8,55 @@ void drive_layout(Drive *p) {
     p->samples = p->speed_ring + (size_t)p->measured_speed.window.length;
 }
 
-/* The past before the first instant: setpoint and axis stood at their first values, everything else was at rest. It is
- * made here and not at the start, because importers may set the first inputs as late as before the first step. */
+/* The past before the first instant with release: setpoint and axis stood at their present values, everything else was
+ * at rest. It is made here and not at the start, because importers may set the first inputs as late as before the first
+ * step. */
 static void begin(const Drive *p, DriveState *x, double *lines, const DriveInputs *in) {
     position_start(&p->position, &x->position, lines + p->x_ring, lines + p->n_ring, in->x_s);
     reference_model_start(&p->reference_model, &x->reference_model, lines + p->reference_ring, 0.0);
-    measured_speed_start(&p->measured_speed, &x->speed_newest, lines + p->speed_ring, in->x_a);
+    if (!x->measured) {
+        measured_speed_start(&p->measured_speed, &x->speed_newest, lines + p->speed_ring, in->x_a);
+    }
+    x->released = 1;
+    x->measured = 1;
 }
 
-void drive_instant(const Drive *p, DriveState *x, double *lines, const DriveInputs *in) {
-    if (x->instant == 0) {
-        begin(p, x, lines, in);
+/* An instant without release: no torque, all memory but that of the measurement as before the first instant. */
+static void rest(const Drive *p, DriveState *x, double *lines, const DriveInputs *in) {
+    x->released = 0;
+    if (x->measured) {
+        measured_speed_step(&p->measured_speed, &x->speed_newest, lines + p->speed_ring, in->x_a, in->n_a);
     }
-    if (x->tick == 0) {
+    x->position.x_e = in->x_s - in->x_a;
+    x->n_s = 0.0;
+    x->n_ref = 0.0;
+    x->M_s = 0.0;
+    x->ramp = (SetpointRampState){0};
+    x->speed = (SpeedState){0};
+    x->current = (CurrentState){0};
+    for (int32_t i = 0; i < p->filters; ++i) {
+        x->filter[i] = (BiquadState){0};
+    }
+    x->left = x->right;
+    x->right = (DriveEnd){0};
+    if (p->ideal_current_loop) {
+        x->left = x->right;
+        return;
+    }
+    /* Where no current flows the motor's terminals show its electromotive force. It is also what acts in the first
+     * cycle with release, for which nothing was computed: a motor that turns would else get a torque from it. */
+    x->current.u_q = p->motor.p * in->n_a * p->motor.psi;
+    x->u_d = 0.0;
+    x->u_q = x->current.u_q;
+}
+
+static void control(const Drive *p, DriveState *x, double *lines, const DriveInputs *in) {
+    bool position_too = x->tick == 0;
+    if (!x->released) {
+        begin(p, x, lines, in);
+        position_too = true;
+    }
+    if (position_too) {
         setpoint_ramp_take(&x->ramp, position_step(&p->position, &x->position, lines + p->x_ring, lines + p->n_ring,
                                                    in->x_s, in->n_ffw, in->x_a));
     }
@@ -44,6 +80,14 @@ void drive_instant(const Drive *p, DriveState *x, double *lines, const DriveInpu
         current_step(&p->current, &x->current, &p->motor, &x->left.i, M / p->K_t, in->n_a);
         pmsm_step(&p->motor, &x->right.i, x->u_d, x->u_q, in->n_a, p->T_c);
         x->right.M_a = pmsm_torque(&p->motor, &x->right.i);
+    }
+}
+
+void drive_instant(const Drive *p, DriveState *x, double *lines, const DriveInputs *in) {
+    if (in->release) {
+        control(p, x, lines, in);
+    } else {
+        rest(p, x, lines, in);
     }
     ++x->instant;
     x->tick = x->tick + 1 < p->ticks ? x->tick + 1 : 0;

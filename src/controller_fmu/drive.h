@@ -4,7 +4,15 @@
  *     -> current PI -> one T_c of computing delay -> motor -> M_a(t_k+1)
  *
  * M_a is linear over the cycle from M_a(t_k) to M_a(t_k+1). With an ideal current loop the filtered torque setpoint of
- * t_k acts at once and is held over the cycle. Memory is the caller's and pointer-free: a DriveState, and behind it
+ * t_k acts at once and is held over the cycle.
+ *
+ * Without release there is no torque: M_a runs to 0 within the cycle (at once with an ideal current loop), integrators,
+ * filters and speed setpoint are 0. When the release comes, the drive begins as at its first instant, whatever it did
+ * before: x_s is taken to have stood at its present value. The position controller works at that very instant, in place
+ * of the last one of its grid, which then goes on; so a release that comes a few cycles into a position cycle leaves no
+ * trace but those cycles. Positions for the speed from the scale are kept on, as an encoder does.
+ *
+ * Memory is the caller's and pointer-free: a DriveState, and behind it
  * p->samples doubles for the delay lines. No FMI, no time: the caller counts the instants. */
 #ifndef FEEDSIM_DRIVE_H
 #define FEEDSIM_DRIVE_H
@@ -53,6 +61,7 @@ typedef struct DriveInputs {
     double n_a;   /* measured motor speed [rad/s] */
     double n_add; /* excitation on the speed setpoint [rad/s] */
     double M_add; /* excitation on the torque setpoint [N.m] */
+    bool release; /* controller enable */
 } DriveInputs;
 
 /* What holds at one end of a cycle. */
@@ -77,6 +86,8 @@ typedef struct DriveState {
     SpeedState speed;
     BiquadState filter[FILTERS];
     CurrentState current;
+    int released; /* at the last instant; 0 or not, see speed.h */
+    int measured; /* positions are kept for the speed: since the first release; 0 or not */
 } DriveState;
 
 /* Place the delay lines of a Drive whose blocks are filled in. */

@@ -1,6 +1,6 @@
 /* controller: position, speed and current control of one feed axis, with its synchronous motor.
  *
- *   inputs   x_s n_ffw (taken over every T_pos), x_a n_a n_add M_add (every T_c)
+ *   inputs   x_s n_ffw (taken over every T_pos), x_a n_a n_add M_add release (every T_c)
  *   output   M_a, linear over a control cycle; the rest are observables
  *
  * Equations, symbols and units stand in the headers of the blocks: position.h (delay.h, lag.h), setpoint_ramp.h,
@@ -30,6 +30,9 @@
 
 /* More instants in one step are taken for a mistake: the unit would not come back for minutes. */
 #define MOST_INSTANTS 1e9
+
+/* Instants are counted up to here, where doubles can still tell them apart; 285 years of the shortest cycle. */
+#define MOST_COUNTED ((int64_t)1 << 53)
 
 /* An end of a step so close to the end of a cycle [T_c] is the end of the cycle. */
 #define ROUNDING 1e-6
@@ -111,6 +114,17 @@ static void derive_blocks(const Scalars *v, Drive *p) {
     p->motor.psi = pmsm_flux_linkage(v->K_t, v->p);
 }
 
+static bool derive_drive(Unit *unit, const Scalars *v, Drive *p) {
+    bool cycles = derive_cycles(unit, v, p);
+    bool filters = derive_filters(unit, v, p);
+    if (!cycles || !filters) {
+        return false;
+    }
+    derive_blocks(v, p);
+    drive_layout(p);
+    return true;
+}
+
 static bool derive(Unit *unit) {
     Drive *p = unit_derived(unit);
     if (p == NULL) {
@@ -120,15 +134,7 @@ static bool derive(Unit *unit) {
         }
         unit_set_derived(unit, p);
     }
-    const Scalars *v = unit_scalars(unit);
-    bool cycles = derive_cycles(unit, v, p);
-    bool filters = derive_filters(unit, v, p);
-    if (!cycles || !filters) {
-        return false;
-    }
-    derive_blocks(v, p);
-    drive_layout(p);
-    return true;
+    return derive_drive(unit, unit_scalars(unit), p);
 }
 
 static size_t state_size(const Unit *unit) {
@@ -141,6 +147,37 @@ static void release(Unit *unit) {
     unit_set_derived(unit, NULL);
 }
 
+/* The counts of a saved state, within what the parameters saved with it make of them. */
+static bool accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size) {
+    Drive p;
+    if (!derive_drive(unit, scalars, &p)) {
+        return false;
+    }
+    if (size < sizeof(State)) {
+        return unit_fail(unit, "the state holds %.0f bytes of model state, without delay lines alone it has %.0f",
+                         (double)size, (double)sizeof(State));
+    }
+    const DriveState *x = &((const State *)state)->drive;
+    const struct {
+        const char *name;
+        int64_t value, end;
+    } counts[] = {
+        {"sample instant", x->instant, MOST_COUNTED},
+        {"cycle within T_pos", x->tick, p.ticks},
+        {"place in the delay line of x_s", x->position.x_newest, p.position.x_delay.length},
+        {"place in the delay line of n_ffw", x->position.n_newest, p.position.n_delay.length},
+        {"place in the delay line of T_ref", x->reference_model.newest, p.reference_model.dead_time.length},
+        {"place in the delay line of speed_window", x->speed_newest, p.measured_speed.window.length},
+    };
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
+        if (counts[i].value < 0 || counts[i].value >= counts[i].end) {
+            return unit_fail(unit, "the state is out of range: %s is %.0f; allowed is 0 to %.0f", counts[i].name,
+                             (double)counts[i].value, (double)(counts[i].end - 1));
+        }
+    }
+    return true;
+}
+
 /* --- time --------------------------------------------------------------------------------------------------------- */
 
 /* What the outputs show that belong to the last instant. */
@@ -151,8 +188,8 @@ static void show_instant(Scalars *v, const DriveState *x) {
     v->M_s = x->M_s;
     v->u_d = x->u_d;
     v->u_q = x->u_q;
-    v->torque_limited = x->speed.limited;
-    v->voltage_limited = x->current.limited;
+    v->torque_limited = x->speed.limited != 0;
+    v->voltage_limited = x->current.limited != 0;
 }
 
 /* What runs linearly over the cycle, at `share` [1] of it. */
@@ -214,7 +251,8 @@ static bool step(Unit *unit, double t, double h) {
                                 .x_a = v->x_a + slope.x_a * since,
                                 .n_a = v->n_a + slope.n_a * since,
                                 .n_add = v->n_add + slope.n_add * since,
-                                .M_add = v->M_add + slope.M_add * since};
+                                .M_add = v->M_add + slope.M_add * since,
+                                .release = v->release != 0};
         drive_instant(p, x, state->lines, &in);
         t_k = start_time + (double)x->instant * p->T_c;
     }
@@ -259,6 +297,7 @@ const Model MODEL = {.identifier = "controller",
                      .load = NULL,
                      .derive = derive,
                      .state_size = state_size,
+                     .accepts = accepts,
                      .start = start,
                      .step = step,
                      .output_derivative = output_derivative,

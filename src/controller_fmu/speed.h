@@ -26,8 +26,8 @@ typedef struct SpeedController {
 } SpeedController;
 
 typedef struct SpeedState {
-    double I;     /* integral part [N.m] */
-    bool limited; /* at the last instant */
+    double I;    /* integral part [N.m] */
+    int limited; /* at the last instant; 0 or not: any bytes of a saved state are an int, few a bool */
 } SpeedState;
 
 /* K_p [N.m.s/rad] >= 0, T_n [s] > 0, cycle T_c [s], M_max [N.m] >= 0; integrator false: P controller. */

@@ -66,12 +66,12 @@ bool csv_next_cell(CsvRow *row, CsvCell *cell) {
     while (end > start && csv_blank(end[-1])) {
         end--;
     }
-    *cell = (CsvCell){start, (int)(end - start)};
+    *cell = (CsvCell){start, (size_t)(end - start)};
     return true;
 }
 
 bool csv_equal(CsvCell cell, const char *text) {
-    return strlen(text) == (size_t)cell.length && memcmp(text, cell.text, (size_t)cell.length) == 0;
+    return strlen(text) == cell.length && memcmp(text, cell.text, cell.length) == 0;
 }
 
 bool csv_number(CsvCell cell, double *value) {

@@ -28,7 +28,7 @@ typedef struct CsvRow {
 
 typedef struct CsvCell {
     const char *text;
-    int length;
+    size_t length;
 } CsvCell;
 
 /* A table of `size` bytes, which a zero byte closes (not counted). */

@@ -49,6 +49,7 @@
 #define values_find PREFIXED(values_find)
 #define values_name PREFIXED(values_name)
 #define values_arrays PREFIXED(values_arrays)
+#define values_sound PREFIXED(values_sound)
 #define values_get_real PREFIXED(values_get_real)
 #define values_set_real PREFIXED(values_set_real)
 #define values_get_whole PREFIXED(values_get_whole)

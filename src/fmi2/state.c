@@ -1,9 +1,12 @@
 #include "state.h"
 
 #include <ctype.h>
+#include <math.h>
 #include <string.h>
 
 #include "log.h"
+#include "numbers.h"
+#include "values.h"
 
 #define MAGIC "FEEDSIM"
 #define FORMAT 1u
@@ -149,6 +152,48 @@ bool state_serialize(Unit *unit, const Snapshot *snapshot, fmi2Byte bytes[], siz
     return true;
 }
 
+/* --- what came from outside: the checksum finds damage, these what was never saved by a unit */
+
+static bool header_sound(Unit *unit, const Header *header) {
+    char text[2][NUMBER_TEXT_SIZE];
+    if (header->phase >= PHASE_COUNT)
+        return unit_fail(unit, "the serialized state is damaged: it is in phase %lu of %d",
+                         (unsigned long)header->phase, PHASE_COUNT);
+    if (header->stale && header->phase > PHASE_INITIALIZATION)
+        return unit_fail(unit, "the serialized state is damaged: initialised (phase %lu), but without initial values",
+                         (unsigned long)header->phase);
+    if (header->last_step != fmi2OK && header->last_step != fmi2Error)
+        return unit_fail(unit, "the serialized state is damaged: no step ends with status %lu",
+                         (unsigned long)header->last_step);
+    if (!isfinite(header->start_time) || !isfinite(header->time) || isnan(header->stop_time))
+        return unit_fail(unit, "the serialized state is damaged: started at %s s, it stands at %s s%s",
+                         number_text(text[0], header->start_time), number_text(text[1], header->time),
+                         isnan(header->stop_time) ? " and stops at nan s" : "");
+    return true;
+}
+
+static bool slopes_sound(Unit *unit, const Header *header, const unsigned char *block) {
+    for (size_t i = 0; i < unit->input_count; i++) {
+        double slope;
+        memcpy(&slope, block + unit->slopes_at + unit->inputs[i] * sizeof slope, sizeof slope);
+        const bool none = !(slope < 0 || slope > 0);
+        if (!isfinite(slope) || !(none || header->sloped)) {
+            char name[VARIABLE_NAME_SIZE], text[NUMBER_TEXT_SIZE];
+            return unit_fail(unit, "the slope of input '%s' is %s; allowed is a finite one, and 0 where none was set",
+                             values_name(unit, &unit->variables[unit->inputs[i]], name), number_text(text, slope));
+        }
+    }
+    return true;
+}
+
+static bool block_sound(Unit *unit, const unsigned char *block) {
+    Header header;
+    memcpy(&header, block, sizeof header);
+    /* Results may be anything where a step has failed, or the making of initial values. */
+    const bool results = header.phase != PHASE_FAILED && !header.stale;
+    return header_sound(unit, &header) && values_sound(unit, block, results) && slopes_sound(unit, &header, block);
+}
+
 bool state_deserialize(Unit *unit, const fmi2Byte bytes[], size_t size, Snapshot **snapshot) {
     if (*snapshot != NULL && !state_known(unit, *snapshot))
         return false;
@@ -169,11 +214,8 @@ bool state_deserialize(Unit *unit, const fmi2Byte bytes[], size_t size, Snapshot
         return unit_fail(unit, "the serialized state is damaged: checksum %s, its heading says %s",
                          hash_text(text[0], found), hash_text(text[1], heading.checksum));
     }
-    Header header;
-    memcpy(&header, bytes + sizeof heading, sizeof header);
-    if (header.phase >= PHASE_COUNT)
-        return unit_fail(unit, "the serialized state is damaged: it is in phase %lu of %d", (unsigned long)header.phase,
-                         PHASE_COUNT);
+    if (!block_sound(unit, (const unsigned char *)bytes + sizeof heading))
+        return false;
     if (!allot(unit, snapshot, (size_t)heading.size))
         return false;
     memcpy(*snapshot, bytes, (size_t)heading.size);

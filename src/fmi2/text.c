@@ -27,10 +27,16 @@ static bool may_follow(char lead, char second) {
     return !(a == 0xE0 && b < 0xA0) && !(a == 0xED && b > 0x9F) && !(a == 0xF0 && b < 0x90) && !(a == 0xF4 && b > 0x8F);
 }
 
+/* ASCII's, and those of two bytes, U+0080 to U+009F. */
+static bool controls(const char *text) {
+    const unsigned char c = (unsigned char)text[0];
+    return c < 0x20 || c == 0x7F || (c == 0xC2 && (unsigned char)text[1] < 0xA0 && follows(text[1]));
+}
+
 void text_mend(char *text) {
     while (*text != '\0') {
         const int bytes = bytes_of(*text);
-        int found = bytes > 0;
+        int found = bytes > 0 && !controls(text);
         while (found > 0 && found < bytes && follows(text[found]) && (found > 1 || may_follow(text[0], text[1])))
             found++;
         if (found == bytes && bytes > 0) {

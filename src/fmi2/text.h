@@ -10,8 +10,9 @@
  * and need not be closed by a zero byte. */
 size_t text_whole(const char *text, size_t size, size_t length);
 
-/* Make a text sound UTF-8 in place: a character that the end cuts off is dropped, other bytes that belong to no
- * character (files in other encodings have them) become question marks. Importers may refuse to print anything else. */
+/* Make a text sound UTF-8 of characters that can be shown, in place: a character that the end cuts off is dropped,
+ * other bytes that belong to no character (files in other encodings have them) and control characters become question
+ * marks. Importers may refuse to print the former, terminals obey the latter. */
 void text_mend(char *text);
 
 #endif

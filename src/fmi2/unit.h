@@ -86,8 +86,9 @@ typedef struct Model {
     size_t (*state_size)(const Unit *unit);
 
     /* Whether a saved model state, state[size] made with the variables `scalars`, belongs to the data that derive()
-     * finds for them; false with the reason logged. Changes nothing. NULL where derive() depends on the variables
-     * alone. */
+     * finds for them, and every index and count in it lies within that data: the bytes may be anybody's; false with the
+     * reason logged. Asked before derive() sees those variables, so that what is refused costs nothing; changes
+     * nothing. NULL where derive() depends on the variables alone and the state is of plain numbers. */
     bool (*accepts)(Unit *unit, const Scalars *scalars, const void *state, size_t size);
 
     /* Initial state and outputs from parameters and the inputs at the start; the state arrives zeroed. Called whenever

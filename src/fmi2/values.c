@@ -210,3 +210,43 @@ bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference refere
     }
     return true;
 }
+
+/* --- check a whole block */
+
+static bool real_sound(Unit *unit, const Variable *variable, double value, bool results) {
+    const Causality causality = variable->info->causality;
+    if (causality == CAUSALITY_parameter || causality == CAUSALITY_input)
+        return in_range(unit, variable, value);
+    return !results || isfinite(value) || out_of_range(unit, variable, value);
+}
+
+static bool sound(Unit *unit, const Variable *variable, const unsigned char *at, bool results) {
+    char name[VARIABLE_NAME_SIZE];
+    double real;
+    int whole;
+    switch (variable->info->kind) {
+    case KIND_REAL:
+        memcpy(&real, at, sizeof real);
+        return real_sound(unit, variable, real, results);
+    case KIND_INTEGER:
+        memcpy(&whole, at, sizeof whole);
+        return in_range(unit, variable, whole);
+    case KIND_BOOLEAN:
+        memcpy(&whole, at, sizeof whole);
+        return whole == 0 || whole == 1 ||
+               unit_fail(unit, "the value of %s '%s' is %d; a Boolean is 0 or 1",
+                         table_causality(variable->info->causality), values_name(unit, variable, name), whole);
+    case KIND_STRING:
+        return memchr(at, '\0', STRING_SIZE) != NULL ||
+               unit_fail(unit, "the value of '%s' is too long: allowed are at most %d bytes",
+                         values_name(unit, variable, name), STRING_SIZE - 1);
+    }
+    return false;
+}
+
+bool values_sound(Unit *unit, const unsigned char *block, bool results) {
+    for (size_t i = 0; i < unit->variable_count; i++)
+        if (!sound(unit, &unit->variables[i], block + unit->variables[i].offset, results))
+            return false;
+    return true;
+}

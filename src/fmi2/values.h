@@ -29,4 +29,8 @@ bool values_set_whole(Unit *unit, Kind kind, size_t count, const fmi2ValueRefere
 bool values_get_string(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2String values[]);
 bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2String values[]);
 
+/* Whether the variables of a foreign block (aligned or not) are such as this file would have let them become; results:
+ * its Real outputs and locals must be finite as well. */
+bool values_sound(Unit *unit, const unsigned char *block, bool results);
+
 #endif

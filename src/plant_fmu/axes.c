@@ -6,6 +6,9 @@
 #include "csv.h"
 #include "text.h"
 
+#define AXES_QUOTED(number) #number
+#define AXES_TEXT(number) AXES_QUOTED(number)
+
 size_t axes_capacity(const char *text, size_t size) {
     return csv_lines(text, size);
 }
@@ -19,7 +22,7 @@ static bool axes_legal_name(CsvCell cell) {
     if (cell.length < 1 || cell.length >= AXIS_NAME_SIZE || !axes_letter(cell.text[0])) {
         return false;
     }
-    for (int i = 1; i < cell.length; i++) {
+    for (size_t i = 1; i < cell.length; i++) {
         const char c = cell.text[i];
         if (!axes_letter(c) && !(c >= '0' && c <= '9')) {
             return false;
@@ -36,6 +39,9 @@ static const char *axes_read_row(CsvRow row, AxisRow *rows, size_t count) {
     }
     csv_next_cell(&row, &name);
     csv_next_cell(&row, &x_0);
+    if (count == AXES_MOST) {
+        return "these are more axes than the " AXES_TEXT(AXES_MOST) " that a machine may have";
+    }
     if (!axes_legal_name(name)) {
         return "column 'axis': a name has letters, digits and _, at most 31, begins with no digit, and is not tool, "
                "tcp or pose";
@@ -48,7 +54,7 @@ static const char *axes_read_row(CsvRow row, AxisRow *rows, size_t count) {
     if (!csv_number(x_0, &rows[count].x_0)) {
         return "column 'x_0 [m]' is no finite number with a decimal point";
     }
-    memcpy(rows[count].name, name.text, (size_t)name.length);
+    memcpy(rows[count].name, name.text, name.length);
     rows[count].name[name.length] = 0;
     return NULL;
 }

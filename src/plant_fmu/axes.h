@@ -12,6 +12,7 @@
 #define axes_read PREFIXED(axes_read)
 
 #define AXIS_NAME_SIZE 32 /* bytes of an axis name, the closing zero included */
+#define AXES_MOST 256     /* in a table */
 
 typedef struct AxisRow {
     char name[AXIS_NAME_SIZE];

@@ -19,6 +19,7 @@
  *
  * Each mode is advanced exactly for inputs that are linear over the step (modal.h). The state is that of the modes; the
  * inputs at the end of the last step are kept with it, as the accelerations there need them. */
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -121,6 +122,11 @@ static double plant_jump(const Plant *plant, size_t from, size_t to, double larg
     return largest;
 }
 
+/* A counter that stays at its end. */
+static int plant_count(int before, size_t more) {
+    return more < (size_t)(INT_MAX - before) ? before + (int)more : INT_MAX;
+}
+
 /* Into the cell that the positions at the end of the step lie in, with the end's q and v and what is measured there. */
 static bool plant_follow(Unit *unit, Plant *plant, double *q, double *v) {
     const size_t inputs = plant_inputs(plant), ports = plant_ports(plant);
@@ -137,7 +143,7 @@ static bool plant_follow(Unit *unit, Plant *plant, double *q, double *v) {
     }
     plant_head(unit)->cell = passage.cell;
     shown->pose_cell = (int)passage.cell;
-    shown->pose_crossings += (int)passage.crossings;
+    shown->pose_crossings = plant_count(shown->pose_crossings, passage.crossings);
     shown->pose_E_kin_lost += passage.kinetic_lost;
     shown->pose_E_el_lost += passage.elastic_lost;
     shown->pose_held = fmax(shown->pose_held, passage.held);

@@ -39,7 +39,7 @@ static bool modes_fail(const Reader *reader, unsigned line, const char *format, 
 }
 
 static int modes_shown(CsvCell cell) {
-    return (int)text_whole(cell.text, (size_t)cell.length, CELL_SHOWN);
+    return (int)text_whole(cell.text, cell.length, CELL_SHOWN);
 }
 
 size_t modes_width(size_t axes) {
@@ -132,11 +132,11 @@ static bool modes_read_row(const Reader *reader, unsigned line, CsvRow header, C
         double value;
         if (!csv_number(cell, &value)) {
             return modes_fail(reader, line, "column '%.*s': '%.*s' is no finite number with a decimal point",
-                              name.length, name.text, modes_shown(cell), cell.text);
+                              (int)name.length, name.text, modes_shown(cell), cell.text);
         }
         if (column < MODES_SHAPES && value < 0) {
-            return modes_fail(reader, line, "column '%.*s' is %.*s; it must not be negative", name.length, name.text,
-                              modes_shown(cell), cell.text);
+            return modes_fail(reader, line, "column '%.*s' is %.*s; it must not be negative", (int)name.length,
+                              name.text, modes_shown(cell), cell.text);
         }
         if (column < reader->width) {
             values[column] = value;

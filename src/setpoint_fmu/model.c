@@ -2,6 +2,7 @@
  *
  *   r = floor((t - t_start - t_0) / T_pos), from 0 to the last row           row that holds at the communication point
  * t A.x_s, A.n_ffw = columns of axis A in row r                              held from row to row
+ *   A.release = true                                                         there are setpoints from the start on
  *
  *   t_start start of the experiment, t_0 time of the first row, T_pos time from row to row [s]
  *
@@ -30,6 +31,7 @@ static void setpoint_show(Unit *unit, const Setpoints *table, size_t row) {
         AxisBlock *axis = unit_axis(unit, i);
         axis->x_s = values[2 * i];
         axis->n_ffw = values[2 * i + 1];
+        axis->release = 1;
     }
 }
 

@@ -14,6 +14,9 @@
 
 enum { SHOWN = 40 }; /* characters of a faulty cell in a message */
 
+#define SETPOINTS_QUOTED(number) #number
+#define SETPOINTS_TEXT(number) SETPOINTS_QUOTED(number)
+
 static const char *const suffixes[] = {".x_s [m]", ".n_ffw [rad/s]"};
 
 /* --- header ------------------------------------------------------------------------------------------------------- */
@@ -43,7 +46,7 @@ static bool setpoints_legal_name(const char *text, size_t length) {
 
 /* Length of the axis name that `cell` has ahead of `suffix`; 0 where it does not end so. */
 static size_t setpoints_name_length(CsvCell cell, const char *suffix) {
-    const size_t length = (size_t)cell.length, tail = strlen(suffix);
+    const size_t length = cell.length, tail = strlen(suffix);
     return length > tail && memcmp(cell.text + length - tail, suffix, tail) == 0 ? length - tail : 0;
 }
 
@@ -52,6 +55,9 @@ static const char *setpoints_read_name(CsvCell cell, SetpointAxis *names, size_t
     const size_t length = setpoints_name_length(cell, suffixes[0]);
     if (length == 0) {
         return "expected is the position setpoint of an axis, as X.x_s [m]";
+    }
+    if (count == SETPOINT_AXES_MOST) {
+        return "these are more axes than the " SETPOINTS_TEXT(SETPOINT_AXES_MOST) " that a table may have";
     }
     if (!setpoints_legal_name(cell.text, length)) {
         return "an axis name is a letter followed by at most 30 letters, digits or _";
@@ -93,7 +99,7 @@ bool setpoints_read_axes(const char *text, size_t size, const char *source, Setp
         column++;
     }
     if (fault != NULL) {
-        const int shown = (int)text_whole(cell.text, (size_t)cell.length, SHOWN);
+        const int shown = (int)text_whole(cell.text, cell.length, SHOWN);
         snprintf(message, message_size, "%s, line %u, column %lu: '%.*s': %s", source, csv.line, (unsigned long)column,
                  shown, cell.text, fault);
         return false;
@@ -123,7 +129,7 @@ static void setpoints_column(const char *header, size_t size, size_t column, cha
     csv_next_row(&csv, &row);
     for (size_t i = 0; i <= column && csv_next_cell(&row, &cell); i++) {
     }
-    snprintf(text, text_size, "%.*s", cell.length, cell.text);
+    snprintf(text, text_size, "%.*s", (int)cell.length, cell.text); /* short: the header was read */
 }
 
 /* Allowed distance from an even time at t: what is written of it, and its rounding to a double. */
@@ -167,7 +173,7 @@ static bool setpoints_read_row(CsvRow row, const char *text, size_t size, const 
         if (column < table->width && !csv_number(cell, &values[column])) {
             char name[SETPOINT_NAME_SIZE + 16];
             setpoints_column(text, size, column, name, sizeof name);
-            const int shown = (int)text_whole(cell.text, (size_t)cell.length, SHOWN);
+            const int shown = (int)text_whole(cell.text, cell.length, SHOWN);
             snprintf(message, message_size, "%s, line %u: %s is '%.*s', which is no finite number with a decimal point",
                      source, line, name, shown, cell.text);
             return false;
@@ -180,6 +186,17 @@ static bool setpoints_read_row(CsvRow row, const char *text, size_t size, const 
         return false;
     }
     return setpoints_check_time(table, count, source, line, message, message_size);
+}
+
+static bool setpoints_check_span(const Setpoints *table, const char *source, char *message, size_t message_size) {
+    if (!isfinite(table->cycle)) {
+        char text[2][NUMBER_TEXT_SIZE];
+        const double last = table->values[(table->rows - 1) * table->width];
+        snprintf(message, message_size, "%s: the times run from %s s to %s s, a span that is no finite number", source,
+                 number_text(text[0], table->first), number_text(text[1], last));
+        return false;
+    }
+    return true;
 }
 
 /* Row by row the distances are even; their small differences must not add up. */
@@ -220,14 +237,15 @@ bool setpoints_read_rows(const char *text, size_t size, const char *source, Setp
     table->rows = count;
     table->first = table->values[0];
     table->cycle = (table->values[(count - 1) * table->width] - table->first) / (double)(count - 1);
-    return setpoints_check_drift(table, source, message, message_size);
+    return setpoints_check_span(table, source, message, message_size) &&
+           setpoints_check_drift(table, source, message, message_size);
 }
 
 /* --- look-up ------------------------------------------------------------------------------------------------------ */
 
 double setpoints_slack(const Setpoints *table, double t, double h) {
-    const double rounding = fmax(1e-9 * fabs(t), 2 * UNEVEN * table->cycle);
-    return fmax(16 * DBL_EPSILON * fabs(t), fmin(rounding, 0.1 * fmin(h, table->cycle)));
+    const double rounding = fmax(fmax(1e-9 * fabs(t), 2e-9), 2 * UNEVEN * table->cycle);
+    return fmax(16 * DBL_EPSILON * fabs(t), fmin(rounding, 0.01 * fmin(h, table->cycle)));
 }
 
 size_t setpoints_row(const Setpoints *table, double elapsed, double slack) {

@@ -15,7 +15,8 @@
 #define setpoints_slack PREFIXED(setpoints_slack)
 #define setpoints_row PREFIXED(setpoints_row)
 
-#define SETPOINT_NAME_SIZE 32 /* bytes of an axis name, the closing zero included */
+#define SETPOINT_NAME_SIZE 32  /* bytes of an axis name, the closing zero included */
+#define SETPOINT_AXES_MOST 256 /* in a table */
 
 typedef char SetpointAxis[SETPOINT_NAME_SIZE];
 
@@ -47,9 +48,10 @@ bool setpoints_read_rows(const char *text, size_t size, const char *source, Setp
                          size_t message_size);
 
 /* How far the communication point at t [s] that ends a step of h [s] may lie ahead of a row and count as having reached
- * it: importers round time, and so does the table. A part in 10^9 of the time, or two millionths of the cycle, but
- * never a noticeable part of the step or the cycle, and never less than a few units in the last place. h may be
- * infinite. */
+ * it: importers round time, and so does the table. A part in 10^9 of the time, 2 ns (clocks in whole nanoseconds) or
+ * two millionths of the cycle, whichever is most, but never more than a hundredth of the step or the cycle (a clock
+ * that adds up steps of 125 us is off by less after an hour), and never less than a few units in the last place. h may
+ * be infinite. */
 double setpoints_slack(const Setpoints *table, double t, double h);
 
 /* Row that holds at `elapsed` [s] since the start: the last one whose time is not above elapsed + slack; the first

@@ -3,11 +3,16 @@
 import shutil
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
+import fmpy
 import pytest
+from lxml import etree
 
 from fmu.unpacked import PLATFORM, UNITS, Archive, initialize, instantiate, unpack
 from packager import build, compile, machine_tables, toolchain, variables
+
+HEADERS = f"-I{build.STANDARD}"  # an importer has them
 
 
 def test_rebuilding_gives_the_same_bytes(unit: str, tmp_path: Path) -> None:
@@ -27,7 +32,7 @@ def _compiler() -> list[str]:
 
 
 def test_sources_compile_without_a_warning(archive: Archive, tmp_path: Path) -> None:
-    flags = [*compile.FLAGS, "-pedantic", "-Werror", "-c"]
+    flags = [*compile.FLAGS, "-pedantic", "-Werror", HEADERS, "-c"]
     for source in archive.source_files:
         target = str(tmp_path / f"{Path(source).stem}.o")
         done = subprocess.run(
@@ -41,14 +46,15 @@ def test_sources_compile_without_a_warning(archive: Archive, tmp_path: Path) -> 
 
 
 def test_sources_build_by_themselves(archive: Archive, tmp_path: Path) -> None:
-    """As an importer of source-code FMUs does it: the files that the description lists, no definition, no option."""
+    """As an importer of source-code FMUs does it: the files that the description lists, no definition, no option but
+    where its own headers are."""
     sources = archive.folder / "sources"
     assert set(archive.source_files) == {path.name for path in sources.glob("*.c")}
     rebuilt = tmp_path / "unpacked"
     shutil.copytree(archive.folder, rebuilt)
     library = rebuilt / "binaries" / PLATFORM.folder / archive.library.name
     library.unlink()
-    command = [*_compiler(), "-shared", "-fPIC", *archive.source_files, "-lm", "-o", str(library)]
+    command = [*_compiler(), "-shared", "-fPIC", HEADERS, *archive.source_files, "-lm", "-o", str(library)]
     subprocess.run(command, cwd=sources, check=True)
     slave = instantiate(archive, rebuilt)
     try:
@@ -57,6 +63,30 @@ def test_sources_build_by_themselves(archive: Archive, tmp_path: Path) -> None:
         slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=125e-6)
     finally:
         slave.freeInstance()
+
+
+def test_the_headers_of_the_standard_are_left_to_the_importer(archive: Archive) -> None:
+    """FMI 2.0, section 2.3: all headers but fmi2Functions.h, fmi2FunctionTypes.h and fmi2TypesPlatform.h."""
+    assert [path.name for path in (archive.folder / "sources").iterdir() if path.name.startswith("fmi2")] == []
+
+
+def test_build_description_says_how_to_compile(archive: Archive, tmp_path: Path) -> None:
+    path = archive.folder / "sources/buildDescription.xml"
+    schema = Path(fmpy.__file__).parent / "schema/fmi3/fmi3BuildDescription.xsd"
+    etree.XMLSchema(file=str(schema)).assertValid(etree.parse(path))
+    (configuration,) = fmpy.model_description.read_build_description(str(archive.folder))
+    assert configuration.modelIdentifier == archive.unit
+    (files,) = configuration.sourceFileSets
+    assert files.language == "C99"
+    assert sorted(files.sourceFiles) == sorted(archive.source_files)
+    root = ET.parse(path).getroot()
+    options = root.findall("BuildConfiguration/SourceFileSet")[0].attrib["compilerOptions"].split()
+    libraries = [f"-l{each.attrib['name']}" for each in root.iterfind("BuildConfiguration/Library")]
+    assert (options, libraries) == (["-std=c99", "-ffp-contract=off"], ["-lm"])
+    # What it says is enough: nothing stays undefined.
+    whole = ["-shared", "-fPIC", "-Wl,--no-undefined"] if PLATFORM.suffix == ".so" else ["-shared", "-fPIC"]
+    command = [*_compiler(), *options, *whole, HEADERS, *files.sourceFiles, *libraries, "-o", str(tmp_path / "unit")]
+    subprocess.run(command, cwd=archive.folder / "sources", check=True)
 
 
 PROGRAM = """\
@@ -100,7 +130,7 @@ def test_all_units_link_into_one_program(fmus: Path, tmp_path: Path) -> None:
         folder = tmp_path / unit / "sources"
         found = [(folder / name).with_suffix(".o") for name in archive.source_files]
         for source, compiled in zip(archive.source_files, found, strict=True):
-            command = [*_compiler(), "-c", f"-DFMI2_FUNCTION_PREFIX={unit}_", source, "-o", str(compiled)]
+            command = [*_compiler(), "-c", HEADERS, f"-DFMI2_FUNCTION_PREFIX={unit}_", source, "-o", str(compiled)]
             subprocess.run(command, cwd=folder, check=True)
         if shutil.which("nm"):
             listed = subprocess.run(
@@ -112,9 +142,8 @@ def test_all_units_link_into_one_program(fmus: Path, tmp_path: Path) -> None:
         objects += found
     (tmp_path / "main.c").write_text(PROGRAM, encoding="utf-8")
     program = tmp_path / "program"
-    include = f"-I{tmp_path / 'plant' / 'sources'}"
     subprocess.run(
-        [*_compiler(), include, "main.c", *map(str, objects), "-lm", "-o", str(program)], cwd=tmp_path, check=True
+        [*_compiler(), HEADERS, "main.c", *map(str, objects), "-lm", "-o", str(program)], cwd=tmp_path, check=True
     )
     assert subprocess.run([str(program), *guids]).returncode == 0
 

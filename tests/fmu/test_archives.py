@@ -41,8 +41,8 @@ def test_archive_has_its_parts_and_no_trace_of_this_machine(archive: Archive) ->
             for trace in (str(ROOT), str(Path.home()), "packager-"):
                 assert trace == "/" or trace.encode() not in opened.read(entry), (entry.filename, trace)
     expected = {"modelDescription.xml", "documentation/index.html", "documentation/licenses/license.txt"}
-    expected |= {"sources/variables.json"}
-    expected |= {f"binaries/{PLATFORM.folder}/{archive.unit}{PLATFORM.suffix}", "sources/fmi2Functions.h"}
+    expected |= {"sources/variables.json", "sources/buildDescription.xml"}
+    expected |= {f"binaries/{PLATFORM.folder}/{archive.unit}{PLATFORM.suffix}", "sources/functions.c"}
     expected |= {f"resources/{name}" for name in RESOURCES.get(archive.unit, ()) if name.endswith(".csv")}
     assert expected <= set(names)
     assert {name.split("/")[0] for name in names} <= {
@@ -179,24 +179,29 @@ def test_initial_values_depend_on_the_inputs_that_are_told(archive: Archive) -> 
     outputs = [
         (int(each.attrib["valueReference"]), each[0].tag) for each in elements if each.attrib["causality"] == "output"
     ]
-    inputs = [int(each.attrib["valueReference"]) for each in elements if each.attrib["causality"] == "input"]
+    inputs = [
+        (int(each.attrib["valueReference"]), each[0].tag) for each in elements if each.attrib["causality"] == "input"
+    ]
 
     def values(slave: FMU2Slave) -> list[float]:
         return [(slave.getReal if tag == "Real" else slave.getBoolean)([reference])[0] for reference, tag in outputs]
 
     found: dict[int, set[int]] = {reference + 1: set() for reference, _ in outputs}
-    for reference in inputs:
+    for reference, kind in inputs:
         slave = instantiate(archive)
         try:
             initialize(slave)
             before = values(slave)
-            slave.setReal([reference], [0.37])
+            if kind == "Real":
+                slave.setReal([reference], [0.37])
+            else:
+                slave.setBoolean([reference], [not slave.getBoolean([reference])[0]])
             for (output, _), old, new in zip(outputs, before, values(slave), strict=True):
                 if new != old:
                     found[output + 1].add(reference + 1)
         finally:
             slave.freeInstance()
-    candidates = {reference + 1 for reference in inputs}
+    candidates = {reference + 1 for reference, _ in inputs}
     told = {index: known & candidates for index, known in _structure(archive, "InitialUnknowns").items()}
     assert found == told
 
@@ -248,6 +253,46 @@ def test_default_axes_are_the_pose_of_the_default_machine() -> None:
     assert all(math.isclose(packed[axis], stated[axis], rel_tol=3e-16) for axis in packed)
 
 
+def test_capabilities_are_those_of_the_variables(archive: Archive) -> None:
+    """Inputs can be interpolated where there are Real ones, outputs have slopes where they are continuous. The binary
+    answers accordingly: slopes of inputs are taken, those of held outputs would be 0."""
+    rows = [
+        (each[0].tag, each.attrib["causality"], each.attrib["variability"]) for each in archive.variables().values()
+    ]
+    inputs = any(row[:2] == ("Real", "input") for row in rows)
+    continuous = ("Real", "output", "continuous") in rows
+    attributes = archive.description.find("CoSimulation").attrib
+    told = [attributes[name] for name in ("canInterpolateInputs", "providesDirectionalDerivative")]
+    assert told == [str(inputs).lower()] * 2
+    assert attributes["maxOutputDerivativeOrder"] == str(int(continuous))
+    assert (inputs, continuous) == ((False, False) if archive.unit == "setpoint" else (True, True))
+    slave = instantiate(archive)
+    try:
+        initialize(slave)
+        slave.exitInitializationMode()
+        known, held, sloped = (
+            [
+                int(each.attrib["valueReference"])
+                for each, row in zip(archive.variables().values(), rows, strict=True)
+                if row in wanted
+            ]
+            for wanted in (
+                {("Real", "input", "continuous"), ("Real", "input", "discrete")},
+                {("Real", "output", "discrete")},
+                {("Real", "output", "continuous")},
+            )
+        )
+        if inputs:
+            slave.setRealInputDerivatives(known, [1] * len(known), [0.0] * len(known))
+            assert len(slave.getDirectionalDerivative(held + sloped, known, [1.0] * len(known))) == len(held + sloped)
+        if sloped:
+            assert all(map(math.isfinite, slave.getRealOutputDerivatives(sloped, [1] * len(sloped))))
+        if held:
+            assert not any(slave.getRealOutputDerivatives(held, [1] * len(held)))
+    finally:
+        slave.freeInstance()
+
+
 # --- documentation
 
 
@@ -257,7 +302,13 @@ def test_documentation_is_whole_and_self_contained(archive: Archive) -> None:
         assert f"<code>{name}</code>" in text
     assert not re.search(r"<(script|link|img|iframe)\b", text)
     assert not re.search(r"@import|url\(", text)
-    assert not re.search(r"""href=(?!"(https?:|mailto:|#))""", text)
+    local = re.findall(r"""href="(?!https?:|mailto:|#)(.*?)\"""", text)
+    assert local == ["fmi-ls-ref.html"]  # the page that FMI-LS-REF recommends
+    references = (archive.folder / "documentation/fmi-ls-ref.html").read_text(encoding="utf-8")
+    assert not re.search(r"""<(script|link|img|iframe)\b|@import|url\(|href=(?!"(https?:|mailto:|#))""", references)
+    readme = (archive.folder / "extra/org.fmi-standard.fmi-ls-ref/README.md").read_text(encoding="utf-8")
+    heading = readme.splitlines()[0].strip("# ")
+    assert f"<h1>{html.escape(heading)}</h1>" in references
     assert "of a synthetic default machine" in text
     licence = (ROOT / "LICENSE").read_text(encoding="utf-8")
     assert licence in (archive.folder / "documentation/licenses/license.txt").read_text(encoding="utf-8")

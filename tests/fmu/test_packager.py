@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -32,6 +33,37 @@ def read_resources(folder: Path, axes: str = AXES, modes: str = MODES) -> machin
     (folder / "axes.csv").write_text(axes, encoding="utf-8", newline="")
     (folder / "modes.csv").write_text(modes, encoding="utf-8", newline="")
     return machine_tables.read(folder / "axes.csv", folder / "modes.csv")
+
+
+def test_the_number_of_axes_is_limited(tmp_path: Path) -> None:
+    listed = "".join(f"A{i},0\n" for i in range(257))
+    with pytest.raises(InputError, match=r"axes\.csv: 257 axes are listed, at most 256 are allowed"):
+        read_resources(tmp_path, f"axis,x_0 [m]\n{listed}")
+
+
+@pytest.mark.parametrize(
+    ("number", "good"),
+    [
+        ("0." + "1" * 509, True),
+        ("0." + "1" * 510, False),  # numbers.c: at most 510 characters besides the point
+        ("1" + "0" * 300 + "." + "0" * 209, True),
+        ("0" * 510, True),
+        ("0" * 511, False),
+        ("\u0661", False),  # a digit to Python alone
+        ("1_0", False),
+        ("1e", False),
+        (".", False),
+        (".5E-3", True),
+        ("1e999", False),
+    ],
+)
+def test_numbers_are_those_that_the_units_read(tmp_path: Path, number: str, good: bool) -> None:
+    """Of axes.csv; tests/unit_c/test_numbers.c has the other side."""
+    if good:
+        assert read_resources(tmp_path, f"axis,x_0 [m]\nX,{number}\nZ,0\n").axes[0].x_0 == float(number)
+        return
+    with pytest.raises(InputError, match="not a finite number"):
+        read_resources(tmp_path, f"axis,x_0 [m]\nX,{number}\nZ,0\n")
 
 
 def test_axis_block_is_repeated_for_every_axis(tmp_path: Path, compiler: tuple[str, ...]) -> None:
@@ -179,6 +211,38 @@ def test_archive_depends_on_names_and_contents_alone() -> None:
         assert all(entry.date_time == (1980, 1, 1, 0, 0, 0) for entry in opened.infolist())
         assert all(entry.compress_type == zipfile.ZIP_DEFLATED for entry in opened.infolist())
         assert all(entry.extract_version <= 20 for entry in opened.infolist())  # the standard allows no newer zip
+
+
+def _zip(path: Path, *names: str) -> Path:
+    with zipfile.ZipFile(path, "w") as opened, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of names that are there already
+        for name in names:
+            opened.writestr(name, b"12345678")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("a", "../b"), "'../b' is no path within an archive"),
+        (("resources/../../b",), "'resources/../../b' is no path"),
+        (("/etc/x",), "'/etc/x' is no path"),
+        (("C:/x",), "'C:/x' is no path"),
+        (("a\\..\\b",), "is no path"),
+        (("a//b",), "'a//b' is no path"),
+        (("a", "b", "a"), "'a' is in it 2 times"),
+        (("a", "b", "c", "d"), "its files have 32 bytes; at most 31 are read"),
+    ],
+)
+def test_archives_that_no_packager_made_are_refused(
+    tmp_path: Path, names: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(archive, "LARGEST", 31)
+    with pytest.raises(InputError) as caught:
+        archive.read(_zip(tmp_path / "x.fmu", *names))
+    assert f"{tmp_path / 'x.fmu'}: not the archive of a unit" in str(caught.value)
+    assert said in str(caught.value)
+    assert archive.read(_zip(tmp_path / "good.fmu", "a", "b/..c", "d.e")).keys() == {"a", "b/..c", "d.e"}
 
 
 def test_archive_is_written_whole_or_not_at_all(tmp_path: Path) -> None:

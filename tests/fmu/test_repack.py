@@ -82,12 +82,13 @@ def test_holds_what_it_was_given_and_keeps_the_rest(repacked: Archive, fmus: Pat
     changed = {"modelDescription.xml", "documentation/index.html", "sources/embedded_resources.c"}
     changed |= {"terminalsAndIcons/terminalsAndIcons.xml"}  # terminals are the axes'
     with zipfile.ZipFile(fmus / "plant.fmu") as base, zipfile.ZipFile(repacked.path) as packed:
-        kept = [
-            name for name in base.namelist() if not name.startswith(("resources/", "extra/")) and name not in changed
-        ]
+        gone = ("resources/", "extra/", "documentation/fmi-ls-ref")
+        kept = [name for name in base.namelist() if not name.startswith(gone) and name not in changed]
         assert f"binaries/{PLATFORM.folder}/plant{PLATFORM.suffix}" in kept
         assert {name: packed.read(name) for name in kept} == {name: base.read(name) for name in kept}
         assert {name for name in packed.namelist() if not name.startswith("resources/")} == {*kept, *changed}
+        assert b"fmi-ls-ref.html" in base.read("documentation/index.html")
+        assert b"fmi-ls-ref.html" not in packed.read("documentation/index.html")
 
 
 def test_embedded_copy_is_the_tables(repacked: Archive) -> None:
@@ -131,7 +132,8 @@ def test_same_machine_gives_the_built_archive(plant: Archive, tmp_path: Path) ->
     tables = ["--axes", str(DEFAULT_AXES), "--modes", str(DEFAULT_MODES)]
     assert cli.main(["repack", str(plant.path), *tables, "--out", str(out)]) == 0
     with zipfile.ZipFile(plant.path) as base, zipfile.ZipFile(out) as packed:
-        kept = [name for name in base.namelist() if not name.startswith("extra/")]  # references are of built ones alone
+        # references are of built ones alone
+        kept = [name for name in base.namelist() if not name.startswith(("extra/", "documentation/fmi-ls-ref"))]
         assert packed.namelist() == kept
         assert [name for name in kept if packed.read(name) != base.read(name)] == ["documentation/index.html"]
 

@@ -1,6 +1,9 @@
 """Serialised states as files between processes: continued to the last bit by the unit they belong to, refused with a
-message by any other, and by all where they are damaged."""
+message by any other, and by all where they are damaged. Nobody's bytes crash a unit, not those with a checksum that
+fits either."""
 
+import ctypes
+import math
 import os
 import random
 import shutil
@@ -9,8 +12,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from fmu.apart import apart
-from fmu.binary import ERROR, OK, Slave
+from fmu.binary import ERROR, OK, Slave, of, reals, references
 from fmu.continued import go_on
 from fmu.unpacked import ROOT, UNITS, Archive, unpack
 
@@ -144,4 +149,185 @@ def test_a_flipped_bit_is_found(archive: Archive) -> None:
         changed = bytearray(keeper.image)
         changed[at] ^= 1 << bit
         keeper.refuses(bytes(changed))
+    keeper.is_unharmed()
+
+
+# Behind the heading: what the shell keeps, then variables and slopes, then (at `model`) the model's own state.
+START, STOP, TIME, PHASE, STALE, LAST_STEP = (HEADING + at for at in (0, 8, 16, 32, 36, 44))
+INSTANTIATED, INITIALIZATION, STEPPING, TERMINATED, FAILED = range(5)
+
+
+def _model(image: bytes) -> int:
+    """Where the model's state begins."""
+    (fixed,) = struct.unpack_from("<Q", image, SIZES + 8)
+    return HEADING + int(fixed)
+
+
+def _signed(image: bytes) -> bytes:
+    """With the checksum of its contents: FNV-1a of 64 bits."""
+    found = 0xCBF29CE484222325
+    for byte in image[HEADING:]:
+        found = (found ^ byte) * 0x100000001B3 % 2**64
+    return image[:CHECKSUM] + struct.pack("<Q", found) + image[HEADING:]
+
+
+def _with(image: bytes, at: int, layout: str, value: float) -> bytes:
+    changed = bytearray(image)
+    struct.pack_into(layout, changed, at, value)
+    return _signed(bytes(changed))
+
+
+@apart
+def test_the_checksum_is_known_here(archive: Archive) -> None:
+    """Else the tests below would only see that a wrong one is found."""
+    keeper = Keeper(archive)
+    assert _signed(keeper.image[:CHECKSUM] + bytes(8) + keeper.image[HEADING:]) == keeper.image
+
+
+@apart
+def test_what_no_life_leads_to_is_refused(archive: Archive) -> None:
+    keeper = Keeper(archive)
+    image = keeper.image
+    for at, layout, value, text in (
+        (PHASE, "<I", 5, "in phase 5 of 5"),
+        (STALE, "<I", 1, "initialised (phase 2), but without initial values"),
+        (LAST_STEP, "<I", 77, "no step ends with status 77"),
+        (START, "<d", math.nan, "started at nan s"),
+        (TIME, "<d", -math.inf, "stands at -inf s"),
+        (STOP, "<d", math.nan, "stops at nan s"),
+    ):
+        keeper.refuses(_with(image, at, layout, value), text)
+    keeper.is_unharmed()
+
+
+@pytest.fixture(scope="module")
+def controller(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Archive:
+    return unpack("controller", fmus, tmp_path_factory.mktemp("controller"))
+
+
+# Offsets in the controller's state: struct DriveState.
+@pytest.mark.parametrize(
+    ("at", "layout", "text", "end"),
+    [
+        (0, "<q", "sample instant", 2**53),
+        (8, "<q", "cycle within T_pos", 8),
+        (128, "<i", "place in the delay line of x_s", 7),  # (1.326 + 3.528) ms / 1 ms: 3 to 6 cycles ago
+        (132, "<i", "place in the delay line of n_ffw", 4),
+        (168, "<i", "place in the delay line of T_ref", 1),
+        (176, "<i", "place in the delay line of speed_window", 1),
+    ],
+)
+@apart
+def test_counts_of_the_controller_are_refused_beyond_their_range(
+    controller: Archive, at: int, layout: str, text: str, end: int
+) -> None:
+    keeper = Keeper(controller)
+    bits = 8 * struct.calcsize(layout)
+    for value in (-1, end, 2 ** (bits - 1) - 1, -(2 ** (bits - 1))):
+        image = _with(keeper.image, _model(keeper.image) + at, layout, value)
+        keeper.refuses(image, f"the state is out of range: {text} is {float(value):.0f}; allowed is 0 to {end - 1}")
+    keeper.is_unharmed()
+    assert keeper.slave.restore(_with(keeper.image, _model(keeper.image) + at, layout, end - 1)) == OK
+    go_on(keeper.slave, FIRST, 20)
+
+
+@apart
+def test_counts_belong_to_the_parameters_of_the_state(controller: Archive) -> None:
+    """Not to those of the instance that it is handed to."""
+    keeper = Keeper(controller)
+    T_dyn = of(controller, "parameter")["T_dyn"]
+    slow = Slave(controller).set_up()
+    slow.set([T_dyn], [0.1])
+    slow.must("fmi2ExitInitializationMode")
+    go_on(slow, 0, FIRST)
+    image = slow.state()
+    expected = go_on(slow, FIRST, MORE)
+    (place,) = struct.unpack_from("<i", image, _model(image) + 128)
+    assert place > 90  # the shorter line of the other instance has 7
+    assert keeper.slave.restore(image) == OK
+    assert go_on(keeper.slave, FIRST, MORE) == expected
+    assert keeper.slave.restore(keeper.image) == OK
+    keeper.refuses(_with(image, _model(image) + 128, "<i", place + 20), "place in the delay line of x_s")
+    keeper.is_unharmed()
+    slow.free()
+
+
+@apart
+def test_a_cell_that_is_not_there_is_refused(plant: Archive) -> None:
+    keeper = Keeper(plant)
+    for cell in (1, 2**31, 2**64 - 1):
+        image = _with(keeper.image, _model(keeper.image) + 8, "<Q", cell)
+        keeper.refuses(image, f"cell {float(cell):.0f} of the poses; allowed is less than 1")
+    keeper.is_unharmed()
+
+
+REALS = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, -1.0, 1e-9)
+WHOLES = (-1, 2, 77, 2**31 - 1, -(2**31), 65536)
+
+
+def _forged(image: bytes, rng: random.Random) -> bytes:
+    """Contents that somebody made up: all of them, those of the model's state, or a few among sound ones."""
+    model = _model(image)
+    changed = bytearray(image)
+    first = HEADING if model == len(image) or rng.random() < 0.5 else model
+    match rng.randrange(5):
+        case 0:
+            changed[first:] = rng.randbytes(len(image) - first)
+        case 1:
+            for _ in range(rng.randint(1, 20)):
+                changed[rng.randrange(first, len(image))] = rng.randrange(256)
+        case 2:
+            for _ in range(rng.randint(1, 3)):
+                at = rng.randrange(first, len(image) - 7, 8)
+                struct.pack_into("<d", changed, at, rng.choice(REALS))
+        case 3:
+            for _ in range(rng.randint(1, 3)):
+                at = rng.randrange(first, len(image) - 3, 4)
+                struct.pack_into("<i", changed, at, rng.choice(WHOLES))
+        case 4:
+            for at in range(first, len(image) - 7, 8):
+                struct.pack_into("<d", changed, at, rng.choice(REALS))
+            struct.pack_into("<IIII", changed, PHASE, rng.randrange(5), rng.randrange(2), 0, 0)
+    return _signed(bytes(changed))
+
+
+def _live(slave: Slave, image: bytes) -> None:
+    """Whatever can be asked of an instance in this state. Answers are free, but what a step gives out is finite."""
+    inputs, outputs = (list(of(slave.archive, each).values()) for each in ("input", "output"))
+    (time,) = struct.unpack_from("<d", image, TIME)
+    results, seeds = reals([0.0] * len(outputs)), reals([1.0] * len(inputs))
+    orders = (ctypes.c_int * len(outputs))(*[1] * len(outputs))
+    (phase,) = struct.unpack_from("<I", image, PHASE)
+    if phase == INSTANTIATED:
+        slave.call("fmi2EnterInitializationMode")
+    if phase in (INSTANTIATED, INITIALIZATION):
+        slave.call("fmi2ExitInitializationMode")
+    for k in range(12):
+        slave.call("fmi2GetReal", references(outputs), len(outputs), results)
+        slave.call("fmi2GetRealOutputDerivatives", references(outputs), len(outputs), orders, results)
+        asked = (references(outputs), len(outputs), references(inputs), len(inputs), seeds, results)
+        slave.call("fmi2GetDirectionalDerivative", *asked)
+        slave.call("fmi2GetStatus", 0, ctypes.byref(ctypes.c_int()))
+        if slave.call("fmi2DoStep", time + k * 1e-3, 1e-3, 1) == OK:
+            assert all(math.isfinite(value) for value in slave.get(outputs))
+    slave.state()
+
+
+@pytest.mark.parametrize("part", range(4))
+@apart
+def test_forged_contents_crash_nothing(archive: Archive, part: int) -> None:
+    keeper = Keeper(archive)
+    slave, refused = keeper.slave, 0
+    for seed in range(100):
+        rng = random.Random(f"{archive.unit} {part} {seed}")
+        forged = _forged(keeper.image, rng)
+        slave.messages.clear()
+        if slave.restore(forged) == OK:
+            _live(slave, forged)
+            assert slave.restore(keeper.image) == OK
+        else:
+            refused += 1
+            assert slave.messages
+        assert slave.state() == keeper.image
+    assert refused > 25
     keeper.is_unharmed()

@@ -103,6 +103,22 @@ def test_every_communication_point_has_its_row(
             expect(slave, packed, min((k + 1) * h // CYCLE, ROWS - 1))
 
 
+def test_release_is_true_from_the_initialisation_on(packed: Archive) -> None:
+    """Also where it is asked for in initialization mode, and beyond the end of the table."""
+    release = [references(packed)[f"{axis}.release"] for axis in AXES]
+    slave = instantiate(packed)
+    try:
+        slave.setupExperiment(startTime=5.0)
+        slave.enterInitializationMode()
+        assert slave.getBoolean(release) == [1, 1]
+        slave.exitInitializationMode()
+        for k in range(ROWS + 3):
+            assert slave.getBoolean(release) == [1, 1]
+            slave.doStep(5.0 + k * exact(CYCLE), exact(CYCLE))
+    finally:
+        slave.freeInstance()
+
+
 def test_rounded_time_is_the_row_and_a_time_before_it_is_not(packed: Archive) -> None:
     # Within two millionths of the cycle, which three steps of 333333 ns keep: the row has come.
     for end, row in ((0.0009999999999, 1), (0.000999999, 1), (0.00099999, 0), (0.00099, 0), (0.0010000001, 1)):
@@ -227,8 +243,48 @@ def test_packed_archive_says_what_it_plays(packed: Archive) -> None:
     assert "57 rows, one every 0.001 s until 0.056 s, of the axes Z, X_1" in page
     assert "<code>X_1.n_ffw</code>" in page
     assert "<code>Y.n_ffw</code>" not in page
-    assert [name for name in references(packed) if "." in name] == ["Z.x_s", "Z.n_ffw", "X_1.x_s", "X_1.n_ffw"]
+    wanted = [f"{axis}.{name}" for axis in ("Z", "X_1") for name in ("x_s", "n_ffw", "release")]
+    assert [name for name in references(packed) if "." in name] == wanted
     assert (packed.folder / "resources/setpoints.csv").read_text(encoding="utf-8") == text()
+
+
+def _experiment(archive: Archive) -> dict[str, float]:
+    return {name: float(text) for name, text in archive.description.find("DefaultExperiment").attrib.items()}
+
+
+def test_default_experiment_is_that_of_the_table(default: Archive, packed: Archive) -> None:
+    assert _experiment(default) == {"startTime": 0.0, "stopTime": 0.25, "stepSize": 125e-6}
+    assert _experiment(packed) == {"startTime": 0.0, "stopTime": 0.056, "stepSize": 125e-6}
+
+
+@pytest.mark.parametrize(
+    ("cycle", "first", "stop", "step"),
+    [
+        (250_000, 0, 0.014, 125e-6),
+        (100_000, 0, 0.0056, 100e-6),  # shorter than a usual step
+        (400_000, 0, 0.0224, 100e-6),  # no multiple of it
+        (2_000_000, 5_000_000, 0.117, 125e-6),
+        (333_333, 0, 0.018666648, 111.111e-6),
+        (1_000_000, -100_000_000, 1.0, 125e-6),  # over before the start
+    ],
+)
+def test_default_steps_meet_every_row(
+    fmus: Path, tmp_path: Path, cycle: int, first: int, stop: float, step: float
+) -> None:
+    assert _experiment(pack(fmus, tmp_path, text(cycle, first))) == {
+        "startTime": 0.0,
+        "stopTime": stop,
+        "stepSize": step,
+    }
+
+
+@pytest.mark.parametrize("start", [0.0, 1000.0, 86400.0, 31557600.0])
+def test_a_step_that_ends_between_rows_stays_on_its_row(packed: Archive, start: float) -> None:
+    """After a late start, too: how far times are rounded there is no reason to be a row ahead."""
+    for k, row in ((0.95, 0), (0.98, 0), (1.0, 1), (1.95, 1)):
+        with started(packed, start) as slave:
+            slave.doStep(start, k * 1e-3)
+            expect(slave, packed, row)
 
 
 def test_command_line_packs_the_same(packed: Archive, fmus: Path, tmp_path: Path) -> None:

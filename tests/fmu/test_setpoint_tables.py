@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy.fmi2 import FMU2Slave
 
 from fmu.setpoint_table import pack, text
 from fmu.unpacked import Archive, instantiate
@@ -16,6 +17,16 @@ from packager.resources import File
 @pytest.fixture(scope="module")
 def packed(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Archive:
     return pack(fmus, tmp_path_factory.mktemp("packed"), text())
+
+
+def _instantiate(packed: Archive, folder: Path, content: bytes) -> FMU2Slave:
+    """With this table, as if it had been packed."""
+    shutil.copytree(packed.folder, folder)
+    (folder / "resources/setpoints.csv").write_bytes(content)
+    digest = 0xCBF29CE484222325
+    for byte in content:
+        digest = (digest ^ byte) * 0x100000001B3 % 2**64
+    return instantiate(packed, folder, f"{packed.guid[:17]}{digest:016x}")
 
 
 @pytest.mark.parametrize(
@@ -34,6 +45,9 @@ def packed(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Archive:
         ("\n0.003,", "\n0.003,1,", ["line 5: 6 fields, expected 5"]),
         ("\n0.003,", "\n0.003;", ["line 5: 4 fields, expected 5"]),
         ("\n0.003,", "\n0_0.003,", ["line 5: time [s] is '0_0.003', not a finite number"]),
+        ("\n0.003,", "\n0.003\x0c,", ["line 5: time [s] is '0.003\x0c', not a finite number"]),
+        ("\n0.003,", f"\n0.003{'0' * 507},", ["line 5: time [s] is '0.003000000", "of 512 characters; at most 510"]),
+        ("\n0.003,", f"\n0.003{'0' * 506},", []),  # the longest number
         ("\n", "\n\n", []),  # blank lines do not count
     ],
 )
@@ -49,17 +63,11 @@ def test_faulty_tables_are_refused_by_packager_and_unit(
             setpoints.check(File("t.csv", content))
         assert str(caught.value).startswith("t.csv: ")
         assert all(part in str(caught.value) for part in said), str(caught.value)
-    shutil.copytree(packed.folder, tmp_path / "unpacked")
-    (tmp_path / "unpacked/resources/setpoints.csv").write_bytes(content)
-    digest = 0xCBF29CE484222325
-    for byte in content:
-        digest = (digest ^ byte) * 0x100000001B3 % 2**64
-    guid = f"{packed.guid[:17]}{digest:016x}"
     if not said:
-        instantiate(packed, tmp_path / "unpacked", guid).freeInstance()
+        _instantiate(packed, tmp_path / "unpacked", content).freeInstance()
     else:
         with pytest.raises(Exception, match="instantiate"):
-            instantiate(packed, tmp_path / "unpacked", guid)
+            _instantiate(packed, tmp_path / "unpacked", content)
         assert "resources/setpoints.csv" in capfd.readouterr().out
 
 
@@ -69,6 +77,30 @@ def test_tables_of_too_few_rows_are_refused() -> None:
             setpoints.check(File("t.csv", text(rows=rows).encode()))
     with pytest.raises(InputError, match=r"but reads \(empty\)"):
         setpoints.check(File("t.csv", b""))
+
+
+def _refused_by_both(packed: Archive, folder: Path, content: bytes, packager: str) -> None:
+    with pytest.raises(InputError, match=packager):
+        setpoints.check(File("t.csv", content))
+    with pytest.raises(Exception, match="instantiate"):
+        _instantiate(packed, folder, content)
+
+
+def test_a_span_of_time_beyond_all_numbers_is_refused(packed: Archive, tmp_path: Path) -> None:
+    for times in ((-1e308, 1e308), (-1e308, 0.0, 1e308)):
+        rows = "".join(f"{time!r},1,2\n" for time in times)
+        content = f"time [s],X.x_s [m],X.n_ffw [rad/s]\n{rows}".encode()
+        _refused_by_both(packed, tmp_path / str(len(times)), content, "span that is no finite number")
+
+
+def test_the_number_of_axes_is_limited(packed: Archive, tmp_path: Path) -> None:
+    def table(axes: int) -> bytes:
+        header = ",".join(f"A{i}.x_s [m],A{i}.n_ffw [rad/s]" for i in range(axes))
+        return f"time [s],{header}\n".encode() + b"".join(b"%d" % row + b",1" * 2 * axes + b"\n" for row in (0, 1))
+
+    assert len(setpoints.check(File("t.csv", table(256))).axes) == 256
+    _instantiate(packed, tmp_path / "256", table(256)).freeInstance()
+    _refused_by_both(packed, tmp_path / "257", table(257), "515 columns; at most 513, those of 256 axes")
 
 
 def test_small_differences_that_add_up_are_refused() -> None:

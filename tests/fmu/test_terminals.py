@@ -78,7 +78,7 @@ def test_symbols_of_terminals_do_not_overlap(archive: Archive) -> None:
 
 DRIVE = ("M_a", "n_a", "x_a")
 CONTACT = ("M_fr", "n_fr")
-SETPOINT = ("x_s", "n_ffw")
+SETPOINT = ("x_s", "n_ffw", "release")
 TOOL = ("F_X", "F_Y", "F_Z", "x_X", "x_Y", "x_Z")
 EXPECTED: dict[str, dict[str, dict[str, str]]] = {
     "plant": {
@@ -228,7 +228,7 @@ def test_picture_is_the_drawing(path: Path) -> None:
         assert (image.format, image.size) == ("PNG", size)
     assert path.with_suffix(".png").stat().st_size < 10_000
     if not shutil.which("rsvg-convert"):
-        return
+        pytest.skip("size and format are as they should be; no rsvg-convert here to draw it anew")
     drawn = subprocess.run(
         ["rsvg-convert", "-w", str(size[0]), "-h", str(size[1]), str(path)], capture_output=True, check=True
     ).stdout

@@ -7,14 +7,14 @@ Values are held over a step. What remains is what initialisation and the first s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
 
 from feedsim.cosim.unit import Archive, Port, Unit
-from importers.system import Experiment, Result, System
+from importers.system import Experiment, Result, System, boolean
 
 
 @dataclass(frozen=True)
@@ -36,14 +36,38 @@ class Master:
     late: str = ""
 
 
+class _Signals:
+    """Real and Boolean variables of a unit, exchanged together; `values` (n,) as `names`, the Real ones first."""
+
+    def __init__(self, unit: Unit, names: Sequence[str]) -> None:
+        reals = [name for name in names if not boolean(name)]
+        flags = [name for name in names if boolean(name)]
+        self.names = (*reals, *flags)
+        self.values = np.zeros(len(self.names))
+        self._fmu = unit._fmu
+        self._port = Port(unit, reals, self.values[: len(reals)])
+        self._flags = unit.references(flags).tolist()
+        self._at = len(reals)
+
+    def set(self) -> None:
+        self._port.set()
+        if self._flags:
+            self._fmu.setBoolean(self._flags, [bool(value) for value in self.values[self._at :]])
+
+    def get(self) -> None:
+        self._port.get()
+        if self._flags:
+            self.values[self._at :] = [float(value != 0) for value in self._fmu.getBoolean(self._flags)]
+
+
 class _Member:
     def __init__(self, name: str, unit: Unit, system: System) -> None:
         self.unit = unit
         self.sources = system.sources(name)
-        self.inputs = Port(unit, list(self.sources))
+        self.inputs = _Signals(unit, list(self.sources))
         wanted = sorted({source[1] for source, _ in system.connections if source[0] == name})
-        self.outputs = Port(unit, wanted)
-        self.position = {variable: i for i, variable in enumerate(wanted)}
+        self.outputs = _Signals(unit, wanted)
+        self.position = {variable: i for i, variable in enumerate(self.outputs.names)}
         self.take: list[Callable[[], float]] = []
 
     def receive(self) -> None:
@@ -71,7 +95,8 @@ def run(system: System, experiment: Experiment, master: Master) -> Result:
             unit.set_parameters(component.start)
             members[name] = _Member(name, unit, system)
         for member in members.values():
-            for instance, variable in member.sources.values():
+            for name in member.inputs.names:
+                instance, variable = member.sources[name]
                 source = members[instance]
                 member.take.append(
                     lambda values=source.outputs.values, i=source.position[variable]: values[i]  # type: ignore[misc]

@@ -13,6 +13,14 @@ Floats = NDArray[np.float64]
 Value = float | int | bool | str
 
 
+RELEASE, FINISHED = "release", "finished"  # of the variables that are connected, those that are Boolean
+
+
+def boolean(variable: str) -> bool:
+    """Whether a connected variable is Boolean; all others are Real."""
+    return variable.rpartition(".")[2] in (RELEASE, FINISHED)
+
+
 @dataclass(frozen=True)
 class Component:
     """An instance: `archive` is its .fmu, `start` its parameters and start values by variable name."""
@@ -32,6 +40,10 @@ class System:
     def sources(self, instance: str) -> dict[str, tuple[str, str]]:
         """Connected inputs of `instance` -> what drives them."""
         return {target[1]: source for source, target in self.connections if target[0] == instance}
+
+    def without(self, name: str) -> System:
+        """The same system without the connections to inputs of that name."""
+        return System(self.components, tuple(each for each in self.connections if each[1][1] != name))
 
     def reordered(self, *names: str) -> System:
         """The same system with its instances in another order."""

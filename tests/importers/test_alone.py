@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from importers import alone, with_fmpy, z_move
+from importers import alone, loops, with_fmpy, z_move
 from importers.registry import Importer
-from importers.system import Component, Experiment, Result, System, difference
+from importers.system import FINISHED, RELEASE, Component, Experiment, Result, System, difference
 
 # Relative to the largest value. libcosim's time is whole nanoseconds and its steps differences of such times, exact to
 # some 1e-17 s of 125 us, so 1e-13 of a step; measured are 3e-15. In the others no bit differs.
@@ -38,6 +38,25 @@ def test_a_unit_alone_in_simulate_fmu(case: alone.Case, fmus: Path) -> None:
     component = Component(fmus / f"{case.unit}.fmu", case.start)
     result = with_fmpy.run_unit(component, alone.inputs(case), alone.experiment(case))
     _agree(result, alone.by_hand(case, fmus))
+
+
+def test_a_boolean_connection_carries(importer: Importer, fmus: Path, tmp_path: Path) -> None:
+    """A drive that is released when the table has ended. In the wired system every drive always is, which one that took
+    no notice of the connection would be, too."""
+    time = np.arange(41) * 1e-3
+    x_s = 1e-5 * time / time[-1]  # x_a stays at its start value, 0
+    table = z_move.table(fmus, tmp_path / "table.fmu", time, {"Z": (x_s, np.zeros(41))})
+    do = Experiment(alone.STEP, 640, (("controller", "M_a"), ("controller", "x_e")))
+    system = System(
+        {"setpoint": Component(table), "controller": Component(fmus / "controller.fmu")},
+        ((("setpoint", "Z.x_s"), ("controller", "x_s")), (("setpoint", FINISHED), ("controller", RELEASE))),
+    )
+    result = importer.run(system, do, tmp_path)
+    _agree(result, loops.run(system, do, importer.master))
+    told = result["controller", "M_a"]
+    ended = 40 * 8 + 1  # the row counts at the end of the step that reaches it
+    assert np.nanmax(np.abs(told[:ended])) == 0.0
+    assert np.nanmax(np.abs(told[ended:])) > 0.1
 
 
 def test_the_setpoint_unit_alone(move: z_move.Move, system: System, importer: Importer, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, scenario, ssp
+from feedsim import cli, cosim, scenario, ssp
+from feedsim.trace import write_csv
 from importers import document, with_ecos, z_move
 
 _PART = re.compile(r"^### (.+?)\n(.*?)(?=^##)", re.MULTILINE | re.DOTALL)
@@ -54,5 +56,16 @@ def test_it_runs(name: str, fmus: Path, tmp_path: Path) -> None:
     if name == "fmucontainer":
         assert abs(told - 0.11) < REST
     else:
-        trace = cosim.run(loaded, fmus=fmus).trace
-        assert abs(told - np.interp(1.0, trace.time, trace["Z.x_a"])) < STEP
+        result = cosim.run(loaded, fmus=fmus)
+        assert abs(told - np.interp(1.0, result.trace.time, result.trace["Z.x_a"])) < STEP
+    if name == "ecos":
+        write_csv(tmp_path / "reference.csv", result.trace)
+        assert _compared(tmp_path) == 0
+
+
+def _compared(folder: Path) -> int:
+    """What the page's comparison of ecos with a run gives; the run, without its report, is folder/reference.csv."""
+    (command,) = re.findall(r"(?ms)^feedsim (compare ecos\.csv .*?)\n```", document.PAGE.read_text(encoding="utf-8"))
+    words = shlex.split(command.replace("\\\n", " "))
+    assert words[2] == "results/z_parallel/result.csv"
+    return cli.main([words[0], str(folder / words[1]), str(folder / "reference.csv"), *words[3:]])

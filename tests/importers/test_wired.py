@@ -9,7 +9,7 @@ import pytest
 from importers import document, loops, with_ecos, with_fmpy, with_libcosim, z_move
 from importers.loops import Master
 from importers.registry import IMPORTERS, Importer
-from importers.system import Result, System
+from importers.system import RELEASE, Result, System
 
 # Our imitation makes the same calls with the same numbers: no bit differs, except in libcosim, whose steps differ from
 # 125 us by some 1e-17 s (time in whole nanoseconds, handed over as differences of such times): 1.4e-7 nm and 4e-8 mN.m
@@ -31,7 +31,9 @@ def test_our_master_in_parallel_is_the_plain_loop(move: z_move.Move, system: Sys
 def test_an_imitation_can_fail(move: z_move.Move, system: System, parallel: Result) -> None:
     """A step's lag, another order, another first step: each is far above what is allowed."""
     for master in (Master(lag=1), Master(sequential=True), Master(zeros=True)):
-        x, torque = z_move.differences(loops.run(system, move.experiment, master), parallel, move)
+        # A first step with zeros makes no difference to drives that are not released in it.
+        bare = system.without(RELEASE) if master.zeros else system
+        x, torque = z_move.differences(loops.run(bare, move.experiment, master), parallel, move)
         assert x > 100.0, master
         assert torque > 50.0, master
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from importers.system import Experiment, Result, System
+from importers.system import Experiment, Result, System, boolean
 
 if TYPE_CHECKING:
     from ecospy import EcosSimulation
@@ -47,7 +47,8 @@ def run(system: System | Path, experiment: Experiment) -> Result:
         for name, component in system.components.items():
             structure.add_model(name, component.archive)
         for source, target in system.connections:
-            structure.make_real_connection("::".join(source), "::".join(target))
+            connect = structure.make_bool_connection if boolean(source[1]) else structure.make_real_connection
+            connect("::".join(source), "::".join(target))
         start = {
             f"{name}::{variable}": value
             for name, component in system.components.items()

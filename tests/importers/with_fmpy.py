@@ -11,7 +11,7 @@ from fmpy import simulate_fmu
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import Parameter, ParameterSet, read_ssv
 
-from importers.system import Component, Experiment, Floats, Result, System
+from importers.system import Component, Experiment, Floats, Result, System, boolean
 
 SSD = "SystemStructure.ssd"
 _NAMESPACES = (
@@ -93,7 +93,8 @@ def _write(path: Path, system: System, experiment: Experiment) -> None:
     elements, archives = [], {component.archive for component in system.components.values()}
     for name, component in system.components.items():
         own = "".join(
-            f'<ssd:Connector name="{variable}" kind="{kind}"><ssc:Real/></ssd:Connector>'
+            f'<ssd:Connector name="{variable}" kind="{kind}"><ssc:{"Boolean" if boolean(variable) else "Real"}/>'
+            "</ssd:Connector>"
             for (instance, variable), kind in connectors.items()
             if instance == name
         )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from importers.system import Experiment, Result, System
+from importers.system import Experiment, Result, System, boolean
 
 NANOSECONDS = 1e9
 BUFFER = 4096  # samples that an observer keeps
@@ -41,9 +41,8 @@ def run(system: System | Path, experiment: Experiment) -> Result:
     }
     if not isinstance(system, Path):
         for source, target in system.connections:
-            execution.connect_real_variables(
-                index[source[0]], variables[source].reference, index[target[0]], variables[target].reference
-            )
+            connect = execution.connect_boolean_variables if boolean(source[1]) else execution.connect_real_variables
+            connect(index[source[0]], variables[source].reference, index[target[0]], variables[target].reference)
         for name, component in system.components.items():
             for variable, value in component.start.items():
                 kind = CosimVariableType(variables[name, variable].type)

@@ -65,6 +65,7 @@ def hand_wired(move: Move, fmus: Path, folder: Path) -> System:
         connections += [
             (("setpoint", f"{axis}.x_s"), (control, "x_s")),
             (("setpoint", f"{axis}.n_ffw"), (control, "n_ffw")),
+            (("setpoint", f"{axis}.release"), (control, "release")),
             (("plant", f"{axis}.x_a"), (control, "x_a")),
             (("plant", f"{axis}.n_a"), (control, "n_a")),
             ((control, "M_a"), ("plant", f"{axis}.M_a")),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -66,7 +67,10 @@ def test_exit_codes(reference: Path, off: Path, tmp_path: Path, capsys: pytest.C
         (["--only", "Y.*"], "the reference has no column 'Y.*'"),
         (["--unit", "Z.x_a=parsec"], "unknown unit"),
         (["--from", "1"], "has no unit"),
-        (["--from", "5 s"], "do not overlap"),
+        (["--from", "5 s"], "the reference's 0 to 2 s (asked for from 5 s)"),
+        (["--tol", "0,1 mm"], "two tolerances in value; write a decimal point, not a comma"),
+        (["--axis", "Z"], "--axis Z: is for the record of a drive"),
+        (["--machine", "scenarios/machines/test_centre"], "--columns or --reference-columns"),
         (["--shift", "3 mm"], "is a length"),
         (["--time", "clock"], "no column 'clock'"),
     ],
@@ -159,6 +163,8 @@ def test_junit(reference: Path, off: Path, tmp_path: Path) -> None:
             assert suite.get(name) == str(count)
             totals[name] += count
     assert {name: int(root.get(name, "")) for name in totals} == totals
+    assert [suite.get("name") for suite in root] == [f"{r} against {reference}" for r in (off, reference, nix)]
+    assert all(case.get("classname") == suite.get("name") for suite in root for case in suite.findall("testcase"))
     assert totals == {"tests": 4 + 4 + 1, "failures": 2, "errors": 1}
     failures = {case.get("name"): case.find("failure") for case in root[0].findall("testcase")}
     worst = failures["Z.x_a"]
@@ -241,20 +247,82 @@ def test_a_run_against_a_measured_record(tmp_path: Path, capsys: pytest.CaptureF
 
 
 def test_rules_that_match_nothing_are_told(reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of the command line at once; of a file that serves several references only where it matches in none of them."""
-    assert run(reference, reference, "--tol", "Y.*=1 nm") == 0
-    assert "note: the tolerance for 'Y.*' matches no column" in capsys.readouterr().out
+    """Of the command line as any wrong option; of a file beside references only where the whole of it serves none."""
+    assert run(reference, reference, "--tol", "Y.*=1 nm") == 2
+    assert "--tol given for 'Y.*', which matches no column; there is Z.x_a, Z.M_a, Z.limited" in capsys.readouterr().out
     whole = wave()
     other = written(tmp_path / "other.csv", Series(whole.time, {"Z.x_a": whole["Z.x_a"]}, {"Z.x_a": "m"}))
-    (tmp_path / "tolerances.yaml").write_text("variables: {'*.M_a': 1 N.m, 'Y.*': 1 nm}", encoding="utf-8")
-    assert run(reference, reference, other, other) == 0
+    assert run(reference, reference, other, other, "--tol", "*.M_a=1 N.m") == 0  # serves one of the two
+    assert run(other, other, reference, reference, "--tol", "*.M_b=1 N.m", "--junit", tmp_path / "out.xml") == 2
+    assert len(ElementTree.parse(tmp_path / "out.xml").findall("testsuite/testcase/error")) == 2
+    capsys.readouterr()
+    file = tmp_path / "tolerances.yaml"
+    file.write_text("value: 1e-3\nvariables: {'*.M_a': 1 N.m, 'Y.*': 1 nm}", encoding="utf-8")
+    assert run(reference, reference, other, other) == run(other, other) == 0
     out = capsys.readouterr().out
-    assert "tolerances.yaml: the tolerance for 'Y.*' matches no column" in out
-    assert "M_a'" not in out
     assert "2 comparisons: 2 same" in out
+    assert out.count("note") == 1
+    assert "tolerances.yaml: matches no column: '*.M_a', 'Y.*'" in out
+    assert run(reference, reference, other, other, "--tolerances", file) == 0  # asked for by its name
+    assert "tolerances.yaml: matches no column: 'Y.*'" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("unit", ["friction", "controller"])
+def test_one_bad_cell(reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """File, row and value; on either side it is unusable, and --ignore leaves it out."""
+    lines = reference.read_text(encoding="utf-8").splitlines()
+    cells = lines[16].split(",")
+    lines[16] = ",".join([*cells[:2], "1.2.3", *cells[3:]])
+    bad = tmp_path / "bad.csv"
+    bad.write_text("\n".join(lines), encoding="utf-8")
+    for pair in ((bad, reference), (reference, bad)):
+        assert run(*pair) == 2
+        out = capsys.readouterr().out
+        assert f"cannot be compared: Z.M_a ({bad}:17: '1.2.3' in column 'Z.M_a' is no number)" in out
+        assert "missing" not in out
+        assert "Then --column" not in out
+        assert run(*pair, "--shift", "estimate", "--ignore", "*.M_a") == 0
+        capsys.readouterr()
+    text = [f"{line},{'run' if i else 'Z.M_b'}" for i, line in enumerate(lines)]
+    bad.write_text("\n".join(text), encoding="utf-8")
+    assert run(bad, reference, "--ignore", "Z.M_a", "--common") == 0
+    assert "columns of text in the result are not compared: Z.M_b" in capsys.readouterr().out
+    assert run(bad, reference, "--column", "Z.M_b=Z.M_a") == 2
+    assert "the result's column 'Z.M_b' holds text" in capsys.readouterr().out
+
+
+def test_no_number_as_the_worst(reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    values = wave()["Z.x_a"].copy()
+    values[7] = np.nan
+    report = tmp_path / "out.html"
+    assert run(written(tmp_path / "nan.csv", changed(wave(), Z__x_a=values)), reference, "--report", report) == 1
+    text = report.read_text(encoding="utf-8")
+    assert "no number" in text
+    assert not re.search(r"no number (m|of)\b", text)
+
+
+def test_the_first_line_says_why(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A tolerance for all columns that fits only some of them; and which of them it could be meant for."""
+    assert run(reference, reference, "--tol", "2 nm") == 2
+    line = capsys.readouterr().out.splitlines()[0]
+    assert line.count("unusable") == 1
+    assert "cannot be compared: Z.M_a, Z.limited (its tolerance: unit 'nm' is that of a length;" in line
+    assert "give it to the columns that it is for, such as '*.x_a=2 nm'" in line
+    assert run(reference, reference, "--tol", "2 nm", "--only", "Z.M_a") == 2
+    assert re.search(r"unusable: cannot be compared: Z\.M_a \(.", capsys.readouterr().out)
+
+
+def test_an_estimated_shift_of_nothing_is_0(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    late = written(tmp_path / "late.csv", Series(wave().time + 0.3, wave().columns, wave().units))
+    assert run(reference, reference, "--shift", "estimate") == 0
+    assert run(late, reference, "--shift", "estimate", "--max-shift", "0.4 s", "--all") == 0
+    out = capsys.readouterr().out
+    assert "shifted by -300 ms" in out
+    assert not re.search(r"e-[0-9]+ (s|ns)\b", out)
+
+
+@pytest.mark.parametrize("unit", ["friction", "controller", "plant", "setpoint"])
 def test_the_script_for_integrators(unit: str, fmus: Path, tmp_path: Path) -> None:
     """docs/comparing.md: the references in an archive through FMPy, with the tolerances that lie beside them."""
     document = (ROOT / "docs" / "comparing.md").read_text(encoding="utf-8")

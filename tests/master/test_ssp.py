@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -62,6 +64,14 @@ def test_two_writings_are_the_same_bytes(exported: Path, short: Path, fmus: Path
     again = tmp_path / "again.ssp"
     ssp.export(scenario.load(short), again, fmus=fmus)
     assert again.read_bytes() == exported.read_bytes()
+
+
+def test_every_file_that_one_edits_says_whose_numbers_it_holds(exported: Path) -> None:
+    sets = {name: text for name, text in ssp_helpers.contents(exported).items() if name.endswith(".ssv")}
+    assert len(sets) == 7  # plant; controller and friction of three axes
+    for name, content in sets.items():
+        root = ElementTree.fromstring(content)
+        assert root.get("description", "").startswith("Synthetic machine;"), name
 
 
 @pytest.mark.parametrize(
@@ -248,13 +258,135 @@ def test_without_the_annotation_the_signals_are_the_same(exported: Path, tmp_pat
     assert (segment.kind, segment.axes) == ("setpoints", ("Z",))
 
 
-def test_a_shorter_experiment(exported: Path, tmp_path: Path) -> None:
-    """The stop time counts; the annotation's motions then are not what is run, and a warning says so."""
-    stop = float(run_ssp(exported).program.duration)
-    file = edited(exported, tmp_path / "shorter.ssp", STRUCTURE, (f'stopTime="{stop!r}"', 'stopTime="0.05"'))
+def test_without_release_the_drives_are_enabled(exported: Path, tmp_path: Path) -> None:
+    """A file whose controllers' release nothing drives, as where somebody's own control gives the setpoints."""
+
+    def unconnected(text: str) -> str:
+        kept = [line for line in text.splitlines() if 'endConnector="release"' not in line]
+        assert len(text.splitlines()) - len(kept) == 3
+        return "\n".join(kept)
+
+    assert_same(
+        run_ssp(ssp_helpers.altered(exported, tmp_path / "bare.ssp", STRUCTURE, unconnected)), run_ssp(exported)
+    )
+
+
+def with_stop(exported: Path, out: Path, stop: float, start: float = 0.0) -> Path:
+    def change(text: str) -> str:
+        text, changed = re.subn(
+            'startTime="0.0" stopTime="[0-9.]+"', f'startTime="{start!r}" stopTime="{stop!r}"', text
+        )
+        assert changed == 1
+        return text
+
+    return ssp_helpers.altered(exported, out, STRUCTURE, change)
+
+
+def test_a_longer_experiment(exported: Path, tmp_path: Path) -> None:
+    """The axes rest behind the end of the table; the evaluation stays, and nothing is to be warned of."""
+    one = run_ssp(exported)
+    longer = with_stop(exported, tmp_path / "longer.ssp", one.program.duration + 0.1)
+    with ssp.opened(longer) as found:
+        assert found.warnings == ()
+        assert found.program.segments == one.program.segments
+        assert found.scenario.evaluate == one.scenario.evaluate != ()
+    other = run_ssp(longer)
+    for name in one.trace.columns:
+        assert np.array_equal(one.trace[name], other.trace[name][: len(one.trace.time)]), name
+    overshoot = "Z.overshoot"
+    assert analysis.evaluate(one)[overshoot] == analysis.evaluate(other)[overshoot]
+
+
+@pytest.mark.parametrize(("stop", "left", "evaluated"), [(0.05, 1, False), (0.2, 2, True)])
+def test_a_shorter_experiment(exported: Path, tmp_path: Path, stop: float, left: int, evaluated: bool) -> None:
+    """The stop time counts: motions are cut there, and what is no longer driven to its end is not evaluated."""
+    whole = run_ssp(exported)
+    file = with_stop(exported, tmp_path / "shorter.ssp", stop)
     with ssp.opened(file) as found:
-        assert found.program.duration == pytest.approx(0.05, abs=1e-12)  # a multiple of 1 ms
-        assert any("not those of the motions" in warning for warning in found.warnings)
+        assert found.program.duration == pytest.approx(stop, abs=1e-12)  # a multiple of 1 ms
+        assert len(found.program.segments) == left
+        assert found.program.segments[:-1] == whole.program.segments[: left - 1]
+        assert found.program.segments[-1].end == found.program.duration
+        assert bool(found.scenario.evaluate) == evaluated
+        told = ("shorter.ssp: ends at 0.05 s, too early for evaluate.0 (positioning of Z, to 0.",)
+        assert [w.startswith(t) for w, t in zip(found.warnings, () if evaluated else told, strict=True)] != [False]
+        analysis.check(found.scenario, found.program)
+    part = run_ssp(file)
+    for name in part.trace.columns:
+        assert np.array_equal(part.trace[name], whole.trace[name][: len(part.trace.time)]), name
+
+
+def test_every_stop_time_can_be_run(exported: Path, tmp_path: Path) -> None:
+    """Also those just ahead of and behind the ends of motions and rests."""
+    with ssp.opened(exported) as found:
+        move, rest = (segment.end for segment in found.program.segments)
+    for stop in (0.001, move - 0.001, move, move + 0.001, move + 0.049, move + 0.051, rest - 0.001, rest, rest + 0.001):
+        with ssp.opened(with_stop(exported, tmp_path / "x.ssp", round(stop, 3))) as found:
+            analysis.check(found.scenario, found.program)
+            assert bool(found.scenario.evaluate) != bool(found.warnings)
+
+
+def test_the_rest_that_an_evaluation_needs() -> None:
+    from feedsim.analysis.positioning import LEAST_REST
+    from feedsim.ssp import stop_time
+
+    assert stop_time.LEAST_REST == LEAST_REST
+
+
+def test_an_experiment_that_starts_late(exported: Path, tmp_path: Path) -> None:
+    """Setpoints begin with the experiment; results count from its start, and a warning says so."""
+    end = run_ssp(exported).program.duration
+    late = with_stop(exported, tmp_path / "late.ssp", 1000.0 + end, 1000.0)
+    assert_same(run_ssp(exported), run_ssp(late))
+    with ssp.opened(late) as found:
+        assert found.warnings == ("late.ssp: starts at 1000 s; results count time from there: their 0 s is its 1000 s",)
+
+
+def test_rows_are_those_that_the_unit_plays(exported: Path, tmp_path: Path) -> None:
+    """At instants just ahead of rows, for steps of several lengths: with the unit's own slack."""
+    from feedsim.cosim.unit import Archive, Unit
+    from feedsim.ssp.pack import SETPOINTS_IN_ARCHIVE, read_setpoints
+
+    file = tmp_path / "setpoint.fmu"
+    file.write_bytes(ssp_helpers.contents(exported)["resources/setpoint.fmu"])
+    with Archive(file) as archive:
+        table = read_setpoints((archive.directory / SETPOINTS_IN_ARCHIVE).read_bytes(), "table")
+        both = set()
+        for step in (1.25e-4, 1e-3, 1e-6):
+            for ahead in (0.0, 1e-10, 1e-9, 1.9e-9, 2.1e-9, 5e-9, 9e-9, 1.1e-8, 1e-6, 1.2e-5):
+                time = table.time[[3, 57, 200]] - ahead
+                rows = table.rows(time, step)
+                for t, row in zip(time, rows, strict=True):
+                    unit = Unit(archive, "setpoint")
+                    unit.enter_initialisation(0.0, 1.0)
+                    unit.exit_initialisation()
+                    unit.step(0.0, float(t) - step)
+                    unit.step(float(t) - step, step)
+                    assert unit.value("row") == row, (step, ahead, t)
+                    unit.close()
+                both |= set((rows - [3, 57, 200]).tolist())
+        assert both == {0, -1}
+
+
+def test_components_have_places_of_their_own_in_pictures(exported: Path) -> None:
+    """The geometry of the standard: no two components overlap, and the signal flows from the left to the right."""
+    from xml.etree import ElementTree
+
+    space = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
+    root = ElementTree.fromstring(ssp_helpers.contents(exported)[STRUCTURE])
+    boxes = {}
+    for component in root.iter(f"{space}Component"):
+        geometry = component.find(f"{space}ElementGeometry")
+        assert geometry is not None
+        boxes[component.get("name")] = tuple(float(geometry.get(corner, "nan")) for corner in ("x1", "y1", "x2", "y2"))
+    assert len(boxes) == 8
+    for name, (x1, y1, x2, y2) in boxes.items():
+        assert x1 < x2
+        assert y1 < y2
+        for other, (a1, b1, a2, b2) in boxes.items():
+            assert name == other or x2 <= a1 or a2 <= x1 or y2 <= b1 or b2 <= y1, (name, other)
+    assert boxes["setpoint"][2] < boxes["controller_X"][0] < boxes["plant"][0] < boxes["friction_X"][0]
+    assert boxes["controller_X"][1] > boxes["controller_Y"][1] > boxes["controller_Z"][1]
 
 
 def test_what_is_inside(exported: Path) -> None:
@@ -266,7 +398,7 @@ def test_what_is_inside(exported: Path) -> None:
     assert [element.name for element in read.system.elements] == [
         "setpoint", "controller_X", "controller_Y", "controller_Z", "plant", "friction_X", "friction_Y", "friction_Z",
     ]  # fmt: skip
-    assert len(read.system.connections) == 7 * 3
+    assert len(read.system.connections) == 8 * 3
     values = {
         f"{element.name}.{parameter.name}": (parameter.value, parameter.unit)
         for element in read.system.elements
@@ -291,7 +423,7 @@ def test_another_reader_of_the_standard_agrees(exported: Path) -> None:
         )
         with package.system_structure as structure:
             assert len(structure.system.elements) == 8
-            assert len(structure.system.connections) == 21
+            assert len(structure.system.connections) == 24
 
 
 def test_written_anew_by_another_tool(exported: Path, tmp_path: Path) -> None:

@@ -48,6 +48,18 @@ def test_input_driven_twice_is_named(instances: dict[str, Archive]) -> None:
         wiring.check(connections, instances)
 
 
+def test_every_drive_is_released_by_the_source_of_its_setpoints(instances: dict[str, Archive]) -> None:
+    sources = {each.target: each.source for each in wiring.figure_2(AXES)}
+    for axis in AXES:
+        assert sources[Variable(f"controller_{axis}", "release")] == Variable(wiring.NC, f"{axis}.release")
+    connections = [
+        Connection(each.target, Variable("plant", "X.x_a")) if each.target.name == "release" else each
+        for each in wiring.figure_2(AXES)
+    ]
+    with pytest.raises(InputError, match=r"controller_X/release is in 1, but plant/X\.x_a is in m"):
+        wiring.check(connections, instances)
+
+
 def test_other_unit_is_refused(instances: dict[str, Archive]) -> None:
     target = Variable("controller_X", "x_a")
     connections = [

@@ -46,6 +46,7 @@ class Inputs:
     n_a: float = 0.0
     n_add: float = 0.0
     M_add: float = 0.0
+    release: bool = True
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,8 @@ def drive(p: Parameters) -> Generator[Cycle, Inputs, None]:
     lag_u = lag_y = 0.0
     n_new = n_old = x_e = 0.0
     n_s_history: list[float] = []
-    places: list[float] = []  # x_a at every instant
+    places: list[float] = []  # x_a at every instant since the first release
+    released = False
     w, D = p["omega_0"], p["D"]
     model = started(section([0, 0, w * w], [1, 2 * D * w, w * w], 1 / p["T_c"]))
     filters = current_filters(p)
@@ -165,13 +167,32 @@ def drive(p: Parameters) -> Generator[Cycle, Inputs, None]:
     while True:
         now = yield cycle
 
-        # 1. position loop
-        if k % ticks == 0:
+        # 0. without release: no torque, and everything but the measurement is as at the start
+        if not now.release:
+            if places:
+                places.append(now.x_a)
+            x_history, n_history, n_s_history, released = [], [], [], False
+            model = started(section([0, 0, w * w], [1, 2 * D * w, w * w], 1 / p["T_c"]))
+            filters = current_filters(p)
+            ideal, induced = bool(p["ideal_current_loop"]), psi * p["p"] * now.n_a
+            u_next = np.array([0.0, 0.0 if ideal else induced])
+            cycle = Cycle(
+                M_a=(0.0 if ideal else M_a, 0.0), i_d=(0.0 if ideal else float(i[0]), 0.0),
+                i_q=(0.0 if ideal else float(i[1]), 0.0), x_e=now.x_s - now.x_a, u_q=float(u_next[1]),
+            )  # fmt: skip
+            integral = n_new = n_old = M_a = 0.0
+            i, current_integral = np.zeros(2), np.zeros(2)
+            k += 1
+            continue
+
+        # 1. position loop; at a release, too, in place of its last instant
+        if k % ticks == 0 or not released:
+            released = True
             x_history.append(now.x_s)
             n_history.append(now.n_ffw)
             if p["symmetry_lag"]:
                 u = cubic(x_history, p["T_dyn"] / p["T_pos"], x_history[0])
-                if k == 0:
+                if len(x_history) == 1:
                     lag_u = lag_y = u
                 else:
                     lag_y = lag_a * lag_y + lag_old * lag_u + lag_new * u
@@ -199,7 +220,7 @@ def drive(p: Parameters) -> Generator[Cycle, Inputs, None]:
         places.append(now.x_a)
         n, window = now.n_a, int(p["speed_window"])
         if window:
-            n = (now.x_a - places[max(k - window, 0)]) / (window * p["T_c"] * p["I_P"])
+            n = (now.x_a - places[max(len(places) - 1 - window, 0)]) / (window * p["T_c"] * p["I_P"])
         step = p["T_c"] / p["T_n"] if p["speed_integrator"] else 0.0
         integral += p["K_p"] * step * (n_ref - n)
         wanted = p["K_p"] * (n_s - n) + integral + now.M_add

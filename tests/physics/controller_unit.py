@@ -20,7 +20,7 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
-INPUTS = tuple(field.name for field in fields(Inputs))
+INPUTS = tuple(field.name for field in fields(Inputs) if field.name != "release")
 LINEAR = ("M_a", "i_d", "i_q")  # outputs that run linearly over a control cycle
 SAMPLED = ("x_e", "n_s", "n_ref", "M_s", "u_d", "u_q")  # outputs that belong to the last sample instant
 FLAGS = ("torque_limited", "voltage_limited")
@@ -90,6 +90,9 @@ class Instance:
     def set(self, values: Mapping[str, float]) -> None:
         self.fmu.setReal(self.references(values), list(values.values()))
 
+    def enable(self, release: bool) -> None:
+        self.fmu.setBoolean(self.references(["release"]), [release])
+
     def get(self, name: str) -> float:
         return float(self.fmu.getReal(self.references([name]))[0])
 
@@ -151,12 +154,13 @@ def compare(
     *,
     with_slopes: bool = True,
     start_time: float = 0.0,
+    released: Callable[[int], bool] = lambda step: True,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Take `steps` [T_c] with the unit and with the reference; return what both show at their ends, (steps, COLUMNS).
 
     At an instant t_k the drive sees value(t) + slope(t) (t_k - t) of the communication point t ahead of it; the
     reference gets those very numbers. Positions in time are fractions of T_c, so that no rounding decides where an
-    instant belongs.
+    instant belongs. `released`: number of a step -> controller enable in it.
     """
     p = {**DEFAULTS, **parameters}
     T_c = p["T_c"]
@@ -168,14 +172,17 @@ def compare(
         at = Fraction(0)
         instant = 0
         seen, expected = [], []
-        for step in steps:
+        for number, step in enumerate(steps):
+            release = released(number)
+            unit.enable(release)
             t = float(at) * T_c
             values = signals.value(t)
             slopes = signals.derivative(t) if with_slopes else [0.0] * len(INPUTS)
             unit.step(start_time + t, float(step) * T_c, values, slopes if with_slopes else None)
             while instant < at + step:
                 ahead = float(instant - at) * T_c
-                cycle = reference.send(Inputs(*(v + s * ahead for v, s in zip(values, slopes, strict=True))))
+                given = (v + s * ahead for v, s in zip(values, slopes, strict=True))
+                cycle = reference.send(Inputs(*given, release=release))
                 instant += 1
             at += step
             share = float(at - (instant - 1))

@@ -183,6 +183,14 @@ def _speed_step(stop: float) -> Table:
     return {"time": t, "x_s": still, "x_a": still, "n_a": np.round(n_a, 9), "n_add": np.where(t > 0.00999, 2.0, 0.0)}
 
 
+def _released(table: Table, *changes: float) -> Table:
+    """The same inputs with the controller enable: true at first, the other way round from each of the times on."""
+    t = np.union1d(table["time"], changes)
+    switched = np.array([sum(now >= change for change in changes) % 2 == 0 for now in t], dtype=np.float64)
+    more = {name: np.round(np.interp(t, table["time"], values), 12) for name, values in table.items()}
+    return more | {"time": t, "release": switched}
+
+
 def controller_cases() -> list[Pinned]:
     """Default cascade, limits, delays, the other settings, a step of the speed setpoint, and other steps than T_c."""
     other = {
@@ -201,6 +209,7 @@ def controller_cases() -> list[Pinned]:
     }
     # delays of no whole cycles, on both sides of one cycle, and one of the reference model
     delays = {"T_dyn": 0.31e-3, "T_sym": 7.27e-3, "T_ref": 0.29e-3, "speed_window": 3}
+    late = {"T_ref": 0.29e-3, "speed_window": 3}
     ideal = {"ideal_current_loop": 1, "reference_model": 0, "filter_1.type": 0}
     move = _motion(0.4, 4e-3, 10e-6)
 
@@ -223,6 +232,8 @@ def controller_cases() -> list[Pinned]:
         case("other_settings", _motion(0.4, -4e-3, 10e-6, True), other),
         case("speed_step", _speed_step(0.06), every=STEP),
         case("ideal_current_loop", move, ideal, ("M_a", "x_e", "n_s", "n_ref", "M_s")),
+        # in motion, and back within a position cycle; for one cycle; and once more while the axis vibrates
+        case("release", _released(move, 0.07, 0.0905, 0.11, 0.110125, 0.25, 0.3), late),
         case("uneven_step", _motion(0.3, 4e-3, 10e-6), None, ("M_a", "n_s"), 0.2e-3, 1e-3),
     ]
 

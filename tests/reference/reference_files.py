@@ -1,9 +1,9 @@
 """Files of a reference case, after the FMI cross-check rules 4.1: <case>_in.csv, <case>_ref.csv and <case>_ref.opt.
 
 CSV: first column "time" [s], double-quoted header of exact variable names, no row of units. Inputs run linearly between
-the rows. Additions to the rules: <case>_par.csv with the columns "name","value" sets parameters; held/<case>_ref.csv is
-what comes out where the importer holds every input over a step of StepSize; <case>_modes.csv is a table of modes that
-the plant takes instead of its archive's (parameter modes_file).
+the rows, Boolean ones keep the value of a row until the next. Additions to the rules: <case>_par.csv with the columns
+"name","value" sets parameters; held/<case>_ref.csv is what comes out where the importer holds every input over a step
+of StepSize; <case>_modes.csv is a table of modes that the plant takes instead of its archive's (parameter modes_file).
 """
 
 from __future__ import annotations
@@ -43,6 +43,12 @@ class Case:
     def moving(self) -> bool:
         """An input changes, so that holding it over a step makes a difference to a continuous unit."""
         return any(np.ptp(values) > 0 for name, values in self.inputs.items() if name != "time")
+
+
+def booleans(table: Table, name: str, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A Boolean column at the times `t`, 0 or 1: it keeps the value of a row until the next one."""
+    row = np.searchsorted(table["time"], t + 1e-9, side="right") - 1
+    return np.asarray(table[name][row] != 0, dtype=np.float64)
 
 
 def write_table(path: Path, table: Table, digits: int = 15) -> None:

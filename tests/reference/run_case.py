@@ -14,7 +14,7 @@ import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
-from reference_files import Case, Table
+from reference_files import Case, Table, booleans
 
 
 class Unusable(Exception):
@@ -86,6 +86,10 @@ def _instants(case: Case) -> NDArray[np.int_]:
 def _step(unit: FMU2Slave, variables: dict[str, Any], case: Case, inputs: list[str], outputs: list[str]) -> Table:
     steps = round((case.stop - case.start) / case.step)
     t = case.start + np.arange(steps + 1) * case.step
+    flags = [name for name in inputs if variables[name].type == "Boolean"]
+    inputs = [name for name in inputs if name not in flags]
+    switched = np.array([booleans(case.inputs, name, t) for name in flags]).reshape(-1, len(t))
+    switch = [variables[name].valueReference for name in flags]
     given = np.array([np.interp(t, case.inputs["time"], case.inputs[name]) for name in inputs]).reshape(-1, len(t))
     slopes = np.diff(given, axis=1) / case.step
     into = [variables[name].valueReference for name in inputs]
@@ -103,12 +107,14 @@ def _step(unit: FMU2Slave, variables: dict[str, Any], case: Case, inputs: list[s
         return [values[name] for name in outputs]
 
     unit.setReal(into, given[:, 0].tolist())
+    unit.setBoolean(switch, [bool(value) for value in switched[:, 0]])
     unit.exitInitializationMode()
     rows = {0: outputs_now()}
     instants = set(wanted.tolist())
     first_order = [1] * len(into)
     for k in range(steps):
         unit.setReal(into, given[:, k].tolist())
+        unit.setBoolean(switch, [bool(value) for value in switched[:, k]])
         if into and not case.held:
             unit.setRealInputDerivatives(into, first_order, slopes[:, k].tolist())
         unit.doStep(float(t[k]), case.step)

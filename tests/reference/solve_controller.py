@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from reference_files import Case, Table
+from reference_files import Case, Table, booleans
 from scipy.interpolate import BarycentricInterpolator
 from scipy.linalg import expm
 from scipy.signal import bilinear, cont2discrete
@@ -78,23 +78,33 @@ class Cascade:
         p = self.p
         self.ratio = round(p["T_pos"] / p["T_c"])
         self.psi = p["K_t"] / (1.5 * p["p"])
+        lag = cont2discrete(([1.0], [max(p["T_sym"], 1e-12), 1.0]), p["T_pos"], method="foh")
+        self.lag_b, self.lag_a = np.ravel(lag[0]), np.ravel(lag[1])
+        self.measured: list[float] = []  # x_a of the last `speed_window` cycles, oldest first
+        self.k = 0
+        self.released = True
+        self._begin(x_s_start)
+
+    def _begin(self, x_s: float) -> None:
+        """At rest, all that came before forgotten: the setpoint stood at x_s."""
+        p = self.p
         w = p["omega_0"]
         self.reference = _Filter([w * w], [1, 2 * p["D"] * w, w * w], 1 / p["T_c"])
         self.filters = [self._setpoint_filter(f"filter_{i}") for i in range(1, 5) if p.get(f"filter_{i}.type", 0)]
-        lag = cont2discrete(([1.0], [max(p["T_sym"], 1e-12), 1.0]), p["T_pos"], method="foh")
-        self.lag_b, self.lag_a = np.ravel(lag[0]), np.ravel(lag[1])
         self.dead = [0.0] * (math.ceil(p["T_ref"] / p["T_c"]) + 2)  # n_s of the last cycles, oldest first
-        self.measured: list[float] = []  # x_a of the last `speed_window` cycles, oldest first
-        self.x_history = [x_s_start] * 64
-        self.n_history = [0.0] * 64
-        self.lag_input = self.lag_output = x_s_start
-        self.k = 0
+        self._stood_at(x_s)
         self.n_old = self.n_new = self.integral = 0.0
         self.i = np.zeros(2)
         self.u_next = np.zeros(2)
         self.u = np.zeros(2)
         self.current_integral = np.zeros(2)
         self.seen = dict.fromkeys(OBSERVABLES, 0.0)
+
+    def _stood_at(self, x_s: float) -> None:
+        """The past of the setpoints."""
+        self.x_history = [x_s] * 64
+        self.n_history = [0.0] * 64
+        self.lag_input = self.lag_output = x_s
 
     def _setpoint_filter(self, name: str) -> _Filter:
         p, rate = self.p, 1 / self.p["T_c"]
@@ -171,11 +181,39 @@ class Cascade:
         A[1] = [-w * p["L_d"] / p["L_q"], -p["R"] / p["L_q"], (self.u[1] - w * self.psi) / p["L_q"]]
         self.i = np.asarray(expm(A * p["T_c"]) @ np.array([self.i[0], self.i[1], 1.0]))[:2]
 
-    def sample(self, x_s: float, n_ffw: float, x_a: float, n_a: float, n_add: float = 0.0, M_add: float = 0.0) -> float:
+    def _rest(self, x_s: float, x_a: float, n_a: float) -> float:
+        """An instant without release: no torque, at the motor's terminals what it induces; the encoder measures on."""
+        p = self.p
+        self._begin(x_s)
+        self.released = False
+        if self.measured:
+            self._measured_speed(x_a, n_a)
+        self.k += 1
+        self.seen = dict.fromkeys(OBSERVABLES, 0.0) | {"x_e": x_s - x_a}
+        if not p["ideal_current_loop"]:
+            self.u_next = np.array([0.0, p["p"] * n_a * self.psi])
+            self.seen["u_q"] = float(self.u_next[1])
+        return 0.0
+
+    def sample(
+        self,
+        x_s: float,
+        n_ffw: float,
+        x_a: float,
+        n_a: float,
+        n_add: float = 0.0,
+        M_add: float = 0.0,
+        release: float = 1.0,
+    ) -> float:
         """Work at the next sample instant t_k; return M_a(t_k+1) [N.m]."""
         p = self.p
-        if self.k % self.ratio == 0:
+        if not release:
+            return self._rest(x_s, x_a, n_a)
+        if not self.released:
+            self._stood_at(x_s)
+        if self.k % self.ratio == 0 or not self.released:
             self._position(x_s, n_ffw, x_a)
+        self.released = True
         M = self._speed(self._measured_speed(x_a, n_a), n_add, M_add)
         for setpoint_filter in self.filters:
             M = setpoint_filter(M)
@@ -205,6 +243,8 @@ def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
     seen_at = np.floor(t / case.step + 1e-9) * case.step if case.held else t
     given = {n: np.interp(seen_at, case.inputs["time"], case.inputs[n]) for n in names if n in case.inputs}
     given.setdefault("n_ffw", np.zeros_like(t))
+    if "release" in case.inputs:
+        given["release"] = booleans(case.inputs, "release", seen_at)
     cascade = Cascade(case.parameters, float(given["x_s"][0]))
     torque, seen = [0.0], [dict.fromkeys((*OBSERVABLES, "i_d", "i_q"), 0.0)]
     for k in range(cycles):

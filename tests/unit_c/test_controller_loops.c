@@ -46,6 +46,14 @@ static void speed_limit_includes_the_excitation(void) {
     CHECK(!z.limited);
 }
 
+/* What is no number is not taken for one at the limit: nobody would see it. */
+static void speed_limit_lets_no_number_pass(void) {
+    SpeedController p = speed_of(2.0, 0.01, true, 5.0, T_C);
+    SpeedState x = {NAN, false};
+    CHECK(isnan(speed_step(&p, &x, 0.0, 0.0, 0.0, 0.0)));
+    CHECK(isnan(x.I));
+}
+
 /* A setpoint far above what the torque limit reaches, for 0.2 s; then it falls to just below the speed. */
 static void speed_integrator_does_not_wind_up(void) {
     const double K_p = 6.18;
@@ -198,6 +206,7 @@ int main(void) {
     speed_is_a_pi_controller();
     speed_without_integrator();
     speed_limit_includes_the_excitation();
+    speed_limit_lets_no_number_pass();
     speed_integrator_does_not_wind_up();
     current_law();
     current_limit_keeps_the_direction();

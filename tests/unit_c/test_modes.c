@@ -178,6 +178,27 @@ static void axis_tables(void) {
     refuse_axes("axis,x_0 [m]\nan_axis_whose_name_is_far_too_long,1\n", "line 2", "at most 31");
 }
 
+static void most_axes(void) {
+    static char text[16 * (AXES_MOST + 3)];
+    static AxisRow many[AXES_MOST];
+    size_t count = 0;
+    snprintf(text, sizeof text, "axis,x_0 [m]\n");
+    for (int i = 0; i < AXES_MOST; i++) {
+        snprintf(text + strlen(text), sizeof text - strlen(text), "A%d,%d\n", i, i);
+    }
+    CHECK(axes_read(text, strlen(text), "axes.csv", many, &count, message, sizeof message));
+    CHECK(count == AXES_MOST);
+    snprintf(text + strlen(text), sizeof text - strlen(text), "B,0\n");
+    CHECK(!axes_read(text, strlen(text), "axes.csv", many, &count, message, sizeof message));
+    CHECK_CONTAINS(message, "axes.csv, line 258: 'B,0': these are more axes than the 256");
+}
+
+/* A cell may be longer than an int counts; its length must not be cut off on the way. */
+static void cells_have_any_length(void) {
+    CsvCell cell;
+    CHECK(sizeof cell.length == sizeof(size_t));
+}
+
 int main(void) {
     good_tables();
     faults_of_the_header();
@@ -187,5 +208,7 @@ int main(void) {
     zero_bytes();
     numbers_ignore_the_locale();
     axis_tables();
+    most_axes();
+    cells_have_any_length();
     return CHECK_RESULT;
 }

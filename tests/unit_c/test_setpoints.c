@@ -99,6 +99,27 @@ static void test_faults_of_rows(void) {
     refuse(HEADER ROWS "0.004,1,2,3,4\n", "line 5", "rows must be even in time"); /* one is missing */
 }
 
+static void test_span_that_is_no_number(void) {
+    refuse(HEADER "-1e308,1,2,3,4\n1e308,1,2,3,4\n", "t.csv: the times run from -1e+308 s to 1e+308 s",
+           "no finite number");
+    refuse(HEADER "-1e308,1,2,3,4\n0,1,2,3,4\n1e308,1,2,3,4\n", "t.csv", "no finite number");
+}
+
+static void test_most_axes(void) {
+    static char text[64 * (SETPOINT_AXES_MOST + 2)];
+    static SetpointAxis many[SETPOINT_AXES_MOST];
+    size_t axes = 0;
+    snprintf(text, sizeof text, "time [s]");
+    for (int i = 0; i < SETPOINT_AXES_MOST; i++) {
+        snprintf(text + strlen(text), sizeof text - strlen(text), ",A%d.x_s [m],A%d.n_ffw [rad/s]", i, i);
+    }
+    CHECK(setpoints_read_axes(text, strlen(text), "t.csv", many, &axes, message, sizeof message));
+    CHECK(axes == SETPOINT_AXES_MOST);
+    snprintf(text + strlen(text), sizeof text - strlen(text), ",B.x_s [m],B.n_ffw [rad/s]");
+    CHECK(!setpoints_read_axes(text, strlen(text), "t.csv", many, &axes, message, sizeof message));
+    CHECK_CONTAINS(message, "t.csv, line 1, column 514: 'B.x_s [m]': these are more axes than the 256");
+}
+
 /* Each row is a millionth late against the one before: nothing to see from row to row, but they add up. */
 static void test_drift(void) {
     char text[4000] = "time [s],X.x_s [m],X.n_ffw [rad/s]\n";
@@ -120,6 +141,7 @@ static void test_row(void) {
     CHECK(at(0.0009, 1e-4) == 0);
     CHECK(at(0.001, 1e-4) == 1);
     CHECK(at(0.0009999999999, 1e-4) == 1); /* an importer's rounding */
+    CHECK(at(0.000999999, 1e-3) == 1);     /* a clock in whole nanoseconds, as in three steps of a third of 1 ms */
     CHECK(at(0.00099, 1e-5) == 0);
     CHECK(at(0.000999, 1e-6) == 0);
     CHECK(at(0.0009999, 1e-7) == 0); /* smaller steps than anybody takes are told apart, too */
@@ -132,12 +154,23 @@ static void test_row(void) {
     /* a late start: the time of the experiment is large, the one since its start small */
     CHECK(setpoints_row(&table, 0.000999999, setpoints_slack(&table, 1000.000999999, 125e-6)) == 1);
     CHECK(setpoints_row(&table, 0.000998, setpoints_slack(&table, 1000.000998, 1e-6)) == 0);
+    /* steps that end between rows, after starts that are late */
+    const double starts[] = {0, 1000, 86400, 31557600};
+    for (size_t i = 0; i < sizeof starts / sizeof *starts; i++) {
+        const double end = starts[i] + 0.00095;
+        CHECK(setpoints_row(&table, end - starts[i], setpoints_slack(&table, end, end - starts[i])) == 0);
+        CHECK(setpoints_row(&table, end - starts[i], setpoints_slack(&table, end, 10)) == 0);
+    }
     /* no slack is as much as a noticeable part of a step or of a cycle, at any time */
     for (double t = 1e-6; t < 1e12; t *= 10) {
-        CHECK(setpoints_slack(&table, t, 1e-5) <= fmax(0.1 * 1e-5, 16 * DBL_EPSILON * t));
-        CHECK(setpoints_slack(&table, t, 10) <= fmax(1e-4, 16 * DBL_EPSILON * t));
+        CHECK(setpoints_slack(&table, t, 1e-5) <= fmax(0.01 * 1e-5, 16 * DBL_EPSILON * t));
+        CHECK(setpoints_slack(&table, t, 10) <= fmax(1e-5, 16 * DBL_EPSILON * t));
         CHECK(setpoints_slack(&table, t, 10) >= 16 * DBL_EPSILON * t);
     }
+    /* 1 ns short, by a clock in whole nanoseconds, of a row of a shorter cycle */
+    const Setpoints quick = {.axes = 1, .width = 3, .rows = 100, .cycle = 1e-4};
+    CHECK(setpoints_row(&quick, 99999e-9, setpoints_slack(&quick, 99999e-9, 33333e-9)) == 1);
+    CHECK(setpoints_row(&quick, 99e-6, setpoints_slack(&quick, 99e-6, 33e-6)) == 0);
 }
 
 static void test_first_row_at_another_time(void) {
@@ -170,6 +203,8 @@ int main(void) {
     test_reading();
     test_faults_of_the_header();
     test_faults_of_rows();
+    test_span_that_is_no_number();
+    test_most_axes();
     test_drift();
     test_row();
     test_first_row_at_another_time();

@@ -49,8 +49,19 @@ static void texts_are_mended(void) {
     mended("\xE2\xC3\xA4", "?\xC3\xA4");
 }
 
+/* A cell of a file may hold what a terminal obeys. */
+static void control_characters_are_masked(void) {
+    mended("a\x1B[2Jb", "a?[2Jb");
+    mended("a\r\n\tb\x07\x7F", "a???b??");
+    mended("\xC2\x9B"
+           "2J\xC2\xA0\xC2\xB5",
+           "??2J\xC2\xA0\xC2\xB5");
+    mended("\xC2", "");
+}
+
 int main(void) {
     cuts_lie_between_characters();
     texts_are_mended();
+    control_characters_are_masked();
     return CHECK_RESULT;
 }

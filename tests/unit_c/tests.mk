@@ -18,6 +18,7 @@ SOURCES_test_shell_calls     := $(TOY)
 SOURCES_test_shell_values    := $(TOY)
 SOURCES_test_shell_steps     := $(TOY)
 SOURCES_test_shell_states    := $(TOY)
+SOURCES_test_shell_forged    := $(TOY)
 SOURCES_test_shell_instances := $(TOY)
 SOURCES_test_table           := $(TOY)
 SOURCES_test_location        := $(TOY)
@@ -103,7 +104,7 @@ $(C_BUILD)/%/lifecycle: $(UNIT_C)/lifecycle.c $(UNIT_C)/loaded.h src/fmi2/standa
 # The archive's sources, all in one folder, as importers compile them.
 $(C_BUILD)/sanitized/%.so: $(C_BUILD)/packed/%.unpacked
 	@mkdir -p $(@D)
-	$(CC) -std=c99 -ffp-contract=off $(FLAGS_sanitized) -fPIC -shared -fvisibility=hidden -I$(<:.unpacked=)/sources \
+	$(CC) -std=c99 -ffp-contract=off $(FLAGS_sanitized) -fPIC -shared -fvisibility=hidden -I$(<:.unpacked=)/sources -Isrc/fmi2/standard \
 	    $(<:.unpacked=)/sources/*.c -lm -o $@
 
 # The same with prefixed functions, all units in one program.
@@ -111,7 +112,7 @@ $(C_BUILD)/sanitized/%.objects: $(C_BUILD)/packed/%.unpacked
 	@rm -rf $(@:.objects=) && mkdir -p $(@:.objects=)
 	@set -e; for source in $(<:.unpacked=)/sources/*.c; do \
 	    $(CC) -std=c99 -ffp-contract=off $(FLAGS_sanitized) -DFMI2_FUNCTION_PREFIX=$*_ \
-	        -I$(<:.unpacked=)/sources -c $$source -o $(@:.objects=)/$$(basename $$source .c).o; done
+	        -I$(<:.unpacked=)/sources -Isrc/fmi2/standard -c $$source -o $(@:.objects=)/$$(basename $$source .c).o; done
 	@touch $@
 
 $(C_BUILD)/sanitized/one_program: $(UNIT_C)/one_program.c $(foreach unit,$(UNITS),$(C_BUILD)/sanitized/$(unit).objects)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from typing import Protocol
 
 from feedsim.analysis.circularity import Turn, axis_letters, circularity
@@ -13,7 +12,7 @@ from feedsim.analysis.positioning import LEAST_REST, Approach, positioning
 from feedsim.errors import InputError
 from feedsim.nc import Circular, Program, Recorded, Segment, Straight
 from feedsim.scenario import CircleTest, Positioning, Scenario
-from feedsim.trace import Trace
+from feedsim.trace import Trace, matches
 
 
 class Result(Protocol):
@@ -99,7 +98,7 @@ def check(scenario: Scenario, program: Program) -> None:
         found = [
             f"evaluation of {task.prefix} needs {name}, which recording.variables leaves out"
             for name in task.needs
-            if patterns is not None and not any(fnmatchcase(name, pattern) for pattern in patterns)
+            if patterns is not None and not any(matches(name, pattern) for pattern in patterns)
         ]
         if isinstance(task, PositioningTask):
             found += _short_rest(task, program)

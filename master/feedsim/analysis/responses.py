@@ -7,7 +7,6 @@ compliance at the tool; "Z.speed_loop" and "Z.position_loop" are open-loop gains
 
 from __future__ import annotations
 
-import glob
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -161,7 +160,7 @@ def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[
         )
     overlays, warnings = [], []
     for name in mine:
-        alone = response.select([glob.escape(name)])
+        alone = response.select([name])
         wanted = unit_of(name)
         if alone.unit(name):
             alone = alone.converted({name: wanted})

@@ -5,7 +5,6 @@ The structure alone, continuous: motors give their torque whatever the speed, no
 
 from __future__ import annotations
 
-import glob
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -85,8 +84,7 @@ def figures(
     if tool:
         chosen += [COMPLIANCE.format(direction) for direction in TOOL_DIRECTIONS]
     responses = {
-        name: structure_responses(modes, axes, frequency).select([glob.escape(each) for each in chosen])
-        for name, modes in found.tables.items()
+        name: structure_responses(modes, axes, frequency).select(chosen) for name, modes in found.tables.items()
     }
     full = responses.pop(FULL)
     return deviations(responses, full, found.cutoff)

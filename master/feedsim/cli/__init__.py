@@ -8,6 +8,7 @@ has codes of its own: 0 same, 1 different, 2 unusable for whatever reason.
 from __future__ import annotations
 
 import argparse
+import logging
 import signal
 import sys
 from collections.abc import Sequence
@@ -121,6 +122,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from feedsim.cli import commands
     from feedsim.errors import FeedsimError
 
+    # Where no home folder can be written to, matplotlib tells at length that its cache is a temporary one.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     _end_cleanly_on_signals()
     try:
         action = getattr(options, "action", None) or getattr(commands, options.command)

@@ -23,9 +23,9 @@ examples:
   feedsim compare result.csv reference.csv --tol 1e-6
   feedsim compare result.csv reference.csv --tol 1e-6 --tol "*.x_a=2 nm" --tol "*.M_a=1e-3 N.m,1 ms" --report out.html
   feedsim compare results/ references/ --junit compare.xml
-  feedsim compare ecos.csv reference.csv --column "plant::*=*"
+  feedsim compare ecos.csv reference.csv --column "plant::*=*" --column "controller_*::M_a=*.M_a" --common
   feedsim compare results/emps/result.csv DATA_EMPS.mat --reference-columns emps/columns.yaml --axis X \\
-      --shift estimate --tol "X.x_a=0.1 mm" --tol "X.M_a=ignore"
+      --shift estimate --max-shift "2 s" --tol "X.x_a=20 um" --tol "X.M_a=ignore"
 """
 MOST_LINES = 10
 
@@ -135,7 +135,7 @@ def compare(options: Namespace) -> int:
             # Of many pairs those that are the same take one line.
             full = options.all or len(comparisons) == 1
             print("\n".join(line for each in comparisons for line in _lines(each, options.all, full)))
-            for line in (*_unused(comparisons, options.tolerances), *_sum(comparisons)):
+            for line in (*_unused(comparisons, options), *_sum(comparisons)):
                 print(line)
             sys.stdout.flush()
     except OSError:
@@ -151,6 +151,11 @@ def _compared(options: Namespace) -> tuple[list[Comparison], list[float]]:
     from feedsim.compare import pairs_of, unusable
     from feedsim.errors import InputError
 
+    for option, given in (("--axis", options.axis), ("--machine", options.machine)):
+        if given is not None and options.columns is None and options.reference_columns is None:
+            raise InputError(
+                f"{option} {given}: is for the record of a drive; --columns or --reference-columns says which"
+            )
     pairs = pairs_of(options.files)
     inputs = [path for pair in pairs for path in pair]
     inputs += [path for path in (options.tolerances, options.columns, options.reference_columns) if path is not None]
@@ -167,7 +172,22 @@ def _compared(options: Namespace) -> tuple[list[Comparison], list[float]]:
             comparison = unusable(result, reference, str(error))
         found.append(comparison)
         durations.append(perf_counter() - begin)
+    if problem := _matched_nowhere(found, options.tol):
+        found = [unusable(each.result, each.reference, problem) if each.variables else each for each in found]
     return found, durations
+
+
+def _matched_nowhere(comparisons: list[Comparison], texts: list[str]) -> str:
+    """That a pattern of --tol matches in no reference, where it is so."""
+    from feedsim.compare import Tolerances
+    from feedsim.compare.options import no_match
+
+    compared = [each for each in comparisons if each.variables]
+    for pattern, _ in Tolerances.parse(texts).rules:
+        if compared and all(pattern in each.unused for each in compared):
+            names = dict.fromkeys(variable.name for each in compared for variable in each.variables)
+            return f"--tol given for {no_match(pattern, tuple(names))}"
+    return ""
 
 
 def _pair(options: Namespace, choice: Options, result: Path, reference: Path) -> Comparison:
@@ -180,10 +200,14 @@ def _pair(options: Namespace, choice: Options, result: Path, reference: Path) ->
     tolerances: Tolerances = tolerances_of(reference, options.tolerances, options.tol)
     ours = read_side(result, options.time, options.columns, options)
     theirs = read_side(reference, options.reference_time, options.reference_columns, options)
+    notes: list[str] = []
     if options.shift == "estimate":
         most = units.parse(options.max_shift, "s")
-        choice = replace(choice, shift=estimated_shift(ours, theirs, most, choice))
-    return compare_series(ours, theirs, tolerances, choice, names=(str(result), str(reference)))
+        shift = estimated_shift(ours, theirs, most, choice, tolerances)
+        choice = replace(choice, shift=shift.seconds)
+        notes = [shift.note]
+    found = compare_series(ours, theirs, tolerances, choice, names=(str(result), str(reference)))
+    return replace(found, notes=(*notes, *found.notes))
 
 
 def _options(options: Namespace) -> Options:
@@ -249,19 +273,25 @@ def _variable_line(variable: Variable) -> str:
     return f"{variable.verdict}: {variable.line}{outside}"
 
 
-def _unused(comparisons: list[Comparison], given: Path | None) -> list[str]:
-    """Patterns of a tolerance file that match in none of the references it serves."""
-    from feedsim.compare.files import beside
+def _unused(comparisons: list[Comparison], options: Namespace) -> list[str]:
+    """Patterns of a tolerance file that match in no reference.
+
+    Of the file that was asked for, each; one that lies beside references serves those too that are not compared, so
+    that there only a word is worth it that none of its patterns matches.
+    """
+    from feedsim.compare.files import beside, tolerances_of
 
     by_file: dict[Path, list[set[str]]] = {}
     for each in comparisons:
-        if (file := given or beside(Path(each.reference))) is not None and each.variables:
+        if (file := options.tolerances or beside(Path(each.reference))) is not None and each.variables:
             by_file.setdefault(file, []).append(set(each.unused))
-    return [
-        f"note: {file}: the tolerance for {pattern!r} matches no column"
-        for file, patterns in by_file.items()
-        for pattern in sorted(set.intersection(*patterns))
-    ]
+    found = []
+    for file, unused in by_file.items():
+        own = [pattern for pattern, _ in tolerances_of(file, file, ()).rules if pattern != "*"]
+        nowhere = [pattern for pattern in own if all(pattern in each for each in unused)]
+        if nowhere and (options.tolerances is not None or nowhere == own):
+            found.append(f"note: {file}: matches no column: {', '.join(map(repr, nowhere))}")
+    return found
 
 
 def _sum(comparisons: list[Comparison]) -> list[str]:

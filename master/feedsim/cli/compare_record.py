@@ -15,7 +15,6 @@ UNITS = {"x_a": "m", "x_s": "m", "n_a": "rad/s", "M_a": "N.m"}
 
 def read_side(path: Path, time: str | None, mapping: Path | None, options: Namespace) -> Series:
     """Read a file. time: NAME[:UNIT] of its time column; mapping: for a drive's record. InputError."""
-    from feedsim import units
     from feedsim.errors import InputError
     from feedsim.trace import read_series
 
@@ -23,10 +22,7 @@ def read_side(path: Path, time: str | None, mapping: Path | None, options: Names
         return read_record(path, mapping, options.axis, options.machine)
     if path.suffix.lower() == ".mat":
         raise InputError(f"{path}: a MAT file needs a mapping of its columns: --columns or --reference-columns")
-    name, colon, unit = (time or "").rpartition(":") if ":" in (time or "") else (time or "", "", "")
-    if colon:
-        units.factor(unit, "s")
-    return read_series(path, time=name or None, time_unit=unit or None)
+    return read_series(path, time=time)
 
 
 def read_record(path: Path, mapping: Path, axis: str | None, machine: Path | None) -> Series:

@@ -3,7 +3,7 @@
 from feedsim.compare.compare import compare
 from feedsim.compare.files import Clock, compare_files, compare_series, pairs_of, tolerances_of, unusable
 from feedsim.compare.options import Options
-from feedsim.compare.shift import estimated_shift
+from feedsim.compare.shift import Shift, estimated_shift
 from feedsim.compare.tolerance import DEFAULT, Tolerance, Tolerances
 from feedsim.compare.tube import along, bounds
 from feedsim.compare.verdict import EXIT_CODES, Comparison, Curves, Variable, seconds
@@ -15,6 +15,7 @@ __all__ = [
     "Comparison",
     "Curves",
     "Options",
+    "Shift",
     "Tolerance",
     "Tolerances",
     "Variable",

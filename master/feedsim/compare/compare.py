@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from math import inf
 
 import numpy as np
 
-from feedsim.compare.options import Options, chosen, missing, sources, unit_of, unmatched
+from feedsim.compare.options import Options, chosen, listed, missing, no_match, sources, unit_of, units_told, unmatched
+from feedsim.compare.overlap import Overlap
 from feedsim.compare.quantity import allowed, factor
-from feedsim.compare.tolerance import Tolerance, Tolerances
-from feedsim.compare.tube import Rows, along, bounds, slack_of, usual_step
-from feedsim.compare.verdict import Comparison, Curves, Variable, Verdict, seconds
+from feedsim.compare.tolerance import Tolerances
+from feedsim.compare.tube import along, bounds
+from feedsim.compare.verdict import Comparison, Curves, Variable, Verdict
 from feedsim.errors import InputError
-from feedsim.trace import Array, Series, Trace, as_series
+from feedsim.trace import Array, Series, Trace, as_series, matches
 
-# A gap is worth a word from this many usual steps on.
-GAP = 10.0
-# Times that a usual step must be longer than the other's to be called coarser.
-FINER = 1.5
 # A conversion of units rounds twice.
 ROUNDING = 4 * np.finfo(float).eps
 # Curves are kept of so many variables, the worst ones.
@@ -43,17 +39,19 @@ def compare(
     """
     tolerances, options = tolerances or Tolerances(), options or Options()
     result, reference = as_series(result), as_series(reference)
-    asked = [name for name in chosen(reference.names, options) if not tolerances.of(name).ignore]
-    found = sources(result.names, asked, options)
+    asked = [name for name in chosen(reference.all_names, options) if not tolerances.of(name).ignore]
+    found = sources((*result.all_names, *result.skipped), asked, options)
     notes = _unused(result, reference, tolerances, options)
-    unused = tuple(pattern for pattern in tolerances.unused(reference.names) if pattern in tolerances.filed)
+    notes += units_told(reference.units, asked, options.reference_units, "reference")
+    notes += units_told(result.units, found.values(), options.units, "result")
+    unused = tuple(tolerances.unused(reference.all_names))
     blank = Comparison(*names, "unusable", notes=tuple(notes), shift=options.shift, unused=unused)
     if not found:
         wanted = missing(asked[0], result.names) if asked else "every column of the reference is left out"
         return replace(blank, problem=f"no column in common: {wanted}")
     if not len(result) or not len(reference):
         return replace(blank, problem=f"the {'result' if len(reference) else 'reference'} has no rows")
-    over = _Overlap(result, reference, options, max(tolerances.of(name).time or 0.0 for name in found))
+    over = Overlap(result, reference, options, min(tolerances.of(name).time or 0.0 for name in found))
     peers = _magnitudes(reference, asked, options)
     blank = replace(blank, start=over.start, end=over.end)
     if over.problem:
@@ -62,14 +60,18 @@ def compare(
     told: dict[str, list[str]] = {}
     variables = []
     for name in asked:
-        if name in found:
-            variable, remarks = _variable(over, name, found[name], tolerances.of(name), peers)
+        if fault := _not_read(reference, name, found.get(name), result):
+            variables.append(
+                Variable(name, "unusable", found.get(name, ""), reference.units.get(name, ""), reason=fault)
+            )
+        elif name in found:
+            variable, remarks = _variable(over, name, found[name], tolerances, peers)
             for remark in remarks:
                 told.setdefault(remark, []).append(name)
             variables.append(variable)
         elif not options.common:
             variables.append(Variable(name, "missing", reason=missing(name, result.names)))
-    notes += [f"{_listed(who)}: {remark}" for remark, who in told.items()]
+    notes += [f"{listed(who)}: {remark}" for remark, who in told.items()]
     verdict: Verdict = "same"
     if over.uncovered or any(each.verdict in ("different", "missing") for each in variables):
         verdict = "different"
@@ -78,99 +80,11 @@ def compare(
     return replace(blank, verdict=verdict, variables=_light(variables), problem=over.uncovered, notes=tuple(notes))
 
 
-class _Overlap:
-    """The instants at which a result is looked at, and what there is to say about the two times.
-
-    start, end: compared time [s]; at: (M,) instants; rows: which rows of the result they are, None where the result is
-    interpolated. problem: why nothing can be compared; uncovered: what of the reference the result does not cover.
-    """
-
-    def __init__(self, result: Series, reference: Series, options: Options, reach: float) -> None:
-        self.result, self.reference, self.options = result, reference, options
-        time = reference.time
-        self.theirs = result.time + options.shift
-        self.slack = slack_of(time)
-        self.start = max(float(time[0]), -inf if options.start is None else options.start)
-        self.end = min(float(time[-1]), inf if options.end is None else options.end)
-        self.problem, self.uncovered, self.notes = "", "", list[str]()
-        rows = self._inside(self.theirs, self.start, self.end)
-        self.at, self.rows = self.theirs[rows], None if self._at_reference(len(rows)) else rows
-        if self.rows is None:
-            inside = self._inside(time, max(self.start, self.theirs[0]), min(self.end, self.theirs[-1]))
-            self.at = np.unique(time[inside])
-        if self.start > self.end or not self.at.size:
-            asked = f" (of it {self.start:.9g} to {self.end:.9g} s asked for)"
-            shifted = f" (shifted by {seconds(options.shift)})" if options.shift else ""
-            self.problem = (
-                f"the times do not overlap: the result's is {_span(self.theirs)}{shifted}, the reference's "
-                f"{_span(time)}{asked if (options.start, options.end) != (None, None) else ''}"
-            )
-            return
-        step = max(usual_step(time), usual_step(self.theirs))
-        margin = 1.001 * step + self.slack + max(reach, abs(options.shift))
-        parts = []
-        if self.theirs[0] - self.start > margin:
-            parts.append(f"the result begins at {self.theirs[0]:.9g} s, the reference at {self.start:.9g} s")
-        if self.end - self.theirs[-1] > margin:
-            parts.append(f"the result ends at {self.theirs[-1]:.9g} s, the reference at {self.end:.9g} s")
-        if (outside := len(self.theirs) - len(rows)) > 1:
-            self.notes.append(f"{outside} rows of the result are outside the compared time and are left out")
-        parts += self._gaps(self.theirs[rows], step)
-        self.uncovered = "; ".join(parts)
-
-    def values(self, name: str, hold: bool) -> Array:
-        """(M,) values of a column of the result at the instants."""
-        whole = self.result[name]
-        if self.rows is not None:
-            return np.asarray(whole[self.rows])
-        if hold:
-            return np.asarray(whole[(np.searchsorted(self.theirs, self.at + self.slack, side="right") - 1).clip(0)])
-        return along(self.theirs, whole, self.at)
-
-    def _inside(self, time: Array, start: float, end: float) -> Rows:
-        return np.flatnonzero((time >= start - self.slack) & (time <= end + self.slack))
-
-    def _at_reference(self, rows: int) -> bool:
-        if self.options.at != "auto":
-            return self.options.at == "reference"
-        coarser = usual_step(self.reference.time) > FINER * usual_step(self.theirs) > 0
-        if coarser:
-            every = [seconds(usual_step(time)) for time in (self.reference.time, self.theirs)]
-            self.notes.append(
-                f"the reference has fewer rows than the result (one every {every[0]} for {every[1]}): compared at its "
-                "instants, what the result does between is not seen (--at result looks there too)"
-            )
-        return coarser and rows > 0
-
-    def _gaps(self, at: Array, step: float) -> list[str]:
-        """What there is to say about rows that are missing; returned where it makes the result different."""
-        gaps = np.diff(at)
-        longest = int(np.argmax(gaps)) if gaps.size else 0
-        most = self.options.max_gap
-        if gaps.size and most is not None and gaps[longest] > most + self.slack:
-            return [
-                f"rows are missing: no row of the result from {at[longest]:.9g} to {at[longest + 1]:.9g} s, "
-                f"allowed gap {seconds(most)}"
-            ]
-        if gaps.size and gaps[longest] > GAP * step > 0:
-            count = int(np.sum(gaps > GAP * step))
-            self.notes.append(
-                f"rows are missing: {count} gap{'s'[: count != 1]} in the result, the longest from {at[longest]:.9g} "
-                f"to {at[longest + 1]:.9g} s; what happens there is not seen"
-            )
-        ratio = usual_step(self.theirs) / (usual_step(self.reference.time) or inf)
-        if self.rows is not None and ratio > FINER:
-            self.notes.append(
-                f"the result has about one row per {ratio:.3g} of the reference; those between are not seen"
-            )
-        return []
-
-
 def _variable(
-    over: _Overlap, name: str, source: str, tolerance: Tolerance, peers: Mapping[str, float]
+    over: Overlap, name: str, source: str, tolerances: Tolerances, peers: Mapping[str, float]
 ) -> tuple[Variable, list[str]]:
     """A variable and what there is to say about it."""
-    options = over.options
+    options, tolerance = over.options, tolerances.of(name)
     unit = over.reference.units[name] or unit_of(name, options.reference_units)
     theirs = over.result.units[source] or unit_of(source, options.units)
     remarks = []
@@ -182,7 +96,7 @@ def _variable(
     time, values = over.reference.time, over.reference[name]
     hold = tolerance.hold
     if hold is None:
-        hold = any(fnmatchcase(name, pattern) for pattern in options.hold) or (
+        hold = any(matches(name, pattern) for pattern in options.hold) or (
             _whole(values) and _whole(over.result[source] * scale)
         )
     at, y = over.at, over.values(source, hold) * scale
@@ -205,7 +119,8 @@ def _variable(
         magnitude = peers.get(unit, float(np.abs(inside).max(initial=0.0)))
         limit = allowed(tolerance, unit, span, magnitude)
     except InputError as error:
-        return Variable(name, "unusable", source, unit, reason=f"its tolerance: {error}"), remarks
+        reason = f"its tolerance: {error}{_fitting(over.reference, tolerances, name)}"
+        return Variable(name, "unusable", source, unit, reason=reason), remarks
     if tolerance.unit and not unit and not theirs:
         remarks.append("neither side tells a unit; both are taken as SI for the tolerance")
     reach = tolerance.time or 0.0
@@ -213,9 +128,9 @@ def _variable(
     with np.errstate(invalid="ignore"):
         off = np.maximum(np.maximum(y - high, low - y), 0.0)
     bad = ~np.isfinite(y)
-    off[bad] = inf
+    off[bad | np.isnan(off)] = inf
     guard = 0.0 if scale == 1.0 else ROUNDING * np.maximum(np.abs(low), np.abs(high))
-    beyond = off > limit + guard
+    beyond = (off > limit + guard) | ~np.isfinite(off)
     if scale != 1.0:
         off = np.where(off <= guard, 0.0, off)
     worst = int(np.argmax(off))
@@ -223,6 +138,8 @@ def _variable(
     if 0 < off[worst] < inf:
         expected = float(np.clip(y[worst], low[worst], high[worst]))
     reason = ""
+    if not np.isfinite(off[worst]):
+        reason = f"beyond what can be calculated ({y[worst]:.9g} for {expected:.9g})"
     if bad.any():
         reason = f"the result holds no number ({y[np.argmax(bad)]}) in {np.sum(bad)} of {len(y)} rows"
     return Variable(
@@ -253,21 +170,17 @@ def _light(variables: Sequence[Variable]) -> tuple[Variable, ...]:
 
 
 def _unused(result: Series, reference: Series, tolerances: Tolerances, options: Options) -> list[str]:
-    """Rules that match nothing, and columns that are not read."""
-    notes = [
-        f"the tolerance for {pattern!r} matches no column"
-        for pattern in tolerances.unused(reference.names)
-        if pattern not in tolerances.filed
-    ]
+    """Columns that are not read. InputError: rules that match nothing."""
+    notes = []
+    own = [pattern for pattern, _ in tolerances.rules if pattern not in tolerances.shared]
     for what, patterns, names in (
-        ("unit", options.units, result.names),
-        ("reference's unit", options.reference_units, reference.names),
-        ("hold", options.hold, reference.names),
+        ("tolerance", own, reference.all_names),
+        ("unit", options.units, result.all_names),
+        ("reference's unit", options.reference_units, reference.all_names),
+        ("hold", options.hold, reference.all_names),
     ):
         if unused := unmatched(patterns, names):
-            raise InputError(
-                f"{what} given for {unused[0]!r}, which matches no column; there is {', '.join(names[:12])}"
-            )
+            raise InputError(f"{what} given for {no_match(unused[0], names)}")
     for whose, series in (("result", result), ("reference", reference)):
         if series.skipped:
             notes.append(f"columns of text in the {whose} are not compared: {', '.join(series.skipped[:5])}")
@@ -278,6 +191,8 @@ def _magnitudes(reference: Series, names: Sequence[str], options: Options) -> di
     """Unit -> largest magnitude of the reference's columns in it; of plain numbers none."""
     found: dict[str, float] = {}
     for name in names:
+        if name not in reference:
+            continue
         unit = reference.units[name] or unit_of(name, options.reference_units)
         values = np.abs(reference[name])
         if unit not in ("", "1"):
@@ -285,12 +200,28 @@ def _magnitudes(reference: Series, names: Sequence[str], options: Options) -> di
     return found
 
 
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+def _not_read(reference: Series, name: str, source: str | None, result: Series) -> str:
+    """Why a column of either side holds no numbers; "" where it does."""
+    if name in reference.broken:
+        return reference.broken[name]
+    if source is not None and source in result.skipped:
+        return f"the result's column {source!r} holds text"
+    return result.broken.get(source, "") if source is not None else ""
 
 
-def _span(time: Array) -> str:
-    return f"{time[0]:.9g} to {time[-1]:.9g} s"
+def _fitting(reference: Series, tolerances: Tolerances, name: str) -> str:
+    """Where a tolerance for all columns does fit some: how to give it to those alone."""
+    rule = next(((p, t) for p, t in reversed(tolerances.rules) if t.value is not None and matches(name, p)), None)
+    if rule is None or rule[0] != "*" or not rule[1].unit:
+        return ""
+    for other, unit in reference.units.items():
+        try:
+            factor(rule[1].unit, unit or "1")
+        except InputError:
+            continue
+        pattern = f"*.{other.rpartition('.')[2]}" if "." in other else other
+        return f"; give it to the columns that it is for, such as {f'{pattern}={rule[1].text}'!r}"
+    return ""
 
 
 def _whole(values: Array) -> bool:

@@ -100,10 +100,13 @@ def beside(reference: Path) -> Path | None:
 
 
 def tolerances_of(reference: Path, file: Path | None, texts: Sequence[str]) -> Tolerances:
-    """Of a tolerance file (default: the one beside the reference), then of texts as behind --tol. InputError."""
+    """Of a tolerance file (default: the one beside the reference), then of texts as behind --tol. InputError.
+
+    They may serve several references: a pattern that matches nothing is told in Comparison.unused.
+    """
     path = file or beside(reference)
     written = Tolerances.of_file(load_tolerances(path)) if path is not None else Tolerances()
-    return written + Tolerances.parse(texts)
+    return written + Tolerances.parse(texts).for_several()
 
 
 def _counterpart(folder: Path, name: Path) -> Path:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from typing import Literal
 
+from feedsim.compare.quantity import factor
 from feedsim.errors import InputError
+from feedsim.trace import matches
 from feedsim.trace.trace import suggest
 
 
@@ -45,7 +46,7 @@ class Options:
 def chosen(names: Sequence[str], options: Options) -> list[str]:
     """Reference's names that are asked for. InputError: a pattern that matches nothing."""
     for pattern in (*options.only, *options.ignore):
-        if not any(fnmatchcase(name, pattern) for name in names):
+        if not any(matches(name, pattern) for name in names):
             raise InputError(f"the reference has no column {pattern!r}{suggest(pattern, names)}")
     return [name for name in names if (not options.only or _any(name, options.only)) and not _any(name, options.ignore)]
 
@@ -83,16 +84,50 @@ def missing(name: str, result: Sequence[str]) -> str:
 
 def unit_of(name: str, units: Mapping[str, str]) -> str:
     """Unit that is given for a column; "" without."""
-    return next((unit for pattern, unit in reversed(list(units.items())) if fnmatchcase(name, pattern)), "")
+    return next((unit for pattern, unit in reversed(list(units.items())) if matches(name, pattern)), "")
+
+
+def units_told(headers: Mapping[str, str], names: Iterable[str], given: Mapping[str, str], whose: str) -> list[str]:
+    """Which compared columns are given the unit that their header tells already; one that it does not: InputError.
+
+    headers: name -> unit as the file has it. given: pattern -> unit.
+    """
+    twice: dict[str, list[str]] = {}
+    for name in names:
+        header, unit = headers.get(name, ""), unit_of(name, given)
+        if not header or not unit:
+            continue
+        try:
+            scale, _ = factor(unit, header)
+        except InputError:
+            scale = 0.0
+        if scale != 1.0:
+            raise InputError(
+                f"{whose}'s unit given for {name!r}: {unit}, but its header tells {header}; a unit is given to columns "
+                "without one, and a header that is wrong must be put right"
+            )
+        twice.setdefault(unit, []).append(name)
+    return [f"{listed(those)}: the {whose}'s header tells {unit} already" for unit, those in twice.items()]
 
 
 def unmatched(patterns: Iterable[str], names: Sequence[str]) -> list[str]:
     """Patterns that match no name."""
-    return [pattern for pattern in patterns if not any(fnmatchcase(name, pattern) for name in names)]
+    return [pattern for pattern in patterns if not any(matches(name, pattern) for name in names)]
+
+
+def no_match(pattern: str, names: Sequence[str]) -> str:
+    """That a pattern matches no name, and which there are."""
+    more = ", ..." if len(names) > 12 else ""
+    return f"{pattern!r}, which matches no column; there is {', '.join(names[:12])}{more}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first few names, and how many more there are."""
+    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
 
 
 def _any(name: str, patterns: Iterable[str]) -> bool:
-    return any(fnmatchcase(name, pattern) for pattern in patterns)
+    return any(matches(name, pattern) for pattern in patterns)
 
 
 def _renaming(theirs: str, ours: str) -> tuple[re.Pattern[str], str]:

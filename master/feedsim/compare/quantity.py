@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 from feedsim import units
 from feedsim.compare.tolerance import OF_MAGNITUDE, OF_UNIT, Tolerance
 from feedsim.errors import InputError
@@ -36,11 +38,19 @@ def units_alike(one: str, other: str) -> bool:
 def allowed(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> float:
     """Tolerance in value in `unit`; without a unit the values are taken to be in SI.
 
-    span, magnitude: range of the reference, and largest magnitude of its kind. InputError: a unit of another kind.
+    span, magnitude: range of the reference, and largest magnitude of its kind. InputError: a unit of another kind, or
+    what comes of it is too large for a number.
     """
+    found = _allowed(tolerance, unit, span, magnitude)
+    if not isfinite(found):
+        raise InputError(f"{tolerance.text} of a range of {span:.6g} is no finite number")
+    return found
+
+
+def _allowed(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> float:
     value, given = tolerance.value or 0.0, tolerance.unit or ""
     if tolerance.relative:
-        return value * max(span, OF_MAGNITUDE * magnitude, OF_UNIT)
+        return value * max(span, OF_MAGNITUDE * magnitude, OF_UNIT) if value else 0.0
     if not given or given == unit:
         return value
     if not unit:

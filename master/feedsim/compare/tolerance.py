@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.scenario.tolerances import ToleranceFile
+from feedsim.trace import matches
 
 DEFAULT = 1e-3  # of the range of the reference
 # A reference that hardly moves: its range counts as this share of the largest magnitude of all columns in its unit (of
@@ -63,10 +63,13 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Rules (pattern, tolerance) in rising order of precedence; those of `filed` patterns are from a file."""
+    """Rules (pattern, tolerance) in rising order of precedence.
+
+    A pattern must match a column, unless it is among the `shared` ones: they may be for other references.
+    """
 
     rules: tuple[tuple[str, Tolerance], ...] = ()
-    filed: frozenset[str] = frozenset()
+    shared: frozenset[str] = frozenset()
 
     @classmethod
     def parse(cls, texts: Iterable[str]) -> Tolerances:
@@ -80,23 +83,27 @@ class Tolerances:
         for pattern, given in file.variables.items():
             rest = Tolerance(time=given.time, hold=given.hold, ignore=given.ignore)
             rules.append((pattern, _amount(given.value, rest)))
-        return cls(tuple(rules), frozenset(pattern for pattern, _ in rules))
+        return cls(tuple(rules)).for_several()
 
     def __add__(self, other: Tolerances) -> Tolerances:
         """The other's rules count more."""
-        return Tolerances(self.rules + other.rules, self.filed | other.filed)
+        return Tolerances(self.rules + other.rules, self.shared | other.shared)
+
+    def for_several(self) -> Tolerances:
+        """With patterns that need not match in every reference."""
+        return Tolerances(self.rules, frozenset(pattern for pattern, _ in self.rules))
 
     def of(self, name: str) -> Tolerance:
         """All that holds for a variable."""
         found = Tolerance(value=DEFAULT, relative=True, time=0.0)
         for pattern, tolerance in self.rules:
-            if fnmatchcase(name, pattern):
+            if matches(name, pattern):
                 found = tolerance.over(found)
         return found
 
     def unused(self, names: Sequence[str]) -> list[str]:
-        """Patterns that no name matches."""
-        return [p for p, _ in self.rules if not any(fnmatchcase(name, p) for name in names)]
+        """Patterns that no name matches, each once."""
+        return [p for p in dict(self.rules) if not any(matches(name, p) for name in names)]
 
 
 def _amount(value: tuple[float, str] | None, rest: Tolerance) -> Tolerance:
@@ -127,7 +134,8 @@ def specification(spec: str) -> Tolerance:
         given = _part(part.strip())
         twice = found.value if given.time is None else found.time
         if twice is not None:
-            raise InputError(f"two tolerances in {'value' if given.time is None else 'time'}")
+            hint = "; write a decimal point, not a comma" if re.match(r"\s*[-+]?[0-9]+,[0-9]", spec) else ""
+            raise InputError(f"two tolerances in {'value' if given.time is None else 'time'}{hint}")
         found = given.over(found)
     return found
 

@@ -93,7 +93,7 @@ class Comparison:
     notes              what a user should know
     start, end         compared time [s]
     shift              added to the result's time [s]
-    unused             patterns of the tolerance file that match no column: it may serve several references
+    unused             patterns of tolerances that match no column: they may be for other references
     """
 
     result: str
@@ -129,17 +129,16 @@ class Comparison:
     @property
     def line(self) -> str:
         """In one line: verdict, how many, the worst with time and amount."""
-        if self.verdict == "unusable" and not self.those("same", "different"):
-            return f"unusable: {self.problem}"
         compared = self.those("same", "different")
         beyond = len(self.those("different"))
         parts = [self.problem] if self.problem else []
         if beyond:
             parts.append(f"{beyond} of {len(compared)} variables outside")
-        for kind in ("missing", "unusable"):
-            if named := [each.name for each in self.those(kind)]:
-                shown = ", ".join(named[:3]) + (f" and {len(named) - 3} more" if len(named) > 3 else "")
-                parts.append(f"{kind}: {shown}")
+        for kind, words in (("missing", "missing: "), ("unusable", "cannot be compared: ")):
+            if named := self.those(kind):
+                shown = ", ".join(each.name for each in named[:3])
+                why = f" ({named[0].reason})" if kind == "unusable" else ""
+                parts.append(words + shown + (f" and {len(named) - 3} more" if len(named) > 3 else "") + why)
         if self.verdict == "same":
             parts.append(f"{len(compared)} variable{'s'[: len(compared) != 1]}")
         worst = self.worst

@@ -81,6 +81,7 @@ class System:
         self.plant.set_parameters(plant_parameters(machine, plant.modes_file))
         for axis, described in machine.axes.items():
             self.units[wiring.controller(axis)].set_parameters(controller_parameters(machine, described))
+            self.units[wiring.controller(axis)].set_parameters({wiring.RELEASE: True})
             if self.friction:
                 self.units[wiring.friction(axis)].set_parameters(described.friction.parameters())
         self._share_buffers()

@@ -8,21 +8,26 @@ addresses go straight into the FMI calls: wiring two units is sharing memory, an
 from __future__ import annotations
 
 import ctypes
+import os
 import re
 import tempfile
+import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from fmpy import extract, read_model_description
+from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from numpy.typing import NDArray
 
+from feedsim.cosim import binaries, untrusted
 from feedsim.errors import InputError, SimulationError
 
 Floats = NDArray[np.float64]
 
+_DESCRIPTION = "modelDescription.xml"
+_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 WARNING = 1  # fmi2Status: 0 OK, 1 warning, 2 discard, 3 error, 4 fatal
 
 _EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
@@ -33,9 +38,20 @@ _STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.
 
 
 class Archive:
-    """An ``.fmu`` file, unpacked into a temporary folder for as long as this object is open (a context manager)."""
+    """An ``.fmu`` file, unpacked into a temporary folder for as long as this object is open (a context manager).
 
-    def __init__(self, path: Path) -> None:
+    Unpacked is what a run needs: description, resources, and the library for this platform.
+
+    Attributes:
+        platforms: the folders in its binaries/, for this platform and others.
+    """
+
+    def __init__(self, path: Path, allowance: untrusted.Allowance | None = None) -> None:
+        """`allowance`: of the file that `path` stood in, where it stood in one.
+
+        Raises:
+            InputError: no such file, or not an FMI 2.0 archive with co-simulation that can be trusted.
+        """
         if not path.is_file():
             raise InputError(f"{path}: no such file; `make fmus` builds the archives, FEEDSIM_FMUS names their folder")
         self.path = path
@@ -43,15 +59,45 @@ class Archive:
         self._folder = tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True)
         self.directory = Path(self._folder.name)
         try:
-            extract(str(path), unzipdir=str(self.directory))
-            self.description = read_model_description(str(self.directory))
-        except Exception as error:
+            self.platforms = self._unpack(allowance or untrusted.Allowance(path))
+            self.description = self._read_description()
+        except BaseException:
             self.close()
-            raise InputError(f"{path}: not a usable FMI 2.0 archive: {error}") from error
-        if self.description.coSimulation is None:
-            self.close()
-            raise InputError(f"{path}: has no co-simulation interface")
+            raise
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
+
+    def _unpack(self, allowance: untrusted.Allowance) -> tuple[str, ...]:
+        """The platforms."""
+        wanted = ("resources/", *(f"binaries/{folder}/" for folder in binaries.folders()))
+        with untrusted.readable(f"{self.path}: not a usable FMI 2.0 archive"), zipfile.ZipFile(self.path) as package:
+            found = untrusted.entries(package, str(self.path))
+            if _DESCRIPTION not in found:
+                raise InputError(f"{self.path}: not a usable FMI 2.0 archive: it has no {_DESCRIPTION}")
+            needed = [entry for name, entry in found.items() if name == _DESCRIPTION or name.startswith(wanted)]
+            allowance.take(sum(entry.file_size for entry in needed), str(self.path))
+            for entry in needed:
+                untrusted.copy(package, entry, self.directory / entry.filename)
+        parts = [name.split("/") for name in found if name.startswith("binaries/")]
+        return tuple(sorted({part[1] for part in parts if len(part) > 2}))
+
+    def _read_description(self) -> Any:
+        what = f"{self.path}: not a usable FMI 2.0 archive"
+        file = self.directory / _DESCRIPTION
+        if (size := file.stat().st_size) > untrusted.LARGEST_DOCUMENT:
+            raise InputError(f"{what}: {_DESCRIPTION} has {size} bytes, allowed: {untrusted.LARGEST_DOCUMENT}")
+        untrusted.refuse_document_type(file.read_bytes(), f"{self.path}: {_DESCRIPTION}")
+        try:
+            description = read_model_description(str(self.directory))
+        except Exception as error:
+            raise InputError(f"{what}: {error}") from error
+        if description.fmiVersion != "2.0":
+            raise InputError(f"{what}: it is of FMI {description.fmiVersion}")
+        if description.coSimulation is None:
+            raise InputError(f"{self.path}: has no co-simulation interface")
+        identifier = str(description.coSimulation.modelIdentifier)
+        if not _IDENTIFIER.fullmatch(identifier):
+            raise InputError(f"{what}: its modelIdentifier {identifier[:80]!r} is no C identifier")
+        return description
 
     @property
     def guid(self) -> str:
@@ -86,12 +132,7 @@ class Unit:
         self.warnings: list[str] = []
         self._messages: list[str] = []
         self._time = 0.0
-        self._fmu = FMU2Slave(
-            guid=archive.guid,
-            unzipDirectory=str(archive.directory),
-            modelIdentifier=archive.description.coSimulation.modelIdentifier,
-            instanceName=name,
-        )
+        self._fmu = self._loaded()
         callbacks = fmi2CallbackFunctions()
         callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
         callbacks.allocateMemory = defaultCallbacks.allocateMemory
@@ -110,6 +151,30 @@ class Unit:
         self._set_slope = _DERIVATIVE(("fmi2SetRealInputDerivatives", library))
         self._get_slope = _DERIVATIVE(("fmi2GetRealOutputDerivatives", library))
         self._do_step = _STEP(("fmi2DoStep", library))
+
+    def _loaded(self) -> FMU2Slave:
+        """fmpy's wrapper of the library. InputError: none for this platform, or none that can be loaded here."""
+        archive = self.archive
+        identifier = archive.description.coSimulation.modelIdentifier
+        path = binaries.library(archive.directory, identifier, archive.platforms, f"{archive.path}")
+        before = Path.cwd()
+        try:
+            return FMU2Slave(
+                guid=archive.guid,
+                unzipDirectory=str(archive.directory),
+                modelIdentifier=identifier,
+                instanceName=self.name,
+                libraryPath=str(path),
+            )
+        except Exception as error:
+            os.chdir(before)  # fmpy goes to the library's folder and does not come back when it fails
+            folder = f"binaries/{path.parent.name}"
+            told = str(error).replace(f"{archive.directory.absolute()}{os.sep}", "")
+            there = ", ".join(archive.platforms)
+            raise InputError(
+                f"{archive.path}: its binary for this platform, in {folder}, cannot be loaded: {told}; it has binaries "
+                f"for {there}"
+            ) from error
 
     def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
         text = message.decode("utf-8", errors="replace").replace("%%", "%").replace("##", "#")

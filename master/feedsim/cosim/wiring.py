@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from feedsim.cosim.unit import Archive
 from feedsim.errors import InputError
 
-NC = "nc"  # source of setpoints: x_s and n_ffw per axis
+NC = "nc"  # source of setpoints: x_s, n_ffw and release per axis
 ZERO = "zero"  # an input that nothing drives, held at 0 on purpose; a measurement may excite it
 
 
@@ -33,6 +33,7 @@ class Connection:
 
 
 SETPOINT_UNITS = {"x_s": "m", "n_ffw": "rad/s"}
+RELEASE = "release"  # controller enable, Boolean; true where nothing gives it
 TOOL_FORCES = ("tool.F_X", "tool.F_Y", "tool.F_Z")
 
 
@@ -55,6 +56,7 @@ def figure_2(axes: Sequence[str], *, with_friction: bool = True) -> list[Connect
         drives = {
             Variable(control, "x_s"): Variable(NC, f"{axis}.x_s"),
             Variable(control, "n_ffw"): Variable(NC, f"{axis}.n_ffw"),
+            Variable(control, RELEASE): Variable(NC, f"{axis}.{RELEASE}"),
             Variable(control, "x_a"): Variable(PLANT, f"{axis}.x_a"),
             Variable(control, "n_a"): Variable(PLANT, f"{axis}.n_a"),
             Variable(control, "n_add"): Variable(ZERO, "n_add"),
@@ -103,7 +105,7 @@ def _faults(connection: Connection, instances: Mapping[str, Archive]) -> list[st
         return faults
     wanted = instances[target.instance].unit_of(target.name)
     given = (
-        SETPOINT_UNITS[source.name.rpartition(".")[2]]
+        SETPOINT_UNITS.get(source.name.rpartition(".")[2], "1")
         if source.instance == NC
         else instances[source.instance].unit_of(source.name)
     )

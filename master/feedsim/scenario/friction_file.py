@@ -15,11 +15,10 @@ from typing import Any
 import yaml
 
 from feedsim import units
-from feedsim.errors import InputError, OutputError
+from feedsim.errors import OutputError
 from feedsim.scenario.fields import Quantity
-from feedsim.scenario.load import check, fetch, read_group
+from feedsim.scenario.load import read_checked
 from feedsim.scenario.machine import Friction
-from feedsim.scenario.problems import in_order
 from feedsim.trace.files import written_whole
 
 # Relative 5e-8 at most: what is calculated from the file is that of the fit to 1e-6, and a person can still read it.
@@ -85,14 +84,7 @@ def friction_text(
 
 def read_friction(path: str | Path) -> Friction:
     """Read a friction file. Raises InputError that lists every problem with file and line."""
-    path = Path(path)
-    source = read_group(path)
-    faults: list[str] = []
-    fetch(source, Friction, (), faults)
-    friction = check(source, Friction, faults)
-    if faults or friction is None:
-        raise InputError.of(str(path), in_order(faults))
-    return friction
+    return read_checked(path, Friction)
 
 
 class _Dumper(yaml.SafeDumper):

@@ -141,6 +141,17 @@ def read_group(path: Path) -> Source:
     return source
 
 
+def read_checked(path: str | Path, model: type[M]) -> M:
+    """A file as a model that needs no more than its own checks. InputError lists every problem with file and line."""
+    source = read_group(Path(path))
+    faults: list[str] = []
+    fetch(source, model, (), faults)
+    found = check(source, model, faults)
+    if faults or found is None:
+        raise InputError.of(str(path), in_order(faults))
+    return found
+
+
 def _own_settings(source: Source, faults: list[str]) -> Iterator[tuple[str, Source]]:
     """Take the `set` group out of the tree."""
     settings = source.data.pop("set", None)

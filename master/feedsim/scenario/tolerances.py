@@ -14,8 +14,7 @@ from pydantic_core import core_schema
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.scenario.fields import Model, Quantity, brief, fault
-from feedsim.scenario.load import check, fetch, read_group
-from feedsim.scenario.problems import in_order
+from feedsim.scenario.load import read_checked
 
 Time = Annotated[float, Quantity("s", minimum=0, example="1 ms")]
 EXAMPLE = "2 nm, or 1e-3 for a thousandth of the reference's range"
@@ -94,11 +93,4 @@ class ToleranceFile(Model):
 
 def load_tolerances(path: str | Path) -> ToleranceFile:
     """Read and check a tolerance file. InputError lists every problem with file and line."""
-    path = Path(path)
-    source = read_group(path)
-    faults: list[str] = []
-    fetch(source, ToleranceFile, (), faults)
-    found = check(source, ToleranceFile, faults)
-    if faults or found is None:
-        raise InputError.of(str(path), in_order(faults))
-    return found
+    return read_checked(path, ToleranceFile)

@@ -1,84 +1,90 @@
-"""An SSP file as bytes by name: read with distrust, written the same each time, whole or not at all."""
+"""An SSP file: its files by name, read with distrust and when they are asked for; written the same each time, whole or
+not at all."""
 
 from __future__ import annotations
 
-import stat
 import zipfile
-import zlib
-from collections.abc import Mapping
-from pathlib import Path, PurePosixPath
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 
+from feedsim.cosim import untrusted
+from feedsim.cosim.untrusted import Allowance
 from feedsim.errors import InputError
 from feedsim.trace.files import written_whole
 
 STRUCTURE = "SystemStructure.ssd"
-LARGEST = 4 << 30  # bytes of all files together, unpacked; the setpoints of the longest program take less
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip file can hold
 
 
 def write(path: Path, files: Mapping[str, bytes]) -> int:
     """Write `files` in their order and return the size [bytes]. Stored, not deflated: what weighs is archives already,
     and the bytes then depend on no version of zlib. OutputError: the file cannot be written; nothing is left then."""
-    with written_whole(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as package:
-        for name, content in files.items():
-            entry = zipfile.ZipInfo(name, _EPOCH)
-            entry.create_system = 3
-            entry.external_attr = 0o644 << 16
-            package.writestr(entry, content)
-    return path.stat().st_size
+    with written_whole(path) as file:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as package:
+            for name, content in files.items():
+                entry = zipfile.ZipInfo(name, _EPOCH)
+                entry.create_system = 3
+                entry.external_attr = 0o644 << 16
+                package.writestr(entry, content)
+        return file.tell()
 
 
-def read(path: Path) -> dict[str, bytes]:
-    """All files of an SSP by name.
+class Files(Mapping[str, bytes]):
+    """Files of an SSP by name. Only what is asked for is unpacked, and only so much of it (`allowance`)."""
+
+    def __init__(self, path: Path, package: zipfile.ZipFile) -> None:
+        self.path = path
+        self.allowance = Allowance(path)
+        self._package = package
+        self._entries = untrusted.entries(package, str(path))
+
+    def __getitem__(self, name: str) -> bytes:
+        """A document, whole. InputError: it is damaged, or too large for one."""
+        entry = self._entries[name]
+        if entry.file_size > untrusted.LARGEST_DOCUMENT:
+            raise InputError(
+                f"{self.path}: {name} has {entry.file_size} bytes; at most {untrusted.LARGEST_DOCUMENT} are read of a "
+                "document"
+            )
+        self.allowance.take(entry.file_size, str(self.path))
+        with untrusted.readable(f"{self.path}: {name} cannot be read"):
+            return self._package.read(entry)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def copy(self, name: str, to: Path) -> None:
+        """Write a file of any size to `to`, whose folders are made. InputError: damaged, too large, no room for it."""
+        self.allowance.take(self._entries[name].file_size, str(self.path))
+        with untrusted.readable(f"{self.path}: {untrusted.shortened(name)} cannot be unpacked"):
+            untrusted.copy(self._package, self._entries[name], to)
+
+
+@contextmanager
+def read(path: Path) -> Iterator[Files]:
+    """The files of an SSP, for as long as the block lasts.
 
     Raises:
-        InputError: no such file, no zip file, damaged, encrypted, or with entries that do not belong into one: names
-            that lead out of it or occur twice, links, more than 4 GiB.
+        InputError: no such file, no zip file, damaged, or with entries that do not belong into one
+            (:func:`feedsim.cosim.untrusted.entries`); it unpacks to more than it may.
     """
-    if path.is_dir():
+    with untrusted.readable(f"{path} cannot be read"):
+        folder, there = path.is_dir(), path.exists()
+    if folder:
         raise InputError(f"{path} is a folder, not an SSP file")
-    try:
-        with zipfile.ZipFile(path) as package:
-            entries = [entry for entry in package.infolist() if not entry.is_dir()]
-            if faults := _faults(entries):
-                raise InputError.of(f"{path}: cannot be trusted", [f"{path}: {fault}" for fault in faults])
-            files = {entry.filename: package.read(entry) for entry in entries}
-    except FileNotFoundError:
-        raise InputError(f"no such file: {path}") from None
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error) as error:
-        raise InputError(f"{path}: not a readable SSP, which is a zip file: {error}") from error
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-    if STRUCTURE not in files:
-        raise InputError(f"{path}: has no {STRUCTURE} at its top; it is no SSP file, or damaged")
-    return files
-
-
-def _faults(entries: list[zipfile.ZipInfo]) -> list[str]:
-    faults: list[str] = []
-    seen: set[str] = set()
-    for entry in entries:
-        name = entry.filename
-        if leads_out(name):
-            faults.append(f"the entry {name!r} leads out of the archive")
-        elif stat.S_ISLNK(entry.external_attr >> 16):
-            faults.append(f"the entry {name!r} is a link")
-        elif entry.flag_bits & 1:
-            faults.append(f"the entry {name!r} is encrypted")
-        elif name in seen:
-            faults.append(f"the entry {name!r} is there twice")
-        seen.add(name)
-    if (size := sum(entry.file_size for entry in entries)) > LARGEST:
-        faults.append(f"it unpacks to {size} bytes; at most {LARGEST} are read")
-    return faults
-
-
-def leads_out(name: str) -> bool:
-    """Whether a name inside an archive is absolute, climbs, or is none that every system reads alike."""
-    return (
-        not name
-        or name.startswith("/")
-        or ".." in PurePosixPath(name).parts
-        or any(c in name for c in "\\:\0")
-        or any(ord(c) < 32 for c in name)
-    )
+    if not there:
+        raise InputError(f"no such file: {path}")
+    with untrusted.readable(f"{path}: not a readable SSP, which is a zip file"):
+        package = zipfile.ZipFile(path)
+    with package:
+        files = Files(path, package)
+        if STRUCTURE not in files:
+            raise InputError(f"{path}: has no {STRUCTURE} at its top; it is no SSP file, or damaged")
+        yield files

@@ -23,6 +23,7 @@ from feedsim.structure.pack import pack
 
 SETPOINT = "setpoint"  # the instance that plays the setpoints
 RESOURCES = "resources"
+WIDTH, HEIGHT, GAP = 40.0, 30.0, 20.0  # of a component and between them, in a picture [mm]
 
 
 @dataclass(frozen=True)
@@ -115,11 +116,12 @@ def _files(scenario: Scenario, program: Program, archives: Mapping[str, Archive]
         bindings: tuple[Binding, ...] = ()
         if instance in parameters:
             source = f"{RESOURCES}/{instance}.ssv"
-            files[source] = _parameters(archives[kind], parameters[instance])
+            files[source] = _parameters(archives[kind], parameters[instance], machine.note)
             bindings = (Binding(source=source),)
         connected = {end[1] for link in links for end in (link.start, link.end) if end[0] == instance}
         connectors = _connectors(archives[kind], connected)
-        components.append(Component(instance, f"{RESOURCES}/{kind}.fmu", connectors, bindings))
+        box = _box(instance, kind, axes)
+        components.append(Component(instance, f"{RESOURCES}/{kind}.fmu", connectors, bindings, box))
     structure = Structure(
         name=scenario.name,
         components=tuple(components),
@@ -136,21 +138,29 @@ def _files(scenario: Scenario, program: Program, archives: Mapping[str, Archive]
     return {archive.STRUCTURE: system_structure.to_bytes(structure), **files}
 
 
+def _box(instance: str, kind: str, axes: tuple[str, ...]) -> tuple[float, float, float, float]:
+    """Place in a picture: the signal flow from the left to the right, the axes from the top to the bottom."""
+    left = (WIDTH + GAP) * ("setpoint", "controller", "plant", "friction").index(kind)
+    row = {name(axis): i for i, axis in enumerate(axes) for name in (wiring.controller, wiring.friction)}.get(instance)
+    first, last = (0, len(axes) - 1) if row is None else (row, row)
+    return left, -(HEIGHT + GAP) * last - HEIGHT, left + WIDTH, -(HEIGHT + GAP) * first
+
+
 def _end(variable: wiring.Variable) -> tuple[str, str]:
     return (SETPOINT if variable.instance == wiring.NC else variable.instance, variable.name)
 
 
 def _connectors(unit: Archive, connected: set[str]) -> tuple[Connector, ...]:
-    """Connectors of a unit: every Real output, and the inputs that are connected; FMPy fails at others."""
+    """Connectors of a unit: every Real output, and whatever is connected; FMPy fails at inputs that are not."""
     return tuple(
-        Connector(name, variable.causality, "Real", unit.unit_of(name))
+        Connector(name, variable.causality, variable.type, unit.unit_of(name) if variable.type == "Real" else None)
         for name, variable in unit.variables.items()
-        if variable.type == "Real" and (variable.causality == "output" or name in connected)
+        if name in connected or (variable.type == "Real" and variable.causality == "output")
     )
 
 
-def _parameters(unit: Archive, values: Mapping[str, Value]) -> bytes:
-    """A parameter set in the order of the unit's variables."""
+def _parameters(unit: Archive, values: Mapping[str, Value], note: str) -> bytes:
+    """A parameter set in the order of the unit's variables, with the machine's note: where the numbers come from."""
     found = tuple(
         parameter_set.parameter(
             name, variable.type, values[name], unit.unit_of(name) if variable.type == "Real" else None
@@ -159,7 +169,7 @@ def _parameters(unit: Archive, values: Mapping[str, Value]) -> bytes:
         if name in values
     )
     used = [parameter.unit for parameter in found if parameter.unit]
-    return parameter_set.to_bytes(ParameterSet(found, _definitions([unit], used)))
+    return parameter_set.to_bytes(ParameterSet(found, _definitions([unit], used), note))
 
 
 def _definitions(archives: Iterable[Archive], used: Iterable[str]) -> dict[str, UnitDefinition]:

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from feedsim import units
 from feedsim.cosim.unit import Archive
+from feedsim.cosim.untrusted import readable
 from feedsim.errors import InputError
 from feedsim.nc import Program, Recorded, Segment, plan
 from feedsim.nc.program import LONGEST
 from feedsim.scenario import Scenario, load
-from feedsim.ssp import archive, rebuilt, system_structure
-from feedsim.ssp.described import RECORDINGS, STRUCTURE
+from feedsim.ssp import archive, rebuilt, stop_time, system_structure
+from feedsim.ssp.described import STRUCTURE
 from feedsim.ssp.pack import SETPOINTS_IN_ARCHIVE, Table, read_setpoints
 from feedsim.ssp.rebuilt import Parts
 from feedsim.ssp.roles import roles
@@ -69,9 +71,12 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
     Raises:
         InputError: not a readable SSP, or not of the units of Fig. 2; lists what is wrong.
     """
-    files = archive.read(path)
-    structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
-    with tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True) as name, ExitStack() as stack:
+    with (
+        archive.read(path) as files,
+        tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True) as name,
+        ExitStack() as stack,
+    ):
+        structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
         folder = Path(name)
         archives = _archives(structure, files, folder, path, stack)
         found = roles(structure, archives, str(path))
@@ -80,15 +85,16 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
         if problems := rebuilt.faults(parts, str(path)):
             raise InputError.of(str(path), problems)
         own = rebuilt.annotation(structure.scenario, files, str(path))
-        _lay_out(folder, files, parts, path)
+        _lay_out(folder, files, parts, own, path)
         program = _sampled(parts, structure, path)
         with _own_names(path, folder):
             scenario, program, warnings = _with_motions(parts, own, program, path, folder, overrides)
-            yield Opened(scenario, program, path, folder, (*_jumps(scenario, program, path), *warnings))
+            told = (*_late(structure, path), *_jumps(scenario, program, path), *warnings)
+            yield Opened(scenario, program, path, folder, told)
 
 
 def _archives(
-    structure: Structure, files: Mapping[str, bytes], folder: Path, path: Path, stack: ExitStack
+    structure: Structure, files: archive.Files, folder: Path, path: Path, stack: ExitStack
 ) -> dict[str, Archive]:
     """Component -> its archive, one for each source."""
     problems: list[str] = []
@@ -97,14 +103,13 @@ def _archives(
         source = component.source
         if source in by_source:
             continue
-        if archive.leads_out(source) or source not in files:
+        if source not in files:
             problems.append(f"{path}: component {component.name}: its source {source!r} is not in the file")
             continue
-        unpacked = folder / "archives" / f"{len(by_source)}_{Path(source).name}"
-        unpacked.parent.mkdir(exist_ok=True)
-        unpacked.write_bytes(files[source])
+        unpacked = folder / "archives" / str(len(by_source)) / PurePosixPath(source).name
         try:
-            by_source[source] = stack.enter_context(Archive(unpacked))
+            files.copy(source, unpacked)
+            by_source[source] = stack.enter_context(Archive(unpacked, files.allowance))
         except InputError as error:
             problems.append(str(error).replace(str(unpacked), f"{path}: {source}"))
     if not structure.components:
@@ -122,8 +127,8 @@ def _table(setpoint: Archive, where: str) -> Table:
     return read_setpoints(content, f"{where}: {SETPOINTS_IN_ARCHIVE}")
 
 
-def _lay_out(folder: Path, files: Mapping[str, bytes], parts: Parts, path: Path) -> None:
-    """Put archives, modes, setpoints and recordings where the scenario's data look for them."""
+def _lay_out(folder: Path, files: archive.Files, parts: Parts, own: Mapping[str, Any] | None, path: Path) -> None:
+    """Put archives, modes, setpoints and what the annotation names where the scenario's data look for them."""
     roles = parts.roles
     first = {
         "plant": roles.plant,
@@ -134,14 +139,16 @@ def _lay_out(folder: Path, files: Mapping[str, bytes], parts: Parts, path: Path)
         parts.archives[component].path.replace(folder / f"{kind}.fmu")
     inside = {rebuilt.MODES: (roles.plant, MODES_IN_ARCHIVE), rebuilt.SETPOINTS: (roles.setpoint, SETPOINTS_IN_ARCHIVE)}
     for name, (component, place) in inside.items():
-        try:
-            (folder / name).write_bytes((parts.archives[component].directory / place).read_bytes())
-        except OSError:
-            raise InputError(f"{path}: {component}: its archive has no {place}") from None
-    for name, content in files.items():
-        if name == STRUCTURE or name.startswith(f"{RECORDINGS}/"):
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_bytes(content)
+        source = parts.archives[component].directory / place
+        if not source.is_file():
+            raise InputError(f"{path}: {component}: its archive has no {place}")
+        with readable(f"{path}: {component}: {place} cannot be unpacked"):
+            shutil.copyfile(source, folder / name)
+    needed = rebuilt.named_files(own)
+    if own is not None and own["machine"].get("structure") == STRUCTURE:
+        needed.append(STRUCTURE)
+    for name in needed:
+        files.copy(name, folder / name)
 
 
 def _sampled(parts: Parts, structure: Structure, path: Path) -> Program:
@@ -152,7 +159,7 @@ def _sampled(parts: Parts, structure: Structure, path: Path) -> Program:
     if not 1 <= cycles <= LONGEST:
         raise InputError(f"{path}: it lasts {last:.6g} s, {cycles:.6g} position cycles; allowed: 1 to {LONGEST}")
     time = np.arange(int(cycles) + 1, dtype=np.float64) * T_pos
-    rows = table.rows(time)
+    rows = table.rows(time, parts.T_c)
     names = parts.roles.setpoints
     return Program(
         time,
@@ -169,7 +176,7 @@ def _with_motions(
     if own is not None and "motions" in own:
         before = _load(rebuilt.scenario_data(parts, own, path.stem, motions=True), folder, path)
         planned = _planned(before, program)
-        if planned is not None and _same(planned.x_s, program.x_s):
+        if planned is not None and stop_time.agree(planned.x_s, program.x_s):
             scenario = _load(rebuilt.scenario_data(parts, own, path.stem, motions=True), folder, path, overrides)
             changed = _planned(scenario, program) if overrides else planned
             if changed is None or not (_same(changed.x_s, planned.x_s) and _same(changed.n_ffw, planned.n_ffw)):
@@ -178,7 +185,13 @@ def _with_motions(
                     "the file has as a table; change the scenario and export it anew (feedsim ssp)"
                 )
             _check_cycles(scenario, parts, path)
-            return scenario, Program(program.time, program.x_s, program.n_ffw, planned.segments), ()
+            scenario, lost = stop_time.evaluation(scenario, planned, program)
+            if lost:
+                warnings.append(
+                    f"{path.name}: ends at {program.duration:.6g} s, too early for {', '.join(lost)}: left out"
+                )
+            kept = stop_time.segments(planned, program)
+            return scenario, Program(program.time, program.x_s, program.n_ffw, kept), tuple(warnings)
         warnings.append(
             f"{path.name}: its setpoints are not those of the motions that it tells: they run as recorded ones, and "
             "what was to be evaluated is not"
@@ -198,6 +211,13 @@ def _with_motions(
         geometry=Recorded(begin=0.0, end=program.duration, file=path, axes=axes),
     )
     return scenario, Program(program.time, program.x_s, program.n_ffw, (segment,)), tuple(warnings)
+
+
+def _late(structure: Structure, path: Path) -> list[str]:
+    if structure.start == 0.0:
+        return []
+    start = units.show(structure.start, "s")
+    return [f"{path.name}: starts at {start}; results count time from there: their 0 s is its {start}"]
 
 
 def _jumps(scenario: Scenario, program: Program, path: Path) -> list[str]:

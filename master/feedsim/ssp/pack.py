@@ -13,7 +13,7 @@ from feedsim.errors import InputError, OutputError
 from feedsim.nc import Program
 
 SETPOINTS_IN_ARCHIVE = "resources/setpoints.csv"
-ON_ROW = 1e-6  # of a row: an instant this little ahead of a row counts as on it, as in the unit
+UNEVEN = 1e-6  # of a row, as in the unit
 
 Array = NDArray[np.float64]
 
@@ -27,12 +27,16 @@ class Table:
     x_s: Mapping[str, Array]
     n_ffw: Mapping[str, Array]
 
-    def rows(self, time: Array) -> NDArray[np.int64]:
-        """Row that is played at each instant from the start of the experiment: held before the first, after the last.
+    def rows(self, time: Array, step: float) -> NDArray[np.int64]:
+        """Row that is played at each instant of an experiment that starts at 0 and is stepped by `step` [s].
 
-        As in the unit: floor((t - t_0)/T + guard).
+        Held before the first and after the last. As in the unit, floor((t - t_0 + slack)/T) with the slack of
+        setpoints_slack (src/setpoint_fmu/setpoints.c).
         """
-        rows = np.floor((time - self.time[0]) / self.cycle + ON_ROW).astype(np.int64)
+        ulps = 16 * np.finfo(np.float64).eps * np.abs(time)
+        rounding = np.maximum(1e-9 * np.abs(time), max(2e-9, 2 * UNEVEN * self.cycle))
+        slack = np.maximum(ulps, np.minimum(rounding, 0.01 * min(step, self.cycle)))
+        rows = np.floor((time - self.time[0] + slack) / self.cycle).astype(np.int64)
         held: NDArray[np.int64] = np.clip(rows, 0, len(self.time) - 1)
         return held
 

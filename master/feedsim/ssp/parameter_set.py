@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import isfinite
+from math import inf, isfinite
 
 from feedsim import units
 from feedsim.errors import InputError
@@ -14,6 +15,8 @@ from feedsim.ssp.unit_definition import UnitDefinition, append_units, read_units
 
 # The same name in every set of a file: ecos asks for the sets of one name, in whichever component they are.
 NAME = "parameters"
+MOST_PROBLEMS = 20  # told at once
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?INF|NaN")  # of XML Schema
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 
 Value = float | int | bool | str
@@ -31,15 +34,17 @@ class Parameter:
 
 @dataclass(frozen=True)
 class ParameterSet:
-    """Parameters in the file's order, and the units that the file defines."""
+    """Parameters in the file's order, the units that the file defines, and a note for whoever opens it."""
 
     parameters: tuple[Parameter, ...]
     units: Mapping[str, UnitDefinition] = field(default_factory=dict)
+    description: str = ""
 
 
 def to_bytes(parameter_set: ParameterSet) -> bytes:
     """The SSV document."""
-    root = xml.element("ssv:ParameterSet", {"version": "1.0", "name": NAME})
+    described = {"description": parameter_set.description} if parameter_set.description else {}
+    root = xml.element("ssv:ParameterSet", {"version": "1.0", "name": NAME, **described})
     group = xml.child(root, "ssv:Parameters")
     for parameter in parameter_set.parameters:
         entry = xml.child(group, "ssv:Parameter", {"name": parameter.name})
@@ -66,22 +71,31 @@ def read(content: bytes, where: str) -> ParameterSet:
 def from_element(root: xml.Element, where: str) -> ParameterSet:
     """A set that stands inside another document."""
     problems: list[str] = []
-    found: list[Parameter] = []
+    found: dict[str, Parameter] = {}
+    kinds = {xml.tag(f"ssv:{kind}") for kind in TYPES}
     for entry in root.findall(f"{xml.tag('ssv:Parameters')}/{xml.tag('ssv:Parameter')}"):
         name = entry.get("name", "")
-        values = [value for value in entry if value.tag in {xml.tag(f"ssv:{kind}") for kind in TYPES}]
+        values = [value for value in entry if value.tag in kinds]
         if not name or len(values) != 1 or values[0].get("value") is None:
             problems.append(
                 f"{where}: parameter {name or '(without a name)'}: one value of {', '.join(TYPES)} is needed"
             )
             continue
-        if any(other.name == name for other in found):
+        if name in found:
             problems.append(f"{where}: parameter {name} is there twice")
         kind = xml.shown(values[0].tag).partition(":")[2]
-        found.append(Parameter(name, kind, values[0].get("value", ""), values[0].get("unit")))
+        found[name] = Parameter(name, kind, values[0].get("value", ""), values[0].get("unit"))
     if problems:
-        raise InputError.of(where, problems)
-    return ParameterSet(tuple(found), read_units(root.find(xml.tag("ssv:Units")), where))
+        raise InputError.of(where, first(problems, where))
+    return ParameterSet(
+        tuple(found.values()), read_units(root.find(xml.tag("ssv:Units")), where), root.get("description", "")
+    )
+
+
+def first(problems: list[str], where: str) -> list[str]:
+    """The first of many problems, and how many more there are."""
+    more = len(problems) - MOST_PROBLEMS
+    return problems if more <= 0 else [*problems[:MOST_PROBLEMS], f"{where}: {more} more problems"]
 
 
 def value(
@@ -97,15 +111,15 @@ def value(
     """
     text = parameter.text.strip()
     if kind == "Real" and parameter.kind in ("Real", "Integer"):
-        number = _number(text)
-        if parameter.unit in (None, "", unit) or not isinstance(number, float):
-            return number
-        return _converted(text, number, str(parameter.unit), unit, definitions)
+        found = number(text)
+        if parameter.unit in (None, "", unit):
+            return found
+        return _converted(text, found, str(parameter.unit), unit, definitions)
     if kind == "Integer" and parameter.kind in ("Integer", "Enumeration", "Real"):
-        number = _number(text)
-        if number != int(number):
+        found = number(text)
+        if found != int(found):
             raise InputError(f"{text} is no whole number")
-        return int(number)
+        return int(found)
     if kind == "Boolean" and text in ("true", "false", "1", "0") and parameter.kind in ("Boolean", "Integer"):
         return text in ("true", "1")
     if kind == "String" and parameter.kind == "String":
@@ -113,28 +127,34 @@ def value(
     raise InputError(f"{parameter.kind} {parameter.text!r} is no value of a {kind} variable")
 
 
-def _number(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        raise InputError(f"{text!r} is no number") from None
-    if not isfinite(number):
-        raise InputError(f"{text} is no number to calculate with")
-    return number
+def number(text: str) -> float:
+    """The number that a text of XML Schema's type double stands for. InputError: none, or not finite."""
+    shown = text if len(text) <= 40 else f"{text[:40]}..."
+    if len(text) > units.LONGEST_NUMBER:
+        raise InputError(f"{shown} has {len(text)} characters; a number has at most {units.LONGEST_NUMBER}")
+    if not _NUMBER.fullmatch(text):
+        raise InputError(f"{shown!r} is no number")
+    found = float(text)
+    if not isfinite(found):
+        raise InputError(f"{shown} is no number to calculate with")
+    return found
 
 
 def _converted(
-    text: str, number: float, given: str, wanted: str, definitions: Iterable[Mapping[str, UnitDefinition]]
+    text: str, value: float, given: str, wanted: str, definitions: Iterable[Mapping[str, UnitDefinition]]
 ) -> float:
     try:
-        # As a scenario's text "1600 mN.m": exact, then rounded once.
-        converted = float(Fraction(text) * units.factor(given, wanted))
+        factor = units.factor(given, wanted)
+        # As a scenario's text "1600 mN.m": exact, then rounded once. What rounds to 0 can have a huge exponent.
+        converted = float(Fraction(text) * factor) if value else 0.0
+    except OverflowError:
+        converted = inf
     except InputError as error:
         target = next((known[wanted] for known in definitions if wanted in known), None)
         source = next((known[given] for known in definitions if given in known), None)
         if source is None or target is None or source.exponents != target.exponents:
-            raise InputError(f"unit {given!r}: {error}") from None
-        converted = (number * source.factor + source.offset - target.offset) / target.factor
+            raise InputError(str(error)) from None
+        converted = (value * source.factor + source.offset - target.offset) / target.factor
     if not isfinite(converted):
         raise InputError(f"{text} {given} is too large to calculate with")
     return converted

@@ -16,7 +16,7 @@ from feedsim.errors import InputError
 from feedsim.scenario.machine import FILTER_TYPES
 from feedsim.ssp.described import RECORDINGS, STRUCTURE
 from feedsim.ssp.pack import Table
-from feedsim.ssp.parameter_set import Value
+from feedsim.ssp.parameter_set import Value, number
 from feedsim.ssp.roles import Roles
 from feedsim.ssp.values import start_value
 
@@ -24,6 +24,7 @@ FILTER_NAMES = {number: name for name, number in reversed(FILTER_TYPES.items())}
 MODES, SETPOINTS = "modes.csv", "setpoints.csv"  # beside the scenario's data
 # What the annotation may tell at its top.
 OWN_KEYS = ("name", "note", "machine", "motions", "coupling", "recording", "logging", "evaluate")
+DEEPEST = 50  # levels of the annotation; a scenario has some 10
 MARGIN = 1e-3  # m, that an axis may travel beyond its setpoints where nobody tells how far
 
 
@@ -85,15 +86,11 @@ def annotation(text: str | None, files: Collection[str], where: str) -> dict[str
         raise InputError(f"{what} is not readable JSON: {error}") from None
     except RecursionError:
         raise InputError(f"{what} is nested too deeply") from None
-    machine = data.get("machine") if isinstance(data, dict) else None
-    axes = machine.get("axes") if isinstance(machine, dict) else None
-    groups = [axes, machine.get("cycles"), machine.get("path")] if isinstance(machine, dict) else [None]
-    if not all(isinstance(group, dict) for group in (*groups, *(axes.values() if isinstance(axes, dict) else ()))):
-        raise InputError(f"{what} has no machine with cycles, path and axes")
+    _check_types(data, what)
     unknown = [key for key in data if key not in OWN_KEYS]
-    motions = data.get("motions", [])
-    recordings = [motion["file"] for motion in motions if isinstance(motion, dict) and "file" in motion]
-    missing = [name for name in recordings if name not in files or not str(name).startswith(f"{RECORDINGS}/")]
+    missing = [name for name in named_files(data) if name not in files or not name.startswith(f"{RECORDINGS}/")]
+    if data["machine"].get("structure") == STRUCTURE and STRUCTURE not in files:
+        missing.append(STRUCTURE)
     if unknown or missing:
         told = [f"{what} has the unknown key {key!r}" for key in unknown]
         raise InputError.of(
@@ -101,6 +98,45 @@ def annotation(text: str | None, files: Collection[str], where: str) -> dict[str
         )
     found: dict[str, Any] = data
     return found
+
+
+def named_files(own: Mapping[str, Any] | None) -> list[str]:
+    """Files that the annotation's motions name, each once."""
+    motions = (own or {}).get("motions", [])
+    return list(dict.fromkeys(motion["file"] for motion in motions if "file" in motion))
+
+
+def _check_types(data: Any, what: str) -> None:
+    """What is read here has the types that :func:`feedsim.ssp.described.text` writes; the rest is the loader's."""
+    if _depth(data) > DEEPEST:
+        raise InputError(f"{what} is nested too deeply")
+    try:
+        json.dumps(data, ensure_ascii=False).encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(f"{what} holds characters that no text can hold") from None
+    machine: Any = data.get("machine") if isinstance(data, dict) else None
+    axes: Any = machine.get("axes") if isinstance(machine, dict) else None
+    groups = [axes, machine.get("cycles"), machine.get("path")] if isinstance(machine, dict) else [None]
+    if not all(isinstance(group, dict) for group in (*groups, *(axes.values() if isinstance(axes, dict) else ()))):
+        raise InputError(f"{what} has no machine with cycles, path and axes")
+    motions = data.get("motions", [])
+    if not isinstance(motions, list) or not all(isinstance(motion, dict) for motion in motions):
+        raise InputError(f"{what}: its motions are no list of groups")
+    if not all(isinstance(motion.get("file", ""), str) for motion in motions):
+        raise InputError(f"{what}: a motion's file is no text")
+    if not all(isinstance(axis.get("friction", {}), dict) for axis in axes.values()):
+        raise InputError(f"{what}: an axis's friction is no group")
+    if not all(isinstance(place.get("name", ""), str) for place in (data, machine)):
+        raise InputError(f"{what}: a name is no text")
+
+
+def _depth(data: Any) -> int:
+    """Levels of groups and lists."""
+    level, depth = [data], 0
+    while level := [each for each in level if isinstance(each, (dict, list))]:
+        level = [inner for each in level for inner in (each.values() if isinstance(each, dict) else each)]
+        depth += 1
+    return depth
 
 
 def scenario_data(parts: Parts, own: Mapping[str, Any] | None, name: str, *, motions: bool) -> dict[str, Any]:
@@ -149,7 +185,7 @@ def _axis(parts: Parts, axis: str, told: Mapping[str, Any]) -> dict[str, Any]:
                     if parts.values[control][f"{key}.{name}"] == value:
                         del inner[name]
     limits = _limits(parts.table, roles.setpoints[axis], float(plant[f"{axis}.x_0"]))
-    identified = told.get("friction", {})
+    identified = {key: value for key, value in told.get("friction", {}).items() if key == "identified"}
     return {
         **limits,
         **{key: value for key, value in told.items() if key in (*limits, "display_sign")},
@@ -180,8 +216,8 @@ def _pitch(I_P: float, told: Any) -> str:
     near = 2 * pi * I_P
     candidates = [near, nextafter(near, inf), nextafter(near, -inf)]
     if isinstance(told, str):
-        with suppress(ValueError):
-            candidates.insert(0, float(told.removesuffix(" m")))
+        with suppress(InputError):
+            candidates.insert(0, number(told.removesuffix(" m")))
     best = min(candidates, key=lambda pitch: abs(pitch / (2 * pi) - I_P))
     return f"{best!r} m"
 

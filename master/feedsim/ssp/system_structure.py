@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from feedsim.errors import InputError
 from feedsim.ssp import xml
-from feedsim.ssp.parameter_set import ParameterSet, from_element
+from feedsim.ssp.parameter_set import ParameterSet, from_element, number
 from feedsim.ssp.unit_definition import UnitDefinition, append_units, read_units
 
 ALGORITHM = "com.opensimulationplatform"  # annotation in which libcosim looks for the step size
@@ -36,12 +36,13 @@ class Binding:
 
 @dataclass(frozen=True)
 class Component:
-    """An instance of the archive `source`, a path inside the SSP."""
+    """An instance of the archive `source`, a path inside the SSP; `box` is x1, y1, x2, y2 in a picture, y upwards."""
 
     name: str
     source: str
     connectors: tuple[Connector, ...] = ()
     bindings: tuple[Binding, ...] = ()
+    box: tuple[float, float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,9 @@ def _append(elements: xml.Element, component: Component) -> None:
     for connector in component.connectors:
         place = xml.child(connectors, "ssd:Connector", {"name": connector.name, "kind": connector.kind})
         xml.child(place, f"ssc:{connector.type}", {} if connector.unit is None else {"unit": connector.unit})
+    if component.box is not None:
+        corners = zip(("x1", "y1", "x2", "y2"), component.box, strict=True)
+        xml.child(entry, "ssd:ElementGeometry", {corner: repr(at) for corner, at in corners})
     if component.bindings:
         bindings = xml.child(entry, "ssd:ParameterBindings")
         for binding in component.bindings:
@@ -217,7 +221,7 @@ _IDENTITY = {(factor, offset) for factor in ("1", "1.0") for offset in ("0", "0.
 
 def _time(given: Mapping[str, str], key: str, where: str, problems: list[str]) -> float | None:
     try:
-        return float(given[key]) if key in given else None
-    except ValueError:
-        problems.append(f"{where}: DefaultExperiment: {key} {given[key]!r} is no number")
+        return number(given[key].strip()) if key in given else None
+    except InputError as error:
+        problems.append(f"{where}: DefaultExperiment: {key} {error}")
         return None

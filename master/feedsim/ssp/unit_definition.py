@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 
 from feedsim.cosim.unit import Archive
 from feedsim.errors import InputError
@@ -47,6 +48,8 @@ def read_units(group: xml.Element | None, where: str) -> dict[str, UnitDefinitio
             factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
         except ValueError:
             raise InputError(f"{where}: unit {entry.get('name')}: its definition holds no number") from None
+        if not (isfinite(factor) and isfinite(offset) and factor):
+            raise InputError(f"{where}: unit {entry.get('name')}: factor {factor!r}, offset {offset!r}; not allowed")
         found[entry.get("name", "")] = UnitDefinition(exponents, factor, offset)
     return found
 
@@ -55,7 +58,7 @@ def unit_definitions(archive: Archive) -> dict[str, UnitDefinition]:
     """Unit definitions of an archive."""
     found = {}
     for each in archive.description.unitDefinitions:
-        if each.baseUnit is not None:
+        if each.baseUnit is not None and float(each.baseUnit.factor):
             exponents = {key: int(getattr(each.baseUnit, key)) for key in BASE if int(getattr(each.baseUnit, key))}
             found[each.name] = UnitDefinition(exponents, float(each.baseUnit.factor), float(each.baseUnit.offset))
     return found

@@ -22,7 +22,8 @@ def values(
     inputs are not needed here and pass by unseen.
 
     Raises:
-        InputError: lists every set that cannot be read and every parameter that is unknown, of another type or unit.
+        InputError: lists every set that cannot be read and every parameter that is unknown, of another type or unit;
+            the first of them where there are many.
     """
     problems: list[str] = []
     found: dict[str, dict[str, Value]] = {}
@@ -35,16 +36,22 @@ def values(
         }
         for place, given, prefix in _sets(component.bindings, files, where, problems):
             for parameter in given.parameters:
+                if len(problems) > parameter_set.MOST_PROBLEMS:
+                    break
                 _set(found, archives, component.name, prefix + parameter.name, parameter, given, structure, place,
                      problems)  # fmt: skip
     for place, given, prefix in _sets(structure.bindings, files, where, problems):
         for parameter in given.parameters:
+            if len(problems) > parameter_set.MOST_PROBLEMS:
+                break
             name = prefix + parameter.name
             owner = next((each for each in archives if name.startswith(f"{each}.")), None)
             if owner is None:
                 problems.append(f"{place}: {name}: is no parameter of a component")
                 continue
             _set(found, archives, owner, name.removeprefix(f"{owner}."), parameter, given, structure, place, problems)
+    if len(problems) > parameter_set.MOST_PROBLEMS:
+        problems[parameter_set.MOST_PROBLEMS :] = [f"{where}: and more like these; the first are listed"]
     if problems:
         raise InputError.of(where, problems)
     return found

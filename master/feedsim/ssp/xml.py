@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from xml.etree import ElementTree as ET
 
+from feedsim.cosim.untrusted import refuse_document_type
 from feedsim.errors import InputError
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
@@ -43,8 +44,7 @@ def to_bytes(root: Element) -> bytes:
 
 def parse(content: bytes, where: str, expected: str) -> Element:
     """The root element of a document. InputError: bad XML, a document type (which is not read), another root."""
-    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
-        raise InputError(f"{where}: has a document type declaration; the SSP standard knows none, and none is read")
+    refuse_document_type(content, where)
     try:
         root = ET.fromstring(content)
     except (ET.ParseError, ValueError, LookupError) as error:

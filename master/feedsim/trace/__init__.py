@@ -6,7 +6,7 @@ from feedsim.trace.mat import convert_mat, read_mat
 from feedsim.trace.recording import Recording, read_recording
 from feedsim.trace.series import Series, as_series, read_series
 from feedsim.trace.setpoints import read_setpoints
-from feedsim.trace.trace import Array, Trace, matching
+from feedsim.trace.trace import Array, Trace, matches, matching
 
 __all__ = [
     "Array",
@@ -15,6 +15,7 @@ __all__ = [
     "Trace",
     "as_series",
     "convert_mat",
+    "matches",
     "matching",
     "read_csv",
     "read_mat",

@@ -1,10 +1,13 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and what is no regular file."""
 
 from __future__ import annotations
 
 import os
+import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import BytesIO
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import IO
@@ -16,12 +19,20 @@ from feedsim.errors import OutputError
 def written_whole(path: Path) -> Iterator[IO[bytes]]:
     """A file to write to that takes its name when the block ends well; otherwise nothing is left and an old file stays.
 
-    The folder must exist. OutputError: it does not, or the file cannot be written.
+    A symbolic link stays: what it leads to is replaced. A pipe or a character device (/dev/stdout, /dev/null) is never
+    replaced: what was written goes into it when the block ends well.
+
+    The folder must exist. OutputError: it does not, the file cannot be written, or `path` is a folder, a socket or a
+    disk.
     """
     try:
-        if path.is_dir():
-            raise IsADirectoryError(21, "it is a folder")
-        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
+        if _is_stream(path):
+            buffer = BytesIO()
+            yield buffer
+            _poured(path, buffer.getvalue())
+            return
+        target = Path(os.path.realpath(path))
+        with NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as file:
             temporary = Path(file.name)
             try:
                 yield file
@@ -29,7 +40,7 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
                 os.fsync(file.fileno())
                 file.close()
                 temporary.chmod(0o666 & ~_umask())
-                temporary.replace(path)
+                temporary.replace(target)
             except BaseException:
                 file.close()
                 with suppress(OSError):
@@ -37,6 +48,47 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
                 raise
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}") from error
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether `path` takes what is written but holds no file. OSError: it is neither a stream nor a file."""
+    if _descriptor(path) is not None:
+        return True
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        return False
+    for what, found in (
+        ("a folder", stat.S_ISDIR(mode)),
+        ("a socket", stat.S_ISSOCK(mode)),
+        ("a disk", stat.S_ISBLK(mode)),
+    ):
+        if found:
+            raise OSError(22, f"it is {what}")
+    return not stat.S_ISREG(mode)
+
+
+def _descriptor(path: Path) -> int | None:
+    """Number of the open file of this process that `path` stands for: 1 for /dev/stdout."""
+    for _ in range(40):  # as many links as Linux follows
+        if path.name.isdigit() and os.path.realpath(path.parent) in ("/dev/fd", f"/proc/{os.getpid()}/fd"):
+            return int(path.name)
+        if not path.is_symlink():
+            return None
+        path = path.parent / path.readlink()
+    return None
+
+
+def _poured(path: Path, content: bytes) -> None:
+    number = _descriptor(path)
+    # An open file is shared, not opened again: into one behind a shell's ">" both would write from its start.
+    if number is None:
+        stream: IO[bytes] = path.open("wb")
+    else:
+        sys.stdout.flush()
+        stream = os.fdopen(os.dup(number), "wb")
+    with stream:
+        stream.write(content)
 
 
 def _umask() -> int:

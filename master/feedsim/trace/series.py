@@ -7,18 +7,17 @@ empty cells, NaN and infinities, columns of text, array names such as `x[3]`, un
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.trace.csv import read_table, seconds_of, time_index
+from feedsim.trace.csv import Table, read_table, seconds_of, time_index
 from feedsim.trace.numbers import Decimal, decimal_mark
-from feedsim.trace.trace import Array, Trace, suggest
+from feedsim.trace.trace import Array, TimeColumns, Trace
 
 # "x [m]", "Z.x_a[REAL]"; an index as in "x[3]" or "A[1,2]" belongs to the name.
 _UNIT_BEHIND = re.compile(r"(.*?[^\s])\s*\[([^\[\]]*)\]")
@@ -36,13 +35,14 @@ _WORDS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class Series(TimeColumns):
     """Columns of numbers over a common time, as simulators leave them.
 
     time     (N,) [s], finite, never decreasing: rows at one instant are before and after an event
     columns  name -> (N,) values; NaN and infinities are possible
     units    name -> unit as written; "" where none is known
     skipped  columns of text that are not read
+    broken   name -> what is wrong with a column that is not read either: of numbers, but for some cells
 
     Arrays are copied and read-only. InputError: lengths that differ, time that is not finite or runs back.
     """
@@ -51,43 +51,18 @@ class Series:
     columns: Mapping[str, Array]
     units: Mapping[str, str] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
+    broken: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        time = _frozen(self.time)
-        if not np.all(np.isfinite(time)):
-            raise InputError(f"time is not finite at row {int(np.argmin(np.isfinite(time)))} (counted from 0)")
-        if (wrong := np.flatnonzero(np.diff(time) < 0)).size:
+        self._settle()
+        if (wrong := np.flatnonzero(np.diff(self.time) < 0)).size:
             row = int(wrong[0]) + 1
-            raise InputError(f"time runs back: {time[row]:.9g} s follows {time[row - 1]:.9g} s at row {row}")
-        columns = {name: _frozen(values) for name, values in self.columns.items()}
-        for name, values in columns.items():
-            if values.shape != time.shape:
-                raise InputError(f"column {name!r} has {values.size} values, the time has {time.size}")
-        if unknown := sorted(set(self.units) - set(columns)):
-            raise InputError(f"unit given for {unknown[0]!r}, which is no column")
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, "columns", MappingProxyType(columns))
-        object.__setattr__(self, "units", MappingProxyType({name: self.units.get(name, "") for name in columns}))
-
-    def __getitem__(self, name: str) -> Array:
-        """Values of a column; InputError with a suggestion if there is none of that name."""
-        if name not in self.columns:
-            raise InputError(f"no column {name!r}{suggest(name, self.columns)}")
-        return self.columns[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.columns
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.columns)
-
-    def __len__(self) -> int:
-        """Number of rows."""
-        return int(self.time.size)
+            raise InputError(f"time runs back: {self.time[row]:.9g} s follows {self.time[row - 1]:.9g} s at row {row}")
 
     @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.columns)
+    def all_names(self) -> tuple[str, ...]:
+        """Names of all columns of numbers, those that are broken included."""
+        return (*self.columns, *self.broken)
 
 
 def as_series(trace: Trace | Series) -> Series:
@@ -98,24 +73,37 @@ def as_series(trace: Trace | Series) -> Series:
 def read_series(path: str | Path, *, time: str | None = None, time_unit: str | None = None) -> Series:
     """Read the CSV file of any simulator; layout, separators and decimal marks as `read_csv`.
 
-    time       name of the time column; default "time" or "t" in any case, else a first column whose unit is a time
+    time       name of the time column, or NAME:UNIT where there is no column of that whole name; default "time" or "t"
+               in any case, else a first column whose unit is a time
     time_unit  unit of the time where the header does not tell it; default s
 
-    True and false are 1 and 0. Raises InputError with file and line: layout, time that runs back or is missing.
+    True and false are 1 and 0. Raises InputError with file and line: layout, time that runs back or is missing, a unit
+    of the time that is not the header's.
     """
     path = Path(path)
-    table = read_table(path, _heads)
+    table = read_table(path, _heads, as_numbers=True)
+    if time is not None and time not in table.names and time_unit is None:
+        name, colon, unit = time.rpartition(":")
+        if colon and (name in table.names or _is_time(unit)):
+            time, time_unit = name, unit
     at = time_index(table, time)
+    if time_unit is not None and units.factor(time_unit, "s") != units.factor(table.units[at] or time_unit, "s"):
+        raise InputError(
+            f"{path}:{table.header_line}: the time column {table.names[at]!r} is in {table.units[at]}, not {time_unit}"
+        )
     mark: Decimal = "."
     if table.decimal_comma and any("," in cell for column in table.columns for cell in column):
         plain = [column for column in table.columns if not _is_text(column)]
         mark = decimal_mark(plain, table.lines, table.where)
     read = {i: _values(column, mark) for i, column in enumerate(table.columns)}
+    if table.numbers is not None:
+        read = dict(enumerate(table.numbers.T))
     instants = read[at]
     if instants is None or not np.all(np.isfinite(instants)):
         row = 0 if instants is None else int(np.argmin(np.isfinite(instants)))
+        found = repr(table.columns[at][row]) if table.numbers is None else f"{table.numbers[row, at]}"
         raise InputError(
-            f"{path}:{table.lines[row]}: {table.columns[at][row]!r} in the time column {table.names[at]!r}; "
+            f"{path}:{table.lines[row]}: {found} in the time column {table.names[at]!r}; "
             "every instant must be a finite number"
         )
     seconds = seconds_of(table, at, instants, time_unit)
@@ -125,8 +113,12 @@ def read_series(path: str | Path, *, time: str | None = None, time_unit: str | N
             f"{path}:{table.lines[row]}: time {instants[row]:.9g} follows {instants[row - 1]:.9g}; it must not run back"
         )
     columns = {table.names[i]: values for i, values in read.items() if values is not None and i != at}
-    skipped = tuple(table.names[i] for i, values in read.items() if values is None)
-    return Series(seconds, columns, {name: table.units[table.names.index(name)] for name in columns}, skipped)
+    broken = {
+        table.names[i]: fault for i, values in read.items() if values is None and (fault := _fault(table, i, mark))
+    }
+    skipped = tuple(table.names[i] for i, values in read.items() if values is None and table.names[i] not in broken)
+    of_columns = {name: table.units[table.names.index(name)] for name in columns}
+    return Series(seconds, columns, of_columns, skipped, broken)
 
 
 def _heads(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -172,11 +164,25 @@ def _values(cells: Sequence[str], mark: Decimal) -> Array | None:
         return None
 
 
+def _fault(table: Table, index: int, mark: Decimal) -> str:
+    """What is wrong with a column of more numbers than text, with file and line; "" where it is one of text."""
+    read = [_values([cell], mark) for cell in table.columns[index]]
+    wrong = [row for row, value in enumerate(read) if value is None]
+    if len(wrong) > sum(value is not None and bool(np.isfinite(value[0])) for value in read):
+        return ""
+    row = wrong[0]
+    more = f" (and {len(wrong) - 1} more such cells)" if len(wrong) > 1 else ""
+    where, name = f"{table.where}:{table.lines[row]}", table.names[index]
+    return f"{where}: {table.columns[index][row]!r} in column {name!r} is no number{more}"
+
+
+def _is_time(unit: str) -> bool:
+    try:
+        units.factor(unit, "s")
+    except InputError:
+        return False
+    return True
+
+
 def _is_text(cells: Sequence[str]) -> bool:
     return _values(cells, ",") is None and _values(cells, ".") is None
-
-
-def _frozen(values: Array) -> Array:
-    array = np.array(values, dtype=np.float64).reshape(-1)
-    array.setflags(write=False)
-    return array

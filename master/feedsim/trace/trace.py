@@ -14,43 +14,28 @@ from feedsim.errors import InputError
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Trace:
-    """Columns of numbers over a common time.
-
-    time     (N,) [s], strictly increasing; need not be even
-    columns  name -> (N,) values
-    units    name -> unit as written in a CSV header ("m", "rad/s"; "" where none is known)
-
-    Arrays are copied to float64 and made read-only. InputError: lengths that differ, time that does not increase, a
-    name or unit that could not be written to a CSV header and read back, a unit for a column that does not exist.
-    """
+class TimeColumns:
+    """What columns over a common time have in common: time, columns, units, and how they are reached."""
 
     time: Array
     columns: Mapping[str, Array]
-    units: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str]
 
-    def __post_init__(self) -> None:
+    def _settle(self) -> None:
+        """Copy the arrays, read-only. InputError: not one-dimensional, lengths that differ, time that is not finite,
+        a unit for a column that does not exist."""
         time = _frozen_array(self.time, "time")
-        if time.size and not np.all(np.isfinite(time)):
+        if not np.all(np.isfinite(time)):
             raise InputError(f"time is not finite at row {int(np.argmin(np.isfinite(time)))} (counted from 0)")
-        if (wrong := np.flatnonzero(np.diff(time) <= 0)).size:
-            row = int(wrong[0]) + 1
-            raise InputError(
-                f"time must increase: {time[row]:.9g} s follows {time[row - 1]:.9g} s at row {row} (counted from 0)"
-            )
-        columns: dict[str, Array] = {}
-        for name, values in self.columns.items():
-            check_name(name)
-            columns[name] = _frozen_array(values, name)
-            if columns[name].shape != time.shape:
-                raise InputError(f"column {name!r} has {columns[name].size} values, the time has {time.size}")
+        columns = {name: _frozen_array(values, name) for name, values in self.columns.items()}
+        for name, values in columns.items():
+            if values.shape != time.shape:
+                raise InputError(f"column {name!r} has {values.size} values, the time has {time.size}")
         if unknown := sorted(set(self.units) - set(columns)):
             raise InputError(f"unit given for {unknown[0]!r}, which is no column")
-        units = {name: check_unit(self.units.get(name, "")) for name in columns}
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "columns", MappingProxyType(columns))
-        object.__setattr__(self, "units", MappingProxyType(units))
+        object.__setattr__(self, "units", MappingProxyType({name: self.units.get(name, "") for name in columns}))
 
     def __getitem__(self, name: str) -> Array:
         """Values of a column; InputError with a suggestion if there is none of that name."""
@@ -73,6 +58,36 @@ class Trace:
     def names(self) -> tuple[str, ...]:
         return tuple(self.columns)
 
+
+@dataclass(frozen=True, eq=False)
+class Trace(TimeColumns):
+    """Columns of numbers over a common time.
+
+    time     (N,) [s], strictly increasing; need not be even
+    columns  name -> (N,) values
+    units    name -> unit as written in a CSV header ("m", "rad/s"; "" where none is known)
+
+    Arrays are copied to float64 and made read-only. InputError: lengths that differ, time that does not increase, a
+    name or unit that could not be written to a CSV header and read back, a unit for a column that does not exist.
+    """
+
+    time: Array
+    columns: Mapping[str, Array]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in self.columns:
+            check_name(name)
+        self._settle()
+        if (wrong := np.flatnonzero(np.diff(self.time) <= 0)).size:
+            row = int(wrong[0]) + 1
+            raise InputError(
+                f"time must increase: {self.time[row]:.9g} s follows {self.time[row - 1]:.9g} s at row {row} "
+                "(counted from 0)"
+            )
+        for unit in self.units.values():
+            check_unit(unit)
+
     def unit(self, name: str) -> str:
         """Unit of a column as in the CSV header; "" where none is known."""
         self[name]
@@ -94,14 +109,25 @@ class Trace:
         return Trace(self.time, {name: self.columns[name] for name in kept}, {name: self.units[name] for name in kept})
 
 
+def matches(name: str, pattern: str) -> bool:
+    """Whether a name is that of a glob pattern: * stands for anything, ? for one character.
+
+    Brackets are themselves, as they are part of names: x[3] is the element 3 of x.
+    """
+    return name == pattern or fnmatchcase(name, pattern.replace("[", "[[]"))
+
+
 def matching(names: Iterable[str], patterns: Iterable[str]) -> list[str]:
-    """Names that match any of the glob patterns, in their order. InputError for a pattern that matches nothing."""
+    """Names that match any of the glob patterns, in their order; a name that is given as it is means itself alone.
+
+    InputError for a pattern that matches nothing.
+    """
     names, wanted = list(names), set[str]()
     for pattern in patterns:
-        matches = {name for name in names if fnmatchcase(name, pattern)}
-        if not matches:
+        found = {pattern} if pattern in names else {name for name in names if matches(name, pattern)}
+        if not found:
             raise InputError(f"no column matches {pattern!r}{suggest(pattern, names)}")
-        wanted |= matches
+        wanted |= found
     return [name for name in names if name in wanted]
 
 

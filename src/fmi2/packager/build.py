@@ -4,13 +4,14 @@ import os
 import tempfile
 import time
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from . import (
     archive,
+    build_description,
     carried,
     compile,
     description,
@@ -24,7 +25,7 @@ from . import (
 )
 from .errors import CompilerError, InputError
 from .machine import Machine, named
-from .resources import Resources
+from .resources import Experiment, Resources
 from .table import Table
 from .targets import Target
 from .variables import Variable
@@ -65,6 +66,7 @@ class Unit:
             version=self.version,
             sources=self.c_files,
             machine=self.machine,
+            experiment=self.resources.experiment() if self.resources else Experiment(),
         )
 
 
@@ -112,7 +114,7 @@ def load(
         table=rows,
         resources=given,
         variables=variables.expand(rows, given),
-        sources=_sources(directory, given) | {CARRIED: carried.dump(rows, version)},
+        sources=_sources(rows.unit, directory, given) | {CARRIED: carried.dump(rows, version)},
         guid=variables.guid(rows, given),
         version=version,
         machine=replace(
@@ -133,8 +135,11 @@ def _version() -> tuple[str, tuple[str, ...]]:
     return version, ()
 
 
-def _sources(directory: Path, given: Resources | None) -> dict[str, bytes]:
-    """The flat sources folder: shell, headers of the standard, the unit, its resources as constants."""
+def _sources(unit: str, directory: Path, given: Resources | None) -> dict[str, bytes]:
+    """The flat sources folder: shell, the unit, its resources as constants, how to compile them.
+
+    Without the standard's headers: those of the importer are to be used (FMI 2.0, section 2.3).
+    """
     found: dict[str, Path] = {}
     problems: list[str] = []
     for folder in (SHELL, STANDARD, directory):
@@ -147,8 +152,11 @@ def _sources(directory: Path, given: Resources | None) -> dict[str, bytes]:
             found[path.name] = path
     if problems:
         raise InputError(f"{directory}: file names must differ, as the archive's sources folder is flat", problems)
-    embedded = {EMBEDDED: given.embedded_source()} if given else {}
-    return {name: path.read_bytes() for name, path in found.items()} | embedded
+    files = {name: path.read_bytes() for name, path in found.items() if path.parent != STANDARD}
+    if given:
+        files[EMBEDDED] = given.embedded_source()
+    listed = [name for name in files if name.endswith(".c")]
+    return files | {build_description.NAME: build_description.describe(unit, listed)}
 
 
 def build(
@@ -171,7 +179,8 @@ def build(
         _stage(unit, stage / "sources")
         libraries = _compile(unit, stage, compiler, targets, progress)
         tried = _try(unit, stage, libraries)
-    pages, warnings = _documentation(unit)
+    references = _references(unit)
+    pages, warnings = _documentation(unit, references)
     pictures, more_warnings = terminals.files(unit.directory, unit.variables)
     warnings += more_warnings
     content = archive.pack(
@@ -182,7 +191,7 @@ def build(
             **(unit.resources.files() if unit.resources else {}),
             **pages,
             **pictures,
-            **_references(unit),
+            **references,
         }
     )
     archive.write(out, content)
@@ -251,7 +260,7 @@ def _try(unit: Unit, stage: Path, libraries: Sequence[compile.Library]) -> bool:
     return False
 
 
-def _documentation(unit: Unit) -> tuple[dict[str, bytes], list[str]]:
+def _documentation(unit: Unit, references: Mapping[str, bytes]) -> tuple[dict[str, bytes], list[str]]:
     warnings: list[str] = []
     texts: dict[str, str | None] = {}
     for what, path in (("readme", unit.directory / "README.md"), ("licence", PROJECT / "LICENSE")):
@@ -267,5 +276,6 @@ def _documentation(unit: Unit) -> tuple[dict[str, bytes], list[str]]:
         standard_header=(STANDARD / "fmi2TypesPlatform.h").read_text(encoding="utf-8"),
         version=unit.version,
         machine=unit.machine,
+        references=references[reference.ROOT + reference.README].decode("utf-8") if references else None,
     )
     return pages, warnings

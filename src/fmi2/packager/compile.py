@@ -65,7 +65,7 @@ def compile_library(
         part = output.resolve() / processor / library.name if len(target.zig) > 1 else library
         part.parent.mkdir(exist_ok=True)
         command = [*toolchain.for_target(compiler, processor), *FLAGS]
-        command += [f"-ffile-prefix-map={sources.resolve()}=sources"]
+        command += [f"-ffile-prefix-map={sources.resolve()}=sources", f"-I{portable.HEADER.parent}"]
         command += [*_link_flags(compiler, target, library.name, stripped=not extra), *extra]
         command += [*sorted(names), "-o", str(part), "-lm"]
         toolchain.run(command, sources)

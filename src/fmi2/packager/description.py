@@ -8,25 +8,11 @@ from xml.etree import ElementTree as ET
 from . import units
 from .errors import InputError
 from .machine import Machine
+from .resources import Experiment
 from .table import INITIAL, Row, Table
 from .variables import Variable
 
 GENERATION_TOOL = "feedsim packager"
-DEFAULT_EXPERIMENT = {"startTime": 0.0, "stopTime": 1.0, "stepSize": 125e-6}  # s; stepSize is the drives' control cycle
-
-# What the shell in src/fmi2 can do, for every unit alike.
-CAPABILITIES: dict[str, bool | int] = {
-    "needsExecutionTool": False,
-    "canHandleVariableCommunicationStepSize": True,
-    "canInterpolateInputs": True,
-    "maxOutputDerivativeOrder": 1,
-    "canRunAsynchronuously": False,  # spelled so in the standard
-    "canBeInstantiatedOnlyOncePerProcess": False,
-    "canNotUseMemoryManagementFunctions": False,
-    "canGetAndSetFMUstate": True,
-    "canSerializeFMUstate": True,
-    "providesDirectionalDerivative": True,
-}
 
 LOG_CATEGORIES = {
     "logStatusError": "Calls that were refused or failed, with the reason",
@@ -60,6 +46,26 @@ TYPES = {
 }
 
 
+def capabilities(variables: Iterable[Variable]) -> dict[str, bool | int]:
+    """What the shell in src/fmi2 can do, with such variables."""
+    reals = [variable.row for variable in variables if variable.row.kind == "REAL"]
+    inputs = any(row.causality == "input" for row in reals)
+    outputs = any(row.causality == "output" for row in reals)
+    continuous = any(row.causality == "output" and row.variability == "continuous" for row in reals)
+    return {
+        "needsExecutionTool": False,
+        "canHandleVariableCommunicationStepSize": True,
+        "canInterpolateInputs": inputs,
+        "maxOutputDerivativeOrder": 1 if continuous else 0,  # values that are held have none (it would be told as 0)
+        "canRunAsynchronuously": False,  # spelled so in the standard
+        "canBeInstantiatedOnlyOncePerProcess": False,
+        "canNotUseMemoryManagementFunctions": False,
+        "canGetAndSetFMUstate": True,
+        "canSerializeFMUstate": True,
+        "providesDirectionalDerivative": inputs and outputs,
+    }
+
+
 def describe(
     table: Table,
     variables: Sequence[Variable],
@@ -68,6 +74,7 @@ def describe(
     version: str,
     sources: Iterable[str],
     machine: Machine,
+    experiment: Experiment,
 ) -> bytes:
     """The file's content. `sources` are the C files to compile, by name. Deterministic: no date, no computer."""
     summary = ". ".join(text for text in (table.summary, machine.sentence()) if text)
@@ -84,8 +91,8 @@ def describe(
             "variableNamingConvention": "structured",
         },
     )
-    capabilities = {name: _text(value) for name, value in CAPABILITIES.items()}
-    simulation = ET.SubElement(root, "CoSimulation", {"modelIdentifier": table.unit, **capabilities})
+    can = {name: _text(value) for name, value in capabilities(variables).items()}
+    simulation = ET.SubElement(root, "CoSimulation", {"modelIdentifier": table.unit, **can})
     files = ET.SubElement(simulation, "SourceFiles")
     for name in sorted(sources):
         ET.SubElement(files, "File", name=name)
@@ -95,7 +102,8 @@ def describe(
     categories = ET.SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
         ET.SubElement(categories, "Category", name=name, description=text)
-    ET.SubElement(root, "DefaultExperiment", {name: _text(value) for name, value in DEFAULT_EXPERIMENT.items()})
+    times = {"startTime": 0.0, "stopTime": experiment.stop, "stepSize": experiment.step}
+    ET.SubElement(root, "DefaultExperiment", {name: _text(value) for name, value in times.items()})
     _add_variables(root, variables)
     _add_structure(root, variables)
     ET.indent(root)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # renders the README; packing a machine does without it
     from markdown_it.token import Token
 
 INDEX = "documentation/index.html"
+REFERENCES = "documentation/fmi-ls-ref.html"  # where FMI-LS-REF recommends a page on the references
 
 _STYLE = """\
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #1c2126; }
@@ -33,7 +34,7 @@ td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: 
 """
 
 _BUILD = """\
-cc -std=c99 -O2 -ffp-contract=off -fPIC -shared -fvisibility=hidden *.c -lm -o {unit}.so
+cc -std=c99 -O2 -ffp-contract=off -fPIC -shared -fvisibility=hidden -I FOLDER *.c -lm -o {unit}.so
 """
 
 
@@ -46,10 +47,11 @@ _CONNECT = (
 )
 
 _HEADERS = """
-The files fmi2Functions.h, fmi2FunctionTypes.h and fmi2TypesPlatform.h in sources/ are part of the FMI standard and
-under a licence of their own: fmi-headers.txt.
+The headers of the FMI standard that the binaries were compiled with are under a licence of their own: fmi-headers.txt.
 """
 
+
+_LINK = '<p>The archive carries <a href="fmi-ls-ref.html">reference results</a> to compare an importer\'s with.</p>\n'
 
 _MARKS = {part: (f"<!-- {part} -->\n", f"<!-- end of {part} -->\n") for part in ("machine", "variables")}
 
@@ -64,14 +66,18 @@ def pages(
     standard_header: str,
     version: str,
     machine: Machine,
+    references: str | None = None,
 ) -> dict[str, bytes]:
     """Archive path -> content. Without `readme` or `licence` that part is left out (the caller warns).
 
+    `references` is the text that goes with the archive's reference results, where it has any.
     `standard_header` is a header of the FMI standard, whose opening comment holds the standard's licence.
     """
     body = _rendered(readme) if readme else f"<h1>{table.unit}</h1>\n<p>{html.escape(table.summary)}.</p>\n"
-    index = _index(table, body, _marked_parts(variables, resources, machine), licence, version)
-    found = {INDEX: index.encode()}
+    parts = _marked_parts(variables, resources, machine, with_references=references is not None)
+    found = {INDEX: _index(table, body, parts, licence, version).encode()}
+    if references is not None:
+        found[REFERENCES] = _page(f"{table.unit} {version}: reference results", _rendered(references)).encode()
     if licence is not None:
         found["documentation/licenses/license.txt"] = (licence + _HEADERS).encode()
     found["documentation/licenses/fmi-headers.txt"] = _licence_of(standard_header).encode()
@@ -95,10 +101,13 @@ def for_machine(
     return text.encode()
 
 
-def _marked_parts(variables: Sequence[Variable], resources: Resources | None, machine: Machine) -> dict[str, str]:
+def _marked_parts(
+    variables: Sequence[Variable], resources: Resources | None, machine: Machine, *, with_references: bool = False
+) -> dict[str, str]:
     """What the page says of the machine, between its marks."""
+    about = _about(resources, machine) if resources and not machine.default else ""
     parts = {
-        "machine": _about(resources, machine) if resources and not machine.default else "",
+        "machine": about + (_LINK if with_references else ""),
         "variables": _terminal_table(variables)
         + "<h2>Variables</h2>\n"
         + (_synthetic(resources) if machine.default else "")
@@ -131,22 +140,29 @@ def _licence_of(header: str) -> str:
 
 def _index(table: Table, body: str, parts: Mapping[str, str], licence: str | None, version: str) -> str:
     texts = [
-        "<!DOCTYPE html>\n",
-        f'<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{table.unit} {html.escape(version)}</title>\n',
-        f"<style>\n{_STYLE}</style>\n</head>\n<body>\n",
         parts["machine"],
         body,
         parts["variables"],
         "<h2>Building from the sources</h2>\n",
-        "<p>The folder <code>sources</code> is complete; the C files to compile are listed in modelDescription.xml, ",
-        "nothing needs to be defined, and nothing but the C library and libm is needed:</p>\n",
+        "<p>The folder <code>sources</code> is complete but for the three headers of FMI 2.0 (fmi2Functions.h, ",
+        "fmi2FunctionTypes.h, fmi2TypesPlatform.h), which every importer has: the standard wants the importer's to be ",
+        "used. The C files to compile are listed in modelDescription.xml and, with compiler options and library, in ",
+        "sources/buildDescription.xml. Nothing needs to be defined, and nothing but the C library and libm is needed. ",
+        "FOLDER is that of the headers:</p>\n",
         f"<pre><code>{html.escape(_BUILD.format(unit=table.unit))}</code></pre>\n",
         "<p>To link several units into one program, compile each with ",
         f"<code>-DFMI2_FUNCTION_PREFIX={table.unit}_</code> (the unit's own name and an underscore).</p>\n",
     ]
     if licence is not None:
         texts.append(f"<h2>Licence</h2>\n<pre>{html.escape(licence)}</pre>\n")
-    return "".join((*texts, "</body>\n</html>\n"))
+    return _page(f"{table.unit} {version}", "".join(texts))
+
+
+def _page(title: str, body: str) -> str:
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{html.escape(title)}</title>\n'
+        f"<style>\n{_STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+    )
 
 
 def _rendered(text: str) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from . import poses
 from .errors import InputError
-from .resources import AXIS_NAME, AXIS_NAME_RULE, File, Resources, constant, finite
+from .resources import AXIS_NAME, AXIS_NAME_RULE, MOST_AXES, File, Resources, constant, finite
 
 AXES_HEADER = ("axis", "x_0 [m]")
 DIRECTIONS = ("X", "Y", "Z")  # of the machine frame: ports of the tool force
@@ -113,6 +113,8 @@ def _axes(file: File) -> tuple[Axis, ...]:
     if header != AXES_HEADER:
         found = ",".join(header) or "(empty)"
         raise InputError(f"{file.name}: the header must read {','.join(AXES_HEADER)}, but reads {found}")
+    if len(rows) - 1 > MOST_AXES:
+        raise InputError(f"{file.name}: {len(rows) - 1} axes are listed, at most {MOST_AXES} are allowed")
     axes: list[Axis] = []
     problems: list[str] = []
     for line, fields in rows[1:]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+from .documentation import REFERENCES as PAGE
 from .errors import InputError
 from .variables import Variable
 
@@ -64,7 +65,7 @@ def files(directory: Path, variables: Iterable[Variable]) -> dict[str, bytes]:
 
 def without(archive: Mapping[str, bytes]) -> dict[str, bytes]:
     """The files of an archive less its references, which are of one machine."""
-    return {path: content for path, content in archive.items() if not path.startswith(ROOT)}
+    return {path: content for path, content in archive.items() if not path.startswith(ROOT) and path != PAGE}
 
 
 def _names(found: Mapping[str, bytes]) -> list[str]:

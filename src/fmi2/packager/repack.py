@@ -59,7 +59,13 @@ def repack(base: Path, given: Resources, machine: Machine, out: Path, *, trial_r
     packed = kept | renewed | terminals.describe(listed, kept)
     sources = [path.removeprefix("sources/") for path in packed if re.fullmatch(r"sources/[^/]+\.c", path)]
     packed[DESCRIPTION] = description.describe(
-        table, listed, guid=guid, version=version, sources=sources, machine=machine
+        table,
+        listed,
+        guid=guid,
+        version=version,
+        sources=sources,
+        machine=machine,
+        experiment=given.experiment(),
     )
     tried = trial_run and _try(packed, table.unit, guid, given)
     content = archive.pack(packed)

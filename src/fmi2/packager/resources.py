@@ -15,6 +15,10 @@ from .errors import InputError
 
 AXIS_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")  # the length is AXIS_NAME_SIZE, SETPOINT_NAME_SIZE of the units
 AXIS_NAME_RULE = "is not a letter followed by at most 30 letters, digits or _"
+MOST_AXES = 256  # AXES_MOST, SETPOINT_AXES_MOST of the units
+
+LONGEST_NUMBER = 510  # characters, a decimal point not counted; as numbers.c has it where separators are one byte
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,14 @@ class File:
             return cls(str(path), path.read_bytes())
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """DefaultExperiment: simulated from 0 to `stop` [s] in steps of `step` [s], those of the drives' control."""
+
+    stop: float = 1.0
+    step: float = 125e-6
 
 
 class Resources(ABC):
@@ -62,6 +74,10 @@ class Resources(ABC):
     def embedded_source(self) -> bytes:
         """embedded_resources.c: what targets without files get, as the unit's embedded_resources.h declares it."""
 
+    def experiment(self) -> Experiment:
+        """What to simulate where nobody asks for anything else."""
+        return Experiment()
+
     def hashed(self) -> bytes:
         """The bytes whose hash is the second half of the GUID."""
         return b"".join(self.files().values())
@@ -76,9 +92,8 @@ def constant(name: str, content: bytes) -> str:
 
 
 def finite(text: str) -> float | None:
-    """The finite number that `text` spells; None where it does not."""
-    try:
-        value = float(text)
-    except ValueError:
+    """The finite number that `text` spells, by the rules of numbers.c; None where it does not."""
+    if len(text.replace(".", "", 1)) > LONGEST_NUMBER or _NUMBER.fullmatch(text) is None:
         return None
-    return value if math.isfinite(value) and "_" not in text else None
+    value = float(text)
+    return value if math.isfinite(value) else None

@@ -12,7 +12,17 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from .errors import InputError
-from .resources import AXIS_NAME, AXIS_NAME_RULE, File, Resources, constant
+from .resources import (
+    AXIS_NAME,
+    AXIS_NAME_RULE,
+    LONGEST_NUMBER,
+    MOST_AXES,
+    Experiment,
+    File,
+    Resources,
+    constant,
+    finite,
+)
 
 Doubles: TypeAlias = "array[float]"  # of double
 
@@ -75,6 +85,13 @@ class Setpoints(Resources):
         axes = ", ".join(self.axes)
         return f"Its table: {self.rows} rows, one every {self.cycle:.9g} s until {self.last:.9g} s, of the axes {axes}."
 
+    def experiment(self) -> Experiment:
+        """To the last row, in the longest steps that divide the cycle but the usual ones at most: every row is met."""
+        usual = Experiment()
+        step = self.cycle / math.ceil(self.cycle / usual.step * (1 - UNEVEN))
+        # A mean of rounded times: 12 digits leave the cycle that was meant.
+        return Experiment(self.last if self.last > 0 else usual.stop, float(f"{step:.12g}"))
+
     def embedded_source(self) -> bytes:
         """The table as a constant, where it is not too large."""
         small = len(self.content) <= LARGEST_EMBEDDED
@@ -132,6 +149,9 @@ def _check_header(names: Sequence[str]) -> Iterator[str]:
         wanted = f"{TIME},X{POSITION},X{FEEDFORWARD},... (a pair of columns per axis)"
         yield f"the header must read {wanted}, but reads {shown}"
         return
+    if len(names) > 1 + 2 * MOST_AXES:
+        yield f"{len(names)} columns; at most {1 + 2 * MOST_AXES}, those of {MOST_AXES} axes, are allowed"
+        return
     if len(names) == 1:
         yield f"there is no axis; expected is {TIME},X{POSITION},X{FEEDFORWARD},..."
     for i in range(1, len(names), 2):
@@ -164,7 +184,11 @@ def _read_rows(lines: Iterator[tuple[int, bytes]], names: Sequence[str], values:
             row = [*map(float, fields)]
         except ValueError:
             row = [math.nan]
-        if len(row) == width and b"_" not in line and all(map(math.isfinite, row)):
+        # What float() takes and the unit does not: underscores, blanks of other kinds, very long numbers.
+        odd = b"_" in line or b"\x0b" in line or b"\x0c" in line
+        if len(line) > LONGEST_NUMBER and not odd:
+            odd = any(finite(field.decode("ascii", errors="replace").strip(" \t\r\n")) is None for field in fields)
+        if len(row) == width and not odd and all(map(math.isfinite, row)):
             time = row[0]
             if not time - before > 0 and before == before:
                 problems.append(f"line {number}: {TIME} is {time!r}, the row before has {before!r}; times must rise")
@@ -188,18 +212,19 @@ def _row_faults(fields: Sequence[bytes], names: Sequence[str]) -> Iterator[str]:
         yield f"{len(fields)} fields, expected {len(names)}"
         return
     for name, content in zip(names, fields, strict=True):
-        text = content.decode("utf-8", errors="replace").strip()
-        try:
-            good = math.isfinite(float(text)) and "_" not in text
-        except ValueError:
-            good = False
-        if not good:
+        text = content.decode("utf-8", errors="replace").strip(" \t\r\n")
+        if len(text) > LONGEST_NUMBER and finite(text) is None:
+            yield f"{name} is '{text[:40]}...', of {len(text)} characters; at most {LONGEST_NUMBER} are read"
+        elif finite(text) is None:
             yield f"{name} is '{text[:40]}', not a finite number"
 
 
 def _check_drift(table: Table) -> Iterator[str]:
     """Row by row the distances are even; their small differences must not add up."""
     first, cycle = table.time[0], table.cycle
+    if not math.isfinite(cycle):
+        yield f"the times run from {first!r} s to {table.time[-1]!r} s, a span that is no finite number"
+        return
     for i, time in enumerate(table.time):
         even = first + i * cycle
         if abs(time - even) > _uneven(cycle, max(abs(first), abs(time))):

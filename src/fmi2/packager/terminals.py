@@ -44,9 +44,9 @@ class Kind:
 KINDS = (
     Kind(
         name="setpoint",
-        gives=("x_s", "n_ffw"),
+        gives=("x_s", "n_ffw", "release"),
         takes=(),
-        text="Position setpoint and speed feedforward for a controller",
+        text="Position setpoint, speed feedforward and release for a controller",
         colour="89 99 110",
         edges=("right", "left"),
     ),

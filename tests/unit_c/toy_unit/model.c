@@ -115,8 +115,9 @@ static void toy_release(Unit *unit) {
 
 /* A saved state after 13 steps is of other data. */
 static bool toy_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size) {
-    (void)size;
     const ToyState *saved = state;
+    if (size < offsetof(ToyState, history))
+        return unit_fail(unit, "the state holds %.0f bytes", (double)size);
     return saved->steps != 13 || unit_fail(unit, "state of label '%s' after 13 steps is refused", scalars->label);
 }
 

@@ -16,7 +16,7 @@ _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def junit(comparisons: Sequence[Comparison], durations: Sequence[float] = ()) -> bytes:
-    """JUnit XML: a suite per pair, a case per variable, and one for the pair itself.
+    """JUnit XML: a suite per pair, called by both its files, a case per variable, and one for the pair itself.
 
     What differs or is missing is a failure, what cannot be compared an error. durations: [s] of the pairs.
     """
@@ -24,20 +24,17 @@ def junit(comparisons: Sequence[Comparison], durations: Sequence[float] = ()) ->
     totals = dict.fromkeys(("tests", "failures", "errors"), 0)
     for i, comparison in enumerate(comparisons):
         seconds = durations[i] if i < len(durations) else 0.0
-        suite = ElementTree.SubElement(root, "testsuite", name=_text(comparison.reference))
+        pair = _text(f"{comparison.result} against {comparison.reference}")
+        suite = ElementTree.SubElement(root, "testsuite", name=pair)
         counts = dict.fromkeys(totals, 0)
-        whole = ElementTree.SubElement(
-            suite, "testcase", classname=_text(comparison.reference), name="(whole)", time=f"{seconds:.3f}"
-        )
+        whole = ElementTree.SubElement(suite, "testcase", classname=pair, name="(whole)", time=f"{seconds:.3f}")
         counts["tests"] += 1
         if comparison.problem:
             broken = comparison.verdict == "unusable" and not comparison.those("same", "different")
             _fault(whole, "error" if broken else "failure", comparison.problem, comparison.problem)
             counts["errors" if broken else "failures"] += 1
         for variable in comparison.variables:
-            case = ElementTree.SubElement(
-                suite, "testcase", classname=_text(comparison.reference), name=_text(variable.name), time="0.000"
-            )
+            case = ElementTree.SubElement(suite, "testcase", classname=pair, name=_text(variable.name), time="0.000")
             counts["tests"] += 1
             if variable.verdict == "unusable":
                 _fault(case, "error", variable.reason, variable.reason)

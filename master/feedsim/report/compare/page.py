@@ -72,8 +72,7 @@ def _tiles(comparisons: Sequence[Comparison], counts: dict[str, int]) -> list[Ti
 
 
 def _number(value: float, unit: str) -> str:
-    text = f"{value:.4g}" if isfinite(value) else "no number"
-    return f"{minus(powers(text))} {display_unit(unit)}".strip()
+    return f"{minus(powers(f'{value:.4g}'))} {display_unit(unit)}".strip() if isfinite(value) else "no number"
 
 
 def _pairs(comparisons: Sequence[Comparison]) -> str:

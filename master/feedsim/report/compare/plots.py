@@ -84,9 +84,11 @@ def _near(axes: Axes, variable: Variable, curves: Curves) -> None:
         there = variable.value - along(curves.reference_time, curves.reference, np.array([variable.time]))
         colour = VERMILLION if variable.outside else BLUE
         axes.plot([variable.time], there, color=colour, marker="o", markersize=6)
-    off = f"{variable.deviation:.3g}" if np.isfinite(variable.deviation) else "no number"
     unit = display_unit(variable.unit)
-    heading(axes, minus(powers(f"{off} of {variable.allowed:.3g} {unit}".strip())) + f" at {variable.time:.6g} s")
+    off = f"{variable.deviation:.3g} of {variable.allowed:.3g} {unit}".strip()
+    heading(
+        axes, (minus(powers(off)) if np.isfinite(variable.deviation) else "no number") + f" at {variable.time:.6g} s"
+    )
     axes.set_ylabel(f"less the reference [{unit}]" if unit else "less the reference")
     axes.margins(x=0.01)
 

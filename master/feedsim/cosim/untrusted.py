@@ -1,0 +1,145 @@
+"""What comes from elsewhere, read with distrust: zip archives (names, sizes) and XML documents (no document type)."""
+
+from __future__ import annotations
+
+import shutil
+import stat
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from xml.parsers import expat
+
+from feedsim.errors import InputError
+
+LARGEST = 4 << 30  # bytes that a file may unpack to; the setpoints of the longest program take less
+RATIO = 100  # to the file's own size; tables of setpoints reach some 10, files made to fill a disk 1000
+FREE = 64 << 20  # bytes up to which the ratio does not count
+LARGEST_DOCUMENT = 64 << 20  # bytes of what is read into memory at once: XML, JSON, YAML
+LONGEST_PART = 240  # bytes of a file's or folder's name; systems know 255
+LONGEST_NAME = 1024  # bytes of a name with its folders
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of the standards FMI and SSP
+
+
+class Allowance:
+    """What a file from elsewhere may still unpack to, the archives inside it included."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self._size = path.stat().st_size
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
+        self._limit = min(LARGEST, max(FREE, RATIO * self._size))
+        self._used = 0
+
+    def take(self, size: int, where: str) -> None:
+        """Count `size` bytes. InputError: they are too many."""
+        self._used += size
+        if self._used > self._limit:
+            raise InputError(
+                f"{where}: what is needed of it unpacks to {self._used} bytes or more; at most {self._limit} are read "
+                f"of a file of {self._size} bytes ({RATIO} times its size, from {FREE >> 20} MiB to {LARGEST >> 30} "
+                "GiB)"
+            )
+
+
+def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
+    """Files in a zip archive by name.
+
+    Raises:
+        InputError: lists entries that do not belong into one: names that lead out of it, occur twice, cannot be on a
+            disk together or are too long; links; what is encrypted or packed by an unusual method.
+    """
+    found = [entry for entry in package.infolist() if not entry.is_dir()]
+    names = {entry.filename for entry in found}
+    faults: list[str] = []
+    seen: set[str] = set()
+    for entry in found:
+        name = entry.filename
+        if fault := _fault(entry, name in seen, names):
+            faults.append(f"{where}: the entry {shortened(name)!r} {fault}")
+        seen.add(name)
+    if faults:
+        more = len(faults) - 20
+        faults = [*faults[:20], f"{where}: {more} more like these"] if more > 0 else faults
+        raise InputError.of(f"{where}: cannot be trusted", faults)
+    return {entry.filename: entry for entry in found}
+
+
+def _fault(entry: zipfile.ZipInfo, twice: bool, names: set[str]) -> str | None:
+    name = entry.filename
+    if leads_out(name):
+        return "leads out of the archive"
+    if stat.S_ISLNK(entry.external_attr >> 16):
+        return "is a link"
+    if entry.flag_bits & 1:
+        return "is encrypted"
+    if entry.compress_type not in _METHODS:
+        return "is neither stored nor deflated; FMI and SSP know no other method"
+    if twice:
+        return "is there twice"
+    size = len(name.encode("utf-8", "surrogatepass"))
+    if size > LONGEST_NAME or any(len(p.encode("utf-8", "surrogatepass")) > LONGEST_PART for p in name.split("/")):
+        return f"has a name of more than {LONGEST_PART} bytes ({LONGEST_NAME} with its folders)"
+    above = next((str(each) for each in PurePosixPath(name).parents if str(each) in names), None)
+    return f"is in the folder {above!r}, which is a file too" if above else None
+
+
+def leads_out(name: str) -> bool:
+    """Whether a name inside an archive is absolute, climbs, or is none that every system reads alike."""
+    return (
+        not name
+        or name.startswith("/")
+        or ".." in PurePosixPath(name).parts
+        or any(c in name for c in "\\:\0")
+        or any(ord(c) < 32 or 0xD800 <= ord(c) < 0xE000 for c in name)
+    )
+
+
+def shortened(name: str) -> str:
+    """A name for a message."""
+    return name if len(name) <= 80 else f"{name[:77]}..."
+
+
+def copy(package: zipfile.ZipFile, entry: zipfile.ZipInfo, to: Path) -> None:
+    """Write an entry to the file `to`, whose folders are made; never more bytes than it says it has."""
+    to.parent.mkdir(parents=True, exist_ok=True)
+    with package.open(entry) as source, to.open("wb") as target:
+        shutil.copyfileobj(source, target, 1 << 20)
+
+
+@contextmanager
+def readable(what: str) -> Iterator[None]:
+    """Make an InputError, `what` ahead, of whatever a damaged archive or a full disk raises in the block."""
+    try:
+        yield
+    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error) as error:
+        raise InputError(f"{what}: {error}") from error
+    except OSError as error:
+        raise InputError(f"{what}: {error.strerror or error}") from error
+
+
+class _Root(Exception):
+    """The root element begins: no document type can follow."""
+
+
+def refuse_document_type(content: bytes, where: str) -> None:
+    """Raise InputError for an XML document with a document type declaration, in any encoding, or with bad XML ahead of
+    its root."""
+
+    def refuse(*_: object) -> None:
+        raise InputError(f"{where}: has a document type declaration; FMI and SSP know none, and none is read")
+
+    def stop(*_: object) -> None:
+        raise _Root
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = refuse
+    parser.StartElementHandler = stop
+    try:
+        parser.Parse(content, True)
+    except _Root:
+        pass
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise InputError(f"{where}: not readable XML: {error}") from error

@@ -21,13 +21,15 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from numpy.typing import NDArray
 
-from feedsim.cosim import binaries, untrusted
+from feedsim.cosim import binaries, signals, untrusted
 from feedsim.errors import InputError, SimulationError
 
 Floats = NDArray[np.float64]
 
 _DESCRIPTION = "modelDescription.xml"
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+# Compiled ahead: what a signal raises inside a callback is lost, so callbacks are kept short.
+_CALL = re.compile(r"^fmi2[A-Za-z]+: ")
 WARNING = 1  # fmi2Status: 0 OK, 1 warning, 2 discard, 3 error, 4 fatal
 
 _EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
@@ -87,7 +89,8 @@ class Archive:
             raise InputError(f"{what}: {_DESCRIPTION} has {size} bytes, allowed: {untrusted.LARGEST_DOCUMENT}")
         untrusted.refuse_document_type(file.read_bytes(), f"{self.path}: {_DESCRIPTION}")
         try:
-            description = read_model_description(str(self.directory))
+            with signals.held():  # FMPy's validation has a bare `except:`
+                description = read_model_description(str(self.directory))
         except Exception as error:
             raise InputError(f"{what}: {error}") from error
         if description.fmiVersion != "2.0":
@@ -178,7 +181,7 @@ class Unit:
 
     def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
         text = message.decode("utf-8", errors="replace").replace("%%", "%").replace("##", "#")
-        text = re.sub(r"^fmi2[A-Za-z]+: ", "", text)  # which call it was says nothing to the master's user
+        text = _CALL.sub("", text)  # which call it was says nothing to the master's user
         if status == WARNING:
             self.warnings.append(f"{self.name}: {text}")
         elif status > WARNING:

@@ -129,7 +129,15 @@ def test_other_compilers_give_the_same(
     if not library.is_file():
         library.parent.mkdir(exist_ok=True)
         sources = unpacked[case.unit] / "sources"
-        flags = ["-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off"]
+        flags = [
+            "-std=c99",
+            "-O2",
+            "-fPIC",
+            "-shared",
+            "-fvisibility=hidden",
+            "-ffp-contract=off",
+            f"-I{hosts.HEADERS}",
+        ]
         files = sorted(path.name for path in sources.glob("*.c"))
         subprocess.run([compiler, *flags, *files, "-lm", "-o", str(library)], cwd=sources, check=True)
     host = hosts.host("linux64", scratch)

@@ -77,13 +77,21 @@ ansys: $(VENV)/.ansys ## install the optional reader of ANSYS .full files
 
 # --- the units -----------------------------------------------------------------------------------------------------
 
-fmus: $(FMUS) ## build the four FMUs into fmus/
+fmus: $(FMUS) ## build the four FMUs and the native cycle loop into fmus/
 
 PACKAGER := $(wildcard src/fmi2/packager/*.py src/fmi2/terminals/*)
 SHELL_SOURCES := $(wildcard src/fmi2/*.[ch] src/fmi2/standard/*.h)
 
 fmus/%.fmu: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml LICENSE
 	$(PY) src/fmi2/packager build $* --out $@ --build-dir $(BUILD)/fmus
+
+# The native cycle loop lies beside the archives.
+EXCHANGE := exchange$(if $(filter Windows_NT,$(OS)),.dll,$(if $(filter Darwin,$(shell uname -s)),.dylib,.so))
+EXCHANGE_SOURCES := $(wildcard src/exchange/*.[ch] src/exchange/*.py) $(addprefix src/fmi2/packager/,compile.py toolchain.py)
+
+fmus: fmus/$(EXCHANGE)
+fmus/$(EXCHANGE): $(VENV)/.run $(COMPILER) $(EXCHANGE_SOURCES)
+	$(PY) src/exchange/build.py --out $(@D)
 
 fmus/friction.fmu: $(wildcard src/friction_fmu/*.*)
 fmus/controller.fmu: $(wildcard src/controller_fmu/*.*)
@@ -129,7 +137,10 @@ SANITIZED := $(BUILD)/sanitized-fmus
 $(SANITIZED)/%.fmu: fmus/%.fmu
 	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) src/fmi2/packager build $* --out $@ --build-dir $(SANITIZED)
 
-test-sanitize-scenario: $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu)) ## a scenario on units with sanitisers
+$(SANITIZED)/$(EXCHANGE): fmus/$(EXCHANGE)
+	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) src/exchange/build.py --out $(@D)
+
+test-sanitize-scenario: $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu) $(SANITIZED)/$(EXCHANGE)) ## a scenario on units with sanitisers
 	@if [ -z "$(ASAN_RUNTIME)" ]; then echo "the compiler has no AddressSanitizer runtime: scenario under sanitisers left out"; else \
 	    LD_PRELOAD=$(ASAN_RUNTIME) ASAN_OPTIONS=detect_leaks=0 FEEDSIM_FMUS=$(SANITIZED) \
 	    $(PY) -c 'import feedsim, sys; result = feedsim.run(feedsim.load_scenario(sys.argv[1])); print(sys.argv[1], "under sanitisers: clean,", len(result.trace), "rows")' \
@@ -155,6 +166,7 @@ check-reference: fmus $(VENV)/.run ## compare all units and both scenarios with 
 
 bench: fmus $(VENV)/.run ## measure the units and the master loop
 	$(PY) benchmarks/cycle.py
+	$(PY) benchmarks/floor.py
 
 worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets
 	$(PY) benchmarks/worst_case.py
@@ -167,8 +179,8 @@ identification-study: fmus $(VENV)/.run ## how far identified parameters can be 
 
 # --- keep ----------------------------------------------------------------------------------------------------------
 
-C_FILES := $(foreach folder,src/fmi2 $(UNITS:%=src/%_fmu) tests/unit_c tests/unit_c/toy_unit tests/platforms \
-    tests/reference/monolithic benchmarks,$(wildcard $(folder)/*.[ch]))
+C_FILES := $(foreach folder,src/fmi2 src/exchange $(UNITS:%=src/%_fmu) tests/unit_c tests/unit_c/toy_unit tests/platforms \
+    tests/reference/monolithic benchmarks benchmarks/floor,$(wildcard $(folder)/*.[ch]))
 
 lint: $(VENV)/.dev ## style, types, formatting
 	$(PY) -m ruff check
@@ -192,4 +204,4 @@ lock: ## resolve the dependencies of pyproject.toml anew
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --no-deps pyproject.toml --extra ansys -c requirements.lock -o requirements-ansys.lock
 
 clean: ## remove what was built, keep the environment
-	rm -rf $(BUILD) $(FMUS) $(RESULTS)
+	rm -rf $(BUILD) $(FMUS) fmus/exchange.* $(RESULTS)

@@ -1,4 +1,4 @@
-"""What a 125 us control cycle costs: each unit's doStep (measured in C), and the whole master loop (on the circle).
+"""What a 125 us control cycle costs: each unit's doStep (measured in C), and the master loop in Python (on the circle).
 
 Run by ``make bench``. All figures come from one run on one machine; read the ratios, not the nanoseconds.
 """
@@ -73,7 +73,7 @@ def main() -> int:
     runs = []
     for i in range(REPETITIONS):
         print(f"circle, run {i + 1} of {REPETITIONS}", end="\r", file=sys.stderr)
-        runs.append(cosim.run(circle))
+        runs.append(cosim.run(circle, native=False))
     simulated = float(runs[0].program.time[-1])
     cycles = simulated / circle.machine.cycles.T_c
     loop = statistics.median(run.wall_time for run in runs) / cycles * 1e9

@@ -66,6 +66,11 @@ typedef enum Phase {
 typedef enum Call { CALLS(CALL_NAME) CALL_COUNT } Call;
 #undef CALL_NAME
 
+/* PHASES_DoStep: the states in which fmi2DoStep may be called */
+#define CALL_PHASES(name, phases) PHASES_##name = phases,
+enum { CALLS(CALL_PHASES) };
+#undef CALL_PHASES
+
 /* "fmi2DoStep" */
 const char *call_name(Call call);
 

@@ -5,23 +5,27 @@
 #include "numbers.h"
 #include "values.h"
 
-static bool is(Unit *unit, fmi2ValueReference reference, Causality causality, const char *purpose) {
-    const Variable *variable = values_find(unit, reference, KIND_REAL);
-    if (variable == NULL)
-        return false;
-    if (variable->info->causality == causality)
-        return true;
+RARE static bool is_another(Unit *unit, fmi2ValueReference reference, Causality causality, const char *purpose) {
+    const Variable *variable = &unit->variables[reference];
     char name[VARIABLE_NAME_SIZE];
     return unit_fail(unit, "%s %s, but value reference %u is the %s '%s'", purpose, table_causality(causality),
                      reference, table_causality(variable->info->causality), values_name(unit, variable, name));
 }
 
-static bool first_order(Unit *unit, fmi2ValueReference reference, int order, const char *limit) {
-    if (order == 1)
-        return true;
+static inline bool is(Unit *unit, fmi2ValueReference reference, Causality causality, const char *purpose) {
+    const Variable *variable = values_find(unit, reference, KIND_REAL);
+    return variable != NULL &&
+           (variable->info->causality == causality || is_another(unit, reference, causality, purpose));
+}
+
+RARE static bool another_order(Unit *unit, fmi2ValueReference reference, int order, const char *limit) {
     char name[VARIABLE_NAME_SIZE];
     return unit_fail(unit, "derivative of order %d asked for '%s'; allowed is order 1 (%s)", order,
                      values_name(unit, &unit->variables[reference], name), limit);
+}
+
+static inline bool first_order(Unit *unit, fmi2ValueReference reference, int order, const char *limit) {
+    return order == 1 || another_order(unit, reference, order, limit);
 }
 
 /* --- inputs */

@@ -46,7 +46,7 @@
 #define log_write_list PREFIXED(log_write_list)
 #define log_select PREFIXED(log_select)
 
-#define values_find PREFIXED(values_find)
+#define values_missing PREFIXED(values_missing)
 #define values_name PREFIXED(values_name)
 #define values_arrays PREFIXED(values_arrays)
 #define values_sound PREFIXED(values_sound)

@@ -53,15 +53,20 @@ bool run_derive(Unit *unit, bool may_resize) {
 
 /* --- results */
 
+RARE static bool not_finite(Unit *unit, size_t offset, double value) {
+    char name[VARIABLE_NAME_SIZE], text[NUMBER_TEXT_SIZE];
+    const Variable *variable = unit->variables;
+    while (variable->offset != offset)
+        variable++;
+    return unit_fail(unit, "%s '%s' is not finite: %s", table_causality(variable->info->causality),
+                     values_name(unit, variable, name), number_text(text, value));
+}
+
 static bool results_finite(Unit *unit) {
     for (size_t i = 0; i < unit->result_count; i++) {
-        const Variable *variable = &unit->variables[unit->results[i]];
-        double value = *(const double *)unit_address(unit, variable);
-        if (!isfinite(value)) {
-            char name[VARIABLE_NAME_SIZE], text[NUMBER_TEXT_SIZE];
-            return unit_fail(unit, "%s '%s' is not finite: %s", table_causality(variable->info->causality),
-                             values_name(unit, variable, name), number_text(text, value));
-        }
+        double value = *(const double *)(const void *)(unit->block + unit->results[i]);
+        if (!isfinite(value))
+            return not_finite(unit, unit->results[i], value);
     }
     return true;
 }
@@ -93,11 +98,12 @@ void run_reset(Unit *unit) {
  * same instant. A part in 10^9, but never a noticeable part of a step, and never less than a few units in the last
  * place. */
 static double tolerance(double t, double h) {
-    double scale = fabs(t) + h;
-    return fmax(16 * DBL_EPSILON * scale, fmin(1e-9 * scale, 0.1 * h));
+    const double scale = fabs(t) + h, part = 1e-9 * scale, least = 16 * DBL_EPSILON * scale;
+    const double usual = part < 0.1 * h ? part : 0.1 * h;
+    return usual > least ? usual : least;
 }
 
-static bool step_allowed(Unit *unit, double t, double h) {
+RARE static bool step_refused(Unit *unit, double t, double h) {
     const Header *header = unit_header(unit);
     char text[3][NUMBER_TEXT_SIZE];
     if (!isfinite(t))
@@ -107,10 +113,16 @@ static bool step_allowed(Unit *unit, double t, double h) {
     if (fabs(t - header->time) > tolerance(header->time, h))
         return unit_fail(unit, "the communication point is %s s, but the unit stands at %s s", number_text(text[0], t),
                          number_text(text[1], header->time));
-    if (!isfinite(t + h) || t + h > header->stop_time + tolerance(header->stop_time, h))
-        return unit_fail(unit, "the step would end at %s s, past the stop time of %s s", number_text(text[0], t + h),
-                         number_text(text[1], header->stop_time));
-    return derivatives_inputs_finite(unit, h);
+    return unit_fail(unit, "the step would end at %s s, past the stop time of %s s", number_text(text[0], t + h),
+                     number_text(text[1], header->stop_time));
+}
+
+static bool step_allowed(Unit *unit, double t, double h) {
+    const Header *header = unit_header(unit);
+    const double end = t + h;
+    const bool allowed = isfinite(end) && h > 0 && fabs(t - header->time) <= tolerance(header->time, h) &&
+                         (end <= header->stop_time || end <= header->stop_time + tolerance(header->stop_time, h));
+    return allowed ? derivatives_inputs_finite(unit, h) : step_refused(unit, t, h);
 }
 
 /* A step that is refused leaves everything as it was; one that fails leaves an instance that only a reset or a restored

@@ -47,7 +47,8 @@ struct Unit {
     char **axis_names;
     Variable *variables; /* by value reference */
     size_t variable_count;
-    unsigned *inputs, *results; /* value references of the Real inputs; of the Real outputs and locals */
+    unsigned *inputs; /* value references of the Real inputs */
+    size_t *results;  /* offsets in the block of the Real outputs and locals */
     size_t input_count, result_count;
 
     unsigned char *block;
@@ -92,12 +93,27 @@ bool run_refresh(Unit *unit);                     /* initial values that belong 
 bool run_step(Unit *unit, double t, double h);
 void run_reset(Unit *unit);
 
+/* What an error takes is kept out of the way of what happens in every step. */
+#ifdef __GNUC__
+#define RARE __attribute__((cold, noinline))
+#else
+#define RARE
+#endif
+
+/* call_begin(), for a function whose states are known where it is compiled. */
+static inline bool call_begin_in(Unit *unit, Call call, unsigned phases) {
+    if (unit == NULL || !(phases & 1u << unit_header(unit)->phase))
+        return call_begin(unit, call);
+    unit->call = call;
+    return true;
+}
+
 /* --- entry points: how each of them opens, with its arguments as the log of calls shows them, and what it returns */
 #define BEGIN(call, ...)                                                                                               \
     Unit *unit = c;                                                                                                    \
     if (unit != NULL && (unit->log_categories & LOG_CALLS))                                                            \
         call_tell(unit, CALL_##call, __VA_ARGS__);                                                                     \
-    if (!call_begin(unit, CALL_##call))                                                                                \
+    if (!call_begin_in(unit, CALL_##call, PHASES_##call))                                                              \
     return fmi2Error
 #define STATUS(good) ((good) ? fmi2OK : fmi2Error)
 

@@ -61,7 +61,7 @@ static void lay_row(Unit *unit, size_t base, const VariableInfo *info) {
     if (info->kind == KIND_REAL && info->causality == CAUSALITY_input)
         unit->inputs[unit->input_count++] = reference;
     if (info->kind == KIND_REAL && (info->causality == CAUSALITY_output || info->causality == CAUSALITY_local))
-        unit->results[unit->result_count++] = reference;
+        unit->results[unit->result_count++] = variable->offset;
 }
 
 static void lay_rows(Unit *unit, size_t base, const VariableInfo *rows, size_t count) {

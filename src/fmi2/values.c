@@ -17,7 +17,7 @@ char *values_name(const Unit *unit, const Variable *variable, char *name) {
     return name;
 }
 
-static const Variable *not_found(Unit *unit, fmi2ValueReference reference, Kind kind) {
+RARE const Variable *values_missing(Unit *unit, fmi2ValueReference reference, Kind kind) {
     if (reference >= unit->variable_count) {
         unit_fail(unit, "value reference %u does not exist; those of this unit run from 0 to %u", reference,
                   (unsigned)unit->variable_count - 1);
@@ -29,12 +29,6 @@ static const Variable *not_found(Unit *unit, fmi2ValueReference reference, Kind 
               kind_names[variable->info->kind], table_causality(variable->info->causality),
               values_name(unit, variable, name), kind_names[kind]);
     return NULL;
-}
-
-const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind) {
-    if (reference < unit->variable_count && unit->variables[reference].info->kind == kind)
-        return &unit->variables[reference];
-    return not_found(unit, reference, kind);
 }
 
 bool values_arrays(Unit *unit, size_t count, const void *references, const void *values) {
@@ -63,14 +57,15 @@ static bool ready(Unit *unit, size_t count, const fmi2ValueReference references[
     return true;
 }
 
-static bool all_found(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[]) {
+static inline bool all_found(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[]) {
     for (size_t i = 0; i < count; i++)
         if (values_find(unit, references[i], kind) == NULL)
             return false;
     return true;
 }
 
-static bool readable(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[], const void *values) {
+static inline bool readable(Unit *unit, Kind kind, size_t count, const fmi2ValueReference references[],
+                            const void *values) {
     return values_arrays(unit, count, references, values) && all_found(unit, kind, count, references) &&
            ready(unit, count, references);
 }
@@ -101,10 +96,8 @@ bool values_get_string(Unit *unit, size_t count, const fmi2ValueReference refere
 
 /* --- set: check the whole call first, then write */
 
-static bool settable(Unit *unit, const Variable *variable) {
+RARE static bool settable_now(Unit *unit, const Variable *variable) {
     const VariableInfo *info = variable->info;
-    if (info->causality == CAUSALITY_input)
-        return true;
     char name[VARIABLE_NAME_SIZE];
     if (info->causality != CAUSALITY_parameter)
         return unit_fail(unit, "the %s '%s' is calculated and cannot be set", table_causality(info->causality),
@@ -115,7 +108,11 @@ static bool settable(Unit *unit, const Variable *variable) {
     return true;
 }
 
-static bool out_of_range(Unit *unit, const Variable *variable, double value) {
+static inline bool settable(Unit *unit, const Variable *variable) {
+    return variable->info->causality == CAUSALITY_input || settable_now(unit, variable);
+}
+
+RARE static bool out_of_range(Unit *unit, const Variable *variable, double value) {
     const VariableInfo *info = variable->info;
     char name[VARIABLE_NAME_SIZE], text[3][NUMBER_TEXT_SIZE];
     const char *gap = *info->unit ? " " : "";
@@ -136,13 +133,13 @@ static bool out_of_range(Unit *unit, const Variable *variable, double value) {
                      table_causality(info->causality), name, text[0], gap, info->unit, text[1], text[2]);
 }
 
-static bool in_range(Unit *unit, const Variable *variable, double value) {
+static inline bool in_range(Unit *unit, const Variable *variable, double value) {
     const VariableInfo *info = variable->info;
     return (isfinite(value) && value >= info->min && value <= info->max) || out_of_range(unit, variable, value);
 }
 
 /* What follows from variables having been set. */
-static void note_set(Unit *unit, const Variable *variable) {
+static inline void note_set(Unit *unit, const Variable *variable) {
     if (variable->info->causality == CAUSALITY_parameter)
         unit->parameters_touched = true;
     if (unit_header(unit)->phase != PHASE_STEPPING)

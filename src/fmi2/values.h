@@ -9,7 +9,8 @@
 #include "shell.h"
 
 /* The variable of that reference, or NULL (with the reason logged) where there is none of that kind. */
-const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind);
+static inline const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind);
+const Variable *values_missing(Unit *unit, fmi2ValueReference reference, Kind kind); /* always NULL */
 
 #define VARIABLE_NAME_SIZE 256
 /* "F_S", or "X.M_a" for a row of axis X, written to name[VARIABLE_NAME_SIZE]; returns name. */
@@ -32,5 +33,11 @@ bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference refere
 /* Whether the variables of a foreign block (aligned or not) are such as this file would have let them become; results:
  * its Real outputs and locals must be finite as well. */
 bool values_sound(Unit *unit, const unsigned char *block, bool results);
+
+static inline const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind) {
+    if (reference < unit->variable_count && unit->variables[reference].info->kind == kind)
+        return &unit->variables[reference];
+    return values_missing(unit, reference, kind);
+}
 
 #endif

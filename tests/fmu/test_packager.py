@@ -281,6 +281,26 @@ def test_no_compiler_at_all_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: P
         toolchain.find_compiler()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="a compiler that is a script")
+def test_files_are_compiled_as_one_program_only_where_that_works(tmp_path: Path) -> None:
+    def compiler(name: str, script: str) -> tuple[str]:
+        path = tmp_path / name
+        path.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
+        path.chmod(0o755)
+        return (str(path),)
+
+    gnu = 'echo "gcc, Copyright Free Software Foundation, Inc."'
+    leave = '[ $# = 1 ] || { while [ "$1" != -o ]; do shift; done; echo "%s" > "$2"; }'
+    able = compiler("able", f"{gnu}; {leave % 'reached_across_files'}")
+    lossy = compiler("lossy", f"{gnu}; {leave % 'nothing'}")
+    without = compiler("without", f'{gnu}; case " $* " in *" -flto "*) echo "LTO is not enabled" >&2; exit 1;; esac')
+    another = compiler("another", "echo clang; [ $# = 1 ]")
+    assert toolchain.whole_program(able, ".so") == ("-flto",)
+    for command in (lossy, without, another, ("zig", "cc"), (str(tmp_path / "none"),)):
+        assert toolchain.whole_program(command, ".so") == ()
+    assert toolchain.whole_program(able, ".dylib") == toolchain.whole_program(able, ".dll") == ()
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [

@@ -27,7 +27,7 @@ ORDER = [
 ]
 SOLE_USERS = {
     "fmpy": {"cosim/unit.py"},
-    "ctypes": {"cosim/unit.py", "cosim/friction_law.py"},
+    "ctypes": {"cosim/unit.py", "cosim/friction_law.py", "cosim/exchange.py"},
     "yaml": {"scenario"},
     "pint": {"units.py", "units"},
     "matplotlib": {"report"},

@@ -37,7 +37,10 @@ def test_bound_of_the_friction_slope(scheme: str, of_bound: float, chatters: boo
     sigma_1 = of_bound * bound - friction.sigma_2
     overrides = [f"coupling.scheme={scheme}", f"machine.axes.Z.friction.sigma_1={sigma_1!r} N.m.s/rad"]
     result = cosim.run(scenario.load(file, overrides), fmus=fmus)
-    # A torque that goes from -F_S to F_S and back from cycle to cycle has this second difference: more is chatter.
+    # A torque that goes from -F_S to F_S and back from cycle to cycle has this second difference: more is chatter. Two
+    # passes drift apart without it, and the energy tells.
     largest = 4 * friction.F_S
-    assert (np.abs(np.diff(result.trace["Z.M_fr"], 2)).max() > largest) == chatters
+    chattered = np.abs(np.diff(result.trace["Z.M_fr"], 2)).max() > largest
+    lost = any("not to be trusted" in warning for warning in result.warnings)
+    assert (lost if scheme == "iterated" else chattered) == chatters
     assert any("sigma_1 + sigma_2" in warning for warning in result.warnings) == chatters

@@ -25,6 +25,8 @@ SOURCES_test_location        := $(TOY)
 SOURCES_test_numbers         :=
 SOURCES_test_text            := src/fmi2/text.c
 
+SOURCES_test_exchange := src/exchange/exchange.c
+
 SOURCES_test_lugre     := src/friction_fmu/lugre.c
 SOURCES_test_tem       := src/friction_fmu/tem.c
 SOURCES_test_contact   := $(addprefix src/friction_fmu/,contact.c lugre.c tem.c)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -16,7 +16,9 @@ from typing import Literal
 import numpy as np
 
 from feedsim.cosim import wiring
-from feedsim.cosim.run import Progress, fmus_directory
+from feedsim.cosim.exchange import When, chosen
+from feedsim.cosim.loop import Activity, Keep, Loop, Progress, Record, Send, setpoints
+from feedsim.cosim.run import fmus_directory
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.trust import LOAD_TAKEN_UP
@@ -37,7 +39,6 @@ DRIVE_INPUTS = ("M_add", "n_add")
 DRIVE_SIGNALS = ("n_s", "n_ref", "torque_limited", "voltage_limited")
 TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z")
 LIMITS = {"torque_limited": ("M_max", "N.m"), "voltage_limited": ("u_max", "V")}
-REPORTED_EVERY = 512  # cycles
 # Periods that differ by more than this share of the signal have not settled: 0.01 dB.
 SETTLED = 1e-3
 
@@ -85,6 +86,7 @@ def measure(
     settle: int = 2,
     fmus: Path | None = None,
     progress: Progress | None = None,
+    native: bool | None = None,
 ) -> Measurement:
     """Excite the machine and record its steady response.
 
@@ -101,6 +103,7 @@ def measure(
         settle: periods of excitation ahead of those.
         fmus: folder of the archives; default :func:`fmus_directory`.
         progress: called now and then with (cycles done, cycles in all).
+        native: whether the native cycle loop is to work; see :func:`~feedsim.cosim.run.run`.
 
     Raises:
         InputError: an argument that does not fit the machine, the travel is too short, a drive met a limit, so that the
@@ -117,27 +120,17 @@ def measure(
     machine, program, first = _setpoints(machine, axis, offset_speed or 0.0, wait, duration)
     kept = first * ratio + settle * rows
     total = kept + periods * rows
-    with System(machine, fmus or fmus_directory(), friction=friction) as system:
+    fmus = fmus or fmus_directory()
+    library = chosen(native, fmus)
+    with System(machine, fmus, friction=friction) as system:
         cycle = Cycle(system, SCHEMES["extrapolated"], cycles.T_c, 1)
-        excite = _excite(system, axis, inject, excitation)
-        record = _Record(system, periods * rows)
+        record = _Record(system, periods * rows, When(first=kept))
+        before: list[Activity] = [*setpoints(system, program, ratio)] if offset_speed else []
+        before += [_excite(system, axis, inject, excitation, When(first=first * ratio)), *record.before]
+        loop = Loop(cycle, tuple(before), record.after, library)
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
-        with np.errstate(over="ignore", invalid="ignore"):  # the unit that meets an overflow reports it
-            for k in range(total):
-                if offset_speed and k % ratio == 0:
-                    system.set_setpoints(program, k // ratio)
-                if k >= first * ratio:
-                    excite(k - first * ratio)
-                if k >= kept:
-                    record.before(k - kept)
-                cycle.run(k)
-                if k >= kept:
-                    record.after(k - kept)
-                if progress is not None and (k + 1) % REPORTED_EVERY == 0:
-                    progress(k + 1, total)
-        if progress is not None:
-            progress(total, total)
+        loop.run(total, progress)
         wall_time = time.perf_counter() - begun
         reference = inject if inject.startswith("tool.") else f"{axis}.{inject}"
         _refuse_limits(machine, record, inject, excitation, system)
@@ -247,32 +240,19 @@ def _start(axis: str, machine: Machine, distance: float, before: float) -> float
     return min(max(start, low - min(distance, 0.0)), high - max(distance, 0.0))
 
 
-def _excite(system: System, axis: str, inject: str, excitation: Excitation) -> Callable[[int], None]:
-    """A function that sets the input for the control cycle that begins at sample i."""
-    samples, rows = excitation.samples, len(excitation.samples)
+def _excite(system: System, axis: str, inject: str, excitation: Excitation, when: When) -> Send:
+    """What sets the input for the control cycles, a sample each."""
+    samples = excitation.samples.reshape(-1, 1)
     if inject in DRIVE_INPUTS:
-        port = Port(system.units[wiring.controller(axis)], [inject])
-
-        def drive(i: int) -> None:
-            port.values[0] = samples[i % rows]
-            port.set()
-
-        return drive
-    port = Port(system.plant, [inject])
+        return Send(Port(system.units[wiring.controller(axis)], [inject]), samples, when)
     slopes = (np.roll(samples, -1) - samples) / excitation.cycle
-
-    def force(i: int) -> None:
-        port.values[0], port.slopes[0] = samples[i % rows], slopes[i % rows]
-        port.set()
-        port.set_slopes()
-
-    return force
+    return Send(Port(system.plant, [inject]), samples, when, slopes)
 
 
 class _Record:
     """What is known at t_k before the cycle is run, and what the controllers have worked out at t_k after it."""
 
-    def __init__(self, system: System, rows: int) -> None:
+    def __init__(self, system: System, rows: int, when: When) -> None:
         self.system = system
         axes = len(system.axes)
         self.measured = np.zeros((rows, 2 * axes))  # x_a, n_a of every axis
@@ -281,15 +261,15 @@ class _Record:
         self.tool = Log(system.plant, TOOL_SIGNALS, rows)
         self.drives = [Log(control.unit, DRIVE_SIGNALS, rows) for control in system.controllers]
 
-    def before(self, row: int) -> None:
-        self.measured[row] = self.system.plant_measured.values
-        self.M_fr[row] = self.system.M_fr
-        self.tool.record(row)
-
-    def after(self, row: int) -> None:
-        self.M_a[row] = self.system.M_a_start
-        for log in self.drives:
-            log.record(row)
+        self.before: tuple[Activity, ...] = (
+            Keep(system.measured, self.measured, when),
+            Keep(system.M_fr, self.M_fr, when),
+            Record(self.tool, when),
+        )
+        self.after: tuple[Activity, ...] = (
+            Keep(system.M_a_start, self.M_a, when),
+            *(Record(log, when) for log in self.drives),
+        )
 
     def columns(self) -> tuple[dict[str, Floats], dict[str, str]]:
         """Values and units by column."""

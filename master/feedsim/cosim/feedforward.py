@@ -35,6 +35,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim.cosim import wiring
+from feedsim.cosim.exchange import When
+from feedsim.cosim.loop import Send
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats, Port
 from feedsim.errors import InputError
@@ -100,13 +102,13 @@ def friction_feedforward(
     }
 
 
-def feeder(system: System, torques: TorqueFeedforward, instants: int) -> Callable[[int], None]:
-    """A function that hands over the torques of instant k to the drives.
+def feeders(system: System, torques: TorqueFeedforward, instants: int) -> list[Send]:
+    """What hands over the torques of instant k to the drives.
 
     Raises:
         InputError: an unknown axis, or torques that are not one finite number per instant.
     """
-    ports: list[tuple[Port, Floats]] = []
+    sends: list[Send] = []
     for axis, torque in torques.items():
         if axis not in system.axes:
             raise InputError(f"torque feedforward: no axis {axis!r}{suggest(axis, system.axes)}")
@@ -115,14 +117,9 @@ def feeder(system: System, torques: TorqueFeedforward, instants: int) -> Callabl
                 f"torque feedforward of axis {axis}: {instants} finite values are needed, one per control cycle and "
                 f"one for the end; there are {torque.shape}, {np.count_nonzero(np.isfinite(torque))} of them finite"
             )
-        ports.append((Port(system.units[wiring.controller(axis)], ["M_add"]), torque))
-
-    def feed_forward(k: int) -> None:
-        for port, torque in ports:
-            port.values[0] = torque[k]
-            port.set()
-
-    return feed_forward
+        port = Port(system.units[wiring.controller(axis)], ["M_add"])
+        sends.append(Send(port, torque.reshape(-1, 1), When()))
+    return sends
 
 
 def _numbers(friction: Friction) -> dict[str, float]:

@@ -7,6 +7,8 @@ from collections.abc import Collection
 import numpy as np
 
 from feedsim.cosim import wiring
+from feedsim.cosim.exchange import When
+from feedsim.cosim.loop import Record
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats, Log
 from feedsim.errors import InputError
@@ -73,6 +75,11 @@ class Recording:
         if k % self.every == 0:
             for log in self.logs.values():
                 log.record(k // self.every)
+
+    @property
+    def activities(self) -> list[Record]:
+        """The same for the cycle loop; the end of the last cycle is left to :meth:`record`."""
+        return [Record(log, When(every=self.every)) for log in self.logs.values()]
 
     def trace(self, program: Program, T_c: float, ratio: int) -> Trace:
         """The signals over time; setpoints are those of the position cycle, `ratio` control cycles long."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from feedsim.cosim import trust
-from feedsim.cosim.feedforward import TorqueFeedforward, feeder
+from feedsim.cosim.exchange import chosen
+from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
+from feedsim.cosim.loop import Activity, Loop, Progress, setpoints
 from feedsim.cosim.pose import PoseUse, pose_use
 from feedsim.cosim.recording import Recording, recorded_columns
 from feedsim.cosim.schedule import SCHEMES, Cycle
@@ -21,8 +21,6 @@ from feedsim.nc import Program, plan
 from feedsim.scenario import Scenario
 from feedsim.structure import checked_modes
 from feedsim.trace import Trace
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,7 @@ class Run:
         trace: recorded signals, columns "X.x_a" ... in SI units.
         coupling: per axis, interface energy residual [J], its peak, and the friction work [J] to hold it against.
         wall_time: duration of the cycle loop [s].
+        native: whether the native loop has executed it.
         units: per instance, GUID and version of its archive.
         pose: how far the motion leaves the plant's pose, or how the plant followed it.
         warnings: what a user should know before believing the result, a sentence each.
@@ -51,6 +50,7 @@ class Run:
     warnings: tuple[str, ...]
     fine: Trace | None = None
     log: Trace | None = None
+    native: bool = False
 
 
 def fmus_directory() -> Path:
@@ -66,6 +66,7 @@ def run(
     fmus: Path | None = None,
     progress: Progress | None = None,
     torque_feedforward: TorqueFeedforward | None = None,
+    native: bool | None = None,
 ) -> Run:
     """Run `scenario` and return its trace.
 
@@ -75,9 +76,11 @@ def run(
         progress: called now and then with (cycles done, cycles in all).
         torque_feedforward: axis -> torque [N.m] added to its torque setpoint at the instants k T_c, from 0 to the
             program's end.
+        native: whether the native cycle loop beside the archives is to work (else Python does, to the same bits);
+            default: where there is one.
 
     Raises:
-        InputError: the motion violates a limit, the archives do not fit the machine.
+        InputError: the motion violates a limit, the archives do not fit the machine, `native` without such a loop.
         SimulationError: a unit failed; the message names the unit, the time and the unit's reason.
     """
     program = program or plan(scenario)
@@ -87,29 +90,22 @@ def run(
     ratio = round(cycles.T_pos / cycles.T_c)
     every = round(scenario.recording.interval / cycles.T_c)
     total = (len(program.time) - 1) * ratio
-    with System(scenario.machine, fmus or fmus_directory()) as system:
+    fmus = fmus or fmus_directory()
+    library = chosen(native, fmus)
+    with System(scenario.machine, fmus) as system:
         cycle = Cycle(system, SCHEMES[scenario.coupling.scheme], cycles.T_c, scenario.coupling.substeps)
         recording = Recording(system, total, every)
         at_full_rate = Recording(system, total, 1, full_rate_columns(scenario)) if scenario.logging else None
-        feed_forward = feeder(system, torque_feedforward or {}, total + 1)
+        before: list[Activity] = [*setpoints(system, program, ratio), *recording.activities]
+        before += at_full_rate.activities if at_full_rate is not None else []
+        before += feeders(system, torque_feedforward or {}, total + 1)
+        loop = Loop(cycle, tuple(before), (), library)
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
-        with np.errstate(over="ignore", invalid="ignore"):  # the unit that meets an overflow reports it
-            for k in range(total):
-                if k % ratio == 0:
-                    system.set_setpoints(program, k // ratio)
-                recording.record(k)
-                if at_full_rate is not None:
-                    at_full_rate.record(k)
-                feed_forward(k)
-                cycle.run(k)
-                if progress is not None and (k + 1) % 512 == 0:
-                    progress(k + 1, total)
+        loop.run(total, progress)
         for last in (recording, at_full_rate):
             if last is not None:
                 last.record(total)
-        if progress is not None:
-            progress(total, total)
         wall_time = time.perf_counter() - begun
         pose = pose_use(scenario.machine, program, system)
         fine = None if at_full_rate is None else at_full_rate.trace(program, cycles.T_c, ratio)
@@ -132,6 +128,7 @@ def run(
             ),
             fine=fine,
             log=None if fine is None or scenario.logging is None else log(fine, scenario.logging, ideal_axes(scenario)),
+            native=loop.native is not None,
         )
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim.cosim.system import System
+from feedsim.cosim.unit import Unit
 
 
 @dataclass(frozen=True)
@@ -22,12 +23,14 @@ class Scheme:
     friction_ramp: bool  # plant: M_fr is extrapolated with the slope of its last step; else held
     stable_share: float  # of 2 J_inf/h that the friction's slope sigma_1 + sigma_2 may reach; found by trial on Z
     speed: str  # friction: n_fr linear "within" the step, held at its "end" or its "start", or "extrapolated"
+    passes: int = 1  # plant and friction go back and take the step again, with the slope of M_fr that they have found
 
 
 SCHEMES = {
     scheme.name: scheme
     for scheme in (
         Scheme("extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.28, speed="within"),
+        Scheme("iterated", torque_ramp=True, friction_ramp=True, stable_share=0.52, speed="within", passes=2),
         Scheme("gauss_seidel", torque_ramp=True, friction_ramp=False, stable_share=0.5, speed="end"),
         Scheme("jacobi", torque_ramp=True, friction_ramp=False, stable_share=0.28, speed="start"),
         Scheme("jacobi_extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.11, speed="extrapolated"),
@@ -53,7 +56,9 @@ class Cycle:
         self.substeps = substeps
         self.step = cycle / substeps
         count = len(system.axes)
+        self.M_fr_start = np.zeros(count)  # of the exchange step, where it is taken again
         self.M_a_before = np.zeros(count)  # what an importer without slopes knows of the torque
+        self.assumed_torque = np.zeros(count)  # at the end of the exchange step, by the plant
         self.residual = np.zeros(count)
         self.residual_peak = np.zeros(count)
         self.dissipated = np.zeros(count)
@@ -78,21 +83,38 @@ class Cycle:
             np.multiply(system.M_a_slope, j * self.step, out=system.M_a)
             system.M_a += system.M_a_start
             self._exchange(t + j * self.step)
-        system.plant_measured.get()
 
     def _exchange(self, t: float) -> None:
         """Plant and friction over one exchange step."""
-        system, scheme, h = self.system, self.scheme, self.step
-        system.plant_torque.set()
-        system.plant_torque.set_slopes()
-        system.plant_friction.set()
-        if scheme.friction_ramp:
-            system.plant_friction.set_slopes()
-        system.plant.step(t, h)
+        system, scheme = self.system, self.scheme
         system.n_start[:] = system.n_end
-        system.plant_contact.get()
+        if scheme.passes > 1:
+            self.M_fr_start[:] = system.M_fr
+            for unit in self._stepped_again():
+                unit.keep()
+        self._step(t)
+        for _ in range(1, scheme.passes):
+            for unit in self._stepped_again():
+                unit.go_back()
+            system.M_fr[:] = self.M_fr_start
+            self._step(t)
+        taken = system.M_fr * (system.n + self.step * system.n_slope)
+        self.residual += 0.5 * self.step * (self.assumed_torque * system.n_end - taken)
+        np.maximum(self.residual_peak, np.abs(self.residual), out=self.residual_peak)
+        self.dissipated += self.step * taken
 
-        assumed_torque = system.M_fr + h * system.M_fr_slope if scheme.friction_ramp else system.M_fr.copy()
+    def _stepped_again(self) -> list[Unit]:
+        return [self.system.plant, *(contact.unit for contact in self.system.contacts)]
+
+    def _step(self, t: float) -> None:
+        """A pass: the plant, then friction."""
+        system, scheme, h = self.system, self.scheme, self.step
+        system.plant_inputs.set()
+        (system.plant_inputs if scheme.friction_ramp else system.plant_torque).set_slopes()
+        system.plant.step(t, h)
+        system.plant_outputs.get()
+
+        self.assumed_torque[:] = system.M_fr + h * system.M_fr_slope if scheme.friction_ramp else system.M_fr
         slope = (system.n_end - system.n_start) / h
         if scheme.speed == "within":
             system.n[:], system.n_slope[:] = system.n_start, slope
@@ -109,8 +131,3 @@ class Cycle:
             contact.unit.step(t, h)
             contact.torque.get()
             contact.torque.get_slopes()
-
-        taken = system.M_fr * (system.n + h * system.n_slope)
-        self.residual += 0.5 * h * (assumed_torque * system.n_end - taken)
-        np.maximum(self.residual_peak, np.abs(self.residual), out=self.residual_peak)
-        self.dissipated += h * taken

@@ -47,6 +47,7 @@ class System:
     M_fr, M_fr_slope        friction torque at the start of the exchange step and the slope of the last one
     n_start, n_end          speed at the friction contact at the ends of the exchange step
     n, n_slope              what the friction units are told of it
+    measured                x_a and n_a of every axis at the end of the exchange step
     ======================= ==============================================================================
     """
 
@@ -97,16 +98,21 @@ class System:
         def buffer() -> Floats:
             return np.zeros(count)
 
-        self.M_a_start, self.M_a_end, self.M_a, self.M_a_slope = buffer(), buffer(), buffer(), buffer()
-        self.M_fr, self.M_fr_slope = buffer(), buffer()
-        self.n_start, self.n_end, self.n, self.n_slope, self.n_slope_last = (buffer() for _ in range(5))
-        measured = np.zeros(2 * count)
+        self.M_a_start, self.M_a_end = buffer(), buffer()
+        self.n_start, self.n, self.n_slope, self.n_slope_last = (buffer() for _ in range(4))
+        # What the plant takes and gives lies together, for one call each.
+        inputs, slopes, outputs = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3 * count)
+        self.M_a, self.M_a_slope = inputs[:count], slopes[:count]
+        self.M_fr, self.M_fr_slope = inputs[count:], slopes[count:]
+        self.n_end, self.measured = outputs[:count], outputs[count:]
 
         plant = self.plant
-        self.plant_torque = Port(plant, [f"{axis}.M_a" for axis in axes], self.M_a, self.M_a_slope)
-        self.plant_friction = Port(plant, [f"{axis}.M_fr" for axis in axes], self.M_fr, self.M_fr_slope)
-        self.plant_contact = Port(plant, [f"{axis}.n_fr" for axis in axes], self.n_end)
-        self.plant_measured = Port(plant, [f"{axis}.{y}" for axis in axes for y in ("x_a", "n_a")], measured)
+        torques, frictions = [f"{axis}.M_a" for axis in axes], [f"{axis}.M_fr" for axis in axes]
+        contacts = [f"{axis}.n_fr" for axis in axes]
+        measured = [f"{axis}.{y}" for axis in axes for y in ("x_a", "n_a")]
+        self.plant_torque = Port(plant, torques, self.M_a, self.M_a_slope)
+        self.plant_inputs = Port(plant, [*torques, *frictions], inputs, slopes)
+        self.plant_outputs = Port(plant, [*contacts, *measured], outputs)
         self.controllers: list[Control] = []
         self.contacts: list[Contact] = []
         for i, axis in enumerate(axes):
@@ -116,7 +122,7 @@ class System:
                 Control(
                     unit=control,
                     setpoint=Port(control, ["x_s", "n_ffw"]),
-                    measured=Port(control, ["x_a", "n_a"], measured[2 * i : 2 * i + 2]),
+                    measured=Port(control, ["x_a", "n_a"], self.measured[2 * i : 2 * i + 2]),
                     torque=Port(control, ["M_a"], self.M_a_end[own], self.M_a_slope[own]),
                 )
             )
@@ -136,8 +142,7 @@ class System:
         for unit in self.units.values():
             unit.enter_initialisation(0.0, stop)
             unit.check_parameters()
-        self.plant_measured.get()
-        self.plant_contact.get()
+        self.plant_outputs.get()
         self.n_start[:] = self.n[:] = self.n_end
         for contact in self.contacts:
             contact.speed.set()
@@ -147,8 +152,7 @@ class System:
             control.measured.set()
             control.torque.get()
         self.M_a[:] = self.M_a_end
-        self.plant_torque.set()
-        self.plant_friction.set()
+        self.plant_inputs.set()
         for unit in self.units.values():
             unit.exit_initialisation()
 

@@ -14,7 +14,7 @@ import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 import numpy as np
 from fmpy import read_model_description
@@ -36,6 +36,7 @@ _EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, cty
 _DERIVATIVE = ctypes.CFUNCTYPE(
     ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_void_p
 )
+_STATE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
 _STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
 
 
@@ -134,7 +135,7 @@ class Unit:
         self.name = name
         self.warnings: list[str] = []
         self._messages: list[str] = []
-        self._time = 0.0
+        self._time = self._kept_time = 0.0
         self._fmu = self._loaded()
         callbacks = fmi2CallbackFunctions()
         callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
@@ -154,6 +155,10 @@ class Unit:
         self._set_slope = _DERIVATIVE(("fmi2SetRealInputDerivatives", library))
         self._get_slope = _DERIVATIVE(("fmi2GetRealOutputDerivatives", library))
         self._do_step = _STEP(("fmi2DoStep", library))
+        self._get_state = _STATE(("fmi2GetFMUstate", library))
+        self._set_state = _STATE(("fmi2SetFMUstate", library))
+        self._free_state = _STATE(("fmi2FreeFMUstate", library))
+        self.kept_state: NDArray[np.uintp] = np.zeros(1, dtype=np.uintp)  # an fmi2FMUstate; 0: none yet
 
     def _loaded(self) -> FMU2Slave:
         """fmpy's wrapper of the library. InputError: none for this platform, or none that can be loaded here."""
@@ -192,8 +197,10 @@ class Unit:
         self._messages.clear()
         return said
 
-    def fail(self, action: str) -> None:
-        """Raise for a call that returned an error."""
+    def fail(self, action: str, t: float | None = None) -> NoReturn:
+        """Raise for a call that returned an error, at t [s]; without it where the unit stands."""
+        if t is not None:
+            self._time = t
         said = self._said() or "no message"
         raise SimulationError(f"unit {self.name}, t = {self._time:.9g} s: {action} failed: {said}")
 
@@ -209,6 +216,15 @@ class Unit:
         """The unit's shared library, loaded for as long as this instance is open."""
         library: ctypes.CDLL = self._fmu.dll
         return library
+
+    @property
+    def component(self) -> int:
+        """Address of the instance, the first argument of every FMI function."""
+        return int(self._component)
+
+    def address(self, function: str) -> int:
+        """Address of one of the library's functions, for those who call it without Python in between."""
+        return ctypes.cast(getattr(self.library, function), ctypes.c_void_p).value or 0
 
     def set_parameters(self, parameters: Mapping[str, float | int | bool | str]) -> None:
         """Set start values by name, before initialisation.
@@ -258,8 +274,20 @@ class Unit:
     def step(self, t: float, h: float) -> None:
         """Advance from t to t + h [s]."""
         if self._do_step(self._component, t, h, 1) > WARNING:
-            self._time = t
-            self.fail(f"step of {h:.6g} s")
+            self.fail(stepping(h), t)
+        self._time = t + h
+
+    def keep(self) -> None:
+        """Keep the state as it is now, in place of the one kept before."""
+        if self._get_state(self._component, self.kept_state.ctypes.data) > WARNING:
+            self.fail(KEEPING)
+        self._kept_time = self._time
+
+    def go_back(self) -> None:
+        """Bring back the state that was kept."""
+        if self._set_state(self._component, int(self.kept_state[0])) > WARNING:
+            self.fail(GOING_BACK)
+        self._time = self._kept_time
 
     def value(self, name: str) -> float:
         """A Real or Integer variable as it is now; for what is read once, ports and logs are faster.
@@ -278,6 +306,8 @@ class Unit:
     def close(self) -> None:
         """Free the instance; never raises, so that it can stand in a `finally`."""
         if self._component is not None:
+            if self.kept_state[0]:
+                self._free_state(self._component, self.kept_state.ctypes.data)
             self._component = None
             self._fmu.freeInstance()  # and unloads the library
 
@@ -295,10 +325,27 @@ class Unit:
         return np.array([known[name].valueReference for name in names], dtype=np.uint32)
 
 
+def stepping(h: float) -> str:
+    """What a unit was about that failed in a step; likewise :func:`setting` and :func:`reading` on variables."""
+    return f"step of {h:.6g} s"
+
+
+def setting(names: Sequence[str], slopes: bool = False) -> str:
+    return f"setting {'slopes of ' if slopes else ''}{', '.join(names)}"
+
+
+def reading(names: Sequence[str], slopes: bool = False) -> str:
+    return f"reading {'slopes of ' if slopes else ''}{', '.join(names)}"
+
+
+RECORDING, KEEPING, GOING_BACK = "recording", "keeping the state", "going back to the state kept"
+
+
 class Port:
     """Real variables of one unit that are exchanged in one call.
 
     Attributes:
+        references, orders: (n,) value references, and the order of the derivatives (1), as the FMI functions take them.
         values: (n,) in the unit's own units; what `set` sends and `get` fills.
         slopes: (n,) first time derivatives; what `set_slopes` sends and `get_slopes` fills.
     """
@@ -314,28 +361,28 @@ class Port:
         for buffer in (self.values, self.slopes):
             if buffer.shape != (count,) or buffer.dtype != np.float64 or not buffer.flags.c_contiguous:
                 raise ValueError(f"port {self.names}: a buffer of {count} contiguous float64 is needed")
-        self._references = unit.references(self.names)
-        self._orders = np.ones(count, dtype=np.int32)
+        self.references = unit.references(self.names)
+        self.orders = np.ones(count, dtype=np.int32)
         component = unit._component
-        at = self._references.ctypes.data
+        at = self.references.ctypes.data
         self._exchange = (component, at, count, self.values.ctypes.data)
-        self._derivative = (component, at, count, self._orders.ctypes.data, self.slopes.ctypes.data)
+        self._derivative = (component, at, count, self.orders.ctypes.data, self.slopes.ctypes.data)
 
     def set(self) -> None:
         if self.unit._set_real(*self._exchange) > WARNING:
-            self.unit.fail(f"setting {', '.join(self.names)}")
+            self.unit.fail(setting(self.names))
 
     def get(self) -> None:
         if self.unit._get_real(*self._exchange) > WARNING:
-            self.unit.fail(f"reading {', '.join(self.names)}")
+            self.unit.fail(reading(self.names))
 
     def set_slopes(self) -> None:
         if self.unit._set_slope(*self._derivative) > WARNING:
-            self.unit.fail(f"setting slopes of {', '.join(self.names)}")
+            self.unit.fail(setting(self.names, slopes=True))
 
     def get_slopes(self) -> None:
         if self.unit._get_slope(*self._derivative) > WARNING:
-            self.unit.fail(f"reading slopes of {', '.join(self.names)}")
+            self.unit.fail(reading(self.names, slopes=True))
 
 
 class Log:
@@ -344,6 +391,7 @@ class Log:
     Attributes:
         reals: (rows, n) of the Real variables `real_names`.
         flags: (rows, m) of the Boolean variables `flag_names`, 0 or 1.
+        real_references, flag_references: (n,) and (m,) value references.
     """
 
     def __init__(self, unit: Unit, names: Sequence[str], rows: int) -> None:
@@ -356,20 +404,20 @@ class Log:
             raise InputError(f"{unit.archive.path.name}: only Real and Boolean variables can be recorded, not {names}")
         self.reals = np.zeros((rows, len(self.real_names)))
         self.flags = np.zeros((rows, len(self.flag_names)), dtype=np.int32)
-        self._real_references = unit.references(self.real_names)
-        self._flag_references = unit.references(self.flag_names)
+        self.real_references = unit.references(self.real_names)
+        self.flag_references = unit.references(self.flag_names)
 
     def record(self, row: int) -> None:
         unit = self.unit
         for call, references, table in (
-            (unit._get_real, self._real_references, self.reals),
-            (unit._get_boolean, self._flag_references, self.flags),
+            (unit._get_real, self.real_references, self.reals),
+            (unit._get_boolean, self.flag_references, self.flags),
         ):
             if not references.size:
                 continue
             address = table.ctypes.data + row * table.strides[0]
             if call(unit._component, references.ctypes.data, references.size, address) > WARNING:
-                unit.fail("recording")
+                unit.fail(RECORDING)
 
     def columns(self) -> dict[str, Floats]:
         """Recorded columns by variable name, each (rows,)."""

@@ -14,7 +14,7 @@ from feedsim.scenario.logging import Logging
 from feedsim.scenario.machine import Machine
 from feedsim.scenario.motion import Motion
 
-Scheme = Literal["extrapolated", "gauss_seidel", "jacobi", "jacobi_extrapolated", "parallel"]
+Scheme = Literal["extrapolated", "iterated", "gauss_seidel", "jacobi", "jacobi_extrapolated", "parallel"]
 
 
 class Coupling(Model):

@@ -66,7 +66,8 @@ def compile_library(
         part.parent.mkdir(exist_ok=True)
         command = [*toolchain.for_target(compiler, processor), *FLAGS]
         command += [f"-ffile-prefix-map={sources.resolve()}=sources", f"-I{portable.HEADER.parent}"]
-        command += [*_link_flags(compiler, target, library.name, stripped=not extra), *extra]
+        command += [*_link_flags(compiler, target, library.name, stripped=not extra)]
+        command += extra or toolchain.whole_program(tuple(compiler), target.suffix)
         command += [*sorted(names), "-o", str(part), "-lm"]
         toolchain.run(command, sources)
         parts.append(part.read_bytes())

@@ -1,0 +1,118 @@
+"""What the FMI and the master cost: the circle in the native loop and in Python's, against the same models linked
+together and called directly, without FMI (``benchmarks/floor``).
+
+Run by ``make bench``. The three take turns; a ratio is the median of those of neighbouring runs. The floor must leave
+the same bits, or it is no floor for this work.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from feedsim_packager import compile, toolchain
+
+from feedsim import cosim, nc, scenario
+from feedsim.cosim.system import System
+
+ROOT = Path(__file__).resolve().parents[1]
+FLOOR = ROOT / "benchmarks" / "floor"
+REPETITIONS = 9
+# What of a unit's folder is equations rather than FMI.
+EQUATIONS = {
+    "plant": ("modal.c",),
+    "controller": (
+        "biquad.c", "current.c", "delay.c", "drive.c", "lag.c", "measured_speed.c", "pmsm.c", "position.c",
+        "reference_model.c", "setpoint_ramp.c", "speed.c",
+    ),
+    "friction": ("contact.c", "lugre.c", "parameters.c", "tem.c", "../fmi2/table.c", "../fmi2/hash.c"),
+}  # fmt: skip
+CONTROLLER = ("M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q", "torque_limited", "voltage_limited")
+FRICTION = ("M_fr", "z", "c", "k", "lambda")
+TOOL = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
+
+
+def build(directory: Path, extra: tuple[str, ...] = ()) -> ctypes.CDLL:
+    """Compile the units' equations and the loop around them into one library, with the units' compiler and flags."""
+    directory.mkdir(parents=True, exist_ok=True)
+    compiler = toolchain.find_compiler()
+    command = [*compiler, *compile.FLAGS, *toolchain.whole_program(compiler, compile.host_target().suffix), *extra]
+    shared = [f"-I{ROOT / 'src' / 'fmi2'}", f"-I{ROOT / 'src' / 'fmi2' / 'standard'}", f"-I{FLOOR}"]
+    objects = []
+    for unit, names in (*EQUATIONS.items(), ("floor", ())):
+        folder = ROOT / "src" / f"{unit}_fmu"
+        for source in (FLOOR / f"{unit}.c", *(folder / name for name in names)):
+            made = directory / f"{unit}-{source.stem}.o"
+            subprocess.run([*command, f"-I{folder}", *shared, "-c", str(source), "-o", str(made)], check=True)
+            objects.append(str(made))
+    library = directory / "floor.so"
+    subprocess.run([*command, "-shared", *objects, "-lm", "-o", str(library)], check=True)
+    return ctypes.CDLL(str(library))
+
+
+def floor(library: ctypes.CDLL, circle: scenario.Scenario, program: nc.Program) -> tuple[float, np.ndarray, list[str]]:
+    """Seconds of the loop, the table it leaves, and the table's columns."""
+    cycles = circle.machine.cycles
+    ratio, every = round(cycles.T_pos / cycles.T_c), round(circle.recording.interval / cycles.T_c)
+    total = (len(program.time) - 1) * ratio
+    with System(circle.machine, cosim.fmus_directory()) as system:
+        system.initialise(program, stop=total * cycles.T_c)
+        axes = system.axes
+        names = [f"{axis}.{signal}" for axis in axes for signal in (*CONTROLLER, *FRICTION)]
+        names += [f"{axis}.{signal}" for axis in axes for signal in ("x_a", "n_a")] + list(TOOL)
+        setpoints = np.array([np.column_stack([program.x_s[axis], program.n_ffw[axis]]) for axis in axes])
+        table, energies = np.zeros((total // every + 1, len(names))), np.zeros((len(axes), 3))
+        pointers = ctypes.c_void_p * len(axes)
+        arguments = (
+            ctypes.c_void_p(system.plant.component),
+            pointers(*(control.unit.component for control in system.controllers)),
+            pointers(*(contact.unit.component for contact in system.contacts)),
+            ctypes.c_size_t(len(axes)), ctypes.c_long(total), ctypes.c_double(cycles.T_c), ctypes.c_long(ratio),
+            ctypes.c_void_p(setpoints.ctypes.data), ctypes.c_size_t(setpoints.shape[1]), ctypes.c_long(every),
+            ctypes.c_void_p(table.ctypes.data), ctypes.c_void_p(energies.ctypes.data),
+        )  # fmt: skip
+        library.floor_run.restype = None
+        begun = time.perf_counter()
+        library.floor_run(*arguments)
+        return time.perf_counter() - begun, table, names
+
+
+def main() -> int:
+    library = build(ROOT / "build" / "bench" / "floor")
+    circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml")
+    program = nc.plan(circle)
+    simulated = float(program.time[-1])
+    spent: dict[str, list[float]] = {"floor": [], "native loop": [], "Python loop": []}
+    for i in range(REPETITIONS):
+        print(f"circle, run {i + 1} of {REPETITIONS}", end="\r", file=sys.stderr)
+        seconds, table, names = floor(library, circle, program)
+        native = cosim.run(circle, program=program, native=True)
+        spent["floor"].append(seconds)
+        spent["native loop"].append(native.wall_time)
+        spent["Python loop"].append(cosim.run(circle, program=program, native=False).wall_time)
+        different = [name for at, name in enumerate(names) if np.any(native.trace[name] != table[:, at])]
+        if different:
+            print(f"the floor has computed something else: {', '.join(different)}", file=sys.stderr)
+            return 1
+    print("| the circle, per 125 us cycle | median | shortest | of the floor | real-time factor |")
+    print("|---|---|---|---|---|")
+    results: dict[str, float] = {}
+    for name, seconds in spent.items():
+        per_cycle = [1e6 * value * circle.machine.cycles.T_c / simulated for value in seconds]
+        ratio = statistics.median(a / b for a, b in zip(seconds, spent["floor"], strict=True))
+        median = statistics.median(per_cycle)
+        results |= {f"{name} us": median, f"{name} of the floor": ratio}
+        factor = simulated / statistics.median(seconds)
+        print(f"| {name} | {median:.3f} us | {min(per_cycle):.3f} us | {ratio:.2f} | {factor:.3g} |")
+    (ROOT / "build" / "bench" / "floor.json").write_text(json.dumps(results, indent=2) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,96 @@
+/* The native cycle loop: executes what the master has compiled a control cycle to, on units that the master has loaded.
+ *
+ * A cycle is a list of operations, worked through in order: calls of FMI functions on buffers that the master owns, and
+ * small vector arithmetic in between. The loop knows neither units nor schemes nor recordings; which operations make a
+ * cycle is the master's business (feedsim/cosim/compiled.py), and so is all memory. No globals, no allocation, no
+ * printing: a call that fails ends the loop, and the unit has told its logger why.
+ *
+ * The master reads the layout below as text and leaves a library alone that has another one. */
+#ifndef FEEDSIM_EXCHANGE_H
+#define FEEDSIM_EXCHANGE_H
+
+#include <stdint.h>
+
+/* To be counted up when an operation comes to mean something else though the tables below stay. */
+#define EXCHANGE_VERSION 1
+
+/* The operations. FMI calls take values (slopes) from y or leave them there:
+ *   set_real, set_slopes, get_real, get_slopes, get_boolean (int)   count variables by their references
+ *   get_state, set_state                                            y holds one fmi2FMUstate; the first get fills it
+ *   do_step                                                         from k T_c + s, over h
+ * Vectors have `count` entries, y may be one of the operands:
+ *   copy     y = a
+ *   line     y = a + s b
+ *   rate     y = (a - b) / s
+ *   product  y = a b
+ *   peak     y = max(y, |a|), NaN where there is one */
+#define EXCHANGE_KINDS(K)                                                                                              \
+    K(set_real)                                                                                                        \
+    K(set_slopes)                                                                                                      \
+    K(do_step)                                                                                                         \
+    K(get_real)                                                                                                        \
+    K(get_slopes)                                                                                                      \
+    K(get_boolean)                                                                                                     \
+    K(get_state)                                                                                                       \
+    K(set_state)                                                                                                       \
+    K(copy)                                                                                                            \
+    K(line)                                                                                                            \
+    K(rate)                                                                                                            \
+    K(product)                                                                                                         \
+    K(peak)
+
+typedef void *address;
+typedef void (*function)(void);
+
+/* An operation is due in every cycle (every = 0, y is a buffer), or in cycle `next` and each `every` cycles from then
+ * on; y is then a table of `rows` rows that are `stride` bytes apart, used one after the other and over again. */
+#define EXCHANGE_FIELDS(F)                                                                                             \
+    F(int64_t, kind)                                                                                                   \
+    F(int64_t, count)                                                                                                  \
+    F(function, call)                                                                                                  \
+    F(address, component)                                                                                              \
+    F(address, references)                                                                                             \
+    F(address, orders)                                                                                                 \
+    F(address, y)                                                                                                      \
+    F(address, a)                                                                                                      \
+    F(address, b)                                                                                                      \
+    F(double, s)                                                                                                       \
+    F(double, h)                                                                                                       \
+    F(int64_t, every)                                                                                                  \
+    F(int64_t, next)                                                                                                   \
+    F(int64_t, stride)                                                                                                 \
+    F(int64_t, rows)                                                                                                   \
+    F(int64_t, row)
+
+#define EXCHANGE_KIND(name) EXCHANGE_##name,
+typedef enum ExchangeKind { EXCHANGE_KINDS(EXCHANGE_KIND) EXCHANGE_KIND_COUNT } ExchangeKind;
+
+#define EXCHANGE_FIELD(type, name) type name;
+typedef struct Operation {
+    EXCHANGE_FIELDS(EXCHANGE_FIELD)
+} Operation;
+
+/* Where the loop ended early. */
+typedef struct Fault {
+    int64_t cycle;
+    int64_t operation; /* index in the list */
+} Fault;
+
+#ifdef _WIN32
+#define EXCHANGE_API __declspec(dllexport)
+#elif defined(__GNUC__)
+#define EXCHANGE_API __attribute__((visibility("default")))
+#else
+#define EXCHANGE_API
+#endif
+
+/* Version, kinds in their order and fields in theirs: "1: set_real set_slopes ..; int64_t kind, int64_t count, ..". */
+EXCHANGE_API const char *exchange_interface(void);
+
+/* Work the cycles k with begin <= k < end, each T_c [s] long. The operations keep count of their rows: what follows
+ * continues at `end`. Returns the fmi2Status (fmi2OK or fmi2Warning) 0, or that of the call that failed, with *fault
+ * telling which; the operations ahead of it in that cycle are done. */
+EXCHANGE_API int exchange_run(Operation operations[], int64_t count, double T_c, int64_t begin, int64_t end,
+                              Fault *fault);
+
+#endif

@@ -1,0 +1,152 @@
+/* The native cycle loop (src/exchange) with FMI functions of a unit that only notes what it is called with. */
+#include "check.h"
+#include "exchange.h"
+#include "fmi2FunctionTypes.h"
+#include "vectors.h"
+
+typedef struct Notes {
+    int calls;
+    double seen[32], t[32], h;
+    double fail_at; /* time of the step that fails */
+} Notes;
+
+static fmi2Status note_set(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
+    Notes *notes = c;
+    CHECK(vr != NULL && n == 2);
+    notes->seen[notes->calls++] = value[1];
+    return fmi2OK;
+}
+
+static fmi2Status note_get(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
+    Notes *notes = c;
+    CHECK(vr != NULL && n == 1);
+    value[0] = 100 + notes->calls++;
+    return fmi2Warning; /* goes on */
+}
+
+static fmi2Status note_step(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean keep) {
+    Notes *notes = c;
+    CHECK(keep == fmi2True);
+    notes->t[notes->calls++] = t;
+    notes->h = h;
+    return t >= notes->fail_at ? fmi2Discard : fmi2OK;
+}
+
+static unsigned references[2] = {7, 8};
+
+static void tables_are_used_row_by_row(void) {
+    double sent[3][2] = {{0, 10}, {0, 11}, {0, 12}}, got[2] = {0, 0};
+    Notes setting = {.calls = 0}, getting = {.calls = 0};
+    Fault fault = {-1, -1};
+    Operation operations[] = {
+        {.kind = EXCHANGE_set_real,
+         .count = 2,
+         .call = (function)note_set,
+         .component = &setting,
+         .references = references,
+         .y = sent,
+         .every = 2,
+         .next = 1,
+         .stride = sizeof sent[0],
+         .rows = 3},
+        {.kind = EXCHANGE_get_real,
+         .count = 1,
+         .call = (function)note_get,
+         .component = &getting,
+         .references = references,
+         .y = got,
+         .every = 5,
+         .next = 5,
+         .stride = sizeof got[0],
+         .rows = 2},
+    };
+    /* in two slices, which must not matter: due at 1, 3, 5, 7 and at 5 */
+    CHECK(exchange_run(operations, 2, 1e-3, 0, 4, &fault) == fmi2OK);
+    CHECK(setting.calls == 2 && getting.calls == 0);
+    CHECK(exchange_run(operations, 2, 1e-3, 4, 9, &fault) == fmi2OK);
+    CHECK(setting.calls == 4 && getting.calls == 1);
+    const double expected[] = {10, 11, 12, 10};
+    for (int i = 0; i < 4; i++)
+        CHECK_EQUAL(setting.seen[i], expected[i]);
+    CHECK_EQUAL(got[0], 100);
+    CHECK_EQUAL(got[1], 0);
+    CHECK(fault.cycle == -1); /* untouched */
+}
+
+static void failure_ends_the_loop(void) {
+    double a = 1, y = 0;
+    Notes notes = {.fail_at = 0.095};
+    Fault fault = {-1, -1};
+    Operation operations[] = {
+        {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 1},
+        {.kind = EXCHANGE_do_step, .call = (function)note_step, .component = &notes, .s = 0.01, .h = 0.02},
+        {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 100},
+    };
+    CHECK(exchange_run(operations, 3, 0.03, 0, 10, &fault) == fmi2Discard);
+    CHECK(fault.cycle == 3 && fault.operation == 1);
+    CHECK(notes.calls == 4);
+    for (int k = 0; k < 4; k++)
+        CHECK_EQUAL(notes.t[k], k * 0.03 + 0.01);
+    CHECK_EQUAL(notes.h, 0.02);
+    CHECK_EQUAL(y, 3 * 101 + 1);
+    Operation unknown = {.kind = EXCHANGE_KIND_COUNT};
+    CHECK(exchange_run(&unknown, 1, 1, 0, 1, &fault) == fmi2Fatal);
+}
+
+static fmi2Status note_keep(fmi2Component c, fmi2FMUstate *state) {
+    *state = c;
+    return fmi2OK;
+}
+
+static fmi2Status note_back(fmi2Component c, fmi2FMUstate state) {
+    CHECK(state == c);
+    ((Notes *)c)->calls = 0;
+    return fmi2OK;
+}
+
+static void states_are_kept_where_y_says(void) {
+    Notes notes = {.fail_at = 1};
+    Fault fault;
+    fmi2FMUstate kept = NULL;
+    Operation operations[] = {
+        {.kind = EXCHANGE_get_state, .call = (function)note_keep, .component = &notes, .y = &kept},
+        {.kind = EXCHANGE_do_step, .call = (function)note_step, .component = &notes, .h = 1},
+        {.kind = EXCHANGE_set_state, .call = (function)note_back, .component = &notes, .y = &kept},
+    };
+    CHECK(exchange_run(operations, 3, 0.1, 0, 2, &fault) == fmi2OK);
+    CHECK(kept == &notes && notes.calls == 0);
+    CHECK_EQUAL(notes.t[0], 0.1);
+}
+
+static void arithmetic(void) {
+    const double a[] = {1, -2, 0.1}, b[] = {3, 5, 0.7};
+    double y[3];
+    vector_copy(3, y, a);
+    CHECK_EQUAL(y[1], -2);
+    vector_line(3, y, a, 0.3, b);
+    CHECK_EQUAL(y[2], 0.1 + 0.3 * 0.7);
+    vector_rate(3, y, a, b, 0.25);
+    CHECK_EQUAL(y[0], -8);
+    vector_product(3, y, a, b);
+    CHECK_EQUAL(y[1], -10);
+    vector_product(3, y, y, y); /* in place */
+    CHECK_EQUAL(y[1], 100);
+    double peak[] = {0, 3, 0};
+    vector_peak(3, peak, a);
+    CHECK_EQUAL(peak[0], 1);
+    CHECK_EQUAL(peak[1], 3);
+    /* what is no number stays visible */
+    vector_peak(1, peak, (const double[]){NAN});
+    CHECK(isnan(peak[0]));
+    vector_peak(1, peak, a);
+    CHECK(isnan(peak[0]));
+}
+
+int main(void) {
+    CHECK_CONTAINS(exchange_interface(), "1: set_real set_slopes do_step");
+    tables_are_used_row_by_row();
+    failure_ends_the_loop();
+    states_are_kept_where_y_says();
+    arithmetic();
+    return CHECK_RESULT;
+}

@@ -154,7 +154,8 @@ test-platforms: $(ALL_FMUS) $(VENV)/.dev ## the FMUs of all platforms: Windows u
 	ZIG='$(ZIG)' FEEDSIM_PLATFORM_FMUS=$(BUILD)/fmus-all $(PY) -m pytest -s tests/platforms
 
 # Other people's simulators and validators. What cannot be installed is skipped; the summary at the end says what and why.
-test-importers: fmus $(VENV)/.importers ## the units in FMPy, ecos, libcosim, fmucontainer, Maestro; three validators
+# Java and Maven are the machine's: nothing is installed outside this folder here (CONTRIBUTING.md says how).
+test-importers: fmus $(VENV)/.importers ## the units in other simulators, three validators (Java, Maven: CONTRIBUTING)
 	$(PY) tests/importers/install.py $(BUILD)/importers
 	FEEDSIM_IMPORTERS=$(BUILD)/importers $(PY) -m pytest tests/importers
 

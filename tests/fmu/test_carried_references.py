@@ -53,7 +53,7 @@ class Carried:
         found = None
         for pattern, given in yaml.safe_load(text)["variables"].items():
             if re.fullmatch(pattern.replace(".", r"\.").replace("*", ".*"), name):
-                number, _, unit = str(given).partition(" ")
+                number, _, unit = str(given["value"] if isinstance(given, dict) else given).partition(" ")
                 found = float(number) if unit else float(number) * max(np.ptp(values), 1e-6 * np.max(np.abs(values)))
         assert found is not None, f"{name} has no tolerance in {own}"
         return found

@@ -1,16 +1,20 @@
-"""Fetch what `make test-importers` needs beyond pip: Java and Maven (apt, as root only), Maestro and VDMCheck2 (Maven).
+"""Fetch what `make test-importers` needs beyond pip: Maestro and VDMCheck2 (by Maven), into FOLDER.
 
-    python tests/importers/install.py FOLDER
+    python tests/importers/install.py [--system] FOLDER
 
-What cannot be had is said, and is no failure: its tests are skipped with the reason.
+Java and Maven must be there. With --system they are installed first where they are not (apt, as root); without it
+nothing is installed on the machine itself. What cannot be had is said, and is no failure: its tests are skipped with
+the reason.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -26,13 +30,23 @@ UNPACKED = {
 PACKAGES = {"java": "default-jre-headless", "mvn": "maven"}
 
 
-def main(folder: Path) -> int:
+def main(words: Sequence[str]) -> int:
+    parser = argparse.ArgumentParser(description="Fetch Maestro and VDMCheck2, for make test-importers.")
+    parser.add_argument("--system", action="store_true", help="install Java and Maven too, with apt, as root")
+    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    options = parser.parse_args(words)
+    return fetch(options.folder, system=options.system)
+
+
+def fetch(folder: Path, *, system: bool) -> int:
+    """Exit code. `system`: whether the machine's package manager may be used."""
     jars, vdmcheck = folder / "jars", folder / "vdmcheck"
     needed = ["java"] if _complete(folder) else list(PACKAGES)
-    if any(not shutil.which(program) for program in needed):
+    if system and any(not shutil.which(program) for program in needed):
         _apt(needed)
     if missing := [program for program in needed if not shutil.which(program)]:
-        return _left_out(f"{' and '.join(missing)} not found (Debian: {' '.join(PACKAGES[name] for name in missing)})")
+        packages = " ".join(PACKAGES[name] for name in missing)
+        return _left_out(f"{' and '.join(missing)} not found (Debian: {packages}; --system installs them, as root)")
     if not _complete(folder):
         jars.mkdir(parents=True, exist_ok=True)
         goal = ("dependency:copy-dependencies", f"-DoutputDirectory={jars.resolve()}")
@@ -71,4 +85,4 @@ def _left_out(reason: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    sys.exit(main(sys.argv[1:]))

@@ -331,3 +331,22 @@ def test_the_script_for_integrators(unit: str, fmus: Path, tmp_path: Path) -> No
     words = [str(fmus / f"{unit}.fmu"), f"references/{unit}", f"results/{unit}"]
     subprocess.run([sys.executable, "simulate.py", *words], cwd=tmp_path, check=True, capture_output=True)
     assert run(tmp_path / "results", tmp_path / "references") == 0
+
+
+def test_names_do_not_command_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, value in (("a", 1), ("b", 2)):
+        (tmp_path / f"{name}.csv").write_text(f"time,x\x1b[2J\x9b\n0,{value}\n1,{value}\n", encoding="utf-8")
+    for files in (["a.csv", "b.csv"], ["a.csv", "\x1b[31m.csv"]):
+        assert main(["compare", *(str(tmp_path / each) for each in files), "--all"]) in (1, 2)
+    told = "".join(capsys.readouterr())
+    assert "x\\x1b[2J\\x9b" in told
+    assert all(c.isprintable() or c == "\n" for c in told)
+
+
+@pytest.mark.filterwarnings("error")
+def test_names_that_the_pictures_font_lacks_are_not_warned_of(tmp_path: Path) -> None:
+    for name, value in (("a", 1), ("b", 2)):
+        (tmp_path / f"{name}.csv").write_text(f"time,軸位置\n0,{value}\n1,{value}\n", encoding="utf-8")
+    report = tmp_path / "report.html"
+    assert main(["compare", str(tmp_path / "a.csv"), str(tmp_path / "b.csv"), "--report", str(report)]) == 1
+    assert "軸位置" in report.read_text(encoding="utf-8")

@@ -244,3 +244,47 @@ def test_a_large_file_of_numbers(tmp_path: Path) -> None:
     )
     found = read_series(path)
     np.testing.assert_array_equal(found["c7"], columns[:, 8])
+
+
+# --- no numbers, shifts ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("at", ["auto", "reference"])
+@pytest.mark.parametrize("hold", [(), ("x",)])
+def test_what_is_no_number_between_the_references_rows_is_outside(value: float, at: str, hold: tuple[str]) -> None:
+    """Rows 15 of 10 and 20, which the reference has, and 20: told as it is, and once."""
+    coarse, fine = still(np.arange(11.0)), still(np.linspace(0, 10, 101))
+    for row, more in ((15, 1), (20, 0)):
+        x = fine["x"].copy()
+        x[row] = value
+        found = compare(Series(fine.time, {"x": x}), coarse, None, Options(at=at, hold=hold))  # type: ignore[arg-type]
+        told(found, "1 of 1 variables outside", f"no number ({value})", f"in 1 of {11 + more} rows")
+        assert found.variables[0].first == fine.time[row]
+    x = fine["x"].copy()
+    x[95] = value
+    later = compare(Series(fine.time, {"x": x}), coarse, None, Options(at=at, end=9.0))  # type: ignore[arg-type]
+    assert later.same, later.line
+
+
+@pytest.mark.parametrize("shift", [0.05, -0.05])
+def test_a_shift_allows_for_rows_at_the_end_that_it_moves_from(shift: float) -> None:
+    """Both last 1 s. Moved later, the result lacks 50 ms at the start; 40 ms that lack at its end are not due to it."""
+    time = np.linspace(0, 1, 1001)
+    found = compare(still(time), still(time), None, Options(shift=shift))
+    assert found.same, found.line
+    assert [note for note in found.notes if "its shift allows for it" in note]
+    cut = still(time[time < 0.9105] if shift > 0 else time[time > 0.0895])
+    word = "the result ends at 0.96 s" if shift > 0 else "the result begins at 0.04 s"
+    told(compare(cut, still(time), None, Options(shift=shift)), word)
+    assert not compare(still(time), still(time)).notes
+
+
+def test_a_tolerance_in_time_allows_for_rows_at_either_end_and_it_is_told() -> None:
+    time = np.linspace(0, 1, 1001)
+    for part in (time[time < 0.96], time[time > 0.04]):
+        found = compare(still(part), still(time), Tolerances.parse(["0.1,50 ms"]))
+        assert found.same, found.line
+        assert any("its tolerance in time allows for it" in note for note in found.notes)
+        assert compare(still(part), still(time), Tolerances.parse(["0.1,30 ms"])).verdict == "different"

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from feedsim import cli, scenario, ssp
+from feedsim.cosim import binaries
 from feedsim.errors import InputError, OutputError
 from ssp_helpers import STRUCTURE, altered, contents, edited, short_scenario, write
 
@@ -112,6 +113,88 @@ def test_all_faults_at_once(exported: Path, tmp_path: Path) -> None:
     first = edited(exported, tmp_path / "1.ssp", "resources/friction_Z.ssv", ('name="F_C"', 'name="F_c"'))
     second = edited(first, tmp_path / "2.ssp", "resources/controller_X.ssv", ('name="K_v"', 'name="K_V"'))
     assert len(refusal(second).problems) == 2
+
+
+RELEASE = (
+    '<ssd:Connection startElement="setpoint" startConnector="Z.release" endElement="controller_Z" '
+    'endConnector="release" />'
+)
+
+
+def _parameter(name: str, value: str, kind: str = "Real", unit: str = "") -> str:
+    given = f' unit="{unit}"' if unit else ""
+    return f'<ssv:Parameter name="{name}"><ssv:{kind} value="{value}"{given} /></ssv:Parameter>'
+
+
+def _with_start_values(file: Path, out: Path, component: str, *parameters: str) -> Path:
+    start = "<ssv:Parameters>"
+    return edited(file, out, f"resources/{component}.ssv", (start, start + "".join(parameters)))
+
+
+@pytest.mark.parametrize(
+    ("component", "parameter", "words"),
+    [
+        ("plant", _parameter("tool.F_Z", "500", unit="N"), ("plant.tool.F_Z: 500 N is", "such an input at 0 N:")),
+        ("plant", _parameter("tool.F_Z", "0.5", unit="kN"), ("plant.tool.F_Z: 0.5 kN is", "such an input at 0 N:")),
+        ("plant", _parameter("tool.F_Z", "much"), ("plant.tool.F_Z: 'much' is no number",)),
+        ("controller_Z", _parameter("M_add", "5", unit="N.m"), ("controller_Z.M_add: 5 N.m is", "at 0 N.m:")),
+        ("controller_Z", _parameter("n_add", "1"), ("controller_Z.n_add: 1 is", "at 0 rad/s:")),
+        ("controller_Z", _parameter("release", "false", "Boolean"), ("controller_Z.release: false is", "at true:")),
+    ],
+)
+def test_start_values_that_cannot_be_held(
+    exported: Path, tmp_path: Path, component: str, parameter: str, words: tuple[str, ...]
+) -> None:
+    """Of inputs that nothing drives: other tools hold them for the whole run, feedsim would not and says so."""
+    file = edited(exported, tmp_path / "free.ssp", STRUCTURE, (RELEASE, ""))
+    said = refusal(_with_start_values(file, tmp_path / "start.ssp", component, parameter))
+    assert len(said.problems) == 1
+    assert f"resources/{component}.ssv" in str(said)
+    for each in words:
+        assert each in str(said)
+
+
+def test_start_values_that_cannot_be_held_are_told_with_other_faults(
+    exported: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = edited(exported, tmp_path / "1.ssp", "resources/friction_Z.ssv", ('name="F_C"', 'name="F_c"'))
+    both = (_parameter("tool.F_X", "1", unit="N"), _parameter("tool.F_Z", "500", unit="N"))
+    file = _with_start_values(first, tmp_path / "2.ssp", "plant", *both)
+    assert len(refusal(file).problems) == 3
+    assert cli.main(["run", str(file), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    for words in ("plant.tool.F_X", "plant.tool.F_Z", "feedsim cannot hold it"):
+        assert words in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_start_values_of_inputs_that_change_nothing(exported: Path, tmp_path: Path) -> None:
+    """Of connected inputs, whatever they are; of others the archive's own; and one that the system's set takes back."""
+    first = _with_start_values(
+        exported, tmp_path / "1.ssp", "controller_Z",
+        _parameter("release", "false", "Boolean"), _parameter("x_a", "0.3", unit="m"), _parameter("M_add", "0.0"),
+    )  # fmt: skip
+    file = _with_start_values(first, tmp_path / "2.ssp", "plant", _parameter("tool.F_Z", "0", unit="kN"))
+    with ssp.opened(file):
+        pass
+    file = _with_start_values(first, tmp_path / "3.ssp", "plant", _parameter("tool.F_Z", "500", unit="N"))
+    refusal(file)
+    inline = (
+        "<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>"
+        f'<ssv:ParameterSet version="1.0" name="x"><ssv:Parameters>{_parameter("plant.tool.F_Z", "VALUE", unit="N")}'
+        "</ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>"
+    )
+    space = 'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"'
+    old = "<ssd:Elements>"
+    for number, given in enumerate((file, exported)):
+        for value, fine in (("0", True), ("7", False)):
+            new = inline.replace("VALUE", value).replace("<ssv:ParameterSet ", f"<ssv:ParameterSet {space} ") + old
+            changed = edited(given, tmp_path / f"s{number}{value}.ssp", STRUCTURE, (old, new))
+            if fine:
+                with ssp.opened(changed):
+                    pass
+            else:
+                assert "plant.tool.F_Z: 7 N is asked" in str(refusal(changed))
 
 
 def test_controllers_with_different_cycles(exported: Path, tmp_path: Path) -> None:
@@ -265,7 +348,9 @@ def test_writing_is_whole_or_not_at_all(fmus: Path, tmp_path: Path, capsys: pyte
     assert sorted(path.name for path in tmp_path.iterdir()) == ["folder.ssp", "short.yaml"]
     capsys.readouterr()
     assert cli.main([*fine, str(tmp_path / "x.ssp")]) == 0
-    assert capsys.readouterr().out.startswith(f"{tmp_path / 'x.ssp'}: ")
+    said = capsys.readouterr().out
+    assert said.startswith(f"{tmp_path / 'x.ssp'}: ")
+    assert binaries.folders()[0] in said.rpartition("runs on ")[2]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["folder.ssp", "short.yaml", "x.ssp"]
 
 

@@ -162,10 +162,31 @@ def test_entries_that_tell_a_smaller_size(friction: dict[str, bytes], tmp_path: 
         (["resources/" + 130 * "ä"], "has a name of more than 240 bytes"),
         (["resources/" + 600 * "x/" + "y"], "has a name of more than 240 bytes (1024 with its folders)"),
         (["../evil"], "leads out"),
+        (["resources/x", "resources/X"], "'resources/X' differs from 'resources/x' only in case or accents"),
+        (["resources/x/a", "Resources/X/A"], "differs from 'resources/x/a' only in case"),
+        (["resources/\u00e9", "resources/e\u0301"], "only in case or accents"),
+        (["resources/a", "resources/A/b"], "is in the folder 'resources/a', which is a file too"),
+        (["resources/./a"], "has a part that is empty or '.'"),
+        (["./a"], "has a part that is empty or '.'"),
+        (["resources//a"], "has a part that is empty or '.'"),
+        (["resources/CON"], "has a part, 'CON', that is a device on Windows"),
+        (["resources/nul.csv"], "a device on Windows"),
+        (["aux /a"], "has a part that ends in a dot or a space, 'aux '"),
+        (["resources/com1 .txt"], "a device on Windows"),
+        (["resources/a."], "ends in a dot or a space, 'a.'"),
+        (["resources/a /b"], "ends in a dot or a space, 'a '"),
+        (["resources/.../b"], "ends in a dot or a space"),
     ],
 )
 def test_names_that_no_disk_takes(friction: dict[str, bytes], tmp_path: Path, names: list[str], words: str) -> None:
     assert words in refusal(write(tmp_path / "x.fmu", friction | dict.fromkeys(names, b"")))
+
+
+def test_names_that_every_disk_takes(friction: dict[str, bytes], tmp_path: Path) -> None:
+    """Dots and spaces inside, names that only begin as a device's, folders as entries of their own."""
+    names = ["a b.csv", ".hidden", "a..b", "console.txt", "com10", "auxiliary/x", "X/a", "X/b", "stra\u00dfe", "empty/"]
+    with Archive(write(tmp_path / "x.fmu", friction | {f"resources/{name}": b"" for name in names})) as archive:
+        assert sum(path.is_file() for path in (archive.directory / "resources").rglob("*")) >= len(names) - 1
 
 
 def test_a_method_of_another_kind(friction: dict[str, bytes], tmp_path: Path) -> None:

@@ -69,7 +69,11 @@ def add_command(subparsers: argparse._SubParsersAction[argparse.ArgumentParser])
     which.add_argument("--ignore", action="append", default=[], metavar="PATTERN", help="do not compare these")
     which.add_argument("--common", action="store_true", help="columns that the result lacks are left out, not missing")
     which.add_argument(
-        "--hold", action="append", default=[], metavar="PATTERN", help="hold their values between rows, without ramps"
+        "--hold",
+        action="append",
+        default=[],
+        metavar="PATTERN",
+        help="hold their values between rows, without ramps (flags of 0 and 1 do)",
     )
     for whose in ("", "reference-"):
         side = "reference" if whose else "result"
@@ -125,7 +129,7 @@ def compare(options: Namespace) -> int:
             comparisons, html=options.report, xml=options.junit, json=options.json, durations=durations
         )
     except FeedsimError as error:
-        print(f"feedsim: {error}", file=sys.stderr)
+        print(*(_plain(line) for line in f"feedsim: {error}".split("\n")), sep="\n", file=sys.stderr)
         return 2
     except Exception:  # a fault of our own must not look like a difference
         traceback.print_exc()
@@ -134,15 +138,15 @@ def compare(options: Namespace) -> int:
         if not options.quiet:
             # Of many pairs those that are the same take one line.
             full = options.all or len(comparisons) == 1
-            print("\n".join(line for each in comparisons for line in _lines(each, options.all, full)))
+            print("\n".join(_plain(line) for each in comparisons for line in _lines(each, options.all, full)))
             for line in (*_unused(comparisons, options), *_sum(comparisons)):
-                print(line)
+                print(_plain(line))
             sys.stdout.flush()
     except OSError:
         sys.stdout = None  # who read has gone, or the disk is full; the code still counts
     for each in comparisons:
         if each.verdict == "unusable" and options.quiet:
-            print(f"feedsim: {each.result}: {each.line}", file=sys.stderr)
+            print(_plain(f"feedsim: {each.result}: {each.line}"), file=sys.stderr)
     return code
 
 
@@ -169,7 +173,7 @@ def _compared(options: Namespace) -> tuple[list[Comparison], list[float]]:
         try:
             comparison = _pair(options, choice, result, reference)
         except InputError as error:
-            comparison = unusable(result, reference, str(error))
+            comparison = unusable(result, reference, "; ".join(str(error).splitlines()))
         found.append(comparison)
         durations.append(perf_counter() - begin)
     if problem := _matched_nowhere(found, options.tol):
@@ -261,11 +265,16 @@ def _lines(comparison: Comparison, everything: bool, notes: bool) -> list[str]:
     ranked = sorted(comparison.variables, key=lambda each: (-each.ratio, each.verdict == "same"))
     shown = [each for each in ranked if everything or each.verdict != "same"]
     cut = shown if everything else shown[:MOST_LINES]
-    width = max((len(each.name) for each in cut), default=0)
-    found += [f"  {each.name:<{width}}  {_variable_line(each)}" for each in cut]
+    width = max((len(_plain(each.name)) for each in cut), default=0)
+    found += [f"  {_plain(each.name):<{width}}  {_variable_line(each)}" for each in cut]
     if len(shown) > len(cut):
         found.append(f"  and {len(shown) - len(cut)} more; --all lists them")
     return found + [f"  note: {note}" for note in comparison.notes if notes or not comparison.same]
+
+
+def _plain(text: str) -> str:
+    """As the terminal may show it: names come from files, and control characters in them are not obeyed."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def _variable_line(variable: Variable) -> str:

@@ -61,7 +61,8 @@ def write(options: Namespace) -> None:
         print(f"feedsim: warning: {warning}", file=sys.stderr)
     print(
         f"{done.path}: {done.size / 1024:.0f} KiB, {len(done.instances)} instances, {done.duration:.4g} s at "
-        f"{loaded.machine.cycles.T_c * 1e6:.6g} us; parameters in resources/*.ssv"
+        f"{loaded.machine.cycles.T_c * 1e6:.6g} us; parameters in resources/*.ssv; "
+        f"runs on {', '.join(done.platforms) or 'no platform'}"
     )
 
 

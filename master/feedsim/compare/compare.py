@@ -95,11 +95,17 @@ def _variable(
         return Variable(name, "unusable", source, unit, reason=f"units differ: {error}"), []
     time, values = over.reference.time, over.reference[name]
     hold = tolerance.hold
-    if hold is None:
-        hold = any(matches(name, pattern) for pattern in options.hold) or (
-            _whole(values) and _whole(over.result[source] * scale)
+    if hold is None and any(matches(name, pattern) for pattern in options.hold):
+        hold = True
+    if hold:
+        remarks.append("held between rows, as asked for: the value of either neighbour is right")
+    elif hold is None and (hold := _is_flag(values)):
+        remarks.append(
+            "held between rows, as the reference is 0 or 1 alone: the value of either neighbour is right "
+            "({hold: false} in a file of tolerances makes it a ramp)"
         )
-    at, y = over.at, over.values(source, hold) * scale
+    at, y = over.rows_of(source, bool(hold))
+    y = y * scale
     usable = np.isfinite(values)
     if not usable.all():
         # Instants whose neighbours in the reference are no numbers cannot be judged.
@@ -124,7 +130,7 @@ def _variable(
     if tolerance.unit and not unit and not theirs:
         remarks.append("neither side tells a unit; both are taken as SI for the tolerance")
     reach = tolerance.time or 0.0
-    low, high = bounds(time, values, at, reach, slack=over.slack, hold=hold)
+    low, high = bounds(time, values, at, reach, slack=over.slack, hold=bool(hold))
     with np.errstate(invalid="ignore"):
         off = np.maximum(np.maximum(y - high, low - y), 0.0)
     bad = ~np.isfinite(y)
@@ -157,7 +163,7 @@ def _variable(
         outside=int(np.sum(beyond)),
         first=float(at[np.argmax(beyond)]) if beyond.any() else None,
         reason=reason,
-        curves=Curves(at, y, low - limit, high + limit, time, values, hold),
+        curves=Curves(at, y, low - limit, high + limit, time, values, bool(hold)),
     ), remarks
 
 
@@ -224,6 +230,10 @@ def _fitting(reference: Series, tolerances: Tolerances, name: str) -> str:
     return ""
 
 
-def _whole(values: Array) -> bool:
+def _is_flag(values: Array) -> bool:
+    """Whether a reference switches between 0 and 1 and is nothing else.
+
+    Other whole numbers may be a ramp, of a speed in rpm or a count: held, it would have a row of room in time.
+    """
     finite = values[np.isfinite(values)]
-    return bool(np.all(finite == np.rint(finite)))
+    return bool(np.any(finite == 0) and np.any(finite == 1) and np.all((finite == 0) | (finite == 1)))

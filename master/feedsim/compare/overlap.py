@@ -54,31 +54,49 @@ class Overlap:
             return
         steps = usual_step(time), usual_step(self.theirs)
         instants = np.unique(time[self._inside(time, self.start, self.end)])
-        forgiven = min(max(reach, abs(options.shift)), LACKING * (self.end - self.start))
+        # A shift takes rows away at the end that it moves the result from; a tolerance in time at both.
+        longest = LACKING * (self.end - self.start)
+        forgiven = [min(max(reach, each, 0.0), longest) for each in (options.shift, -options.shift)]
         # Tools begin or end a step apart; a step of a reference with few rows would be much.
         most = max(steps[1], 0.01 * (self.end - self.start))
         first, last = (
-            1.001 * min(max(steps[0], float(step)), most) + self.slack + forgiven
+            1.001 * min(max(steps[0], float(step)), most) + self.slack
             for step in (np.diff(instants)[[0, -1]] if len(instants) > 1 else (0.0, 0.0))
         )
         parts = []
-        if self.theirs[0] - self.start > first:
-            parts.append(f"the result begins at {self.theirs[0]:.9g} s, the reference at {self.start:.9g} s")
-        if self.end - self.theirs[-1] > last:
-            parts.append(f"the result ends at {self.theirs[-1]:.9g} s, the reference at {self.end:.9g} s")
+        for lacking, step, allowed, words in (
+            (self.theirs[0] - self.start, first, forgiven[0], ("begins", self.theirs[0], self.start)),
+            (self.end - self.theirs[-1], last, forgiven[1], ("ends", self.theirs[-1], self.end)),
+        ):
+            text = f"the result {words[0]} at {words[1]:.9g} s, the reference at {words[2]:.9g} s"
+            if lacking > step + allowed:
+                parts.append(text)
+            elif lacking > step:
+                why = "its tolerance in time" if allowed <= reach else "its shift"
+                self.notes.append(f"{text}; {why} allows for it, what the reference does there is not seen")
         if (outside := len(self.theirs) - len(rows)) > 1:
             self.notes.append(f"{outside} rows of the result are outside the compared time and are left out")
         parts += self._gaps(self.theirs[rows], max(steps)) or self._unseen(self.theirs[rows], instants)
         self.uncovered = "; ".join(parts)
 
-    def values(self, name: str, hold: bool) -> Array:
-        """(M,) values of a column of the result at the instants."""
+    def rows_of(self, name: str, hold: bool) -> tuple[Array, Array]:
+        """(K,) instants and values of a column of the result: those looked at, and its rows between that are none."""
         whole = self.result[name]
         if self.rows is not None:
-            return np.asarray(whole[self.rows])
+            return self.at, np.asarray(whole[self.rows])
         if hold:
-            return np.asarray(whole[(np.searchsorted(self.theirs, self.at + self.slack, side="right") - 1).clip(0)])
-        return along(self.theirs, whole, self.at)
+            values = whole[(np.searchsorted(self.theirs, self.at + self.slack, side="right") - 1).clip(0)]
+        else:
+            values = along(self.theirs, whole, self.at)
+        broken = self._inside(self.theirs, self.start, self.end)
+        broken = broken[~np.isfinite(whole[broken])]
+        # Those at an instant that tells it already do not count twice.
+        told = np.r_[self.at[~np.isfinite(values)], inf]
+        behind = told[np.searchsorted(told, self.theirs[broken] - self.slack, side="left")]
+        broken = broken[behind > self.theirs[broken] + self.slack]
+        at, values = np.r_[self.at, self.theirs[broken]], np.r_[values, whole[broken]]
+        order = np.argsort(at, kind="stable")
+        return at[order], values[order]
 
     def _inside(self, time: Array, start: float, end: float) -> Rows:
         return np.flatnonzero((time >= start - self.slack) & (time <= end + self.slack))

@@ -24,7 +24,7 @@ class Tolerance:
 
     value     in `unit`; without unit (relative) a share of the range of the reference
     time      [s]
-    hold      whether the values hold between rows; None: told from the values
+    hold      whether the values hold between rows; None: where the reference is 0 and 1 alone
     ignore    the variable is not compared
     """
 

@@ -66,8 +66,10 @@ def along(time: Array, values: Array, at: Array) -> Array:
     row = (np.searchsorted(time, at, side="right") - 1).clip(0, len(time) - 2)
     step = time[row + 1] - time[row]
     share = np.where(step > 0, (at - time[row]) / np.where(step > 0, step, 1.0), 1.0).clip(0.0, 1.0)
-    # Both ends exactly, and never outside them.
-    ramp = np.asarray(values[row] + share * (values[row + 1] - values[row]))
+    # Both ends exactly, and never outside them; an infinity stays one up to the next row.
+    with np.errstate(invalid="ignore", over="ignore"):
+        ramp = np.asarray(values[row] + share * (values[row + 1] - values[row]))
+    ramp = np.where((share == 0.0) | np.isinf(values[row]), values[row], ramp)
     return np.asarray(np.where(share == 1.0, values[row + 1], ramp))
 
 

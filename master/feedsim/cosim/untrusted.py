@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shutil
 import stat
+import unicodedata
 import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from xml.parsers import expat
 
 from feedsim.errors import InputError
@@ -19,6 +20,17 @@ FREE = 64 << 20  # bytes up to which the ratio does not count
 LARGEST_DOCUMENT = 64 << 20  # bytes of what is read into memory at once: XML, JSON, YAML
 LONGEST_PART = 240  # bytes of a file's or folder's name; systems know 255
 LONGEST_NAME = 1024  # bytes of a name with its folders
+_DEVICES = frozenset(
+    (
+        "CON",
+        "PRN",
+        "AUX",
+        "NUL",
+        "CONIN$",
+        "CONOUT$",
+        *(f"{port}{n}" for port in ("COM", "LPT") for n in "0123456789¹²³"),
+    )
+)  # on Windows, with any ending
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of the standards FMI and SSP
 
 
@@ -48,11 +60,14 @@ def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
     """Files in a zip archive by name.
 
     Raises:
-        InputError: lists entries that do not belong into one: names that lead out of it, occur twice, cannot be on a
-            disk together or are too long; links; what is encrypted or packed by an unusual method.
+        InputError: lists entries that do not belong into one: names that lead out of it, occur twice, are none that
+            every system has, cannot be on a disk together (one that does not tell upper from lower case, nor the ways
+            to write an accent) or are too long; links; what is encrypted or packed by an unusual method.
     """
     found = [entry for entry in package.infolist() if not entry.is_dir()]
-    names = {entry.filename for entry in found}
+    names: dict[str, str] = {}  # as a disk compares them -> as the first of the entries has it
+    for entry in found:
+        names.setdefault(_folded(entry.filename), entry.filename)
     faults: list[str] = []
     seen: set[str] = set()
     for entry in found:
@@ -67,7 +82,7 @@ def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
     return {entry.filename: entry for entry in found}
 
 
-def _fault(entry: zipfile.ZipInfo, twice: bool, names: set[str]) -> str | None:
+def _fault(entry: zipfile.ZipInfo, twice: bool, names: dict[str, str]) -> str | None:
     name = entry.filename
     if leads_out(name):
         return "leads out of the archive"
@@ -82,8 +97,30 @@ def _fault(entry: zipfile.ZipInfo, twice: bool, names: set[str]) -> str | None:
     size = len(name.encode("utf-8", "surrogatepass"))
     if size > LONGEST_NAME or any(len(p.encode("utf-8", "surrogatepass")) > LONGEST_PART for p in name.split("/")):
         return f"has a name of more than {LONGEST_PART} bytes ({LONGEST_NAME} with its folders)"
-    above = next((str(each) for each in PurePosixPath(name).parents if str(each) in names), None)
-    return f"is in the folder {above!r}, which is a file too" if above else None
+    if fault := next(filter(None, map(_part_fault, name.split("/"))), None):
+        return fault
+    folded = _folded(name)
+    if names[folded] != name:
+        return f"differs from {shortened(names[folded])!r} only in case or accents, which some disks do not tell apart"
+    parts = folded.split("/")
+    above = next((names[each] for i in range(1, len(parts)) if (each := "/".join(parts[:i])) in names), None)
+    return f"is in the folder {shortened(above)!r}, which is a file too" if above else None
+
+
+def _part_fault(part: str) -> str | None:
+    """What keeps the name of a file or folder from being one on every system."""
+    if part in ("", "."):
+        return "has a part that is empty or '.'"
+    if part[-1] in ". ":
+        return f"has a part that ends in a dot or a space, {shortened(part)!r}, which Windows leaves away"
+    if part.partition(".")[0].rstrip(" ").upper() in _DEVICES:
+        return f"has a part, {shortened(part)!r}, that is a device on Windows"
+    return None
+
+
+def _folded(name: str) -> str:
+    """A name as disks compare it that do not tell upper from lower case, nor the ways to write an accent."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
 def leads_out(name: str) -> bool:
@@ -91,7 +128,7 @@ def leads_out(name: str) -> bool:
     return (
         not name
         or name.startswith("/")
-        or ".." in PurePosixPath(name).parts
+        or ".." in name.split("/")
         or any(c in name for c in "\\:\0")
         or any(ord(c) < 32 or 0xD800 <= ord(c) < 0xE000 for c in name)
     )

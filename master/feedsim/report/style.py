@@ -15,6 +15,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
+from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,11 +133,13 @@ def finish(figure: Drawing, stem: str, title: str, caption: str) -> Picture:
         room = 0.13 * (1 + remark.count("\n")) / figure.get_figheight()  # inches to a share of the height
         layout: Any = figure.get_layout_engine()
         layout.set(rect=(0, 0, 1, 1 - room))
-    png = io.BytesIO()
-    figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
-    figure.patch.set_visible(False)
-    svg = io.StringIO()
-    figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    png, svg = io.BytesIO(), io.StringIO()
+    with catch_warnings():
+        # Names in scripts that the font lacks; the page around the picture has them.
+        filterwarnings("ignore", message=r"Glyph \d+ .*missing from")
+        figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
+        figure.patch.set_visible(False)
+        figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     return Picture(stem, title, caption, png.getvalue(), _inline(svg.getvalue(), stem, title))
 
 

@@ -62,8 +62,8 @@ class VariableTolerance(Model):
     time: Time | None = Field(default=None, description="In time: 1 ms")
     hold: StrictBool | None = Field(
         default=None,
-        description="Whether values hold between rows instead of running straight to the next; left out: whole numbers "
-        "do",
+        description="Whether values hold between rows instead of running straight to the next; left out: where the "
+        "reference is 0 and 1 alone",
     )
     ignore: Literal[True] | None = Field(default=None, description="Not compared at all")
 

@@ -28,12 +28,14 @@ WIDTH, HEIGHT, GAP = 40.0, 30.0, 20.0  # of a component and between them, in a p
 
 @dataclass(frozen=True)
 class Exported:
-    """An SSP file. `instances`: components in it; `warnings`: what a user should know before running it."""
+    """An SSP file. `instances`: components in it; `platforms`: folders of binaries/ that all its
+    archives have; `warnings`: what a user should know before running it."""
 
     path: Path
     size: int  # bytes
     instances: tuple[str, ...]
     duration: float  # s
+    platforms: tuple[str, ...]
     warnings: tuple[str, ...]
 
 
@@ -55,13 +57,14 @@ def export(scenario: Scenario, out: Path, *, program: Program | None = None, fmu
         content = _archives(scenario, program, fmus, Path(folder))
         archives = {kind: stack.enter_context(Archive(Path(folder) / f"{kind}.fmu")) for kind in content}
         files = _files(scenario, program, archives)
+        platforms = sorted(set.intersection(*(set(each.platforms) for each in archives.values())))
     files |= {f"{RESOURCES}/{kind}.fmu": data for kind, data in content.items()}
     files |= {name: path.read_bytes() for name, path in described.recordings(scenario).items()}
     if (structure := described.structure(scenario)) is not None:
         files[described.STRUCTURE] = structure
     size = archive.write(out, files)
     instances = tuple(name for name, _ in _instances(tuple(scenario.machine.axes)))
-    return Exported(out, size, instances, program.duration, warnings)
+    return Exported(out, size, instances, program.duration, tuple(platforms), warnings)
 
 
 def _archives(scenario: Scenario, program: Program, fmus: Path, folder: Path) -> dict[str, bytes]:

@@ -8,9 +8,12 @@ from feedsim.cosim.unit import Archive
 from feedsim.errors import InputError
 from feedsim.scenario.fields import did_you_mean
 from feedsim.ssp import parameter_set
-from feedsim.ssp.parameter_set import ParameterSet, Value
+from feedsim.ssp.parameter_set import Parameter, ParameterSet, Value
 from feedsim.ssp.system_structure import Binding, Structure
 from feedsim.ssp.unit_definition import unit_definitions
+
+# Inputs that sets give a start value: component and name -> place of the set that counts, what it says, its set.
+Inputs = dict[tuple[str, str], tuple[str, Parameter, ParameterSet]]
 
 
 def values(
@@ -19,14 +22,16 @@ def values(
     """Component -> parameter -> SI value, for all parameters of its archive.
 
     Sets of the system count over those of a component; a later set of either over an earlier one. Start values of
-    inputs are not needed here and pass by unseen.
+    connected inputs are not needed here and pass by unseen.
 
     Raises:
-        InputError: lists every set that cannot be read and every parameter that is unknown, of another type or unit;
+        InputError: lists every set that cannot be read, every parameter that is unknown, of another type or unit, and
+            every input that nothing drives but a set, with another value than the archive's (:func:`_held_inputs`);
             the first of them where there are many.
     """
     problems: list[str] = []
     found: dict[str, dict[str, Value]] = {}
+    inputs: Inputs = {}
     for component in structure.components:
         archive = archives[component.name]
         found[component.name] = {
@@ -38,8 +43,8 @@ def values(
             for parameter in given.parameters:
                 if len(problems) > parameter_set.MOST_PROBLEMS:
                     break
-                _set(found, archives, component.name, prefix + parameter.name, parameter, given, structure, place,
-                     problems)  # fmt: skip
+                _set(found, inputs, archives, component.name, prefix + parameter.name, parameter, given, structure,
+                     place, problems)  # fmt: skip
     for place, given, prefix in _sets(structure.bindings, files, where, problems):
         for parameter in given.parameters:
             if len(problems) > parameter_set.MOST_PROBLEMS:
@@ -49,7 +54,9 @@ def values(
             if owner is None:
                 problems.append(f"{place}: {name}: is no parameter of a component")
                 continue
-            _set(found, archives, owner, name.removeprefix(f"{owner}."), parameter, given, structure, place, problems)
+            _set(found, inputs, archives, owner, name.removeprefix(f"{owner}."), parameter, given, structure, place,
+                 problems)  # fmt: skip
+    problems += _held_inputs(inputs, structure, archives)
     if len(problems) > parameter_set.MOST_PROBLEMS:
         problems[parameter_set.MOST_PROBLEMS :] = [f"{where}: and more like these; the first are listed"]
     if problems:
@@ -58,10 +65,10 @@ def values(
 
 
 def start_value(archive: Archive, name: str) -> Value:
-    """The start value of a parameter as the archive declares it."""
+    """The start value of a parameter or an input as the archive declares it."""
     variable = archive.variables[name]
     kind = "Integer" if variable.type == "Enumeration" else variable.type
-    declared = parameter_set.Parameter(name, kind, str(variable.start if variable.start is not None else ""))
+    declared = Parameter(name, kind, str(variable.start if variable.start is not None else ""))
     return parameter_set.value(declared, kind, "")
 
 
@@ -85,10 +92,11 @@ def _sets(
 
 def _set(
     found: dict[str, dict[str, Value]],
+    inputs: Inputs,
     archives: Mapping[str, Archive],
     component: str,
     name: str,
-    parameter: parameter_set.Parameter,
+    parameter: Parameter,
     given: ParameterSet,
     structure: Structure,
     place: str,
@@ -97,6 +105,7 @@ def _set(
     archive = archives[component]
     variable = archive.variables.get(name)
     if variable is not None and variable.causality == "input":
+        inputs[component, name] = place, parameter, given
         return
     if variable is None or variable.causality != "parameter":
         known = [each for each, other in archive.variables.items() if other.causality == "parameter"]
@@ -104,9 +113,43 @@ def _set(
         hint = did_you_mean(name, known) if known else "; it has none"
         problems.append(f"{place}: {name}: {what} of {component}{hint}")
         return
-    kind = "Integer" if variable.type == "Enumeration" else variable.type
-    definitions = (given.units, structure.units, unit_definitions(archive))
     try:
-        found[component][name] = parameter_set.value(parameter, kind, archive.unit_of(name), definitions)
+        found[component][name] = _value(parameter, archive, name, given, structure)
     except InputError as error:
         problems.append(f"{place}: {name}: {error}")
+
+
+def _value(parameter: Parameter, archive: Archive, name: str, given: ParameterSet, structure: Structure) -> Value:
+    """What a set says of the variable `name`, in the variable's unit."""
+    variable = archive.variables[name]
+    kind = "Integer" if variable.type == "Enumeration" else variable.type
+    definitions = (given.units, structure.units, unit_definitions(archive))
+    return parameter_set.value(parameter, kind, archive.unit_of(name), definitions)
+
+
+def _held_inputs(inputs: Inputs, structure: Structure, archives: Mapping[str, Archive]) -> list[str]:
+    """Inputs without a connection that a set wants at another value than the archive's start value.
+
+    Other tools hold an input there for the whole run. The master cannot: it drives these inputs itself, at the
+    archive's start values, and would give another result without a word.
+    """
+    connected = {end for link in structure.links for end in (link.start, link.end)}
+    faults = []
+    for (component, name), (place, parameter, given) in inputs.items():
+        if (component, name) in connected:
+            continue
+        archive = archives[component]
+        try:
+            start = start_value(archive, name)
+            if _value(parameter, archive, name, given, structure) == start:
+                continue
+        except InputError as error:
+            faults.append(f"{place}: {component}.{name}: {error}")
+            continue
+        kept = str(start).lower() if isinstance(start, bool) else f"{start:g} {archive.unit_of(name)}"
+        asked = " ".join(filter(None, (parameter.text, parameter.unit)))
+        faults.append(
+            f"{place}: {component}.{name}: {asked} is asked of an input that is not connected; feedsim cannot hold it "
+            f"there, it keeps such an input at {kept}: leave the value out, or run the file in another simulator"
+        )
+    return faults

@@ -90,7 +90,8 @@ def summary_line(run: Run, figures: Mapping[str, Figure]) -> str:
     """The run in one line: its leading figures, and how fast it was."""
     leading = [f"{name} {figure}" for name, figure in figures.items() if is_leading(name, LINE)]
     factor = real_time_factor(run)
-    speed = f" ({factor:.2g} x real time)" if factor is not None else ""
+    digits = ".0f" if factor is not None and factor >= 10 else ".2g"
+    speed = f" ({factor:{digits}} x real time)" if factor is not None else ""
     return ", ".join([*leading, f"{run.program.duration:.4g} s simulated in {run.wall_time:.3g} s{speed}"])
 
 

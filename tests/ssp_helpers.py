@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from feedsim import scenario, ssp
+
 ROOT = Path(__file__).resolve().parents[1]
 STRUCTURE = "SystemStructure.ssd"
+UNPACKED = str(Path(tempfile.gettempdir()) / "feedsim-")  # how the folders begin that archives are unpacked to
 SHORT = """
 name: short move
 machine: {machine}
@@ -25,6 +29,14 @@ def short_scenario(folder: Path, machine: str = "test_centre", text: str = SHORT
     file = folder / "short.yaml"
     file.write_text(text.format(machine=ROOT / "scenarios" / "machines" / machine), encoding="utf-8")
     return file
+
+
+def export_short(folder: Path, fmus: Path) -> Path:
+    """The short move as an SSP file in `folder`."""
+    file = short_scenario(folder)
+    out = file.with_suffix(".ssp")
+    ssp.export(scenario.load(file), out, fmus=fmus)
+    return out
 
 
 def contents(path: Path) -> dict[str, bytes]:

@@ -11,24 +11,21 @@ import pytest
 from feedsim import cli, scenario, ssp
 from feedsim.cosim import binaries
 from feedsim.errors import InputError, OutputError
-from ssp_helpers import STRUCTURE, altered, contents, edited, short_scenario, write
+from ssp_helpers import STRUCTURE, UNPACKED, altered, contents, edited, export_short, short_scenario, write
 
 M_A = '<ssd:Connection startElement="controller_Z" startConnector="M_a" endElement="plant" endConnector="Z.M_a" />'
 
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
-    file = short_scenario(tmp_path_factory.mktemp("scenario"))
-    out = file.with_suffix(".ssp")
-    ssp.export(scenario.load(file), out, fmus=fmus)
-    return out
+    return export_short(tmp_path_factory.mktemp("scenario"), fmus)
 
 
 def refusal(file: Path, *overrides: str) -> InputError:
     with pytest.raises(InputError) as caught, ssp.opened(file, overrides):
         pass
     assert str(file) in str(caught.value)
-    assert "/tmp/feedsim-" not in str(caught.value)  # not of the folder that it was unpacked to
+    assert UNPACKED not in str(caught.value)  # not of the folder that it was unpacked to
     return caught.value
 
 

@@ -12,29 +12,26 @@ from xml.sax.saxutils import escape
 
 import pytest
 
-from feedsim import cli, scenario, ssp, units
+from feedsim import cli, ssp, units
 from feedsim.cosim import untrusted
 from feedsim.errors import InputError
 from feedsim.ssp import parameter_set, rebuilt
 from feedsim.ssp.opened import _load
-from ssp_helpers import STRUCTURE, altered, contents, edited, short_scenario, write
+from ssp_helpers import STRUCTURE, UNPACKED, altered, contents, edited, export_short, write
 
 FRICTION = "resources/friction_Z.ssv"
 
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
-    file = short_scenario(tmp_path_factory.mktemp("scenario"))
-    out = file.with_suffix(".ssp")
-    ssp.export(scenario.load(file), out, fmus=fmus)
-    return out
+    return export_short(tmp_path_factory.mktemp("scenario"), fmus)
 
 
 def refusal(file: Path, capsys: pytest.CaptureFixture[str]) -> str:
     assert cli.main(["validate", str(file)]) == 2
     said = capsys.readouterr().err
     assert str(file) in said
-    assert "/tmp/feedsim-" not in said
+    assert UNPACKED not in said
     return said
 
 

@@ -14,7 +14,7 @@ from feedsim.cosim import binaries, untrusted
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.cosim.unit import Archive, Unit
 from feedsim.errors import InputError
-from ssp_helpers import contents, write
+from ssp_helpers import UNPACKED, contents, write
 
 ROOT = Path(__file__).resolve().parents[2]
 HOST = binaries.folders()[0]
@@ -30,7 +30,7 @@ def refusal(file: Path) -> str:
     with pytest.raises(InputError) as caught, Archive(file) as archive:
         Unit(archive, "friction")
     assert str(file) in str(caught.value)
-    assert "/tmp/feedsim-" not in str(caught.value)  # not of the folder that it was unpacked to
+    assert UNPACKED not in str(caught.value)  # not of the folder that it was unpacked to
     assert Path.cwd() == before
     return str(caught.value)
 

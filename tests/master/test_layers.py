@@ -13,6 +13,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "master" / "feedsim"
 ORDER = [
     "cli",
     "report",
+    "sweep",
     "identify",
     "analysis",
     "compare",
@@ -34,6 +35,9 @@ SOLE_USERS = {
     "ruckig": {"nc"},
     "tqdm": {"cli"},
     "pyuff": {"trace/uff.py"},
+    "distributed": {"sweep"},
+    "dask": {"sweep"},
+    "pyarrow": {"sweep"},
     "feedsim_packager": {"structure/pack.py", "ssp/pack.py"},
 }
 

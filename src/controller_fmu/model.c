@@ -215,8 +215,9 @@ static void start(Unit *unit) {
 
 /* How far ahead of the end of a step from t to t + h an instant belongs to the next step [s]. */
 static double margin(double t, double h, double T_c) {
-    const double drift = fmax(DRIFT * fmin(T_c, h), GRAIN * (fabs(t) + h));
-    return fmin(drift, 0.5 * h); /* steps of a few grains */
+    const double part = DRIFT * (T_c < h ? T_c : h), grain = GRAIN * (fabs(t) + h);
+    const double drift = part > grain ? part : grain;
+    return drift < 0.5 * h ? drift : 0.5 * h; /* steps of a few grains */
 }
 
 static bool step(Unit *unit, double t, double h) {
@@ -234,13 +235,12 @@ static bool step(Unit *unit, double t, double h) {
                                .M_add = unit_slope(unit, VR_M_add)};
 
     double t_k = start_time + (double)x->instant * p->T_c;
-    const double instants = (end - t_k) / p->T_c;
-    if (instants > MOST_INSTANTS) {
+    if (end - t_k > MOST_INSTANTS * p->T_c) {
         char text[3][NUMBER_TEXT_SIZE];
         return unit_fail(unit,
                          "the step would hold %s sample instants, T_c = %s s apart; allowed are at most %.0e, which is "
                          "a step of %s s",
-                         number_text(text[0], ceil(instants)), number_text(text[1], p->T_c), MOST_INSTANTS,
+                         number_text(text[0], ceil((end - t_k) / p->T_c)), number_text(text[1], p->T_c), MOST_INSTANTS,
                          number_text(text[2], MOST_INSTANTS * p->T_c));
     }
     const double last = end - margin(t, h, p->T_c);
@@ -258,9 +258,9 @@ static bool step(Unit *unit, double t, double h) {
     }
 
     if (x->instant > 0) {
-        double share = 1.0 - (t_k - end) / p->T_c;
+        const double ahead = t_k - end; /* of the cycle, what lies behind the end of the step [s] */
         show_instant(v, x);
-        show_cycle(v, x, share > 1.0 - ROUNDING ? 1.0 : fmax(share, 0.0));
+        show_cycle(v, x, ahead < ROUNDING * p->T_c ? 1.0 : fmax(1.0 - ahead / p->T_c, 0.0));
     }
     return true;
 }

@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 /* To be counted up when an operation comes to mean something else though the tables below stay. */
-#define EXCHANGE_VERSION 1
+#define EXCHANGE_VERSION 2
 
 /* The operations. FMI calls take values (slopes) from y or leave them there:
  *   set_real, set_slopes, get_real, get_slopes, get_boolean (int)   count variables by their references
@@ -22,8 +22,8 @@
  *   copy     y = a
  *   line     y = a + s b
  *   rate     y = (a - b) / s
- *   product  y = a b
- *   peak     y = max(y, |a|), NaN where there is one */
+ *   bond     what the exchange between plant and friction does to the energies; a points to a Bond, s is the step
+ * and `end` closes the list. */
 #define EXCHANGE_KINDS(K)                                                                                              \
     K(set_real)                                                                                                        \
     K(set_slopes)                                                                                                      \
@@ -36,8 +36,8 @@
     K(copy)                                                                                                            \
     K(line)                                                                                                            \
     K(rate)                                                                                                            \
-    K(product)                                                                                                         \
-    K(peak)
+    K(bond)                                                                                                            \
+    K(end)
 
 typedef void *address;
 typedef void (*function)(void);
@@ -70,6 +70,21 @@ typedef struct Operation {
     EXCHANGE_FIELDS(EXCHANGE_FIELD)
 } Operation;
 
+/* The bond between plant and friction at the end of an exchange step, every vector with an entry per axis. */
+#define EXCHANGE_BOND(F)                                                                                               \
+    F(address, M_fr)                                                                                                   \
+    F(address, n)                                                                                                      \
+    F(address, n_slope)                                                                                                \
+    F(address, assumed_torque)                                                                                         \
+    F(address, n_end)                                                                                                  \
+    F(address, residual)                                                                                               \
+    F(address, residual_peak)                                                                                          \
+    F(address, dissipated)
+
+typedef struct Bond {
+    EXCHANGE_BOND(EXCHANGE_FIELD)
+} Bond;
+
 /* Where the loop ended early. */
 typedef struct Fault {
     int64_t cycle;
@@ -84,13 +99,12 @@ typedef struct Fault {
 #define EXCHANGE_API
 #endif
 
-/* Version, kinds in their order and fields in theirs: "1: set_real set_slopes ..; int64_t kind, int64_t count, ..". */
+/* Version, kinds in their order, fields in theirs: "2: set_real set_slopes ..; int64_t kind, ..; address M_fr, ..". */
 EXCHANGE_API const char *exchange_interface(void);
 
-/* Work the cycles k with begin <= k < end, each T_c [s] long. The operations keep count of their rows: what follows
- * continues at `end`. Returns the fmi2Status (fmi2OK or fmi2Warning) 0, or that of the call that failed, with *fault
- * telling which; the operations ahead of it in that cycle are done. */
-EXCHANGE_API int exchange_run(Operation operations[], int64_t count, double T_c, int64_t begin, int64_t end,
-                              Fault *fault);
+/* Work the cycles k with begin <= k < end, each T_c [s] long. The list is closed by an `end`. The operations keep count
+ * of their rows: what follows continues at cycle `end`. Returns the fmi2Status (fmi2OK or fmi2Warning) 0, or that of
+ * the call that failed, with *fault telling which; the operations ahead of it in that cycle are done. */
+EXCHANGE_API int exchange_run(Operation operations[], double T_c, int64_t begin, int64_t end, Fault *fault);
 
 #endif

@@ -12,6 +12,11 @@
  * both untouched. */
 bool number_parse(const char *text, const char **end, double *value);
 
+/* 0 for a finite number, else no number: a sum of these tells whether all are finite, without a decision for each. */
+static inline double number_probe(double value) {
+    return value - value;
+}
+
 #define NUMBER_TEXT_SIZE 32
 
 /* Shortest of %.15g, %.16g and %.17g that reads back as `value`, written to text[NUMBER_TEXT_SIZE]; returns text. */

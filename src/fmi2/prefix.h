@@ -22,6 +22,7 @@
 #define unit_set_axes PREFIXED(unit_set_axes)
 #define unit_derived PREFIXED(unit_derived)
 #define unit_set_derived PREFIXED(unit_set_derived)
+#define unit_leave_late PREFIXED(unit_leave_late)
 #define unit_fail PREFIXED(unit_fail)
 #define unit_warn PREFIXED(unit_warn)
 #define unit_alloc PREFIXED(unit_alloc)
@@ -48,7 +49,7 @@
 
 #define values_missing PREFIXED(values_missing)
 #define values_name PREFIXED(values_name)
-#define values_arrays PREFIXED(values_arrays)
+#define values_no_arrays PREFIXED(values_no_arrays)
 #define values_sound PREFIXED(values_sound)
 #define values_get_real PREFIXED(values_get_real)
 #define values_set_real PREFIXED(values_set_real)
@@ -67,6 +68,7 @@
 #define run_derived_for PREFIXED(run_derived_for)
 #define run_refresh PREFIXED(run_refresh)
 #define run_step PREFIXED(run_step)
+#define run_show_late PREFIXED(run_show_late)
 #define run_reset PREFIXED(run_reset)
 
 #define state_save PREFIXED(state_save)

@@ -53,22 +53,47 @@ bool run_derive(Unit *unit, bool may_resize) {
 
 /* --- results */
 
-RARE static bool not_finite(Unit *unit, size_t offset, double value) {
+static double result(const Unit *unit, size_t offset) {
+    return *(const double *)(const void *)(unit->block + offset);
+}
+
+RARE static bool not_finite(Unit *unit, const Variable *variable) {
     char name[VARIABLE_NAME_SIZE], text[NUMBER_TEXT_SIZE];
-    const Variable *variable = unit->variables;
-    while (variable->offset != offset)
-        variable++;
     return unit_fail(unit, "%s '%s' is not finite: %s", table_causality(variable->info->causality),
-                     values_name(unit, variable, name), number_text(text, value));
+                     values_name(unit, variable, name), number_text(text, result(unit, variable->offset)));
+}
+
+/* The first of the results that is not. */
+RARE static bool results_not_finite(Unit *unit) {
+    size_t i = 0;
+    while (isfinite(result(unit, unit->results[i])))
+        i++;
+    const Variable *variable = unit->variables;
+    while (variable->offset != unit->results[i])
+        variable++;
+    return not_finite(unit, variable);
 }
 
 static bool results_finite(Unit *unit) {
-    for (size_t i = 0; i < unit->result_count; i++) {
-        double value = *(const double *)(const void *)(unit->block + unit->results[i]);
-        if (!isfinite(value))
-            return not_finite(unit, unit->results[i], value);
-    }
+    double probe = 0;
+    for (size_t i = 0; i < unit->result_count; i++)
+        probe += number_probe(result(unit, unit->results[i]));
+    return !isnan(probe) || results_not_finite(unit);
+}
+
+static bool late_finite(Unit *unit) {
+    for (unsigned reference = MODEL.late_first; reference < MODEL.late_end; reference++)
+        if (!isfinite(result(unit, unit->variables[reference].offset)))
+            return not_finite(unit, &unit->variables[reference]);
     return true;
+}
+
+bool run_show_late(Unit *unit) {
+    if (!unit->late)
+        return true;
+    MODEL.show_late(unit);
+    unit->late = !late_finite(unit);
+    return !unit->late;
 }
 
 bool run_refresh(Unit *unit) {
@@ -77,8 +102,9 @@ bool run_refresh(Unit *unit) {
     if (!run_derive(unit, true))
         return false;
     memset(unit_state(unit), 0, unit->block_size - unit->state_at);
+    unit->late = false;
     MODEL.start(unit);
-    if (!results_finite(unit))
+    if (!results_finite(unit) || !late_finite(unit))
         return false;
     unit_header(unit)->stale = 0;
     return true;
@@ -86,6 +112,7 @@ bool run_refresh(Unit *unit) {
 
 void run_reset(Unit *unit) {
     memset(unit->block, 0, unit->block_size);
+    unit->late = false;
     memcpy(unit->block + SCALARS_AT, unit->start, unit->slopes_at - SCALARS_AT);
     unit_header(unit)->stop_time = INFINITY;
     unit_header(unit)->stale = 1;

@@ -29,9 +29,18 @@ typedef struct Header {
 #define SCALARS_AT BLOCK_ALIGNED(sizeof(Header))
 #define AXES_AT (SCALARS_AT + BLOCK_ALIGNED(sizeof(Scalars)))
 
+/* What the calls of every step ask of a variable, in one word. */
+enum {
+    READY_REAL = 1, /* a Real that holds its value at all times */
+    FREE_INPUT = 2, /* a Real input that takes every finite number */
+    REAL_INPUT = 4,
+    REAL_OUTPUT = 8,
+};
+
 typedef struct Variable {
     const VariableInfo *info;
     size_t offset; /* in the block */
+    unsigned is;   /* of the above */
 } Variable;
 
 struct Unit {
@@ -48,7 +57,7 @@ struct Unit {
     Variable *variables; /* by value reference */
     size_t variable_count;
     unsigned *inputs; /* value references of the Real inputs */
-    size_t *results;  /* offsets in the block of the Real outputs and locals */
+    size_t *results;  /* offsets in the block of the Real outputs and locals that a step writes */
     size_t input_count, result_count;
 
     unsigned char *block;
@@ -57,6 +66,7 @@ struct Unit {
     unsigned char *derived_for; /* variables that the derived data was made from */
     bool derived_valid;
     bool parameters_touched; /* they may differ from derived_for */
+    bool late;               /* the late outputs are those of an earlier step */
     void *derived;
 };
 
@@ -91,6 +101,7 @@ bool run_derived_for(const Unit *unit,
                      const unsigned char *block); /* the coefficients are those of block's parameters */
 bool run_refresh(Unit *unit);                     /* initial values that belong to the parameters and inputs of now */
 bool run_step(Unit *unit, double t, double h);
+bool run_show_late(Unit *unit); /* late outputs that belong to the state of now */
 void run_reset(Unit *unit);
 
 /* What an error takes is kept out of the way of what happens in every step. */

@@ -38,6 +38,8 @@ bool state_save(Unit *unit, Snapshot **snapshot) {
     /* Before initial values exist, or while they are out of date, the model state means nothing. */
     const Header *header = unit_header(unit);
     size_t state_size = header->stale ? 0 : unit->block_size - unit->state_at;
+    if (!run_show_late(unit)) /* a saved state is complete */
+        return false;
     size_t size = sizeof(Snapshot) + unit->state_at + state_size;
     if (!allot(unit, snapshot, size))
         return false;
@@ -111,6 +113,7 @@ static bool restore_with_parameters(Unit *unit, const Snapshot *snapshot) {
     bool good = run_derive(unit, true) && accepted(unit, snapshot) && restore_model(unit, snapshot);
     if (good) {
         unit_free(unit, own);
+        unit->late = false;
         return true;
     }
     unit_free(unit, unit->block);
@@ -137,6 +140,7 @@ bool state_restore(Unit *unit, const Snapshot *snapshot) {
     }
     memcpy(unit->block, content(snapshot), unit->state_at);
     unit->parameters_touched = true;
+    unit->late = false;
     return true;
 }
 

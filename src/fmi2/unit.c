@@ -2,6 +2,7 @@
  */
 #include "unit.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,15 +53,29 @@ static void write_start(const VariableInfo *info, void *address) {
     }
 }
 
+static bool is_late(unsigned reference) {
+    return MODEL.show_late != NULL && reference >= MODEL.late_first && reference < MODEL.late_end;
+}
+
+static unsigned what_is(const VariableInfo *info, bool late) {
+    if (info->kind != KIND_REAL)
+        return 0;
+    const bool input = info->causality == CAUSALITY_input, bounded = !(isinf(info->min) && isinf(info->max));
+    return (late ? 0u : READY_REAL) | (input && !bounded ? FREE_INPUT : 0u) | (input ? REAL_INPUT : 0u) |
+           (info->causality == CAUSALITY_output ? REAL_OUTPUT : 0u);
+}
+
 static void lay_row(Unit *unit, size_t base, const VariableInfo *info) {
     unsigned reference = (unsigned)unit->variable_count++;
     Variable *variable = &unit->variables[reference];
     variable->info = info;
     variable->offset = base + info->offset;
+    variable->is = what_is(info, is_late(reference));
     write_start(info, unit_address(unit, variable));
     if (info->kind == KIND_REAL && info->causality == CAUSALITY_input)
         unit->inputs[unit->input_count++] = reference;
-    if (info->kind == KIND_REAL && (info->causality == CAUSALITY_output || info->causality == CAUSALITY_local))
+    if (info->kind == KIND_REAL && (info->causality == CAUSALITY_output || info->causality == CAUSALITY_local) &&
+        !is_late(reference))
         unit->results[unit->result_count++] = variable->offset;
 }
 
@@ -219,4 +234,8 @@ void *unit_derived(const Unit *unit) {
 
 void unit_set_derived(Unit *unit, void *derived) {
     unit->derived = derived;
+}
+
+void unit_leave_late(Unit *unit) {
+    unit->late = true;
 }

@@ -42,6 +42,9 @@ const char *unit_resource_hash(const Unit *unit);
 /* load() tells the shell which axes there are; names are copied. false (with a logged error) when memory is short. */
 bool unit_set_axes(Unit *unit, size_t count, const char *const *names);
 
+/* To be called in step(), where it leaves the late outputs (see Model) for when they are asked for. */
+void unit_leave_late(Unit *unit);
+
 /* Pointer to coefficients and tables that the model owns. */
 void *unit_derived(const Unit *unit);
 void unit_set_derived(Unit *unit, void *derived);
@@ -98,6 +101,12 @@ typedef struct Model {
     /* Advance from t to t + h (h > 0, any size). Input i is value_i + slope_i (time - t) within the step. Writes the
      * state, the outputs and the locals. No allocation. */
     bool (*step)(Unit *unit, double t, double h);
+
+    /* Real outputs that mostly nobody reads: value references `late_first` up to `late_end`, without the latter. step()
+     * may leave them out (unit_leave_late()); show_late() then writes them from the state, when they are read or the
+     * state is saved. It depends on the state and on fixed parameters alone. NULL where there are none. */
+    unsigned late_first, late_end;
+    void (*show_late)(Unit *unit);
 
     /* First derivative of Real output `vr` with respect to time at the end of the last step [unit/s]. */
     double (*output_derivative)(Unit *unit, unsigned vr);

@@ -31,22 +31,24 @@ RARE const Variable *values_missing(Unit *unit, fmi2ValueReference reference, Ki
     return NULL;
 }
 
-bool values_arrays(Unit *unit, size_t count, const void *references, const void *values) {
+RARE bool values_no_arrays(Unit *unit, size_t count) {
     if (count > MOST_ELEMENTS)
         return unit_fail(unit, "no array has %.0f elements: was a negative number taken for a size?", (double)count);
-    if (count > 0 && (references == NULL || values == NULL))
-        return unit_fail(unit, "an array of %.0f elements is expected, not NULL", (double)count);
-    return true;
+    return unit_fail(unit, "an array of %.0f elements is expected, not NULL", (double)count);
 }
 
 /* --- get */
+
+static bool late_ready(Unit *unit, size_t count, const fmi2ValueReference references[]) {
+    return !unit->late || values_all(unit, count, references, READY_REAL) || run_show_late(unit);
+}
 
 /* In initialisation mode calculated variables follow what was set; afterwards they belong to the end of the last step.
  */
 static bool ready(Unit *unit, size_t count, const fmi2ValueReference references[]) {
     const Header *header = unit_header(unit);
     if (header->phase != PHASE_INITIALIZATION || !header->stale)
-        return true;
+        return late_ready(unit, count, references);
     for (size_t i = 0; i < count; i++) {
         if (references[i] < unit->variable_count) {
             Causality causality = unit->variables[references[i]].info->causality;
@@ -71,7 +73,9 @@ static inline bool readable(Unit *unit, Kind kind, size_t count, const fmi2Value
 }
 
 bool values_get_real(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2Real values[]) {
-    if (!readable(unit, KIND_REAL, count, references, values))
+    const bool usual = unit_header(unit)->phase == PHASE_STEPPING && references != NULL && values != NULL &&
+                       count <= MOST_ELEMENTS && values_all(unit, count, references, READY_REAL);
+    if (!usual && !readable(unit, KIND_REAL, count, references, values))
         return false;
     for (size_t i = 0; i < count; i++)
         values[i] = *(const double *)unit_address(unit, &unit->variables[references[i]]);
@@ -146,9 +150,22 @@ static inline void note_set(Unit *unit, const Variable *variable) {
         unit_header(unit)->stale = 1;
 }
 
+/* What happens between steps: Real inputs that may have any finite value. false, and nothing changed, where it is not
+ * that. */
+static inline bool set_free_inputs(Unit *unit, size_t count, const fmi2ValueReference references[],
+                                   const fmi2Real values[]) {
+    if (unit_header(unit)->phase != PHASE_STEPPING || !values_all_finite(unit, count, references, values, FREE_INPUT))
+        return false;
+    for (size_t i = 0; i < count; i++)
+        *(double *)unit_address(unit, &unit->variables[references[i]]) = values[i];
+    return true;
+}
+
 bool values_set_real(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2Real values[]) {
     if (!values_arrays(unit, count, references, values))
         return false;
+    if (set_free_inputs(unit, count, references, values))
+        return true;
     for (size_t i = 0; i < count; i++) {
         const Variable *variable = values_find(unit, references[i], KIND_REAL);
         if (variable == NULL || !settable(unit, variable) || !in_range(unit, variable, values[i]))

@@ -3,9 +3,11 @@
 #ifndef FEEDSIM_VALUES_H
 #define FEEDSIM_VALUES_H
 
+#include <math.h>
 #include <stdint.h>
 
 #include "fmi2Functions.h"
+#include "numbers.h"
 #include "shell.h"
 
 /* The variable of that reference, or NULL (with the reason logged) where there is none of that kind. */
@@ -20,7 +22,14 @@ char *values_name(const Unit *unit, const Variable *variable, char *name);
 #define MOST_ELEMENTS (SIZE_MAX / 2 / sizeof(double))
 
 /* Whether `count` elements can lie in both arrays. An importer may pass NULL for an array of no elements only. */
-bool values_arrays(Unit *unit, size_t count, const void *references, const void *values);
+static inline bool values_arrays(Unit *unit, size_t count, const void *references, const void *values);
+bool values_no_arrays(Unit *unit, size_t count); /* always false, with the reason logged */
+
+/* Whether every reference is that of a variable which `is` so (see shell.h), in the fewest instructions. */
+static inline bool values_all(const Unit *unit, size_t count, const fmi2ValueReference references[], unsigned is);
+/* ... and every value that goes with them is finite. */
+static inline bool values_all_finite(const Unit *unit, size_t count, const fmi2ValueReference references[],
+                                     const fmi2Real values[], unsigned is);
 
 bool values_get_real(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2Real values[]);
 bool values_set_real(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2Real values[]);
@@ -34,10 +43,38 @@ bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference refere
  * its Real outputs and locals must be finite as well. */
 bool values_sound(Unit *unit, const unsigned char *block, bool results);
 
+static inline bool values_all_finite(const Unit *unit, size_t count, const fmi2ValueReference references[],
+                                     const fmi2Real values[], unsigned is) {
+    unsigned all = is;
+    double probe = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (references[i] >= unit->variable_count)
+            return false;
+        all &= unit->variables[references[i]].is;
+        probe += number_probe(values[i]);
+    }
+    return all == is && !isnan(probe);
+}
+
 static inline const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind) {
     if (reference < unit->variable_count && unit->variables[reference].info->kind == kind)
         return &unit->variables[reference];
     return values_missing(unit, reference, kind);
+}
+
+static inline bool values_arrays(Unit *unit, size_t count, const void *references, const void *values) {
+    return (count <= MOST_ELEMENTS && references != NULL && values != NULL) || count == 0 ||
+           values_no_arrays(unit, count);
+}
+
+static inline bool values_all(const Unit *unit, size_t count, const fmi2ValueReference references[], unsigned is) {
+    unsigned all = is;
+    for (size_t i = 0; i < count; i++) {
+        if (references[i] >= unit->variable_count)
+            return false;
+        all &= unit->variables[references[i]].is;
+    }
+    return all == is;
 }
 
 #endif

@@ -22,10 +22,15 @@ double contact_engagement(const Contact *p, ContactState state) {
     return tem_engagement(state.z, state.c, p->W);
 }
 
+ContactForce contact_force(const Contact *p, ContactState state, double n) {
+    const double lambda = contact_engagement(p, state), k = tem_share(lambda, p->gamma);
+    return (ContactForce){.M_fr = lugre_torque(&p->lugre, k, state.z, n), .k = k, .lambda = lambda};
+}
+
 double contact_torque(const Contact *p, ContactState state, double n, double *share) {
-    const double k = tem_share(contact_engagement(p, state), p->gamma);
+    const ContactForce force = contact_force(p, state, n);
     if (share != NULL) {
-        *share = k;
+        *share = force.k;
     }
-    return lugre_torque(&p->lugre, k, state.z, n);
+    return force.M_fr;
 }

@@ -11,6 +11,7 @@
 
 #define contact_advance PREFIXED(contact_advance)
 #define contact_engagement PREFIXED(contact_engagement)
+#define contact_force PREFIXED(contact_force)
 #define contact_torque PREFIXED(contact_torque)
 
 typedef struct Contact {
@@ -29,6 +30,15 @@ ContactState contact_advance(const Contact *p, ContactState state, double n_star
 
 /* lambda [1], Eq. 3. */
 double contact_engagement(const Contact *p, ContactState state);
+
+typedef struct ContactForce {
+    double M_fr;   /* [N.m], Eq. 1 */
+    double k;      /* share of the bristle stiffness engaged [1], Eq. 2 */
+    double lambda; /* engagement [1], Eq. 3 */
+} ContactForce;
+
+/* At speed n [rad/s]. */
+ContactForce contact_force(const Contact *p, ContactState state, double n);
 
 /* M_fr [N.m], Eq. 1, at speed n [rad/s], with the share k [1] of the bristle stiffness that goes with lambda (Eq. 2);
  * k is written to *share unless that is NULL. */

@@ -55,11 +55,12 @@ static size_t friction_state_size(const Unit *unit) {
 }
 
 /* Outputs and locals that go with z, c and n. */
-static void friction_show(Scalars *v, const Contact *p, const State *state) {
+static void friction_show(Scalars *v, const State *state, ContactForce force) {
     v->z = state->contact.z;
     v->c = state->contact.c;
-    v->lambda = contact_engagement(p, state->contact);
-    v->M_fr = contact_torque(p, state->contact, state->n, &v->k);
+    v->lambda = force.lambda;
+    v->k = force.k;
+    v->M_fr = force.M_fr;
 }
 
 static void friction_start(Unit *unit) {
@@ -67,7 +68,7 @@ static void friction_start(Unit *unit) {
     State *state = unit_state(unit);
     const Contact p = parameters_contact(v);
     state->n = v->n_fr;
-    friction_show(v, &p, state);
+    friction_show(v, state, contact_force(&p, state->contact, state->n));
 }
 
 static bool friction_step(Unit *unit, double t, double h) {
@@ -76,20 +77,16 @@ static bool friction_step(Unit *unit, double t, double h) {
     State *state = unit_state(unit);
     const Contact p = parameters_contact(v);
     const double n_start = v->n_fr, n_end = n_start + unit_slope(unit, VR_n_fr) * h;
-    State next = *state;
-    next.contact = contact_advance(&p, state->contact, n_start, n_end, h);
-    next.n = n_end;
-    Scalars shown = *v;
-    friction_show(&shown, &p, &next);
-    if (!isfinite(shown.M_fr)) {
+    const ContactState contact = contact_advance(&p, state->contact, n_start, n_end, h);
+    const ContactForce force = contact_force(&p, contact, n_end);
+    if (!isfinite(force.M_fr)) {
         char text[2][NUMBER_TEXT_SIZE];
         return unit_fail(
             unit, "M_fr would be no finite number at the end of the step, in which n_fr goes from %s to %s rad/s",
             number_text(text[0], n_start), number_text(text[1], n_end));
     }
-    next.M_fr_slope = (shown.M_fr - v->M_fr) / h;
-    *state = next;
-    *v = shown;
+    *state = (State){.contact = contact, .n = n_end, .M_fr_slope = (force.M_fr - v->M_fr) / h};
+    friction_show(v, state, force);
     return true;
 }
 

@@ -9,6 +9,8 @@
 #define UNALIASED restrict
 #endif
 
+#define COEFFICIENTS 8 /* of a mode's step */
+
 /* Everything about a mode's step follows from its impulse response g (g(0) = 0, g'(0) = 1) and its integrals, here made
  * dimensionless with x = omega h:
  *   rate = g'(h),  once = g(h)/h,  twice = integral of g / h^2,  thrice = double integral of g / h^3
@@ -111,19 +113,18 @@ size_t modal_padded(size_t modes) {
 }
 
 size_t modal_memory(size_t modes, size_t ports) {
-    return (10 + ports) * modal_padded(modes);
+    return (2 + COEFFICIENTS + ports) * modal_padded(modes);
 }
 
 void modal_place(Modal *modal, double *memory, size_t modes, size_t ports) {
     const size_t size = modal_padded(modes);
-    double **const arrays[] = {&modal->q_q, &modal->q_v,  &modal->q_f,   &modal->q_df, &modal->v_q,  &modal->v_v,
-                               &modal->v_f, &modal->v_df, &modal->omega, &modal->zeta, &modal->shape};
     modal->size = size;
     modal->ports = ports;
     modal->h = 0;
-    for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) {
-        *arrays[i] = memory + i * size;
-    }
+    modal->omega = memory;
+    modal->zeta = modal->omega + size;
+    modal->update = modal->zeta + size;
+    modal->shape = modal->update + COEFFICIENTS * size;
 }
 
 void modal_set_mode(Modal *modal, size_t mode, double omega, double zeta, const double *shape) {
@@ -140,27 +141,29 @@ void modal_prepare(Modal *modal, double h) {
     }
     for (size_t k = 0; k < modal->size; k++) {
         const ModeUpdate update = mode_update(modal->omega[k], modal->zeta[k], h);
-        modal->q_q[k] = update.q_q;
-        modal->q_v[k] = update.q_v;
-        modal->q_f[k] = update.q_f;
-        modal->q_df[k] = update.q_df;
-        modal->v_q[k] = update.v_q;
-        modal->v_v[k] = update.v_v;
-        modal->v_f[k] = update.v_f;
-        modal->v_df[k] = update.v_df;
+        const double c[COEFFICIENTS] = {update.q_q, update.q_v, update.q_f, update.q_df,
+                                        update.v_q, update.v_v, update.v_f, update.v_df};
+        const size_t lane = k % MODAL_LANES;
+        for (size_t i = 0; i < COEFFICIENTS; i++) {
+            modal->update[(k - lane) * COEFFICIENTS + i * MODAL_LANES + lane] = c[i];
+        }
     }
     modal->h = h;
 }
 
+/* The lanes of a step are written out: loops over them are left in memory by compilers that vectorise cautiously. */
+#define Q_END(j) (c[j] * q[k + (j)] + c[4 + (j)] * v[k + (j)]) + (c[8 + (j)] * f[j] + c[12 + (j)] * df[j])
+#define V_END(j) (c[16 + (j)] * q[k + (j)] + c[20 + (j)] * v[k + (j)]) + (c[24 + (j)] * f[j] + c[28 + (j)] * df[j])
+
 void modal_advance(const Modal *modal, size_t inputs, const double *UNALIASED u, const double *UNALIASED du,
                    const double *UNALIASED q, const double *UNALIASED v, double *UNALIASED q_end,
                    double *UNALIASED v_end) {
-    const Modal m = *modal;
-    for (size_t k = 0; k < m.size; k += MODAL_LANES) {
+    const size_t size = modal->size;
+    const double *UNALIASED c = modal->update;
+    for (size_t k = 0; k < size; k += MODAL_LANES, c += COEFFICIENTS * MODAL_LANES) {
         double f[MODAL_LANES] = {0}, df[MODAL_LANES] = {0};
-        const double *b = m.shape + k;
-        for (size_t i = 0; i < inputs; i++, b += m.size) {
-            /* lanes written out: a loop over them is left in memory by compilers that vectorise cautiously */
+        const double *UNALIASED b = modal->shape + k;
+        for (size_t i = 0; i < inputs; i++, b += size) {
             f[0] += b[0] * u[i];
             f[1] += b[1] * u[i];
             f[2] += b[2] * u[i];
@@ -170,11 +173,14 @@ void modal_advance(const Modal *modal, size_t inputs, const double *UNALIASED u,
             df[2] += b[2] * du[i];
             df[3] += b[3] * du[i];
         }
-        for (size_t j = 0; j < MODAL_LANES; j++) {
-            const size_t i = k + j;
-            q_end[i] = (m.q_q[i] * q[i] + m.q_v[i] * v[i]) + (m.q_f[i] * f[j] + m.q_df[i] * df[j]);
-            v_end[i] = (m.v_q[i] * q[i] + m.v_v[i] * v[i]) + (m.v_f[i] * f[j] + m.v_df[i] * df[j]);
-        }
+        q_end[k] = Q_END(0);
+        q_end[k + 1] = Q_END(1);
+        q_end[k + 2] = Q_END(2);
+        q_end[k + 3] = Q_END(3);
+        v_end[k] = V_END(0);
+        v_end[k + 1] = V_END(1);
+        v_end[k + 2] = V_END(2);
+        v_end[k + 3] = V_END(3);
     }
 }
 

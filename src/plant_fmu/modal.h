@@ -11,7 +11,8 @@
  *
  * Modes are stored as a structure of arrays, padded with all-zero modes to a multiple of MODAL_LANES, and sums run in
  * that many partial sums, so that compilers vectorise without reordering arithmetic: every platform adds in the same
- * order. Pure functions; the memory is the caller's. */
+ * order. A step's coefficients lie in the order in which it needs them: twelve arrays side by side would take more
+ * pointers than a processor has registers. Pure functions; the memory is the caller's. */
 #ifndef FEEDSIM_MODAL_H
 #define FEEDSIM_MODAL_H
 
@@ -45,11 +46,10 @@ ModeUpdate mode_update(double omega, double zeta, double h);
 typedef struct Modal {
     size_t size; /* modes, padded */
     size_t ports;
-    double h;                       /* step that the coefficients below belong to; 0: none yet */
-    double *omega, *zeta;           /* [size] */
-    double *q_q, *q_v, *q_f, *q_df; /* [size] */
-    double *v_q, *v_v, *v_f, *v_df; /* [size] */
-    double *shape;                  /* [ports][size]: mode shapes, inputs first */
+    double h;             /* step that the coefficients below belong to; 0: none yet */
+    double *omega, *zeta; /* [size] */
+    double *update;       /* [size / MODAL_LANES][8][MODAL_LANES]: q_q, q_v, q_f, q_df, v_q, v_v, v_f, v_df */
+    double *shape;        /* [ports][size]: mode shapes, inputs first */
 } Modal;
 
 /* `modes` rounded up to a multiple of MODAL_LANES. */

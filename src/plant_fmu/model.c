@@ -24,6 +24,7 @@
 #include <string.h>
 
 #include "cells.h"
+#include "numbers.h"
 #include "plant.h"
 
 static size_t plant_state_size(const Unit *unit) {
@@ -63,26 +64,41 @@ static void plant_gather(Unit *unit, double h, double *u, double *du) {
     du[axes + 2] = h * unit_slope(unit, VR_tool_F_Z);
 }
 
-/* Speeds at the axes' rotors and displacements elsewhere, y[ports]; false where one is no finite number. */
+/* Speeds at the axes' rotors and displacements at their scales, y[ports]; false where one is no finite number. */
 static bool plant_measure(const Plant *plant, const Modal *modal, const double *q, const double *v, double *y) {
-    const size_t ports = plant_ports(plant);
-    bool finite = true;
-    for (size_t port = 0; port < ports; port++) {
-        y[port] = modal_sum(modal, port, port < plant->axes ? v : q);
-        finite = finite && isfinite(y[port]);
+    const size_t inputs = plant_inputs(plant);
+    double probe = 0;
+    for (size_t i = 0; i < plant->axes; i++) {
+        y[i] = modal_sum(modal, i, v);
+        y[inputs + i] = modal_sum(modal, inputs + i, q);
+        probe += number_probe(y[i]) + number_probe(y[inputs + i]);
     }
-    return finite;
+    return !isnan(probe);
+}
+
+/* Displacements at the tool, the rest of y[ports]; likewise. */
+static bool plant_measure_tool(const Plant *plant, const Modal *modal, const double *q, double *y) {
+    double probe = 0;
+    for (size_t port = plant->axes; port < plant_inputs(plant); port++) {
+        y[port] = modal_sum(modal, port, q);
+        probe += number_probe(y[port]);
+    }
+    return !isnan(probe);
 }
 
 static void plant_show(Unit *unit, const Plant *plant, const double *y) {
-    Scalars *v = unit_scalars(unit);
-    const double *tool = y + plant->axes, *x = tool + TOOL_DIRECTIONS;
+    const double *x = y + plant_inputs(plant);
     for (size_t i = 0; i < plant->axes; i++) {
         AxisBlock *axis = unit_axis(unit, i);
         axis->n_a = y[i];
         axis->n_fr = y[i];
         axis->x_a = axis->x_0 + x[i];
     }
+}
+
+static void plant_show_tool(Unit *unit, const Plant *plant, const double *y) {
+    Scalars *v = unit_scalars(unit);
+    const double *tool = y + plant->axes;
     v->tool_x_X = tool[0];
     v->tool_x_Y = tool[1];
     v->tool_x_Z = tool[2];
@@ -105,10 +121,12 @@ static void plant_start(Unit *unit) {
     Scalars *shown = unit_scalars(unit);
     plant_gather(unit, 0, u, plant->du);
     plant_measure(plant, &plant->modal[0], q, v, plant->y); /* at rest, whatever the cell */
+    plant_measure_tool(plant, &plant->modal[0], q, plant->y);
     plant_positions(unit, plant, plant->y + plant_inputs(plant), plant->x);
     head->table_hash = plant->table_hash;
     head->cell = plant->cells > 1 ? cells_find(&plant->poses, plant->x) : 0;
     plant_show(unit, plant, plant->y);
+    plant_show_tool(unit, plant, plant->y);
     shown->pose_cell = (int)head->cell;
     shown->pose_crossings = 0;
     shown->pose_E_kin_lost = shown->pose_E_el_lost = 0;
@@ -131,6 +149,9 @@ static int plant_count(int before, size_t more) {
 static bool plant_follow(Unit *unit, Plant *plant, double *q, double *v) {
     const size_t inputs = plant_inputs(plant), ports = plant_ports(plant);
     Scalars *shown = unit_scalars(unit);
+    if (!plant_measure_tool(plant, &plant->modal[plant_head(unit)->cell], q, plant->y)) {
+        return false; /* measured ahead, for the jump */
+    }
     plant_positions(unit, plant, plant->y + inputs, plant->x);
     const Passage passage =
         cells_follow(&plant->poses, plant->modal, (size_t)plant_head(unit)->cell, plant->x, q, v, plant->carried);
@@ -138,7 +159,8 @@ static bool plant_follow(Unit *unit, Plant *plant, double *q, double *v) {
         return true;
     }
     memcpy(plant->y_before, plant->y, ports * sizeof *plant->y);
-    if (!plant_measure(plant, &plant->modal[passage.cell], q, v, plant->y)) {
+    const Modal *modal = &plant->modal[passage.cell];
+    if (!plant_measure(plant, modal, q, v, plant->y) || !plant_measure_tool(plant, modal, q, plant->y)) {
         return false;
     }
     plant_head(unit)->cell = passage.cell;
@@ -175,7 +197,20 @@ static bool plant_step(Unit *unit, double t, double h) {
     }
     memcpy(state, end, plant_state_doubles(plant) * sizeof *state);
     plant_show(unit, plant, plant->y);
+    if (plant->cells > 1) {
+        plant_show_tool(unit, plant, plant->y);
+    } else {
+        unit_leave_late(unit);
+    }
     return true;
+}
+
+/* The tool's displacements, a quarter of a step's work, when somebody reads them. */
+static void plant_show_late(Unit *unit) {
+    const Plant *plant = unit_derived(unit);
+    const Modal *modal = &plant->modal[plant_head(unit)->cell];
+    plant_measure_tool(plant, modal, plant_state(unit) + plant_inputs(plant), plant->y);
+    plant_show_tool(unit, plant, plant->y);
 }
 
 /* --- derivatives -------------------------------------------------------------------------------------------------- */
@@ -231,6 +266,9 @@ const Model MODEL = {
     .accepts = plant_accepts,
     .start = plant_start,
     .step = plant_step,
+    .late_first = VR_tool_x_X,
+    .late_end = VR_tcp_x_Z + 1,
+    .show_late = plant_show_late,
     .output_derivative = plant_output_derivative,
     .partial = plant_partial,
     .release = plant_release,

@@ -59,11 +59,12 @@ static void tables_are_used_row_by_row(void) {
          .next = 5,
          .stride = sizeof got[0],
          .rows = 2},
+        {.kind = EXCHANGE_end},
     };
     /* in two slices, which must not matter: due at 1, 3, 5, 7 and at 5 */
-    CHECK(exchange_run(operations, 2, 1e-3, 0, 4, &fault) == fmi2OK);
+    CHECK(exchange_run(operations, 1e-3, 0, 4, &fault) == fmi2OK);
     CHECK(setting.calls == 2 && getting.calls == 0);
-    CHECK(exchange_run(operations, 2, 1e-3, 4, 9, &fault) == fmi2OK);
+    CHECK(exchange_run(operations, 1e-3, 4, 9, &fault) == fmi2OK);
     CHECK(setting.calls == 4 && getting.calls == 1);
     const double expected[] = {10, 11, 12, 10};
     for (int i = 0; i < 4; i++)
@@ -81,8 +82,9 @@ static void failure_ends_the_loop(void) {
         {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 1},
         {.kind = EXCHANGE_do_step, .call = (function)note_step, .component = &notes, .s = 0.01, .h = 0.02},
         {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 100},
+        {.kind = EXCHANGE_end},
     };
-    CHECK(exchange_run(operations, 3, 0.03, 0, 10, &fault) == fmi2Discard);
+    CHECK(exchange_run(operations, 0.03, 0, 10, &fault) == fmi2Discard);
     CHECK(fault.cycle == 3 && fault.operation == 1);
     CHECK(notes.calls == 4);
     for (int k = 0; k < 4; k++)
@@ -90,7 +92,7 @@ static void failure_ends_the_loop(void) {
     CHECK_EQUAL(notes.h, 0.02);
     CHECK_EQUAL(y, 3 * 101 + 1);
     Operation unknown = {.kind = EXCHANGE_KIND_COUNT};
-    CHECK(exchange_run(&unknown, 1, 1, 0, 1, &fault) == fmi2Fatal);
+    CHECK(exchange_run(&unknown, 1, 0, 1, &fault) == fmi2Fatal);
 }
 
 static fmi2Status note_keep(fmi2Component c, fmi2FMUstate *state) {
@@ -112,8 +114,9 @@ static void states_are_kept_where_y_says(void) {
         {.kind = EXCHANGE_get_state, .call = (function)note_keep, .component = &notes, .y = &kept},
         {.kind = EXCHANGE_do_step, .call = (function)note_step, .component = &notes, .h = 1},
         {.kind = EXCHANGE_set_state, .call = (function)note_back, .component = &notes, .y = &kept},
+        {.kind = EXCHANGE_end},
     };
-    CHECK(exchange_run(operations, 3, 0.1, 0, 2, &fault) == fmi2OK);
+    CHECK(exchange_run(operations, 0.1, 0, 2, &fault) == fmi2OK);
     CHECK(kept == &notes && notes.calls == 0);
     CHECK_EQUAL(notes.t[0], 0.1);
 }
@@ -127,26 +130,83 @@ static void arithmetic(void) {
     CHECK_EQUAL(y[2], 0.1 + 0.3 * 0.7);
     vector_rate(3, y, a, b, 0.25);
     CHECK_EQUAL(y[0], -8);
-    vector_product(3, y, a, b);
-    CHECK_EQUAL(y[1], -10);
-    vector_product(3, y, y, y); /* in place */
-    CHECK_EQUAL(y[1], 100);
-    double peak[] = {0, 3, 0};
-    vector_peak(3, peak, a);
-    CHECK_EQUAL(peak[0], 1);
-    CHECK_EQUAL(peak[1], 3);
+}
+
+static void energies_of_the_bond(void) {
+    const double M_fr[] = {2, -1}, n[] = {3, 4}, n_slope[] = {10, 20}, assumed_torque[] = {2.5, -1}, n_end[] = {4, 6};
+    double residual[] = {0, 1}, residual_peak[] = {0, 3}, dissipated[] = {0, 1};
+    Bond bond = {(address)M_fr,  (address)n, (address)n_slope, (address)assumed_torque,
+                 (address)n_end, residual,   residual_peak,    dissipated};
+    Operation operations[] = {{.kind = EXCHANGE_bond, .count = 2, .a = &bond, .s = 0.1}, {.kind = EXCHANGE_end}};
+    Fault fault;
+    CHECK(exchange_run(operations, 0.1, 0, 1, &fault) == fmi2OK);
+    /* taken: 2 (3 + 1) = 8 and -1 (4 + 2) = -6; given: 2.5 4 = 10 and -6 */
+    CHECK_NEAR(residual[0], 0.1, 1e-15);
+    CHECK_EQUAL(residual[1], 1);
+    CHECK_EQUAL(residual_peak[0], residual[0]);
+    CHECK_EQUAL(residual_peak[1], 3);
+    CHECK_NEAR(dissipated[0], 0.8, 1e-15);
+    CHECK_NEAR(dissipated[1], 0.4, 1e-15);
     /* what is no number stays visible */
-    vector_peak(1, peak, (const double[]){NAN});
-    CHECK(isnan(peak[0]));
-    vector_peak(1, peak, a);
-    CHECK(isnan(peak[0]));
+    residual[0] = NAN;
+    CHECK(exchange_run(operations, 0.1, 1, 2, &fault) == fmi2OK);
+    CHECK(isnan(residual_peak[0]));
+    residual[0] = 0;
+    CHECK(exchange_run(operations, 0.1, 2, 3, &fault) == fmi2OK);
+    CHECK(isnan(residual_peak[0]));
+}
+
+/* Parts of a turn that stand behind one another are worked in one go: what is due now and then among them, and a
+ * failure in the middle, must come out as if they were worked one by one. */
+static void turns_are_worked_part_by_part(void) {
+    double value[2] = {0, 5}, sent[2][2] = {{0, 6}, {0, 7}}, got = 0;
+    Notes notes = {.fail_at = 2.5};
+    Fault fault = {-1, -1};
+    Operation operations[] = {
+        {.kind = EXCHANGE_set_real,
+         .count = 2,
+         .call = (function)note_set,
+         .component = &notes,
+         .references = references,
+         .y = value},
+        {.kind = EXCHANGE_set_real,
+         .count = 2,
+         .call = (function)note_set,
+         .component = &notes,
+         .references = references,
+         .y = sent,
+         .every = 2,
+         .next = 1,
+         .stride = sizeof sent[0],
+         .rows = 2},
+        {.kind = EXCHANGE_do_step, .call = (function)note_step, .component = &notes, .s = 0.5, .h = 1},
+        {.kind = EXCHANGE_get_real,
+         .count = 1,
+         .call = (function)note_get,
+         .component = &notes,
+         .references = references,
+         .y = &got},
+        {.kind = EXCHANGE_end},
+    };
+    CHECK(exchange_run(operations, 1, 0, 4, &fault) == fmi2Discard);
+    CHECK(fault.cycle == 2 && fault.operation == 2);
+    CHECK(notes.calls == 3 + 4 + 2);
+    CHECK_EQUAL(notes.seen[0], 5);
+    CHECK_EQUAL(notes.t[1], 0.5);
+    CHECK_EQUAL(notes.seen[3], 5);
+    CHECK_EQUAL(notes.seen[4], 6);
+    CHECK_EQUAL(notes.t[5], 1.5);
+    CHECK_EQUAL(got, 106);
+    CHECK_EQUAL(notes.t[8], 2.5);
 }
 
 int main(void) {
-    CHECK_CONTAINS(exchange_interface(), "1: set_real set_slopes do_step");
+    CHECK_CONTAINS(exchange_interface(), "2: set_real set_slopes do_step");
     tables_are_used_row_by_row();
     failure_ends_the_loop();
     states_are_kept_where_y_says();
     arithmetic();
+    energies_of_the_bond();
+    turns_are_worked_part_by_part();
     return CHECK_RESULT;
 }

@@ -46,16 +46,10 @@ def _compile_exchange(cycle: Cycle, start: float, to: Operations) -> None:
             to.go_back(unit)
         to.copy(system.M_fr, cycle.M_fr_start)
         _compile_step(cycle, start, to)
-    n_reached, taken, given, lost = (np.zeros(len(system.axes)) for _ in range(4))
-    # taken = M_fr (n + h n_slope)
-    to.line(n_reached, system.n, h, system.n_slope)
-    to.product(taken, system.M_fr, n_reached)
-    # residual += h/2 (assumed_torque n_end - taken)
-    to.product(given, cycle.assumed_torque, system.n_end)
-    to.line(lost, given, -1.0, taken)
-    to.line(cycle.residual, cycle.residual, 0.5 * h, lost)
-    to.peak(cycle.residual_peak, cycle.residual)
-    to.line(cycle.dissipated, cycle.dissipated, h, taken)
+    to.bond(
+        h, M_fr=system.M_fr, n=system.n, n_slope=system.n_slope, assumed_torque=cycle.assumed_torque,
+        n_end=system.n_end, residual=cycle.residual, residual_peak=cycle.residual_peak, dissipated=cycle.dissipated,
+    )  # fmt: skip
 
 
 def _compile_step(cycle: Cycle, start: float, to: Operations) -> None:

@@ -22,10 +22,10 @@ from feedsim.cosim.unit import GOING_BACK, KEEPING, RECORDING, Floats, Log, Port
 from feedsim.errors import InputError
 
 # src/exchange/exchange.h, word for word.
-VERSION = 1
+VERSION = 2
 KINDS = (
     "set_real", "set_slopes", "do_step", "get_real", "get_slopes", "get_boolean", "get_state", "set_state",
-    "copy", "line", "rate", "product", "peak",
+    "copy", "line", "rate", "bond", "end",
 )  # fmt: skip
 FIELDS = (
     ("int64_t", "kind"), ("int64_t", "count"),
@@ -33,7 +33,12 @@ FIELDS = (
     ("address", "y"), ("address", "a"), ("address", "b"), ("double", "s"), ("double", "h"),
     ("int64_t", "every"), ("int64_t", "next"), ("int64_t", "stride"), ("int64_t", "rows"), ("int64_t", "row"),
 )  # fmt: skip
-INTERFACE = f"{VERSION}: {' '.join(KINDS)}; {' '.join(f'{kind} {name},' for kind, name in FIELDS)}"
+BOND = (
+    "M_fr", "n", "n_slope", "assumed_torque", "n_end", "residual", "residual_peak", "dissipated",
+)  # fmt: skip
+INTERFACE = f"{VERSION}: {' '.join(KINDS)}; {' '.join(f'{kind} {name},' for kind, name in FIELDS)}; " + " ".join(
+    f"address {name}," for name in BOND
+)
 
 _TYPES = {"int64_t": np.int64, "double": np.float64, "function": np.uintp, "address": np.uintp}
 _OPERATION = np.dtype([(name, _TYPES[kind]) for kind, name in FIELDS], align=True)
@@ -75,20 +80,23 @@ def library(folder: Path) -> Native | None:
     run = loaded.exchange_run
     run.restype = ctypes.c_int
     run.argtypes = (
-        ctypes.c_void_p, ctypes.c_int64, ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.POINTER(_Fault),
+        ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.POINTER(_Fault),
     )  # fmt: skip
     return loaded
 
 
-def chosen(wanted: bool | None, fmus: Path) -> Native | None:
-    """The native loop of the archives' folder. `wanted` None: where there is one that fits; False: not wanted.
+def chosen(wanted: bool | None, *folders: Path) -> Native | None:
+    """The native loop in the first of `folders` that has one. `wanted` None: where there is one that fits; False: not
+    wanted.
 
     Raises:
         InputError: it is wanted, and there is none that fits.
     """
-    found = None if wanted is False else library(fmus)
+    found = None if wanted is False else next(filter(None, map(library, dict.fromkeys(folders))), None)
     if wanted and found is None:
-        raise InputError(f"{fmus}: no native cycle loop that fits this version; `make fmus` builds it")
+        raise InputError(
+            f"{', '.join(map(str, folders))}: no native cycle loop that fits this version; `make fmus` builds it"
+        )
     return found
 
 
@@ -117,6 +125,7 @@ class Operations:
         self._calls: list[tuple[Unit, str] | None] = []  # whose, and what it was about, for messages
         self._kept: list[object] = []  # what the addresses belong to
         self._table = np.zeros(0, dtype=_OPERATION)
+        self.failed_in = 0  # the cycle, where a unit has failed
 
     # --- calls
 
@@ -176,13 +185,18 @@ class Operations:
         """y = (a - b) / s"""
         self._add("rate", count=y.size, y=y, a=a, b=b, s=s)
 
-    def product(self, y: Floats, a: Floats, b: Floats) -> None:
-        """y = a b"""
-        self._add("product", count=y.size, y=y, a=a, b=b)
+    def bond(self, h: float, **vectors: Floats) -> None:
+        """The energies of the bond between plant and friction over a step of h [s]; vectors by the names of BOND:
 
-    def peak(self, y: Floats, a: Floats) -> None:
-        """y = max(y, |a|)"""
-        self._add("peak", count=y.size, y=y, a=a)
+        taken = M_fr (n + h n_slope), residual += h/2 (assumed_torque n_end - taken), residual_peak its largest size
+        so far, dissipated += h taken.
+        """
+        for name, vector in vectors.items():
+            if vector.dtype != np.float64 or not vector.flags.c_contiguous:
+                raise ValueError(f"bond: {name} must be contiguous float64")
+        self._kept.extend(vectors.values())
+        addresses = np.array([vectors[name].ctypes.data for name in BOND], dtype=np.uintp)
+        self._add("bond", count=vectors["residual"].size, a=addresses, s=h)
 
     # --- how it is written down
 
@@ -229,19 +243,21 @@ class Operations:
         Raises:
             SimulationError: a unit failed; the message names the unit, the time and the unit's reason.
         """
-        if len(self._table) != len(self._rows):
-            self._table = np.zeros(len(self._rows), dtype=_OPERATION)
-            for operation, row in zip(self._table, self._rows, strict=True):
+        if not len(self._table):
+            rows = [*self._rows, {"kind": KINDS.index("end")}]
+            self._table = np.zeros(len(rows), dtype=_OPERATION)
+            for operation, row in zip(self._table, rows, strict=True):
                 for name, value in row.items():
                     operation[name] = value
         fault = _Fault()
-        if native.exchange_run(self._table.ctypes.data, len(self._table), T_c, begin, end, ctypes.byref(fault)):
+        if native.exchange_run(self._table.ctypes.data, T_c, begin, end, ctypes.byref(fault)):
             self._fail(fault.cycle, fault.operation, T_c)
 
     def _fail(self, k: int, at: int, T_c: float) -> NoReturn:
         call = self._calls[at]
         assert call is not None, f"operation {at} is none that can fail"
         unit, action = call
+        self.failed_in = k
         t = k * T_c
         if self._rows[at]["kind"] == KINDS.index("do_step"):
             t += self._rows[at]["s"]

@@ -17,7 +17,7 @@ import numpy as np
 
 from feedsim.cosim import wiring
 from feedsim.cosim.exchange import When, chosen
-from feedsim.cosim.loop import Activity, Keep, Loop, Progress, Record, Send, setpoints
+from feedsim.cosim.loop import Activity, Keep, Loop, Progress, Record, Send, Setpoints
 from feedsim.cosim.run import fmus_directory
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
@@ -125,9 +125,10 @@ def measure(
     with System(machine, fmus, friction=friction) as system:
         cycle = Cycle(system, SCHEMES["extrapolated"], cycles.T_c, 1)
         record = _Record(system, periods * rows, When(first=kept))
-        before: list[Activity] = [*setpoints(system, program, ratio)] if offset_speed else []
+        drives = Setpoints(system, program, ratio)
+        before: list[Activity] = [*drives.sends] if offset_speed else []
         before += [_excite(system, axis, inject, excitation, When(first=first * ratio)), *record.before]
-        loop = Loop(cycle, tuple(before), record.after, library)
+        loop = Loop(cycle, tuple(before), record.after, library, (drives,) if offset_speed else ())
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
         loop.run(total, progress)

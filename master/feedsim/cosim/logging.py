@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 from feedsim.cosim.unit import Floats
 from feedsim.errors import InputError
 from feedsim.scenario import Level, Logging, Scenario, moved_axes
-from feedsim.trace import Trace
+from feedsim.trace import Table, Trace, least_and_largest, release, stretches
 
 LINEAR = ("i_d", "i_q", "M_a", "M_fr", "z", "c")
 SMOOTH = ("x_a", "n_a")
@@ -26,6 +28,8 @@ IDEAL = ("i_d", "i_q", "M_a")
 ON_THE_GRID = 1e-6  # of a control cycle: instants come from decimal text
 # Below this share of the largest speed setpoint an axis stands: the spline of the setpoints rings down exponentially.
 STANDS = 1e-9
+# Rows that are worked on at a time.
+BLOCK = 1 << 19
 
 
 class FullRate(Protocol):
@@ -60,12 +64,12 @@ def logged(source: FullRate | Trace, logging: Logging | None = None, *, ideal: S
     return log(fine, logging or Logging(), ideal)
 
 
-def log(fine: Trace, logging: Logging, ideal: Sequence[str] = ()) -> Trace:
+def log(fine: Trace, logging: Logging, ideal: Sequence[str] = (), scratch: Path | None = None) -> Trace:
     """The log of signals at the control cycle: columns "A.signal", a row per logging interval, the first at 0.
 
     fine: columns "A.signal" at k T_c from 0; with A.n_ffw where noise is given as a share. Before the start every
     signal has been as it is at 0. Noise of every signal is a random stream of its own, made of the seed and
-    the column's name.
+    the column's name. scratch: folder for the file that holds a long log.
     """
     cycle = float(fine.time[-1] - fine.time[0]) / max(len(fine) - 1, 1)
     every = round(logging.interval / cycle)
@@ -73,20 +77,44 @@ def log(fine: Trace, logging: Logging, ideal: Sequence[str] = ()) -> Trace:
         raise InputError(
             f"logging.interval: {logging.interval:.9g} s is no whole multiple of the signals' cycle, {cycle:.9g} s"
         )
-    rows = np.arange(0, len(fine), every)
-    columns: dict[str, Floats] = {}
+    rows = -(-len(fine) // every)
     noise, steps, delays = logging.noise.given(), logging.quantisation.given(), logging.delay.given()
-    for axis in logging.axes or _axes_of(fine):
-        for signal in logging.signals:
-            name = f"{axis}.{signal}"
-            values = sampled(fine[name], rows, delays.get(signal, 0.0) / cycle, _course(signal, axis in ideal))
-            if signal in noise:
-                deviation = _deviation(noise[signal], fine, axis, name)
-                values = values + deviation * _stream(logging.seed, name).standard_normal(len(values))
-            if signal in steps:
-                values = np.round(values / steps[signal]) * steps[signal]
-            columns[name] = values
-    return Trace(np.asarray(rows * cycle, dtype=np.float64), columns, {name: fine.unit(name) for name in columns})
+    names = [(axis, signal) for axis in logging.axes or _axes_of(fine) for signal in logging.signals]
+    logs = []
+    for axis, signal in names:
+        name = f"{axis}.{signal}"
+        course, delay = _course(signal, axis in ideal), delays.get(signal, 0.0) / cycle
+        deviation = _deviation(noise[signal], fine, axis, name) if signal in noise else None
+        logs.append(_Column(fine[name], course, delay, deviation, _stream(logging.seed, name), steps.get(signal)))
+    table = Table(1 + len(logs), rows, scratch)
+    for first in range(0, rows, BLOCK):
+        at = np.arange(first, min(first + BLOCK, rows)) * every
+        table.append(np.array([at * cycle, *(column.at(at) for column in logs)]))
+        release(*(column.values for column in logs))
+    time, *columns = table.columns()
+    found = {f"{axis}.{signal}": column for (axis, signal), column in zip(names, columns, strict=True)}
+    return Trace(time, found, {name: fine.unit(name) for name in found})
+
+
+@dataclass(frozen=True, eq=False)
+class _Column:
+    """A signal at the control cycle, and what becomes of it on its way into a log."""
+
+    values: Floats
+    course: str
+    delay: float  # cycles
+    deviation: float | None  # of the noise
+    stream: np.random.Generator
+    quantum: float | None
+
+    def at(self, rows: NDArray[np.int64]) -> Floats:
+        """The log at the next of its rows."""
+        values = sampled(self.values, rows, self.delay, self.course)
+        if self.deviation is not None:
+            values = values + self.deviation * self.stream.standard_normal(len(values))
+        if self.quantum is not None:
+            values = np.round(values / self.quantum) * self.quantum
+        return values
 
 
 def sampled(values: Floats, rows: NDArray[np.int64], delay: float, course: str) -> Floats:
@@ -157,9 +185,17 @@ def _axes_of(fine: Trace) -> tuple[str, ...]:
 def _deviation(level: Level, fine: Trace, axis: str, name: str) -> float:
     if not level.relative:
         return level.value
-    speed = np.abs(fine[f"{axis}.n_ffw"])
-    moving = speed > STANDS * speed.max(initial=0.0)
-    return level.value * math.sqrt(float(np.mean(fine[name][moving] ** 2))) if moving.any() else 0.0
+    speed = fine[f"{axis}.n_ffw"]
+    stands = STANDS * max(abs(end) for end in least_and_largest(speed))
+    means: list[float] = []
+    counts: list[int] = []
+    for n, values in stretches(speed, fine[name], rows=BLOCK):
+        if (moving := np.abs(n) > stands).any():
+            means.append(float(np.mean(values[moving] ** 2)))
+            counts.append(int(np.count_nonzero(moving)))
+    # A single stretch keeps the digits of its mean.
+    mean = means[0] if len(means) == 1 else float(np.dot(means, counts)) / max(sum(counts), 1)
+    return level.value * math.sqrt(mean)
 
 
 def _stream(seed: int, name: str) -> np.random.Generator:

@@ -16,12 +16,16 @@ from feedsim.cosim.exchange import Native, Operations, When
 from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats, Log, Port
+from feedsim.errors import SimulationError
 from feedsim.nc import Program
+from feedsim.trace import release
 
 Progress = Callable[[int, int], None]
 
 # Cycles between two reports of progress, some 60 ms in Python, 3 ms in the native loop, which is interrupted here only.
 REPORTED_EVERY = 2048
+# Rows that are held at the least of what is long.
+RING = 1024
 
 
 class Activity(Protocol):
@@ -96,18 +100,29 @@ class Keep:
         to.copy(self.table, self.buffer, self.when)
 
 
-@dataclass(frozen=True, eq=False)
+class Buffered(Protocol):
+    """What holds a stretch of a run only: it is refilled, or emptied, between the cycles."""
+
+    def ahead(self, begin: int, end: int) -> None:
+        """Be ready for the cycles `begin` to `end` - 1; those before are done."""
+
+
+@dataclass(eq=False)
 class Loop:
     """Control cycles with what happens `before` and `after` each, in that order.
 
     Attributes:
         native: the library that executes it; None: Python does.
+        buffered: what is told of every stretch of cycles ahead of it.
+        done: cycles so far.
     """
 
     cycle: Cycle
     before: tuple[Activity, ...]
     after: tuple[Activity, ...]
     native: Native | None
+    buffered: tuple[Buffered, ...] = ()
+    done: int = 0
 
     def run(self, total: int, progress: Progress | None = None) -> None:
         """Work `total` cycles from the first one on.
@@ -119,6 +134,8 @@ class Loop:
         with np.errstate(over="ignore", invalid="ignore"):  # the unit that meets an overflow reports it
             for begin in range(0, total, REPORTED_EVERY):
                 end = min(begin + REPORTED_EVERY, total)
+                for part in self.buffered:
+                    part.ahead(begin, end)
                 work(begin, end)
                 if progress is not None and end - begin == REPORTED_EVERY:
                     progress(end, total)
@@ -135,6 +152,7 @@ class Loop:
                 cycle.run(k)
                 for activity in after:
                     activity(k)
+                self.done = k + 1
 
         return work
 
@@ -145,13 +163,41 @@ class Loop:
         compile_cycle(self.cycle, operations)
         for activity in self.after:
             activity.compile(operations)
-        return lambda begin, end: operations.run(native, self.cycle.cycle, begin, end)
+
+        def work(begin: int, end: int) -> None:
+            try:
+                operations.run(native, self.cycle.cycle, begin, end)
+            except SimulationError:
+                self.done = operations.failed_in
+                raise
+            self.done = end
+
+        return work
 
 
-def setpoints(system: System, program: Program, ratio: int) -> list[Send]:
-    """The setpoints of each position cycle, `ratio` control cycles long."""
-    when = When(every=ratio)
-    return [
-        Send(control.setpoint, np.column_stack([program.x_s[axis], program.n_ffw[axis]]), when)
-        for axis, control in zip(system.axes, system.controllers, strict=True)
-    ]
+class Setpoints:
+    """The setpoints of each position cycle, `ratio` control cycles long, for the drives; of a long program a stretch.
+
+    Attributes:
+        sends: one per axis.
+    """
+
+    def __init__(self, system: System, program: Program, ratio: int) -> None:
+        self._columns = [(program.x_s[axis], program.n_ffw[axis]) for axis in system.axes]
+        self._ratio = ratio
+        self._rows = min(len(program.time), max(RING, 2 * (REPORTED_EVERY // ratio + 1)))
+        self._filled = 0
+        when = When(every=ratio)
+        self.sends = [Send(control.setpoint, np.zeros((self._rows, 2)), when) for control in system.controllers]
+
+    def ahead(self, begin: int, end: int) -> None:
+        done, needed = -(-begin // self._ratio), -(-end // self._ratio)
+        if needed <= self._filled:
+            return
+        last = min(done + self._rows, len(self._columns[0][0]))
+        at = np.arange(self._filled, last) % self._rows
+        for send, columns in zip(self.sends, self._columns, strict=True):
+            for i, column in enumerate(columns):
+                send.values[at, i] = column[self._filled : last]
+        release(*(column for columns in self._columns for column in columns))
+        self._filled = last

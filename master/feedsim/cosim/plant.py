@@ -48,8 +48,11 @@ def open_plant(machine: Machine, fmus: Path) -> Plant:
     with tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True) as folder:
         packed = Path(folder) / "plant.fmu"
         pose = {axis: machine.pose[axis] for axis in machine.axes}
-        # Without a trial: the unit is instantiated next anyway.
-        pack(general.path, packed, modes=machine.modes, pose=pose, name=machine.name, note=machine.note, trial=False)
+        # Without a trial: the unit is instantiated next anyway. Uncompressed: it is unpacked at once.
+        pack(
+            general.path, packed, modes=machine.modes, pose=pose, name=machine.name, note=machine.note, trial=False,
+            level=0,
+        )  # fmt: skip
         return Plant(Archive(packed), None)
 
 

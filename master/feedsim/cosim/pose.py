@@ -54,7 +54,7 @@ class PoseUse:
 
 def pose_use(machine: Machine, program: Program, system: System) -> PoseUse:
     """Of a system that is built; with the crossings so far, where the plant follows its axes."""
-    ranges = {axis: (float(x.min()), float(x.max())) for axis, x in program.x_s.items()}
+    ranges = {axis: program.reached(axis) for axis in program.x_s}
     grid = _grid(system)
     followed = {axis.axis for axis in grid}
     change = pose_change(machine, {axis: reached for axis, reached in ranges.items() if axis not in followed})

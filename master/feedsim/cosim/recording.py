@@ -1,20 +1,28 @@
-"""What a run records: which signals of which unit, row by row, and the trace they become."""
+"""What a run records: which signals of which unit, row by row, and the trace they become.
+
+The cycle loop writes rows into rings that hold a stretch of a run, over and over again; what they hold is taken over
+into the table of the whole run before it is overwritten.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+from pathlib import Path
+from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedsim.cosim import wiring
 from feedsim.cosim.exchange import When
-from feedsim.cosim.loop import Record
-from feedsim.cosim.system import System
+from feedsim.cosim.loop import REPORTED_EVERY, RING, Activity, Keep, Record
+from feedsim.cosim.schedule import Cycle
+from feedsim.cosim.signals import held
 from feedsim.cosim.unit import Floats, Log
 from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Scenario
-from feedsim.trace import Trace, matching
+from feedsim.trace import Table, Trace, matching
 
 CONTROLLER_SIGNALS = (
     "M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q", "torque_limited", "voltage_limited",
@@ -22,6 +30,12 @@ CONTROLLER_SIGNALS = (
 FRICTION_SIGNALS = ("M_fr", "z", "c", "k", "lambda")
 PLANT_SIGNALS = ("x_a", "n_a")
 TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
+# Of the coupling, not of a unit: recorded where it is asked for.
+RESIDUAL, RESIDUAL_UNIT = "residual", "J"
+# The drives' limits are looked at in every run: a warning must not depend on what is recorded.
+LIMITS = ("torque_limited", "voltage_limited")
+
+Sink = Callable[[Trace], None]
 
 
 def recorded_columns(scenario: Scenario) -> list[str]:
@@ -30,81 +44,161 @@ def recorded_columns(scenario: Scenario) -> list[str]:
     Raises:
         InputError: an entry of recording.variables matches none.
     """
-    names = [
-        f"{axis}.{signal}"
-        for axis in scenario.machine.axes
-        for signal in (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *CONTROLLER_SIGNALS, *FRICTION_SIGNALS)
-    ]
-    names += TOOL_SIGNALS
-    if scenario.recording.variables is None:
-        return names
+    axes = tuple(scenario.machine.axes)
+    wanted = scenario.recording.variables
+    if wanted is None:
+        return columns_of(axes)
     try:
-        return matching(names, scenario.recording.variables)
+        return matching(columns_of(axes, residual=True), wanted)
     except InputError as error:
         raise InputError(f"{scenario.file}: recording.variables: {error}") from None
 
 
+def columns_of(axes: Collection[str], *, residual: bool = False) -> list[str]:
+    """All columns that can be recorded, in the order of a trace."""
+    signals = (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *CONTROLLER_SIGNALS, *FRICTION_SIGNALS)
+    signals += (RESIDUAL,) if residual else ()
+    return [*(f"{axis}.{signal}" for axis in axes for signal in signals), *TOOL_SIGNALS]
+
+
 class Recording:
-    """Rows of the units' signals, one every `every` control cycles.
+    """Rows of signals, one every `every` control cycles; a buffered part of a :class:`~feedsim.cosim.loop.Loop`.
 
     Attributes:
-        logs: instance -> its :class:`Log`.
+        limited: axis and limit -> rows in which the drive was at it.
+        sinking: time that the sink has taken [s].
     """
 
-    def __init__(self, system: System, cycles: int, every: int, only: Collection[str] | None = None) -> None:
-        """`only`: columns of the trace to be; None: all."""
-        self.system = system
-        self.every = every
-        self.only = only
-        rows = cycles // every + 1
-        plant = [f"{axis}.{signal}" for axis in system.axes for signal in PLANT_SIGNALS] + list(TOOL_SIGNALS)
-        self.logs = {wiring.PLANT: Log(system.plant, [name for name in plant if self._wanted(name)], rows)}
-        for axis in system.axes:
-            for instance, signals in (
-                (wiring.controller(axis), CONTROLLER_SIGNALS),
-                (wiring.friction(axis), FRICTION_SIGNALS),
-            ):
-                names = [signal for signal in signals if self._wanted(f"{axis}.{signal}")]
-                self.logs[instance] = Log(system.units[instance], names, rows)
+    def __init__(
+        self,
+        cycle: Cycle,
+        program: Program,
+        cycles: int,
+        ratio: int,
+        every: int,
+        columns: Collection[str],
+        *,
+        scratch: Path | None = None,
+        sink: Sink | None = None,
+    ) -> None:
+        """
+        Args:
+            cycles: control cycles of the run; `ratio` of them are a position cycle.
+            columns: of the trace to be; the units are asked for nothing else but their limits.
+            scratch: folder for the file that holds a long trace.
+            sink: called with the rows, a stretch at a time, as soon as they are there.
 
-    def _wanted(self, column: str) -> bool:
-        return self.only is None or column in self.only
+        Raises:
+            InputError: a column that there is not.
+            OutputError: the file cannot be made.
+        """
+        system = cycle.system
+        self._axes = system.axes
+        self.every, self._ratio, self._T_c = every, ratio, cycle.cycle
+        self._columns = matching(columns_of(system.axes, residual=True), columns)
+        total = cycles // every + 1
+        self._ring = min(total, max(RING, 2 * (REPORTED_EVERY // every + 1)))
+        self._table = Table(1 + len(self._columns), total, scratch)
+        self._sink, self.sinking = sink, 0.0
+        self._units: dict[str, str] = {}
+        self._logs: list[tuple[Log, dict[str, str]]] = []  # with the names that its signals have in the trace
+        self._setpoints: dict[str, Floats] = {}
+        for axis in system.axes:
+            for setpoint, values in (("x_s", program.x_s), ("n_ffw", program.n_ffw)):
+                if (name := f"{axis}.{setpoint}") in self._columns:
+                    self._setpoints[name] = values[axis]
+                    self._units[name] = wiring.SETPOINT_UNITS[setpoint]
+        plant = [f"{axis}.{signal}" for axis in system.axes for signal in PLANT_SIGNALS]
+        self._log(wiring.PLANT, {name: name for name in (*plant, *TOOL_SIGNALS)}, cycle)
+        for axis in system.axes:
+            self._log(wiring.controller(axis), {signal: f"{axis}.{signal}" for signal in CONTROLLER_SIGNALS}, cycle)
+            self._log(wiring.friction(axis), {signal: f"{axis}.{signal}" for signal in FRICTION_SIGNALS}, cycle)
+        residuals = [f"{axis}.{RESIDUAL}" for axis in system.axes]
+        self._residual = np.zeros((self._ring, len(system.axes)))
+        self._residual_names = residuals if any(name in self._columns for name in residuals) else []
+        self._units |= {name: RESIDUAL_UNIT for name in residuals if name in self._columns}
+        self._cycle = cycle
+        self.limited = {f"{axis}.{limit}": 0 for axis in system.axes for limit in LIMITS}
+
+    def _log(self, instance: str, names: dict[str, str], cycle: Cycle) -> None:
+        """Record the signals of a unit that are among the columns; `names`: signal -> column."""
+        asked = {signal: name for signal, name in names.items() if name in self._columns or signal in LIMITS}
+        if not asked:
+            return
+        log = Log(cycle.system.units[instance], list(asked), self._ring)
+        self._logs.append((log, asked))
+        for signal, name in asked.items():
+            if name in self._columns:
+                self._units[name] = log.unit.archive.unit_of(signal)
+
+    @property
+    def rows(self) -> int:
+        """How many have been taken over."""
+        return self._table.filled
+
+    @property
+    def activities(self) -> list[Activity]:
+        """What the cycle loop does ahead of each cycle; the end of the last one is left to :meth:`record`."""
+        when = When(every=self.every)
+        kept = [Keep(self._cycle.residual, self._residual, when)] if self._residual_names else []
+        return [*(Record(log, when) for log, _ in self._logs), *kept]
 
     def record(self, k: int) -> None:
         """Record the instant k T_c, where it is one to be recorded."""
-        if k % self.every == 0:
-            for log in self.logs.values():
-                log.record(k // self.every)
+        for activity in self.activities:
+            activity(k)
 
-    @property
-    def activities(self) -> list[Record]:
-        """The same for the cycle loop; the end of the last cycle is left to :meth:`record`."""
-        return [Record(log, When(every=self.every)) for log in self.logs.values()]
+    def ahead(self, begin: int, end: int) -> None:
+        """Make room for the rows of the cycles `begin` to `end` - 1."""
+        if -(-end // self.every) - self.rows > self._ring:
+            self.collect(begin)
 
-    def trace(self, program: Program, T_c: float, ratio: int) -> Trace:
-        """The signals over time; setpoints are those of the position cycle, `ratio` control cycles long."""
-        plant = self.logs[wiring.PLANT]
-        of_plant = plant.columns()
-        cycle = np.arange(len(plant.reals)) * self.every
-        position_cycle = cycle // ratio
-        columns: dict[str, Floats] = {}
-        units: dict[str, str] = {}
-        for axis in self.system.axes:
-            for setpoint, values in (("x_s", program.x_s), ("n_ffw", program.n_ffw)):
-                if not self._wanted(f"{axis}.{setpoint}"):
-                    continue
-                columns[f"{axis}.{setpoint}"] = values[axis][position_cycle]
-                units[f"{axis}.{setpoint}"] = wiring.SETPOINT_UNITS[setpoint]
-            for name in (f"{axis}.{signal}" for signal in PLANT_SIGNALS):
-                if name in of_plant:
-                    columns[name] = of_plant[name]
-                    units[name] = plant.unit.archive.unit_of(name)
-            for log in (self.logs[wiring.controller(axis)], self.logs[wiring.friction(axis)]):
-                for signal, column in log.columns().items():
-                    columns[f"{axis}.{signal}"] = column
-                    units[f"{axis}.{signal}"] = log.unit.archive.unit_of(signal)
-        for signal in TOOL_SIGNALS:
-            if signal in of_plant:
-                columns[signal] = of_plant[signal]
-                units[signal] = plant.unit.archive.unit_of(signal)
-        return Trace(time=np.asarray(cycle * T_c, dtype=np.float64), columns=columns, units=units)
+    def collect(self, cycles: int) -> None:
+        """Take over the rows of the instants before that of `cycles`.
+
+        Raises:
+            OutputError: the disk is full; or what the sink raises.
+        """
+        first, last = self.rows, min(-(-cycles // self.every), self._table.rows)
+        if first >= last:
+            return
+        with held():  # neither half a row nor one twice
+            block = self._block(np.arange(first, last))
+            self._table.append(block)
+            if self._sink is not None:
+                begun = perf_counter()
+                self._sink(self._as_trace(list(block)))
+                self.sinking += perf_counter() - begun
+
+    def _block(self, rows: NDArray[np.int64]) -> Floats:
+        """Time and columns of rows that the rings hold, (1 + columns, n)."""
+        at, cycle = rows % self._ring, rows * self.every
+        found: dict[str, Floats] = {}
+        for log, names in self._logs:
+            reals, flags = log.reals[at].T, log.flags[at].T
+            found.update({names[signal]: values for signal, values in zip(log.real_names, reals, strict=True)})
+            found.update({names[signal]: values for signal, values in zip(log.flag_names, flags, strict=True)})
+        for name in self.limited:
+            self.limited[name] += int(np.count_nonzero(found[name]))
+        position_cycle = cycle // self._ratio
+        low, high = int(position_cycle[0]), int(position_cycle[-1]) + 1
+        found |= {name: values[low:high][position_cycle - low] for name, values in self._setpoints.items()}
+        if self._residual_names:
+            found |= dict(zip(self._residual_names, self._residual[at].T, strict=True))
+        block = np.empty((1 + len(self._columns), len(rows)))
+        block[0] = cycle * self._T_c
+        for i, name in enumerate(self._columns):
+            block[1 + i] = found[name]
+        return block
+
+    def share(self, limit: str) -> float:
+        """Share of the recorded instants at which a drive was at a limit, "A.torque_limited"."""
+        return self.limited[limit] / self.rows if self.rows else 0.0
+
+    def trace(self) -> Trace:
+        """The rows that were taken over; nothing can be recorded afterwards."""
+        return self._as_trace(self._table.columns())
+
+    def _as_trace(self, columns: list[Floats]) -> Trace:
+        time, *values = columns
+        return Trace(time, dict(zip(self._columns, values, strict=True)), self._units)

@@ -12,9 +12,9 @@ from feedsim.cosim import trust
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
-from feedsim.cosim.loop import Activity, Loop, Progress, setpoints
+from feedsim.cosim.loop import Activity, Loop, Progress, Setpoints
 from feedsim.cosim.pose import PoseUse, pose_use
-from feedsim.cosim.recording import Recording, recorded_columns
+from feedsim.cosim.recording import Recording, Sink, recorded_columns
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
 from feedsim.nc import Program, plan
@@ -27,10 +27,14 @@ from feedsim.trace import Trace
 class Run:
     """What a run leaves behind.
 
+    Long traces and programs are in files without names, and read page by page: they vanish, and give back the disk,
+    with the last array that looks into them; nothing is to be closed or removed. A copy (``numpy.array(column)``) is in
+    memory as usual.
+
     Attributes:
         trace: recorded signals, columns "X.x_a" ... in SI units.
         coupling: per axis, interface energy residual [J], its peak, and the friction work [J] to hold it against.
-        wall_time: duration of the cycle loop [s].
+        wall_time: duration of the cycle loop [s], without what a `sink` has taken.
         native: whether the native loop has executed it.
         units: per instance, GUID and version of its archive.
         pose: how far the motion leaves the plant's pose, or how the plant followed it.
@@ -67,6 +71,8 @@ def run(
     progress: Progress | None = None,
     torque_feedforward: TorqueFeedforward | None = None,
     native: bool | None = None,
+    scratch: Path | None = None,
+    sink: Sink | None = None,
 ) -> Run:
     """Run `scenario` and return its trace.
 
@@ -78,12 +84,16 @@ def run(
             program's end.
         native: whether the native cycle loop beside the archives is to work (else Python does, to the same bits);
             default: where there is one.
+        scratch: folder for the files without names that hold what is long; default: the system's for temporary files.
+        sink: called with the rows of the trace, a stretch at a time, while the run goes on; of one that fails or is
+            interrupted it has got all rows up to there when the exception arrives.
 
     Raises:
         InputError: the motion violates a limit, the archives do not fit the machine, `native` without such a loop.
         SimulationError: a unit failed; the message names the unit, the time and the unit's reason.
+        OutputError: a file without a name cannot be written.
     """
-    program = program or plan(scenario)
+    program = program or plan(scenario, scratch=scratch)
     recorded = recorded_columns(scenario)
     modes = checked_modes(scenario.machine)
     cycles = scenario.machine.cycles
@@ -91,28 +101,35 @@ def run(
     every = round(scenario.recording.interval / cycles.T_c)
     total = (len(program.time) - 1) * ratio
     fmus = fmus or fmus_directory()
-    library = chosen(native, fmus)
+    library = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
     with System(scenario.machine, fmus) as system:
         cycle = Cycle(system, SCHEMES[scenario.coupling.scheme], cycles.T_c, scenario.coupling.substeps)
-        recording = Recording(system, total, every)
-        at_full_rate = Recording(system, total, 1, full_rate_columns(scenario)) if scenario.logging else None
-        before: list[Activity] = [*setpoints(system, program, ratio), *recording.activities]
-        before += at_full_rate.activities if at_full_rate is not None else []
+        recording = Recording(cycle, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
+        recordings, at_full_rate = [recording], None
+        if scenario.logging:
+            at_full_rate = Recording(cycle, program, total, ratio, 1, full_rate_columns(scenario), scratch=scratch)
+            recordings.append(at_full_rate)
+        drives = Setpoints(system, program, ratio)
+        before: list[Activity] = [*drives.sends, *(activity for each in recordings for activity in each.activities)]
         before += feeders(system, torque_feedforward or {}, total + 1)
-        loop = Loop(cycle, tuple(before), (), library)
+        loop = Loop(cycle, tuple(before), (), library, (drives, *recordings))
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
-        loop.run(total, progress)
-        for last in (recording, at_full_rate):
-            if last is not None:
-                last.record(total)
-        wall_time = time.perf_counter() - begun
+        try:
+            loop.run(total, progress)
+        except BaseException:
+            recording.collect(loop.done)
+            raise
+        for each in recordings:
+            each.record(total)
+            each.collect(total + 1)
+        wall_time = time.perf_counter() - begun - recording.sinking
         pose = pose_use(scenario.machine, program, system)
-        fine = None if at_full_rate is None else at_full_rate.trace(program, cycles.T_c, ratio)
+        fine = None if at_full_rate is None else at_full_rate.trace()
         return Run(
             scenario=scenario,
             program=program,
-            trace=recording.trace(program, cycles.T_c, ratio).select(recorded),
+            trace=recording.trace(),
             coupling=trust.energies(system, cycle),
             wall_time=wall_time,
             units={
@@ -127,7 +144,9 @@ def run(
                 *trust.found(scenario, cycle, recording),
             ),
             fine=fine,
-            log=None if fine is None or scenario.logging is None else log(fine, scenario.logging, ideal_axes(scenario)),
+            log=None
+            if fine is None or scenario.logging is None
+            else log(fine, scenario.logging, ideal_axes(scenario), scratch),
             native=loop.native is not None,
         )
 

@@ -21,7 +21,7 @@ class Scheme:
     name: str
     torque_ramp: bool  # plant: M_a runs linearly from M_a(t_k) to M_a(t_k+1); else M_a(t_k) is held
     friction_ramp: bool  # plant: M_fr is extrapolated with the slope of its last step; else held
-    stable_share: float  # of 2 J_inf/h that the friction's slope sigma_1 + sigma_2 may reach; found by trial on Z
+    stable_share: float  # of 2 J_inf/h that the friction's slope sigma_1 + sigma_2 may reach; docs/theory.md derives it
     speed: str  # friction: n_fr linear "within" the step, held at its "end" or its "start", or "extrapolated"
     passes: int = 1  # plant and friction go back and take the step again, with the slope of M_fr that they have found
 
@@ -29,12 +29,12 @@ class Scheme:
 SCHEMES = {
     scheme.name: scheme
     for scheme in (
-        Scheme("extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.28, speed="within"),
-        Scheme("iterated", torque_ramp=True, friction_ramp=True, stable_share=0.52, speed="within", passes=2),
+        Scheme("extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.25, speed="within"),
+        Scheme("iterated", torque_ramp=True, friction_ramp=True, stable_share=0.5, speed="within", passes=2),
         Scheme("gauss_seidel", torque_ramp=True, friction_ramp=False, stable_share=0.5, speed="end"),
-        Scheme("jacobi", torque_ramp=True, friction_ramp=False, stable_share=0.28, speed="start"),
-        Scheme("jacobi_extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.11, speed="extrapolated"),
-        Scheme("parallel", torque_ramp=False, friction_ramp=False, stable_share=0.28, speed="start"),
+        Scheme("jacobi", torque_ramp=True, friction_ramp=False, stable_share=0.25, speed="start"),
+        Scheme("jacobi_extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.1, speed="extrapolated"),
+        Scheme("parallel", torque_ramp=False, friction_ramp=False, stable_share=0.25, speed="start"),
     )
 }
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from feedsim.cosim import wiring
 from feedsim.cosim.recording import Recording
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
@@ -34,7 +33,7 @@ def foreseen(scenario: Scenario, modes: Modes) -> tuple[str, ...]:
 
 def found(scenario: Scenario, cycle: Cycle, recording: Recording) -> tuple[str, ...]:
     """What the run itself tells a user to doubt, a sentence each."""
-    return (*_energy(scenario, recording.system, cycle), *_limits(recording))
+    return (*_energy(scenario, cycle.system, cycle), *_limits(recording))
 
 
 def _stability(scenario: Scenario, modes: Modes) -> list[str]:
@@ -47,8 +46,8 @@ def _stability(scenario: Scenario, modes: Modes) -> list[str]:
         if slope > scheme.stable_share * bound:
             warnings.append(
                 f"axis {name}: sigma_1 + sigma_2 = {slope:.4g} N.m.s/rad is above "
-                f"{scheme.stable_share * bound:.4g}, where scheme {scheme.name} was found to become "
-                f"unstable ({scheme.stable_share:g} of 2 J_inf/h); use more coupling.substeps"
+                f"{scheme.stable_share * bound:.4g}, where scheme {scheme.name} becomes unstable at a reversal "
+                f"({scheme.stable_share:g} of 2 J_inf/h); use more coupling.substeps"
             )
     return warnings
 
@@ -79,7 +78,6 @@ def _energy(scenario: Scenario, system: System, cycle: Cycle) -> list[str]:
 def _limits(recording: Recording) -> list[str]:
     return [
         f"axis {axis}: {flag.replace('_', ' ')} in {100 * share:.2g} % of the recorded instants"
-        for axis in recording.system.axes
-        for flag in ("torque_limited", "voltage_limited")
-        if (share := float(np.mean(recording.logs[wiring.controller(axis)].columns()[flag]))) > 0
+        for axis, _, flag in (limit.partition(".") for limit in recording.limited)
+        if (share := recording.share(f"{axis}.{flag}")) > 0
     ]

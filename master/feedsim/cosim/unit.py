@@ -7,14 +7,16 @@ addresses go straight into the FMI calls: wiring two units is sharing memory, an
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import os
 import re
-import tempfile
+import threading
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn, Self
+from typing import IO, Any, NoReturn, Self
 
 import numpy as np
 from fmpy import read_model_description
@@ -22,11 +24,13 @@ from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2Ca
 from numpy.typing import NDArray
 
 from feedsim.cosim import binaries, signals, untrusted
+from feedsim.cosim.unpacked import STORE, Content, Description, check_there
 from feedsim.errors import InputError, SimulationError
 
 Floats = NDArray[np.float64]
 
 _DESCRIPTION = "modelDescription.xml"
+_LOADING = threading.Lock()  # FMPy changes the working folder while it loads a library
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 # Compiled ahead: what a signal raises inside a callback is lost, so callbacks are kept short.
 _CALL = re.compile(r"^fmi2[A-Za-z]+: ")
@@ -41,11 +45,14 @@ _STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.
 
 
 class Archive:
-    """An ``.fmu`` file, unpacked into a temporary folder for as long as this object is open (a context manager).
+    """An ``.fmu`` file, unpacked for as long as this object is open (a context manager).
 
-    Unpacked is what a run needs: description, resources, and the library for this platform.
+    Unpacked is what a run needs: description, resources, and the library for this platform. Archives of the same
+    content share it, and a later one finds it still there (feedsim.cosim.unpacked).
 
     Attributes:
+        directory: where it is unpacked to; only to be read.
+        variables: by name.
         platforms: the folders in its binaries/, for this platform and others.
     """
 
@@ -55,53 +62,13 @@ class Archive:
         Raises:
             InputError: no such file, or not an FMI 2.0 archive with co-simulation that can be trusted.
         """
-        if not path.is_file():
-            raise InputError(f"{path}: no such file; `make fmus` builds the archives, FEEDSIM_FMUS names their folder")
+        check_there(path)
         self.path = path
-        # An object that removes its folder even when a signal ends the program while the archive is being unpacked.
-        self._folder = tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True)
-        self.directory = Path(self._folder.name)
-        try:
-            self.platforms = self._unpack(allowance or untrusted.Allowance(path))
-            self.description = self._read_description()
-        except BaseException:
-            self.close()
-            raise
-        self.variables = {variable.name: variable for variable in self.description.modelVariables}
-
-    def _unpack(self, allowance: untrusted.Allowance) -> tuple[str, ...]:
-        """The platforms."""
-        wanted = ("resources/", *(f"binaries/{folder}/" for folder in binaries.folders()))
-        with untrusted.readable(f"{self.path}: not a usable FMI 2.0 archive"), zipfile.ZipFile(self.path) as package:
-            found = untrusted.entries(package, str(self.path))
-            if _DESCRIPTION not in found:
-                raise InputError(f"{self.path}: not a usable FMI 2.0 archive: it has no {_DESCRIPTION}")
-            needed = [entry for name, entry in found.items() if name == _DESCRIPTION or name.startswith(wanted)]
-            allowance.take(sum(entry.file_size for entry in needed), str(self.path))
-            for entry in needed:
-                untrusted.copy(package, entry, self.directory / entry.filename)
-        parts = [name.split("/") for name in found if name.startswith("binaries/")]
-        return tuple(sorted({part[1] for part in parts if len(part) > 2}))
-
-    def _read_description(self) -> Any:
-        what = f"{self.path}: not a usable FMI 2.0 archive"
-        file = self.directory / _DESCRIPTION
-        if (size := file.stat().st_size) > untrusted.LARGEST_DOCUMENT:
-            raise InputError(f"{what}: {_DESCRIPTION} has {size} bytes, allowed: {untrusted.LARGEST_DOCUMENT}")
-        untrusted.refuse_document_type(file.read_bytes(), f"{self.path}: {_DESCRIPTION}")
-        try:
-            with signals.held():  # FMPy's validation has a bare `except:`
-                description = read_model_description(str(self.directory))
-        except Exception as error:
-            raise InputError(f"{what}: {error}") from error
-        if description.fmiVersion != "2.0":
-            raise InputError(f"{what}: it is of FMI {description.fmiVersion}")
-        if description.coSimulation is None:
-            raise InputError(f"{self.path}: has no co-simulation interface")
-        identifier = str(description.coSimulation.modelIdentifier)
-        if not _IDENTIFIER.fullmatch(identifier):
-            raise InputError(f"{what}: its modelIdentifier {identifier[:80]!r} is no C identifier")
-        return description
+        allowance = allowance or untrusted.Allowance(path)
+        self._content: Content | None = STORE.take(path, allowance, partial(_unpack, path, allowance))
+        self.directory = self._content.directory
+        found = self._content.description
+        self.description, self.variables, self.platforms = found.model, found.variables, found.platforms
 
     @property
     def guid(self) -> str:
@@ -112,7 +79,10 @@ class Archive:
         return str(self.description.version)
 
     def close(self) -> None:
-        self._folder.cleanup()
+        """Its units are to be closed before it."""
+        content, self._content = self._content, None
+        if content is not None:
+            STORE.give_back(content)
 
     def __enter__(self) -> Self:
         return self
@@ -126,6 +96,82 @@ class Archive:
         declared = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
         return str(declared or "1")
 
+    def slave(self, name: str) -> FMU2Slave:
+        """FMPy's wrapper for an instance `name`, around a library that is loaded once.
+
+        Raises:
+            InputError: there is none for this platform, or none that can be loaded here.
+        """
+        if self._content is None:
+            raise ValueError(f"{self.path}: the archive is closed")
+        with _LOADING:
+            if self._content.library is None:
+                loaded = self._load()
+                self._content.library, self._content.unload = loaded, loaded.freeLibrary
+            slave: FMU2Slave = copy.copy(self._content.library)  # looking its functions up takes a millisecond
+        slave.instanceName = name
+        return slave
+
+    def _load(self) -> FMU2Slave:
+        identifier = self.description.coSimulation.modelIdentifier
+        path = binaries.library(self.directory, identifier, self.platforms, f"{self.path}")
+        before = Path.cwd()
+        try:
+            return FMU2Slave(
+                guid=self.guid,
+                unzipDirectory=str(self.directory),
+                modelIdentifier=identifier,
+                libraryPath=str(path),
+            )
+        except Exception as error:
+            os.chdir(before)  # fmpy goes to the library's folder and does not come back when it fails
+            folder = f"binaries/{path.parent.name}"
+            told = str(error).replace(f"{self.directory.absolute()}{os.sep}", "")
+            there = ", ".join(self.platforms)
+            raise InputError(
+                f"{self.path}: its binary for this platform, in {folder}, cannot be loaded: {told}; it has binaries "
+                f"for {there}"
+            ) from error
+
+
+def _unpack(path: Path, allowance: untrusted.Allowance, file: IO[bytes], content: Content) -> None:
+    """Fill a content from the archive `path`, open as `file`."""
+    wanted = ("resources/", *(f"binaries/{folder}/" for folder in binaries.folders()))
+    with untrusted.readable(f"{path}: not a usable FMI 2.0 archive"), zipfile.ZipFile(file) as package:
+        found = untrusted.entries(package, str(path))
+        if _DESCRIPTION not in found:
+            raise InputError(f"{path}: not a usable FMI 2.0 archive: it has no {_DESCRIPTION}")
+        needed = [entry for name, entry in found.items() if name == _DESCRIPTION or name.startswith(wanted)]
+        content.size = sum(entry.file_size for entry in needed)
+        allowance.take(content.size, str(path))
+        for entry in needed:
+            untrusted.copy(package, entry, content.directory / entry.filename)
+    parts = [name.split("/") for name in found if name.startswith("binaries/")]
+    platforms = tuple(sorted({part[1] for part in parts if len(part) > 2}))
+    model = _read_description(path, content.directory)
+    content.description = Description(model, {each.name: each for each in model.modelVariables}, platforms)
+
+
+def _read_description(path: Path, directory: Path) -> Any:
+    what = f"{path}: not a usable FMI 2.0 archive"
+    file = directory / _DESCRIPTION
+    if (size := file.stat().st_size) > untrusted.LARGEST_DOCUMENT:
+        raise InputError(f"{what}: {_DESCRIPTION} has {size} bytes, allowed: {untrusted.LARGEST_DOCUMENT}")
+    untrusted.refuse_document_type(file.read_bytes(), f"{path}: {_DESCRIPTION}")
+    try:
+        with signals.held():  # FMPy's validation has a bare `except:`
+            description = read_model_description(str(directory))
+    except Exception as error:
+        raise InputError(f"{what}: {error}") from error
+    if description.fmiVersion != "2.0":
+        raise InputError(f"{what}: it is of FMI {description.fmiVersion}")
+    if description.coSimulation is None:
+        raise InputError(f"{path}: has no co-simulation interface")
+    identifier = str(description.coSimulation.modelIdentifier)
+    if not _IDENTIFIER.fullmatch(identifier):
+        raise InputError(f"{what}: its modelIdentifier {identifier[:80]!r} is no C identifier")
+    return description
+
 
 class Unit:
     """An instance of an archive. Every failed call raises :class:`SimulationError` with the unit's own message."""
@@ -136,7 +182,7 @@ class Unit:
         self.warnings: list[str] = []
         self._messages: list[str] = []
         self._time = self._kept_time = 0.0
-        self._fmu = self._loaded()
+        self._fmu = archive.slave(name)
         callbacks = fmi2CallbackFunctions()
         callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
         callbacks.allocateMemory = defaultCallbacks.allocateMemory
@@ -145,7 +191,6 @@ class Unit:
             self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
             self._fmu.setDebugLogging(True, ["logStatusWarning", "logStatusError"])
         except Exception as error:
-            self._fmu.freeLibrary()
             raise InputError(f"unit {name}: cannot be instantiated: {self._said() or error}") from error
         self._component = self._fmu.component
         library = self._fmu.dll
@@ -159,30 +204,6 @@ class Unit:
         self._set_state = _STATE(("fmi2SetFMUstate", library))
         self._free_state = _STATE(("fmi2FreeFMUstate", library))
         self.kept_state: NDArray[np.uintp] = np.zeros(1, dtype=np.uintp)  # an fmi2FMUstate; 0: none yet
-
-    def _loaded(self) -> FMU2Slave:
-        """fmpy's wrapper of the library. InputError: none for this platform, or none that can be loaded here."""
-        archive = self.archive
-        identifier = archive.description.coSimulation.modelIdentifier
-        path = binaries.library(archive.directory, identifier, archive.platforms, f"{archive.path}")
-        before = Path.cwd()
-        try:
-            return FMU2Slave(
-                guid=archive.guid,
-                unzipDirectory=str(archive.directory),
-                modelIdentifier=identifier,
-                instanceName=self.name,
-                libraryPath=str(path),
-            )
-        except Exception as error:
-            os.chdir(before)  # fmpy goes to the library's folder and does not come back when it fails
-            folder = f"binaries/{path.parent.name}"
-            told = str(error).replace(f"{archive.directory.absolute()}{os.sep}", "")
-            there = ", ".join(archive.platforms)
-            raise InputError(
-                f"{archive.path}: its binary for this platform, in {folder}, cannot be loaded: {told}; it has binaries "
-                f"for {there}"
-            ) from error
 
     def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
         text = message.decode("utf-8", errors="replace").replace("%%", "%").replace("##", "#")
@@ -213,7 +234,7 @@ class Unit:
 
     @property
     def library(self) -> ctypes.CDLL:
-        """The unit's shared library, loaded for as long as this instance is open."""
+        """The unit's shared library, loaded for as long as its archive is open."""
         library: ctypes.CDLL = self._fmu.dll
         return library
 
@@ -308,8 +329,8 @@ class Unit:
         if self._component is not None:
             if self.kept_state[0]:
                 self._free_state(self._component, self.kept_state.ctypes.data)
+            self._fmu.fmi2FreeInstance(self._component)  # the library stays loaded, for other instances
             self._component = None
-            self._fmu.freeInstance()  # and unloads the library
 
     def references(self, names: Iterable[str]) -> NDArray[np.uint32]:
         """Value references of the named variables.

@@ -20,8 +20,11 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date a zip entry can have
 _UNIX = 3  # create_system; fixed, as zipfile takes the host's
 
 
-def pack(files: Mapping[str, bytes]) -> bytes:
-    """Zip archive of `files` (path with forward slashes -> content), sorted by path."""
+def pack(files: Mapping[str, bytes], *, level: int = 9) -> bytes:
+    """Zip archive of `files` (path with forward slashes -> content), sorted by path.
+
+    `level`: of compression; 0 where it is to be unpacked at once, which saves most of the time.
+    """
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for path in sorted(files):
@@ -29,7 +32,7 @@ def pack(files: Mapping[str, bytes]) -> bytes:
             entry.create_system = _UNIX
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = (0o100755 if path.startswith("binaries/") else 0o100644) << 16
-            archive.writestr(entry, files[path], compresslevel=9)
+            archive.writestr(entry, files[path], compresslevel=level)
     return buffer.getvalue()
 
 

@@ -156,25 +156,27 @@ def _check_modes(content: bytes, axes: Sequence[str], axes_file: str) -> Iterato
         return
     if not rows[1:]:
         yield "there is no mode"
+    table: list[tuple[int, list[float | None]]] = []
     for line, fields in rows[1:]:
         if len(fields) != len(expected):
             yield f"line {line}: {len(fields)} fields, expected {len(expected)}"
             continue
-        for name, text in zip(header, fields, strict=True):
-            value = finite(text)
+        values = [finite(text) for text in fields]
+        table.append((line, values))
+        for name, text, value in zip(header, fields, values, strict=True):
             if value is None:
                 yield f"line {line}: {name} is '{text}', not a finite number"
             elif value < 0 and name in expected[1:3]:
                 yield f"line {line}: {name} is {text}, allowed is 0 or more"
-    yield from _check_physics(header, rows[1:])
+    if len(table) == len(rows) - 1:
+        yield from _check_physics(header, table)
 
 
-def _check_physics(header: Sequence[str], rows: Sequence[tuple[int, Sequence[str]]]) -> Iterator[str]:
+def _check_physics(header: Sequence[str], rows: Sequence[tuple[int, Sequence[float | None]]]) -> Iterator[str]:
     """What the unit refuses in a table of sound numbers: damped rigid modes, rotors and scales that nothing moves."""
     columns: dict[str, list[float]] = {name: [] for name in header}
-    for line, fields in rows:
-        values = [finite(text) for text in fields]
-        if len(fields) != len(header) or None in values:
+    for line, values in rows:
+        if None in values:
             return  # reported already
         for name, value in zip(header, values, strict=True):
             columns[name].append(value or 0.0)

@@ -32,10 +32,12 @@ class Repacked:
     tried: bool
 
 
-def repack(base: Path, given: Resources, machine: Machine, out: Path, *, trial_run: bool = True) -> Repacked:
+def repack(
+    base: Path, given: Resources, machine: Machine, out: Path, *, trial_run: bool = True, level: int = 9
+) -> Repacked:
     """Pack the unit of the archive `base` with the resources `given` into `out`, which may be `base` itself.
 
-    `trial_run`: instantiate what was packed, where `base` has a binary for this platform.
+    `trial_run`: instantiate what was packed, where `base` has a binary for this platform. `level`: of compression.
 
     Raises:
         InputError: `base` is no archive of this packager, or cannot hold the machine; or the unit refuses it.
@@ -68,7 +70,7 @@ def repack(base: Path, given: Resources, machine: Machine, out: Path, *, trial_r
         experiment=given.experiment(),
     )
     tried = trial_run and _try(packed, table.unit, guid, given)
-    content = archive.pack(packed)
+    content = archive.pack(packed, level=level)
     archive.write(out, content)
     platforms = sorted({path.split("/")[1] for path in packed if re.match(r"binaries/[^/]+/", path)})
     return Repacked(out, len(content), guid, tuple(platforms), tried)

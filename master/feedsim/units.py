@@ -122,9 +122,92 @@ KINDS = {
     "1/A": ("1/current", "1 1/A"),
 }
 
+# What pint makes of usual expressions, so that files of usual units need not wait for it (a quarter of a second):
+# factor to the base units, times 2 pi to this power, dimension. A test holds every row against pint.
+READY = {
+    "m": ("1", 0, "length"),
+    "1/A": ("1", 0, "1/current"),
+    "Wb": ("1", 0, "length^2*mass/current/time^2"),
+    "H": ("1", 0, "length^2*mass/current^2/time^2"),
+    "V/A": ("1", 0, "length^2*mass/current^2/time^3"),
+    "Ohm": ("1", 0, "length^2*mass/current^2/time^3"),
+    "A": ("1", 0, "current"),
+    "V": ("1", 0, "length^2*mass/current/time^3"),
+    "N*m/A": ("1", 0, "length^2*mass/current/time^2"),
+    "N*m*s/rad": ("1", 0, "length^2*mass/angle/time"),
+    "N*m/rad": ("1", 0, "length^2*mass/angle/time^2"),
+    "N*m": ("1", 0, "length^2*mass/time^2"),
+    "N": ("1", 0, "length*mass/time^2"),
+    "m^4": ("1", 0, "length^4"),
+    "m^2": ("1", 0, "length^2"),
+    "kg*m^2": ("1", 0, "length^2*mass"),
+    "kg/m^3": ("1", 0, "mass/length^3"),
+    "Pa": ("1", 0, "mass/length/time^2"),
+    "N/m": ("1", 0, "mass/time^2"),
+    "m/rad": ("1", 0, "length/angle"),
+    "1/s": ("1", 0, "1/time"),
+    "Hz": ("1", 1, "angle/time"),
+    "rad/s": ("1", 0, "angle/time"),
+    "m/s^3": ("1", 0, "length/time^3"),
+    "m/s^2": ("1", 0, "length/time^2"),
+    "m/s": ("1", 0, "length/time"),
+    "1": ("1", 0, "1"),
+    "rad": ("1", 0, "angle"),
+    "kg": ("1", 0, "mass"),
+    "s": ("1", 0, "time"),
+    "mm": ("1/1000", 0, "length"),
+    "us": ("1/1000000", 0, "time"),
+    "mm/min": ("1/60000", 0, "length/time"),
+    "(m/min)/mm": ("50/3", 0, "1/time"),
+    "mm/rev": ("1/1000", -1, "length/angle"),
+    "N/um": ("1000000", 0, "mass/time^2"),
+    "GPa": ("1000000000", 0, "mass/length/time^2"),
+    "cm^2": ("1/10000", 0, "length^2"),
+    "cm^4": ("1/100000000", 0, "length^4"),
+    "mH": ("1/1000", 0, "length^2*mass/current^2/time^2"),
+    "ms": ("1/1000", 0, "time"),
+    "percent": ("1/100", 0, "1"),
+    "m/min": ("1/60", 0, "length/time"),
+    "um": ("1/1000000", 0, "length"),
+    "cm": ("1/100", 0, "length"),
+    "nm": ("1/1000000000", 0, "length"),
+    "min": ("60", 0, "time"),
+    "kN": ("1000", 0, "length*mass/time^2"),
+    "mrad": ("1/1000", 0, "angle"),
+    "urad": ("1/1000000", 0, "angle"),
+    "rev": ("1", 1, "angle"),
+    "deg": ("1/360", 1, "angle"),
+    "arcsec": ("1/1296000", 1, "angle"),
+    "rpm": ("1/60", 1, "angle/time"),
+    "kHz": ("1000", 1, "angle/time"),
+    "Nm": ("1", 0, "length^2*mass/time^2"),
+    "mm/s": ("1/1000", 0, "length/time"),
+    "deg/s": ("1/360", 1, "angle/time"),
+    "rev/s": ("1", 1, "angle/time"),
+    "rev/min": ("1/60", 1, "angle/time"),
+    "N/mm": ("1000", 0, "mass/time^2"),
+    "kg*cm^2": ("1/10000", 0, "length^2*mass"),
+    "mm/s^2": ("1/1000", 0, "length/time^2"),
+    "MPa": ("1000000", 0, "mass/length/time^2"),
+    "mV": ("1/1000", 0, "length^2*mass/current/time^3"),
+    "mA": ("1/1000", 0, "current"),
+    "uH": ("1/1000000", 0, "length^2*mass/current^2/time^2"),
+    "mOhm": ("1/1000", 0, "length^2*mass/current^2/time^3"),
+    "mm^2": ("1/1000000", 0, "length^2"),
+    "mm^4": ("1/1000000000000", 0, "length^4"),
+    "N*m/(rad/s)": ("1", 0, "length^2*mass/angle/time"),
+    "rad/s^2": ("1", 0, "angle/time^2"),
+    "m/N": ("1", 0, "time^2/mass"),
+    "m/(N*m)": ("1", 0, "time^2/length/mass"),
+    "um/N": ("1/1000000", 0, "time^2/mass"),
+    "g": ("1/1000", 0, "mass"),
+}
+
 DIMENSIONLESS = "1"
 LONGEST_NUMBER = 1100  # characters; every double, written out, has less
 LONGEST = 60  # characters of a unit
+
+_TURN = Fraction(DEFINITIONS["rev"].removesuffix(" rad"))
 
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY = re.compile(rf"\s*({NUMBER})(.*)", re.DOTALL)
@@ -145,8 +228,7 @@ class Unit:
     @property
     def kind(self) -> str:
         """What a quantity of this dimension is called, e.g. "speed"; the dimension itself where it has no name."""
-        named = {unit(known).dimension: name for known, (name, _) in reversed(KINDS.items())}
-        return named.get(self.dimension, self.dimension)
+        return _kinds().get(self.dimension, self.dimension)
 
 
 class UnknownSymbol(InputError):
@@ -242,6 +324,12 @@ def unit(text: str) -> Unit:
     return Unit(text, *_resolve(plain, text))
 
 
+@cache
+def _kinds() -> dict[str, str]:
+    """Dimension -> what a quantity of it is called."""
+    return {unit(known).dimension: name for known, (name, _) in reversed(KINDS.items())}
+
+
 def article(kind: str) -> str:
     """ "a speed", "an angle"."""
     return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
@@ -265,6 +353,15 @@ def show(value: float, text: str) -> str:
 
 
 def _resolve(plain: str, text: str) -> tuple[Fraction, str]:
+    """Factor and dimension of an expression that is clean already."""
+    if plain in READY:
+        number, turns, dimension = READY[plain]
+        return Fraction(number) * _TURN**turns, dimension
+    return by_pint(plain, text)
+
+
+def by_pint(plain: str, text: str) -> tuple[Fraction, str]:
+    """The same, calculated. InputError: `text`, which it was, cannot be read."""
     from pint.errors import PintError
 
     registry = _registry()

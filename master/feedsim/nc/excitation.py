@@ -18,7 +18,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import max_len_seq
 
 from feedsim.errors import InputError
 from feedsim.scenario import Cycles
@@ -200,6 +199,8 @@ def binary_sequence(
     state = np.zeros(stages, dtype=np.int8)
     while not state.any():
         state = random.integers(0, 2, stages, dtype=np.int8)
+    from scipy.signal import max_len_seq  # takes a third of a second, which a plain run should not wait for
+
     sequence = max_len_seq(stages, state=state)[0]
     # Shifts of one sequence are one signal to the machine, and what is not linear would look alike to all of them.
     every = _decimations(stages)

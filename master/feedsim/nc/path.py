@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ Array = NDArray[np.float64]
 END_POINT_TOLERANCE = 1e-6
 # Phases of the profile may be shorter than a cycle; the peak of the combined acceleration lies within one.
 POINTS_PER_PHASE = 33
+# Instants that are looked at together: a long circle has millions.
+INSTANTS = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,11 @@ class Line:
     origin: Mapping[str, float]
     direction: Mapping[str, float]
     length: float
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes that the path names, those that stand among them."""
+        return tuple(self.direction)
 
     @property
     def moving(self) -> tuple[str, ...]:
@@ -88,9 +96,21 @@ class CircularPath:
         Acceleration is the axis' share of tangential acceleration and centripetal acceleration v^2/R together.
         """
         within_phases = np.linspace(profile.times[:-1], profile.times[1:], POINTS_PER_PHASE).ravel()
-        t = np.concatenate(
-            [np.arange(0.0, profile.duration, step), within_phases, profile.turning_points, self._crossings(profile)]
+        special = np.concatenate([within_phases, profile.turning_points, self._crossings(profile)])
+        on_grid = math.ceil(profile.duration / step)
+        stretches = (
+            np.arange(first, min(first + INSTANTS, on_grid), dtype=np.float64) * step
+            for first in range(0, on_grid, INSTANTS)
         )
+        found = dict.fromkeys(self.axes, (math.inf, -math.inf, 0.0, 0.0))
+        for t in chain([special], stretches):
+            for axis, (low, high, speed, acceleration) in self._peaks_at(profile, t).items():
+                least, largest, fastest, hardest = found[axis]
+                found[axis] = min(least, low), max(largest, high), max(fastest, speed), max(hardest, acceleration)
+        return found
+
+    def _peaks_at(self, profile: Profile, t: Array) -> dict[str, tuple[float, float, float, float]]:
+        """The same at the instants ``t`` [s] alone."""
         s, v, a = profile.at(t)
         phi = self.angle(s)
         tangent = (-self.sense * np.sin(phi), self.sense * np.cos(phi))

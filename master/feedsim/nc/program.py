@@ -3,14 +3,16 @@
 Every motion runs from rest to rest. It starts on the T_ipo grid: at 0, or at the first instant of the grid at or after
 the exact end of the motion before it. Its path is sampled at T_ipo, and one C2 cubic spline per axis runs through the
 samples of all motions (from one recording to the next, where there are recordings). Setpoints are its values at T_pos.
+They are computed stretch by stretch, so that planning needs no more memory for an hour than for a minute.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +21,12 @@ from feedsim.errors import InputError
 from feedsim.nc.constant_speed import strokes
 from feedsim.nc.limits import violations
 from feedsim.nc.path import CircularPath, Line, arc, full_circle, line
+from feedsim.nc.points import Along, Held, Joined
 from feedsim.nc.profile import Profile, rest_to_rest
 from feedsim.nc.recorded import recorded, recording_violations
 from feedsim.nc.segment import Circular, Program, Recorded, Segment, Straight, whole_cycles
 from feedsim.nc.sine import sines
-from feedsim.nc.spline import RestSpline
+from feedsim.nc.spline import BLOCK, LongSpline, Points
 from feedsim.scenario import (
     Arc,
     Circle,
@@ -36,10 +39,11 @@ from feedsim.scenario import (
     Sine,
     moved_axes,
 )
+from feedsim.trace import Table
 
 Array = NDArray[np.float64]
 
-# Position cycles that a program may have; its setpoints then take about 2 GB for three axes.
+# Position cycles that a program may have; its setpoints then take about 2 GB for three axes, in a file.
 LONGEST = 40_000_000
 
 
@@ -48,7 +52,7 @@ class _Stretch:
     """Points of all axes on the T_ipo grid from ``first`` on, between two recordings."""
 
     first: int
-    points: dict[str, list[Array]]
+    points: dict[str, list[Points]]
 
 
 @dataclass
@@ -75,8 +79,11 @@ class _Plan:
     problems: list[str] = field(default_factory=list)
 
 
-def plan(scenario: Scenario) -> Program:
+def plan(scenario: Scenario, *, scratch: Path | None = None) -> Program:
     """Setpoints of all motions of ``scenario``; axes without a motion are held.
+
+    scratch: folder for the file without a name that holds the setpoints of a long program; default: that of the
+    system for temporary files.
 
     Raises InputError that lists every motion and axis whose travel, speed or acceleration limit is exceeded, with
     actual and allowed values, and every motion whose geometry or recording is not usable. After one that is not usable,
@@ -110,7 +117,7 @@ def plan(scenario: Scenario) -> Program:
             break
     if state.problems:
         raise InputError.of(f"{scenario.file}: the motions cannot be driven", state.problems)
-    return _sample(state, scenario)
+    return _sample(state, scenario, scratch)
 
 
 def _depends_on(motion: Motion, lost: set[str]) -> bool:
@@ -154,11 +161,11 @@ def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion
     count = whole_cycles(duration, cycles.T_ipo)
     if (state.instant + count) * (cycles.T_ipo / cycles.T_pos) > LONGEST:
         state.instant += count
-        return []  # plan() reports it; sampling it would exhaust the memory
-    samples: Mapping[str, Array] = {}
+        return []  # plan() reports it; looking at all of it would take long
+    samples: Mapping[str, Points] = {}
     problems: list[str] = []
     if profile is not None and path is not None:
-        samples = path.position(profile.at(np.arange(1, count + 1, dtype=np.float64) * cycles.T_ipo)[0])
+        samples = {axis: Along(path, profile, axis, cycles.T_ipo, count) for axis in path.axes}
         for axis, peaks in path.peaks(profile, cycles.T_ipo).items():
             if axis in state.lost:
                 peaks = (origin[axis], origin[axis], *peaks[2:])
@@ -186,14 +193,14 @@ def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion
     return problems
 
 
-def _append_points(state: _Plan, samples: Mapping[str, Array], count: int) -> None:
+def _append_points(state: _Plan, samples: Mapping[str, Points], count: int) -> None:
     """The next ``count`` points of all axes; those without ``samples`` are held."""
     stretch = state.pieces[-1]
     if isinstance(stretch, _Inset):
         stretch = _stretch(state)
         state.pieces.append(stretch)
     for axis, points in stretch.points.items():
-        points.append(samples[axis] if axis in samples else np.full(count, state.position[axis]))
+        points.append(samples[axis] if axis in samples else Held(state.position[axis], count))
     state.instant += count
 
 
@@ -262,38 +269,65 @@ def _append_recording(state: _Plan, scenario: Scenario, index: int, motion: Meas
     return problems
 
 
-def _sample(state: _Plan, scenario: Scenario) -> Program:
+def _sample(state: _Plan, scenario: Scenario, scratch: Path | None) -> Program:
     """Setpoints at T_pos: pieces in their order, each from its first instant on; the next one begins on its last."""
-    machine = scenario.machine
-    ratio = round(machine.cycles.T_ipo / machine.cycles.T_pos)
+    machine, cycles = scenario.machine, scenario.machine.cycles
+    axes = tuple(machine.axes)
+    ratio = round(cycles.T_ipo / cycles.T_pos)
     total = state.instant * ratio + 1
-    x_s = {axis: np.empty(total) for axis in machine.axes}
-    v_s = {axis: np.zeros(total) for axis in machine.axes}
+    table = Table(1 + 2 * len(axes), total, scratch)
     starts = [piece.first * ratio for piece in state.pieces]
     held = dict(machine.pose)
-    for piece, first, last in zip(state.pieces, starts, [*starts[1:], total - 1], strict=True):
-        for axis in machine.axes:
-            x, v = x_s[axis][first : last + 1], v_s[axis][first : last + 1]
-            if isinstance(piece, _Stretch):
-                points = np.concatenate(piece.points[axis])
-                # Knots 1 apart: a position cycle is then 1/ratio, exact for the usual ratios, however long the program.
-                x[:], v[:] = RestSpline(points, 1.0)(np.arange(last - first + 1, dtype=np.float64) / ratio)
-                v /= machine.cycles.T_ipo
-                held[axis] = float(points[-1])
-            elif axis in piece.x_s:
-                used = len(piece.x_s[axis])
-                held[axis] = float(piece.x_s[axis][-1])
-                x[:used], x[used:] = piece.x_s[axis], held[axis]
-                v[:used], v[used:] = piece.v_s[axis], 0.0
-            else:
-                x[:], v[:] = held[axis], 0.0
-    time = np.arange(total, dtype=np.float64) * machine.cycles.T_pos
-    n_ffw = {axis: v_s[axis] / machine.axes[axis].I_P for axis in machine.axes}
-    return Program(time, x_s, n_ffw, tuple(state.segments))
+    for piece, first, last in zip(state.pieces, starts, [*starts[1:], total], strict=True):
+        sampled = {}
+        for axis in axes:
+            sampled[axis] = _sampled(piece, axis, held[axis], ratio, cycles.T_ipo)
+            held[axis] = _end(piece, axis, held[axis])
+        for begin in range(first, last, BLOCK * ratio):
+            instants = np.arange(begin, min(begin + BLOCK * ratio, last))
+            block = np.empty((1 + 2 * len(axes), len(instants)))
+            block[0] = instants * cycles.T_pos
+            for i, axis in enumerate(axes):
+                x, v = sampled[axis](instants - first)
+                block[1 + i], block[1 + len(axes) + i] = x, v / machine.axes[axis].I_P
+            table.append(block)
+    time, *columns = table.columns()
+    x_s, n_ffw = columns[: len(axes)], columns[len(axes) :]
+    return Program(time, dict(zip(axes, x_s, strict=True)), dict(zip(axes, n_ffw, strict=True)), tuple(state.segments))
+
+
+def _sampled(
+    piece: _Stretch | _Inset, axis: str, held: float, ratio: int, T_ipo: float
+) -> Callable[[NDArray[np.int64]], tuple[Array, Array]]:
+    """Position [m] and speed [m/s] of an axis at the position cycles of a piece, counted from its first one."""
+    if isinstance(piece, _Stretch):
+        # Knots 1 apart: a position cycle is then 1/ratio, exact for the usual ratios, however long the program.
+        spline = LongSpline(Joined(piece.points[axis]))
+
+        def stretch(instants: NDArray[np.int64]) -> tuple[Array, Array]:
+            x, v = spline(instants, ratio)
+            return x, v / T_ipo
+
+        return stretch
+    x_s = piece.x_s.get(axis, np.array([held]))
+    v_s = piece.v_s.get(axis, np.zeros(1))
+
+    def inset(instants: NDArray[np.int64]) -> tuple[Array, Array]:
+        at = np.minimum(instants, len(x_s) - 1)
+        return x_s[at], np.where(instants < len(x_s), v_s[at], 0.0)
+
+    return inset
+
+
+def _end(piece: _Stretch | _Inset, axis: str, held: float) -> float:
+    """Where a piece leaves an axis [m]."""
+    if isinstance(piece, _Stretch):
+        return float(piece.points[axis][-1][-1:][0])
+    return float(piece.x_s[axis][-1]) if axis in piece.x_s else held
 
 
 def _stretch(state: _Plan) -> _Stretch:
-    return _Stretch(state.instant, {axis: [np.array([x])] for axis, x in state.position.items()})
+    return _Stretch(state.instant, {axis: [Held(x, 1)] for axis, x in state.position.items()})
 
 
 def _path(motion: Move | Arc | Circle, start: Mapping[str, float]) -> Line | CircularPath:

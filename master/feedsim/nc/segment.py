@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.trace import least_and_largest
+
 Array = NDArray[np.float64]
 
 # An instant within this share of a cycle of the grid lies on it: exact ends carry rounding errors.
@@ -146,6 +148,7 @@ class Program:
     """Setpoints of all axes at the position cycle.
 
     time (N,) [s]: multiples of T_pos from 0; x_s, n_ffw: axis -> (N,) [m], [rad/s]; segments: one per motion.
+    Of a long program the arrays are in a file and read page by page (:mod:`feedsim.trace.table`).
     """
 
     time: Array
@@ -157,6 +160,10 @@ class Program:
     def duration(self) -> float:
         """Last instant of the program [s]."""
         return float(self.time[-1])
+
+    def reached(self, axis: str) -> tuple[float, float]:
+        """Least and largest setpoint of an axis [m]."""
+        return least_and_largest(self.x_s[axis])
 
     def following(self, segment: Segment, axis: str) -> Segment | None:
         """The next motion behind ``segment`` that moves the setpoint of ``axis``; None where there is none."""

@@ -7,6 +7,9 @@ cent). The points are extended by rest points on both sides; there the spline is
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -15,28 +18,77 @@ Array = NDArray[np.float64]
 
 # A disturbance of a cubic spline decays by 2 - sqrt(3) = 0.268 per knot: after 28 knots it is below 1e-16 of its size.
 REST_POINTS = 28
+# Points between which a spline is solved at a time, and how far it then reaches on to either side: what begins
+# differently there is the same to the last bit long before.
+BLOCK, OVERLAP = 1 << 14, 96
+
+
+class Points(Protocol):
+    """Points that may be computed when they are asked for."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, rows: slice, /) -> Array:
+        """Points of a range of rows; step 1, within the length."""
 
 
 class RestSpline:
-    """C2 cubic spline through ``points`` (K + 1,) at the instants 0, step, ... K step [s]."""
+    """C2 cubic spline through ``points`` (K + 1,) at the instants 0, step, ... K step [s].
 
-    def __init__(self, points: Array, step: float) -> None:
+    knots: first and last knot that it is needed for, those outside the points being at rest; default: all of them.
+    """
+
+    def __init__(self, points: Points, step: float, knots: tuple[int, int] | None = None) -> None:
+        count = len(points)
+        first, last = knots or (-REST_POINTS, count + REST_POINTS - 1)
         self._step = step
-        self._constant = float(points[0]) if np.all(points == points[0]) else None
-        if self._constant is not None:
+        within = points[max(first, 0) : min(last + 1, count)]
+        self._origin = float(points[0:1][0])
+        self._constant = knots is None and bool(np.all(within == self._origin))
+        if self._constant:
             return
-        before = np.full(REST_POINTS, points[0])
-        after = np.full(REST_POINTS, points[-1])
+        before = np.full(max(0, -first), self._origin)
+        after = np.full(max(0, last + 1 - count), points[count - 1 : count][0])
         # Knots are whole numbers, so that a long program loses no digits in the differences of instants.
-        knots = np.arange(-REST_POINTS, len(points) + REST_POINTS, dtype=np.float64)
+        at = np.arange(first, last + 1, dtype=np.float64)
         # Deviations from the first point keep the digits of a small motion far from the origin.
-        deviation = np.concatenate([before, points, after]) - points[0]
-        self._origin = float(points[0])
-        self._spline = CubicSpline(knots, deviation, bc_type="clamped", extrapolate=False)
+        deviation = np.concatenate([before, within, after]) - self._origin
+        self._spline = CubicSpline(at, deviation, bc_type="clamped", extrapolate=False)
 
     def __call__(self, time: Array) -> tuple[Array, Array]:
         """Position [unit of the points] and speed [per s] at ``time`` (N,) [s], at rest outside the points."""
-        if self._constant is not None:
-            return np.full(len(time), self._constant), np.zeros(len(time))
+        if self._constant:
+            return np.full(len(time), self._origin), np.zeros(len(time))
         knot = np.clip(time / self._step, self._spline.x[0], self._spline.x[-1])
         return self._origin + self._spline(knot), self._spline(knot, 1) / self._step
+
+
+class LongSpline:
+    """A :class:`RestSpline` of step 1, solved a block of points at a time, in memory that does not grow with them."""
+
+    def __init__(self, points: Points, block: int = BLOCK) -> None:
+        self._points, self._block, self._count = points, block, len(points)
+        self._whole = RestSpline(points, 1.0) if self._count <= block else None
+        self._at, self._solved = -1, self._whole
+
+    def __call__(self, instants: NDArray[np.int64], per_point: int) -> tuple[Array, Array]:
+        """Position [unit of the points] and speed [per distance of points] at ``instants`` / per_point.
+
+        instants: (N,) increasing.
+        """
+        x, v = np.empty(len(instants)), np.empty(len(instants))
+        # Whole numbers over the usual numbers per point are exact, however long the program.
+        knots, blocks = instants / per_point, instants // (per_point * self._block)
+        ends = [0, *(np.flatnonzero(np.diff(blocks)) + 1).tolist(), len(instants)]
+        for first, last in pairwise(ends):
+            spline = self._whole or self._of(int(blocks[first]))
+            x[first:last], v[first:last] = spline(knots[first:last])
+        return x, v
+
+    def _of(self, block: int) -> RestSpline:
+        if self._at != block or self._solved is None:
+            first, last = block * self._block - OVERLAP, (block + 1) * self._block + OVERLAP
+            self._solved = RestSpline(
+                self._points, 1.0, (max(first, -REST_POINTS), min(last, self._count + REST_POINTS - 1))
+            )
+            self._at = block
+        return self._solved

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from feedsim import units
 from feedsim.errors import FeedsimError
-from feedsim.scenario import Machine, load_structure
+from feedsim.scenario import Machine
+from feedsim.structure.at_hand import assembler_of, structure_of
 from feedsim.structure.info import stale
 from feedsim.structure.modes import Modes, read_modes
-from feedsim.structure.poses import SAME_FREQUENCY, movable, structure_axes
+from feedsim.structure.poses import SAME_FREQUENCY, structure_axes
 from feedsim.structure.solve import solve
 
 
@@ -46,9 +47,9 @@ def _shown(pose: Mapping[str, float], between: str) -> str:
 @lru_cache(maxsize=32)
 def _modes(structure: Path, stamp: int, pose: tuple[tuple[str, float], ...]) -> Modes | None:
     """Modes at the pose; `stamp` is the file's time, so that a changed file is read anew."""
-    description = load_structure(structure)
+    description = structure_of(structure, stamp)
     axes = structure_axes(description)
     if not axes:
         return None
-    assembly = movable(description).at({axis: position for axis, position in pose if axis in axes})
-    return solve(assembly, cutoff=description.cutoff, damping=description.damping).modes
+    assembly = assembler_of(structure, stamp).at({axis: position for axis, position in pose if axis in axes})
+    return solve(assembly, cutoff=description.cutoff, damping=description.damping, described=False).modes

@@ -11,6 +11,7 @@ import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -83,10 +84,19 @@ def read_modes(file: Path, axes: Sequence[str]) -> Modes:
     """
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
-            rows = list(csv.reader(stream))
+            text = stream.read()
     except FileNotFoundError:
         raise InputError(f"{file}: no such file (table of modes)") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: cannot be read as a table of modes: {error}") from error
+    return _read(file, text, tuple(axes))
+
+
+@lru_cache(maxsize=8)  # a run asks several times, many runs of a machine ask for the same
+def _read(file: Path, text: str, axes: tuple[str, ...]) -> Modes:
+    try:
+        rows = list(csv.reader(io.StringIO(text, newline="")))
+    except csv.Error as error:
         raise InputError(f"{file}: cannot be read as a table of modes: {error}") from error
     ports = [f"{quantity}_{axis}" for quantity in ("n", "x") for axis in axes] + list(TOOL_PORTS)
     header = rows[0] if rows else []
@@ -96,6 +106,7 @@ def read_modes(file: Path, axes: Sequence[str]) -> Modes:
     if problems:
         raise InputError.of(f"{file}: not a table of modes", problems)
     table, problems = _numbers(file, header, rows[1:])
+    table.setflags(write=False)
     columns = dict(zip(header, table.T, strict=True))
     if not problems:
         problems = [
@@ -143,12 +154,14 @@ def _numbers(file: Path, header: Sequence[str], rows: Sequence[Sequence[str]]) -
             problems.append(f"{file}:{line}: {len(row)} cells; the header has {len(header)}")
             continue
         values = [_number(cell) for cell in row]
+        table.append(values)
+        if all(map(math.isfinite, values)) and min(values[header.index(name)] for name in (FREQUENCY, DAMPING)) >= 0:
+            continue
         for name, cell, value in zip(header, row, values, strict=True):
             if not math.isfinite(value):
                 problems.append(f"{file}:{line}: column '{name}': '{cell}' is no finite number")
             elif name in (FREQUENCY, DAMPING) and value < 0:
                 problems.append(f"{file}:{line}: column '{name}': {cell} is negative; 0 or more is allowed")
-        table.append(values)
     return np.array(table, dtype=np.float64).reshape(-1, len(header)), problems
 
 

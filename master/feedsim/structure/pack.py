@@ -45,6 +45,7 @@ def pack(
     name: str = "",
     note: str = "",
     trial: bool = True,
+    level: int = 9,
 ) -> Packed:
     """Pack a machine into the plant archive `base`; write it to `out`, whole or not at all.
 
@@ -54,6 +55,7 @@ def pack(
         poses: poses.bin, the modes of a grid of poses, for a plant that follows its axes.
         name, note: what the archive's description and documentation say of the machine.
         trial: instantiate the packed unit once, where the base has a binary for this platform.
+        level: of compression, 0 (none) to 9.
 
     Raises:
         InputError: a file is not what it should be, or the unit refuses the machine.
@@ -67,14 +69,16 @@ def pack(
         with tempfile.TemporaryDirectory(prefix="feedsim-") as folder:
             written = Path(folder) / "modes.csv"
             write_modes(written, modes)
-            return pack(base, out, modes=written, pose=pose, poses=poses, name=name, note=note, trial=trial)
+            return pack(
+                base, out, modes=written, pose=pose, poses=poses, name=name, note=note, trial=trial, level=level
+            )  # fmt: skip
     try:
         given = machine_tables.check(
             File("axes.csv", machine_tables.axes_csv(pose)),
             File.at(modes),
             File.at(poses) if poses is not None else None,
         )
-        done = repack.repack(base, given, named(name, note), out, trial_run=trial)
+        done = repack.repack(base, given, named(name, note), out, trial_run=trial, level=level)
     except errors.OutputError as error:
         raise OutputError(str(error)) from error
     except errors.InputError as error:

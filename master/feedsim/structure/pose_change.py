@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from feedsim.errors import FeedsimError
-from feedsim.scenario import Machine, load_structure
+from feedsim.scenario import Machine
 from feedsim.structure.assembly import Assembly
+from feedsim.structure.at_hand import assembler_of, structure_of
 from feedsim.structure.factor import SparseFactor
 from feedsim.structure.modes import TOOL_PORTS
-from feedsim.structure.poses import movable
 from feedsim.structure.solve import Solution, solve
 
 Floats = NDArray[np.float64]
@@ -154,27 +154,28 @@ def _changes(
     structure: Path, stamp: int, pose: tuple[tuple[str, float], ...], axes: tuple[AxisChange, ...]
 ) -> tuple[AxisChange, ...]:
     """The axes with their modes; `stamp` is the file's time, so that a changed file is read anew."""
-    description = load_structure(structure)
-    assembler = movable(description)
+    description = structure_of(structure, stamp)
+    assembler = assembler_of(structure, stamp)
     travels = assembler.structure.axes
     here = {axis: position for axis, position in pose if axis in travels}
 
-    def at(axis: str, position: float) -> tuple[Assembly, Solution]:
+    def at(axis: str, position: float, described: bool) -> tuple[Assembly, Solution]:
         # Beyond the structure's travel (a following error, a recording) its end counts.
         low, high = travels[axis].travel
         assembly = assembler.at({**here, axis: min(max(position, low), high)})
         # The sparse way: a few modes of many.
         cutoff = 2 * math.pi * 2 * LOOKED_AT
-        return assembly, solve(assembly, cutoff=cutoff, damping=description.damping, dense_limit=0)
+        solution = solve(assembly, cutoff=cutoff, damping=description.damping, dense_limit=0, described=described)
+        return assembly, solution
 
     moving = [axis for axis in axes if axis.distance > NEAR and axis.axis in travels]
     if not moving:
         return axes
-    middle = at(moving[0].axis, here[moving[0].axis])
+    middle = at(moving[0].axis, here[moving[0].axis], described=True)
     found = {}
     for axis in moving:
         ends = [
-            middle if abs(position - axis.pose) <= NEAR else at(axis.axis, position)
+            middle if abs(position - axis.pose) <= NEAR else at(axis.axis, position, described=False)
             for position in (axis.low, axis.high)
         ]
         found[axis.axis] = AxisChange(

@@ -52,7 +52,7 @@ class Solution:
     Attributes:
         modes: the mode table: rigid modes first, elastic ones by frequency, pseudo-modes last.
         shapes: (N, n_modes) mass-normalised physical shapes, columns as in the table.
-        moving: what moves, per mode.
+        moving: what moves, per mode; empty where it was not asked for.
         corrections: number of pseudo-modes of the static correction: the last columns; 0 without it.
         cutoff: [rad/s].
         above: (m,) known frequencies above the cut-off, ascending [Hz]; the next few of a large model.
@@ -89,6 +89,7 @@ def solve(
     static_correction: bool = False,
     progress: Callable[[str], None] | None = None,
     dense_limit: int = DENSE,
+    described: bool = True,
 ) -> Solution:
     """Modes up to the cut-off [rad/s]; all of them with math.inf, which gives the full model (small models only).
 
@@ -101,6 +102,8 @@ def solve(
     Static correction appends pseudo-modes (feedsim.structure.residual) for the torques and tool forces: displacements
     under them are then exact at rest, and better towards the cut-off. They take part in J_inf like modes: it falls
     towards the full model's, and with it the coupling limit 2 J_inf/h.
+
+    `described`: whether the solution is to say what moves in its modes.
 
     Raises:
         InputError: rigid modes that are not those of the axes; negative stiffness; a model too large without cut-off.
@@ -139,7 +142,7 @@ def solve(
     return Solution(
         modes=_table(assembly, damping, values, shapes),
         shapes=shapes,
-        moving=what_moves(assembly, shapes),
+        moving=what_moves(assembly, shapes) if described else (),
         corrections=corrections,
         cutoff=cutoff,
         above=above,

@@ -13,7 +13,6 @@ import io
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +21,11 @@ from feedsim import units
 from feedsim.errors import InputError, OutputError
 from feedsim.trace.files import written_whole
 from feedsim.trace.numbers import Decimal, decimal_mark, numbers
-from feedsim.trace.trace import Array, Trace, check_name, check_unit, suggest
+from feedsim.trace.table import stretches
+from feedsim.trace.trace import Array, Trace, check_name, check_unit, first_not_finite, suggest
 
 _HEADER = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?")
+ROWS = 1 << 12  # that are written at a time
 _SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
 # Heads of the columns, and where they stand -> names and units; InputError.
 Header = Callable[[Sequence[str], str], tuple[tuple[str, ...], tuple[str, ...]]]
@@ -90,18 +91,26 @@ def read_csv(
 def write_csv(path: str | Path, trace: Trace) -> None:
     """Write a trace, whole or not at all. OutputError: a value is not finite, or the file cannot be written."""
     path = Path(path)
-    header = ["time [s]"]
     for name, values in trace.columns.items():
-        if not np.all(np.isfinite(values)):
-            row = int(np.argmin(np.isfinite(values)))
+        if (row := first_not_finite(values)) is not None:
             raise OutputError(f"{path} is not written: {name} is {values[row]} at {trace.time[row]:.9g} s")
-        unit = trace.unit(name)
-        header.append(f"{name} [{unit}]" if unit else name)
-    text = [shortest(trace.time), *(shortest(values) for values in trace.columns.values())]
-    lines = chain([",".join(quoted(cell) for cell in header)], map(",".join, zip(*text, strict=True)))
     with written_whole(path) as file:
-        file.write("\n".join(lines).encode("utf-8"))
-        file.write(b"\n")
+        file.write(heading(trace))
+        for columns in stretches(trace.time, *trace.columns.values(), rows=ROWS):
+            file.write(lines_of(columns))
+
+
+def heading(trace: Trace) -> bytes:
+    """The first line of a trace's file."""
+    units = [(name, trace.unit(name)) for name in trace.columns]
+    heads = ["time [s]", *(f"{name} [{unit}]" if unit else name for name, unit in units)]
+    return f"{','.join(quoted(cell) for cell in heads)}\n".encode()
+
+
+def lines_of(columns: Sequence[Array]) -> bytes:
+    """Rows of a file, the time being the first of the columns."""
+    text = zip(*(shortest(values) for values in columns), strict=True)
+    return "".join(f"{','.join(cells)}\n" for cells in text).encode()
 
 
 def shortest(values: Array) -> list[str]:

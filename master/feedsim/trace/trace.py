@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedsim.errors import InputError
+from feedsim.trace.table import STRETCH, release, stretches, unchangeable
 
 Array = NDArray[np.float64]
 
@@ -22,11 +23,11 @@ class TimeColumns:
     units: Mapping[str, str]
 
     def _settle(self) -> None:
-        """Copy the arrays, read-only. InputError: not one-dimensional, lengths that differ, time that is not finite,
+        """Make the arrays read-only. InputError: not one-dimensional, lengths that differ, time that is not finite,
         a unit for a column that does not exist."""
         time = _frozen_array(self.time, "time")
-        if not np.all(np.isfinite(time)):
-            raise InputError(f"time is not finite at row {int(np.argmin(np.isfinite(time)))} (counted from 0)")
+        if (row := first_not_finite(time)) is not None:
+            raise InputError(f"time is not finite at row {row} (counted from 0)")
         columns = {name: _frozen_array(values, name) for name, values in self.columns.items()}
         for name, values in columns.items():
             if values.shape != time.shape:
@@ -67,7 +68,8 @@ class Trace(TimeColumns):
     columns  name -> (N,) values
     units    name -> unit as written in a CSV header ("m", "rad/s"; "" where none is known)
 
-    Arrays are copied to float64 and made read-only. InputError: lengths that differ, time that does not increase, a
+    Arrays are copied to float64 and made read-only; those that nobody can change any more are taken as they are, so
+    that a part of a trace costs no memory. InputError: lengths that differ, time that does not increase, a
     name or unit that could not be written to a CSV header and read back, a unit for a column that does not exist.
     """
 
@@ -79,8 +81,7 @@ class Trace(TimeColumns):
         for name in self.columns:
             check_name(name)
         self._settle()
-        if (wrong := np.flatnonzero(np.diff(self.time) <= 0)).size:
-            row = int(wrong[0]) + 1
+        if (row := _first_not_later(self.time)) is not None:
             raise InputError(
                 f"time must increase: {self.time[row]:.9g} s follows {self.time[row - 1]:.9g} s at row {row} "
                 "(counted from 0)"
@@ -161,8 +162,31 @@ def suggest(name: str, known: Iterable[str]) -> str:
     return f"; there is {shown}" + (f" and {len(names) - 12} more" if len(names) > 12 else "")
 
 
+def first_not_finite(values: Array) -> int | None:
+    """First row that holds no finite number."""
+    first = 0
+    for (part,) in stretches(values):
+        finite = np.isfinite(part)
+        if not finite.all():
+            return first + int(np.argmin(finite))
+        first += len(part)
+    return None
+
+
+def _first_not_later(time: Array) -> int | None:
+    """First row that is not later than the one before."""
+    for first in range(0, len(time), STRETCH):
+        if (wrong := np.flatnonzero(np.diff(time[first : first + STRETCH + 1]) <= 0)).size:
+            return first + int(wrong[0]) + 1
+        release(time)
+    return None
+
+
 def _frozen_array(values: ArrayLike, name: str) -> Array:
-    array = np.array(values, dtype=np.float64)
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and unchangeable(values):
+        array: Array = values
+    else:
+        array = np.array(values, dtype=np.float64)
     if array.ndim != 1:
         raise InputError(f"column {name!r} must be one-dimensional, has shape {array.shape}")
     array.setflags(write=False)

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import signal
 import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from feedsim.cli import compare, compensate, frf, identify, machine, ssp
+from feedsim.cli import compare, compensate, frf, identify, machine, ssp, sweep
 from feedsim.cli.options import add_fmus, add_overrides
 
 EPILOG = """exit codes:
@@ -35,6 +36,7 @@ examples:
   feedsim compensate scenarios/xz_circle.yaml
   feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
   feedsim run xz_circle.ssp
+  feedsim sweep scenarios/studies/friction_wear.yaml
   feedsim compare result.csv reference.csv --tol 1e-6 --report compare.html
 """
 
@@ -63,7 +65,7 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
 
     validate = commands.add_parser(
-        "validate", help="check a scenario or an SSP, its machine and its motion without running it"
+        "validate", help="check a scenario, an SSP or a study, its machine and its motion without running it"
     )
     _add_scenario(validate)
 
@@ -72,13 +74,18 @@ def parser() -> argparse.ArgumentParser:
     identify.add_command(commands)
     compensate.add_command(commands)
     ssp.add_command(commands)
+    sweep.add_command(commands)
     compare.add_command(commands)
 
     schema = commands.add_parser(
-        "schema", help="print the JSON Schema of scenario, machine, structure, mapping or tolerance files, for editors"
+        "schema",
+        help="print the JSON Schema of scenario, machine, structure, mapping, tolerance or study files, for editors",
     )
     schema.add_argument(
-        "kind", nargs="?", choices=("scenario", "machine", "structure", "columns", "tolerances"), default="scenario"
+        "kind",
+        nargs="?",
+        choices=("scenario", "machine", "structure", "columns", "tolerances", "study"),
+        default="scenario",
     )
 
     convert = commands.add_parser(
@@ -118,6 +125,8 @@ def _add_scenario(command: argparse.ArgumentParser) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     options = parser().parse_args(arguments)
+    # Small matrices by the thousand: threads for linear algebra only wait for one another.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     from feedsim.cli import commands
     from feedsim.errors import FeedsimError
@@ -134,7 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"feedsim: {error}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print("feedsim: interrupted; nothing was written", file=sys.stderr)
+        print("feedsim: interrupted; no result was written", file=sys.stderr)
         return 130
     except BrokenPipeError:
         sys.stdout = None  # who read the output has gone; Python would flush into the closed pipe once more

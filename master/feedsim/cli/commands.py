@@ -5,11 +5,16 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from feedsim.errors import InputError
+
+if TYPE_CHECKING:
+    from feedsim.report.partial import Partial
 
 
 def run(options: Namespace) -> None:
@@ -22,25 +27,43 @@ def run(options: Namespace) -> None:
     with subject(options) as (plan, program, fmus, told):
         analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
         report.check_writable(directory, report.input_paths(plan))
-        with tqdm(
-            desc=plan.name,
-            unit=" cycles",
-            unit_scale=True,
-            leave=False,
-            disable=options.quiet or not sys.stderr.isatty(),
-        ) as bar:
+        with (
+            _told_of_what_is_left(report.growing(directory)) as recorded,
+            tqdm(
+                desc=plan.name,
+                unit=" cycles",
+                unit_scale=True,
+                leave=False,
+                disable=options.quiet or not sys.stderr.isatty(),
+            ) as bar,
+        ):
 
             def progress(done: int, total: int) -> None:
                 bar.total = total
                 bar.update(done - bar.n)
 
-            result = cosim.run(plan, program=program, fmus=fmus, progress=progress)
-        result = replace(result, warnings=told(result.warnings))
-        figures = analysis.evaluate(result)
-        report.write(result, figures, directory)
+            result = cosim.run(
+                plan, program=program, fmus=fmus, progress=progress, scratch=recorded.scratch, sink=recorded
+            )
+            bar.close()
+            result = replace(result, warnings=told(result.warnings))
+            figures = analysis.evaluate(result)
+            report.write(result, figures, directory, recorded)
     _warn(result.warnings)
     if not options.quiet:
         print(f"{plan.name}: {report.summary_line(result, figures)} -> {directory}")
+
+
+@contextmanager
+def _told_of_what_is_left(recorded: Partial) -> Iterator[Partial]:
+    """Say where the rows are of a run that does not come to its end."""
+    try:
+        with recorded:
+            yield recorded
+    except BaseException:
+        if recorded.left:
+            print(f"feedsim: the rows up to {recorded.time:.9g} s are kept in {recorded.path}", file=sys.stderr)
+        raise
 
 
 def _warn(warnings: Iterable[str]) -> None:
@@ -50,7 +73,13 @@ def _warn(warnings: Iterable[str]) -> None:
 
 def validate(options: Namespace) -> None:
     from feedsim import analysis, cosim
+    from feedsim.cli import sweep
     from feedsim.cli.ssp import subject
+    from feedsim.scenario import is_study
+
+    if is_study(options.scenario):
+        sweep.validate(options)
+        return
 
     with subject(options) as (checked, program, fmus, told):
         analysis.check(checked, program)

@@ -75,6 +75,8 @@ def subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | None
     from feedsim import nc, scenario, ssp
 
     if not ssp.is_ssp(options.scenario):
+        if scenario.is_study(options.scenario):
+            raise InputError(f"{options.scenario}: is a study of many runs: feedsim sweep {options.scenario}")
         loaded = scenario.load(options.scenario, options.overrides)
         yield loaded, nc.plan(loaded), options.fmus, tuple
         return

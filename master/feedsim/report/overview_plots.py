@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from feedsim.report.labels import heading, legend_above
 from feedsim.report.style import BLUE, MUTED, SETPOINT, VERMILLION, Picture, drawing, finish, thinned
-from feedsim.trace import Trace
+from feedsim.trace import Trace, release
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,5 +61,6 @@ def overview_picture(trace: Trace, axes: Iterable[str], signs: Mapping[str, int]
 
 def _curve(axes: Axes, trace: Trace, name: str, scale: float, label: str, style: Mapping[str, Any]) -> None:
     if name in trace.columns:
-        t, y = thinned(trace.time, scale * trace[name])
-        axes.plot(t, y, label=label, **style)
+        t, y = thinned(trace.time, trace[name])
+        release(trace.time, trace[name])
+        axes.plot(t, scale * y, label=label, **style)

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from html import escape
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings, filterwarnings
@@ -137,10 +138,21 @@ def finish(figure: Drawing, stem: str, title: str, caption: str) -> Picture:
     with catch_warnings():
         # Names in scripts that the font lacks; the page around the picture has them.
         filterwarnings("ignore", message=r"Glyph \d+ .*missing from")
+        _lay_out(figure)
         figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
         figure.patch.set_visible(False)
         figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     return Picture(stem, title, caption, png.getvalue(), _inline(svg.getvalue(), stem, title))
+
+
+def _lay_out(figure: Drawing) -> None:
+    """Give the rooms their places once: saving would for each format, and draw everything once more to do it."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        dpi, figure.dpi = figure.dpi, PNG_DPI
+        engine.execute(figure)
+        figure.dpi = dpi
+        figure.set_layout_engine(None)  # "none" would leave one that does nothing, but costs as much
 
 
 def thinned(x: Array, *ys: Array) -> tuple[Array, ...]:
@@ -175,4 +187,4 @@ def _inline(svg: str, stem: str, title: str) -> str:
     svg = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", svg, count=1)
     for name, on_light, _ in PALETTE:
         svg = re.sub(re.escape(on_light), f"var(--{name})", svg, flags=re.IGNORECASE)
-    return svg.replace("<svg", f'<svg role="img" aria-label="{title}" class="plot"', 1)
+    return svg.replace("<svg", f'<svg role="img" aria-label="{escape(title)}" class="plot"', 1)

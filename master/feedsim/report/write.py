@@ -9,6 +9,7 @@ from feedsim.analysis import Figure, PositioningTask, tasks
 from feedsim.report.circle_plots import contour_picture, torque_picture
 from feedsim.report.overview_plots import overview_picture
 from feedsim.report.page import page
+from feedsim.report.partial import PARTIAL, Partial
 from feedsim.report.parts import to_json
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, write_text
 from feedsim.report.stop_plots import positioning_picture
@@ -25,22 +26,34 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (*FILES, LOG), inputs)
+    check_place(directory, (*FILES, LOG, PARTIAL), inputs)
 
 
-def write(run: Run, figures: Mapping[str, Figure], directory: Path | str) -> tuple[Path, ...]:
+def growing(directory: Path | str) -> Partial:
+    """What takes a run's rows while it goes on, for :func:`write`."""
+    return Partial(directory, RESULT)
+
+
+def write(
+    run: Run, figures: Mapping[str, Figure], directory: Path | str, recorded: Partial | None = None
+) -> tuple[Path, ...]:
     """Write result.csv, summary.json, report.html, figures/*.png and log.csv, if there is one; returns their paths.
 
-    figures: as from ``analysis.evaluate``. Files of an earlier run are replaced. Raises OutputError.
+    figures: as from ``analysis.evaluate``. recorded: the run's rows where they have been written already, in the same
+    directory; the file becomes result.csv. Files of an earlier run are replaced. Raises OutputError.
     """
     pictures = draw(run, figures)
 
     def fill(fresh: Path, names: Sequence[str]) -> None:
-        write_csv(fresh / RESULT, run.trace)
+        if recorded is None:
+            write_csv(fresh / RESULT, run.trace)
         if run.log is not None:
             write_csv(fresh / LOG, run.log)
         write_text(fresh / REPORT, page(run, figures, pictures))
         write_text(fresh / SUMMARY, to_json(summary(run, figures, names)))
+        if recorded is not None:  # the last: what fails before leaves the rows where they are
+            recorded.finished()
+            recorded.path.replace(fresh / RESULT)
 
     files = FILES if run.log is None else (RESULT, LOG, REPORT, SUMMARY)
     return write_results(directory, files, pictures, fill)
@@ -71,6 +84,7 @@ def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
             torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
             pictures += [torques] if torques is not None else []
             covered |= set(task.turn.axes)
-    moving = [axis for axis, x in run.program.x_s.items() if x.min() < x.max() and axis not in covered]
+    reached = {axis: run.program.reached(axis) for axis in run.program.x_s if axis not in covered}
+    moving = [axis for axis, (low, high) in reached.items() if low < high]
     overview = overview_picture(run.trace, moving, signs, "overview")
     return [*pictures, overview] if overview is not None else pictures

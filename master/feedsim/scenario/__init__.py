@@ -1,5 +1,6 @@
 """Scenario and machine files: YAML with units, checked, as objects in SI."""
 
+from feedsim.scenario.base import Base, Change
 from feedsim.scenario.checks import moved_axes
 from feedsim.scenario.columns import Columns, load_columns
 from feedsim.scenario.described import Described, load_described
@@ -11,12 +12,16 @@ from feedsim.scenario.model import CircleTest, Coupling, Evaluation, Positioning
 from feedsim.scenario.motion import Arc, Circle, Column, Dwell, MeasuredSetpoints, Motion, Move
 from feedsim.scenario.schema import json_schema
 from feedsim.scenario.structure import Damping, DampingStep, Structure
+from feedsim.scenario.study import Choice, Distribution, Parameter, Sampling, Study, is_study, load_study
 from feedsim.scenario.subject import Subject, load_subject
 from feedsim.scenario.tolerances import ToleranceFile, load_tolerances
 
 __all__ = [
     "Arc",
     "Axis",
+    "Base",
+    "Change",
+    "Choice",
     "Circle",
     "CircleTest",
     "Column",
@@ -29,6 +34,7 @@ __all__ = [
     "DampingStep",
     "Delay",
     "Described",
+    "Distribution",
     "Drive",
     "Dwell",
     "Evaluation",
@@ -41,23 +47,28 @@ __all__ = [
     "Motion",
     "Move",
     "Noise",
+    "Parameter",
     "PathLimits",
     "Positioning",
     "Quantisation",
     "Recording",
+    "Sampling",
     "Scenario",
     "Sine",
     "SineMove",
     "SpeedRange",
     "Structure",
+    "Study",
     "Subject",
     "ToleranceFile",
+    "is_study",
     "json_schema",
     "load",
     "load_columns",
     "load_described",
     "load_machine",
     "load_structure",
+    "load_study",
     "load_subject",
     "load_tolerances",
     "moved_axes",

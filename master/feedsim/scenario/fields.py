@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import lru_cache
 from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,6 +16,9 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from feedsim import units
 from feedsim.errors import InputError
+
+# Studies check a scenario for every run, most of whose texts are those of the run before.
+_parsed = lru_cache(maxsize=4096)(units.parse)
 
 RESERVED = ("time", "tool", "tcp", "pose")  # first parts of other column names
 
@@ -78,7 +82,7 @@ class Quantity:
             raise fault(f"{brief(value)} is no quantity; {units.article(self.kind)} is expected, for example {shown}")
         if isinstance(value, str):
             try:
-                number = units.parse(value, self.unit, shown)
+                number = _parsed(value, self.unit, shown)
             except InputError as error:
                 raise fault(str(error)) from None
         else:

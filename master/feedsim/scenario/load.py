@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,6 +27,7 @@ from feedsim.scenario.structure.kinds import KINDS, contradictions_of
 MACHINE_FILE = "machine.yaml"
 STRUCTURE_FILE = "structure.yaml"
 M = TypeVar("M", bound=BaseModel)
+Setting = tuple[str, Source]  # dotted key, value
 
 
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
@@ -36,39 +38,87 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
 
     Raises InputError that lists every problem with file and line.
     """
-    path = Path(path)
+    draft = drafted(Path(path), overrides)
+    draft.settle()
+    return draft.scenario()
+
+
+@dataclass
+class Draft:
+    """A scenario before it is checked: the tree of its files and what is changed in it.
+
+    Attributes:
+        path: scenario file.
+        source: the tree, with the files it names; changed by `settle` and `apply`.
+        own: settings of the file's `set` group, which come first.
+        outside: settings from outside, the machine not among them; they count after the file's own.
+        overrides: the settings from outside as KEY=VALUE.
+        faults: what is wrong so far.
+        changed: places that were set, with what has set them.
+    """
+
+    path: Path
+    source: Source
+    own: tuple[Setting, ...]
+    outside: tuple[Setting, ...]
+    overrides: tuple[str, ...]
+    faults: list[str]
+    changed: list[tuple[Place, str]] = field(default_factory=list)
+
+    def copy(self) -> Draft:
+        """One that can be changed without changing this one."""
+        return replace(self, source=self.source.copy(), faults=[*self.faults], changed=[*self.changed])
+
+    def settle(self) -> None:
+        """Apply the file's own settings and those from outside."""
+        self.apply((*self.own, *self.outside))
+
+    def apply(self, settings: Iterable[Setting]) -> None:
+        """Apply further settings."""
+        for key, value in settings:
+            with _collecting(self.faults):
+                for place in changes.apply(self.source, Scenario, key, value):
+                    self.changed.append((place, value.mark(()).where))
+                    fetch(self.source, Scenario, place, self.faults)
+
+    def scenario(self) -> Scenario:
+        """Check what there is. InputError lists every problem with file and line."""
+        source, faults = self.source, [*self.faults]
+        scenario = check(source, Scenario, faults)
+        if scenario is not None:
+            faults += [describe(source, place, message) for place, message in contradictions(scenario)]
+        if faults or scenario is None:
+            raise InputError.of(str(self.path), in_order(faults))
+        scenario._file = self.path
+        scenario._overrides = self.overrides
+        scenario._origins = {place: mark.where for place, mark in source.marks.items()}
+        scenario._changes = tuple(self.changed)
+        scenario._settings = tuple(f"{key}={_text(value.data)}" for key, value in self.own)
+        scenario._files = tuple(_files(source, self.path))
+        scenario.machine._directory = source.mark(("machine",)).folder
+        return scenario
+
+
+def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Setting] = ()) -> Draft:
+    """Read a scenario file and the files it names; nothing is set yet but the machine.
+
+    `settings` come from outside too, before the `overrides`. InputError: the scenario file itself cannot be read.
+    """
     source = read_group(path)
     faults: list[str] = []
-    options = []
+    outside = [*settings]
     for text in overrides:
         with _collecting(faults):
-            options.append(changes.option(text, Path()))
-
+            outside.append(changes.option(text, Path()))
     # A machine chosen from outside comes first: the scenario's own settings then meet that machine.
-    for key, value in options:
+    for key, value in outside:
         if key == "machine":
             source.put(("machine",), value)
-    own = list(_own_settings(source, faults))
-    changed: list[tuple[Place, str]] = []
+    own = tuple(_own_settings(source, faults))
     fetch(source, Scenario, (), faults)
-    for key, value in (*own, *((key, value) for key, value in options if key != "machine")):
-        with _collecting(faults):
-            for place in changes.apply(source, Scenario, key, value):
-                changed.append((place, value.mark(()).where))
-                fetch(source, Scenario, place, faults)
-    scenario = check(source, Scenario, faults)
-    if scenario is not None:
-        faults += [describe(source, place, message) for place, message in contradictions(scenario)]
-    if faults or scenario is None:
-        raise InputError.of(str(path), in_order(faults))
-    scenario._file = path
-    scenario._overrides = tuple(overrides)
-    scenario._origins = {place: mark.where for place, mark in source.marks.items()}
-    scenario._changes = tuple(changed)
-    scenario._settings = tuple(f"{key}={_text(value.data)}" for key, value in own)
-    scenario._files = tuple(_files(source, path))
-    scenario.machine._directory = source.mark(("machine",)).folder
-    return scenario
+    others = tuple((key, value) for key, value in outside if key != "machine")
+    texts = (*(f"{key}={_text(value.data)}" for key, value in settings), *overrides)
+    return Draft(path, source, own, others, texts, faults)
 
 
 def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
@@ -205,13 +255,13 @@ UNREAD = "(not read)"  # stands for the content of a file whose problem is repor
 
 def check(source: Source, model: type[M], faults: list[str]) -> M | None:
     try:
-        return model.model_validate(source.data, context=_reading(source.data))
+        return model.model_validate(source.data, context=reading(source.data))
     except ValidationError as error:
         faults += [text for detail in error.errors() if (text := explain(source, model, detail, UNREAD))]
         return None
 
 
-def _reading(data: dict[str, Any]) -> Reading:
+def reading(data: dict[str, Any]) -> Reading:
     """What single values can be checked against, as far as the machine can be read."""
     machine = data.get("machine", data)
     machine = machine if isinstance(machine, dict) else {}

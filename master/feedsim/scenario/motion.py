@@ -91,7 +91,7 @@ class Circle(PlaneMotion):
 
     kind: Literal["circle"] = "circle"
     radius: Annotated[float, Quantity("m", above=0, example="15 mm")] = Field(description="Radius")
-    turns: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(default=1, description="Number of full turns")
+    turns: Annotated[StrictInt, Field(ge=1, le=100_000)] = Field(default=1, description="Number of full turns")
     start_angle: Annotated[float, Quantity("rad", minimum=-2 * pi, maximum=2 * pi, example="0 deg")] = Field(
         default=0.0, description="Direction from the centre to the start, from the first axis towards the second"
     )

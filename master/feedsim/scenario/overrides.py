@@ -9,7 +9,7 @@ from typing import Any
 from feedsim.errors import InputError
 from feedsim.scenario import shape
 from feedsim.scenario.fields import brief, did_you_mean
-from feedsim.scenario.source import Mark, Place, Source, parse
+from feedsim.scenario.source import Mark, Place, Source, at, copied, parse
 
 
 def option(text: str, folder: Path) -> tuple[str, Source]:
@@ -27,10 +27,14 @@ def apply(source: Source, model: Any, key: str, value: Source) -> Iterator[Place
     A number counts from 0 in a list; * stands for every key or entry there is. Groups that the model knows are made
     where they are missing. InputError: a key that does not belong there, an index out of range.
     """
-    parts = key.split(".")
-    for place in list(_places(source, model, (), parts, key, value.marks[()])):
-        source.put(place, Source(_copy(value.data), value.marks))
+    for place in list(places(source, model, key, value.marks[()])):
+        source.put(place, Source(copied(value.data), value.marks))
         yield place
+
+
+def places(source: Source, model: Any, key: str, mark: Mark) -> Iterator[Place]:
+    """The places that a dotted `key` stands for, as apply() has it; `mark` is named by what is raised."""
+    yield from _places(source, model, (), key.split("."), key, mark)
 
 
 def _places(source: Source, model: Any, place: Place, parts: list[str], key: str, mark: Mark) -> Iterator[Place]:
@@ -38,7 +42,7 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
         yield place
         return
     part, rest = parts[0], parts[1:]
-    data = _at(source.data, place)
+    data = at(source.data, place)
     here = ".".join(str(item) for item in place) or f"the {model.__name__.lower()}"
     if part == "*" and isinstance(data, (dict, list)):
         for name in list(data) if isinstance(data, dict) else range(len(data)):
@@ -65,16 +69,3 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
         data[part] = {}
         source.marks[(*place, part)] = mark
     yield from _places(source, model, (*place, part), rest, key, mark)
-
-
-def _at(data: Any, place: Place) -> Any:
-    for key in place:
-        data = data[key]
-    return data
-
-
-def _copy(data: Any) -> Any:
-    """Own lists and groups, so that one value set at several places is not shared between them."""
-    if isinstance(data, dict):
-        return {key: _copy(value) for key, value in data.items()}
-    return [_copy(item) for item in data] if isinstance(data, list) else data

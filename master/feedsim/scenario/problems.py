@@ -109,7 +109,7 @@ def _wanted(source: Source, model: Any, place: Place) -> str:
     annotation = shape.child(parent, place[-1])
     info = shape.field(parent, place[-1]) if shape.is_model(parent) else None
     description = info.description if info is not None else None
-    if quantity := _quantity(annotation):
+    if quantity := quantity_of(annotation):
         example = quantity.example or units.example(quantity.unit)
         text = f"{units.article(quantity.kind)}, for example {dotted(place[-1:])}: {example}"
     elif shape.is_group(shape.resolve(annotation, None)):
@@ -119,11 +119,12 @@ def _wanted(source: Source, model: Any, place: Place) -> str:
     return f"{text} ({description})" if text and description else text or description or "it is needed"
 
 
-def _quantity(annotation: Any) -> Quantity | None:
+def quantity_of(annotation: Any) -> Quantity | None:
+    """What quantity is expected where a field has `annotation` (not resolved); None where none is."""
     if isinstance(annotation, Quantity):
         return annotation
     for part in get_args(annotation) if get_origin(annotation) not in (dict, tuple) else ():
-        if found := _quantity(part):
+        if found := quantity_of(part):
             return found
     return None
 

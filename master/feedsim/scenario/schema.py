@@ -1,4 +1,4 @@
-"""JSON Schema of scenario, machine, structure, mapping and tolerance files, for editors."""
+"""JSON Schema of scenario, machine, structure, mapping, tolerance and study files, for editors."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
     from feedsim.scenario.fields import Quantity
 
-Kind = Literal["scenario", "machine", "structure", "columns", "tolerances"]
+Kind = Literal["scenario", "machine", "structure", "columns", "tolerances", "study"]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema(kind: Kind = "scenario") -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of a scenario, machine or structure file, of a mapping of a trace's columns, or of
-    tolerances.
+    """JSON Schema (draft 2020-12) of a scenario, machine or structure file, of a mapping of a trace's columns, of
+    tolerances, or of a study.
 
     It knows keys, words and the spelling of quantities; it cannot know limits of quantities nor what needs two places
     to be seen together. What it refuses, load() refuses too.
@@ -27,6 +27,7 @@ def json_schema(kind: Kind = "scenario") -> dict[str, Any]:
     from feedsim.scenario.columns import Columns
     from feedsim.scenario.machine import Machine
     from feedsim.scenario.model import Scenario
+    from feedsim.scenario.study.file import StudyFile
     from feedsim.scenario.tolerances import ToleranceFile
 
     if kind == "structure":
@@ -34,6 +35,7 @@ def json_schema(kind: Kind = "scenario") -> dict[str, Any]:
     else:
         models: dict[str, type[BaseModel]] = {
             "scenario": Scenario, "machine": Machine, "columns": Columns, "tolerances": ToleranceFile,
+            "study": StudyFile,
         }  # fmt: skip
         schema = models[kind].model_json_schema()
     definitions: dict[str, Any] = schema.pop("$defs")

@@ -8,6 +8,7 @@ dates are words. Stricter than YAML: a duplicate key is an error, a file is one 
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from feedsim.errors import InputError
 Place = tuple[str | int, ...]
 
 LARGEST = 100_000  # values in a file, aliases expanded
+_FAST_DEPTH = 2000
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,10 @@ class Source:
             place = place[:-1]
         return self.marks[place]
 
+    def copy(self) -> Source:
+        """An equal one that shares no list or group with this one."""
+        return Source(copied(self.data), dict(self.marks))
+
     def put(self, place: Place, other: Source) -> None:
         """Replace the value at `place` (its parent exists) by another tree, with its marks."""
         parent: Any = self.data
@@ -54,6 +60,20 @@ class Source:
     def forget(self, place: Place) -> None:
         """Drop the marks of a value and of all inside it."""
         self.marks = {known: mark for known, mark in self.marks.items() if known[: len(place)] != place}
+
+
+def at(data: Any, place: Place) -> Any:
+    """The value at a place of a tree of plain values."""
+    for key in place:
+        data = data[key]
+    return data
+
+
+def copied(data: Any) -> Any:
+    """Plain values with lists and groups of their own."""
+    if isinstance(data, dict):
+        return {key: copied(value) for key, value in data.items()}
+    return [copied(item) for item in data] if isinstance(data, list) else data
 
 
 def read(path: Path) -> Source:
@@ -80,11 +100,7 @@ def parse(text: str, name: str, folder: Path, *, lines: bool = True) -> Source:
     """Read YAML text. `name` stands before the line in messages; with lines=False it stands alone (one-line texts)."""
     builder = _Builder(name, folder, lines)
     try:
-        loader = _Loader(text)
-        try:
-            node = loader.get_single_node()
-        finally:
-            loader.dispose()
+        node = _composed(text)
     except RecursionError:
         raise InputError(f"{name}: nested too deeply") from None
     except yaml.MarkedYAMLError as error:
@@ -100,11 +116,35 @@ def parse(text: str, name: str, folder: Path, *, lines: bool = True) -> Source:
     return source
 
 
+def _composed(text: str) -> yaml.Node | None:
+    """The document's root, by libyaml where there is one, ten times faster; PyYAML's own parser words the faults."""
+    # libyaml's binding overruns the stack on text that is nested some ten thousand times. Every level takes a bracket
+    # or a column, of which a list and the group that it stands in may share one.
+    deepest = text.count("[") + text.count("{") + 2 * max(map(len, text.splitlines()), default=0)
+    if _FastLoader is not None and deepest < _FAST_DEPTH:
+        with suppress(yaml.YAMLError):
+            return _root(_FastLoader, text)
+    return _root(_Loader, text)
+
+
+def _root(kind: Any, text: str) -> yaml.Node | None:
+    loader = kind(text)
+    try:
+        node: yaml.Node | None = loader.get_single_node()
+        return node
+    finally:
+        loader.dispose()
+
+
 class _Loader(yaml.SafeLoader):
     """Composes nodes and resolves plain scalars by the YAML 1.2 core schema."""
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012  (PyYAML's own name; emptied of the 1.1 rules)
 
+
+_FastLoader: Any = None
+if yaml.__with_libyaml__:
+    _FastLoader = type("_FastLoader", (yaml.CSafeLoader,), {"yaml_implicit_resolvers": _Loader.yaml_implicit_resolvers})
 
 for _tag, _pattern, _first in (
     ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),

@@ -76,8 +76,8 @@ def _axes(info: MachineInfo) -> str:
     heads = [("Figure", False), ("Unit", False), *((axis.name, True) for axis in info.axes)]
     share = f"{100 * USUAL_EXCHANGE.stable_share:.0f}"
     note = (
-        f'<p class="muted">h = {info.step * 1e6:.6g} µs. The default exchange of plant and friction was found to be '
-        f"stable up to {share} % of 2 J_inf/h.</p>"
+        f'<p class="muted">h = {info.step * 1e6:.6g} µs. The default exchange of plant and friction is stable '
+        f"up to {share} % of 2 J_inf/h.</p>"
         + "".join(f'<p class="muted">{escape(typeset(line))}</p>' for line in exchange(info))
     )
     return f"<h2>Axes</h2>\n{table(heads, rows)}{note}" if info.axes else ""

@@ -1,0 +1,250 @@
+"""What the report on a study tells: parameters and figures in people's units, failures by message, sensitivities."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.report.people import Scale, number, scale
+from feedsim.report.style import Array
+from feedsim.sweep.sensitivity import Sensitivities, sensitivities
+
+if TYPE_CHECKING:
+    from feedsim.scenario import Parameter, Study
+    from feedsim.sweep.design import Design
+    from feedsim.sweep.table import Table
+
+QUANTILES = (5, 50, 95)
+FEW_LEVELS = 12  # distinct values up to which a parameter is drawn level by level
+NARROW = 0.5  # share of a parameter's span within which failures point at it
+
+
+@dataclass(frozen=True, eq=False)
+class Input:
+    """A parameter: its column (rows,) in people's units, or the numbers of its words; drawn: rows that are drawn."""
+
+    name: str
+    parameter: Parameter
+    scale: Scale
+    values: Array
+    words: tuple[str, ...]  # empty for numbers
+    drawn: NDArray[np.int64]
+
+    @property
+    def sample(self) -> Array:
+        """The values that are drawn."""
+        return self.values[self.drawn]
+
+    @property
+    def label(self) -> str:
+        """Name with unit."""
+        return _label(self.name, self.scale)
+
+    @cached_property
+    def levels(self) -> Array:
+        """Its distinct values where they are few and come back, else none."""
+        found = np.unique(self.values)
+        few = len(found) <= FEW_LEVELS and 2 * len(found) <= len(self.values)
+        return found if self.words or few else found[:0]
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether its values spread over orders of magnitude."""
+        law = self.parameter.distribution
+        spread = self.values.min() > 0 and self.values.max() > 5 * self.values.min()
+        return bool(not self.words and spread and law is not None and law.kind in ("loguniform", "lognormal"))
+
+    def text(self, value: float) -> str:
+        """A value as it is shown, without unit."""
+        return self.words[int(value)] if self.words else number(value)
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """A figure: its column (rows,) in people's units, NaN where a run has none, and what it comes to.
+
+    drawn: rows that statistics and pictures are of.
+    """
+
+    name: str
+    scale: Scale
+    values: Array
+    drawn: NDArray[np.int64]
+
+    @property
+    def sample(self) -> Array:
+        """The values that are drawn."""
+        return self.values[self.drawn]
+
+    @property
+    def label(self) -> str:
+        """Name with unit."""
+        return _label(self.name, self.scale)
+
+    @cached_property
+    def known(self) -> Array:
+        """Those of the sample that there are."""
+        return self.sample[np.isfinite(self.sample)]
+
+    @cached_property
+    def statistics(self) -> Mapping[str, float]:
+        """mean, standard deviation (n - 1), quantiles, smallest and largest; NaN without values."""
+        known = self.known
+        if not len(known):
+            return dict.fromkeys(("mean", "std", "q5", "q50", "q95", "min", "max"), np.nan)
+        quantiles = np.percentile(known, QUANTILES)
+        return {
+            "mean": float(known.mean()),
+            "std": float(known.std(ddof=1)) if len(known) > 1 else np.nan,
+            **{f"q{share}": float(value) for share, value in zip(QUANTILES, quantiles, strict=True)},
+            "min": float(known.min()),
+            "max": float(known.max()),
+        }
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Runs that failed alike: an example of their message, their numbers, and where they lie."""
+
+    message: str
+    runs: tuple[int, ...]
+    where: str
+
+
+class Account:
+    """A study with its table, ready to be told. record: how the runs were made, as study.json holds it."""
+
+    def __init__(self, table: Table, study: Study, design: Design, record: Mapping[str, Any] | None = None) -> None:
+        self.table, self.study, self.design = table, study, design
+        self.record: Mapping[str, Any] = {**table.provenance, **(record or {})}
+        self.runs: NDArray[np.int64] = np.asarray(table["run"], dtype=np.int64)
+        self.ok: NDArray[np.bool_] = np.asarray(table.ok, dtype=bool)
+
+    @cached_property
+    def drawn(self) -> NDArray[np.int64]:
+        """Rows of runs that are independent: all, of samples for Sobol indices A and B.
+
+        The other samples repeat their values time and again, and would make clusters.
+        """
+        matrices = self.design.matrices
+        if matrices is None:
+            return np.arange(len(self.runs))
+        return np.flatnonzero(np.isin(self.runs, np.concatenate([matrices.a, matrices.b])))
+
+    @cached_property
+    def inputs(self) -> tuple[Input, ...]:
+        """The parameters, with a value for every row of the table."""
+        found = []
+        for column, parameter in zip(self.design.values.T, self.study.parameters, strict=True):
+            values = column[self.runs]
+            words = tuple(choice.label for choice in parameter.choices) if parameter.worded else ()
+            unit = Scale(1.0, "") if words else scale(parameter.unit, values)
+            found.append(Input(parameter.name, parameter, unit, values * unit.factor, words, self.drawn))
+        return tuple(found)
+
+    @cached_property
+    def outputs(self) -> tuple[Output, ...]:
+        """The figures, in the order of the table."""
+        found = []
+        for name in self.table.figures:
+            values = np.asarray(self.table[name], dtype=np.float64)
+            unit = scale(self.table.unit(name), values)
+            found.append(Output(name, unit, values * unit.factor, self.drawn))
+        return tuple(found)
+
+    @cached_property
+    def sensitivities(self) -> Sensitivities:
+        """What moves the figures."""
+        return sensitivities(self.table, self.design, self.study.sampling.seed or 0)
+
+    @property
+    def failed(self) -> int:
+        """Number of rows without figures."""
+        return int((~self.ok).sum())
+
+    @property
+    def busy(self) -> float:
+        """Time that the runs took, one after the other [s]."""
+        return float(np.nansum(np.asarray(self.table["seconds"], dtype=np.float64)))
+
+    @property
+    def wall_time(self) -> float | None:
+        """Time from the beginning to the end of all runs [s]; None where they were made in several goes."""
+        begun, ended = self.record.get("began"), self.record.get("ended")
+        if self.record.get("resumed", 0) != 0 or not isinstance(begun, str) or not isinstance(ended, str):
+            return None
+        seconds = (datetime.fromisoformat(ended) - datetime.fromisoformat(begun)).total_seconds()
+        return seconds if seconds > 0 else None
+
+    @property
+    def processes(self) -> int | None:
+        """Number of processes that made the runs; None where it is not known."""
+        told = self.record.get("processes")
+        return told if isinstance(told, int) and told > 0 else None
+
+    @property
+    def efficiency(self) -> float | None:
+        """Share of the processes' time that went into runs, where it is known."""
+        known = self.wall_time is not None and self.processes is not None
+        return self.busy / (self.processes * self.wall_time) if known else None  # type: ignore[operator]
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """Of the study, of the runs (with their number), and of what the statistics leave out."""
+        found = [*self.study.warnings, *(str(each) for each in self.record.get("warnings", ()))]
+        if self.table.partial:
+            found.append(f"The study is not finished: {len(self.table)} of {self.design.runs} runs are done.")
+        if self.failed:
+            found.append(
+                f"{self.failed} of {len(self.table)} runs failed and have no figures; statistics are of the others."
+            )
+        for each in self.outputs:
+            missing = int((self.ok & ~np.isfinite(each.values)).sum())
+            if missing:
+                found.append(f"{each.name} could not be determined in {missing} of {int(self.ok.sum())} runs.")
+        told = Counter(_shape(str(text)) for text in self.table["warnings"] if text)
+        example = {_shape(str(text)): str(text) for text in reversed(self.table["warnings"]) if text}
+        found += [f"{count} of {len(self.table)} runs warn: {example[key]}" for key, count in told.items()]
+        return tuple(dict.fromkeys([*found, *self.sensitivities.warnings]))
+
+    @cached_property
+    def failures(self) -> tuple[Failure, ...]:
+        """Failed runs by message, numbers in it aside; the most frequent first."""
+        groups: dict[str, list[int]] = {}
+        for row in np.flatnonzero(~self.ok):
+            groups.setdefault(_shape(str(self.table["message"][row])), []).append(int(row))
+        ordered = sorted(groups.values(), key=lambda rows: (-len(rows), rows[0]))
+        return tuple(
+            Failure(str(self.table["message"][rows[0]]), tuple(int(run) for run in self.runs[rows]), self._where(rows))
+            for rows in ordered
+        )
+
+    def _where(self, rows: list[int]) -> str:
+        """The parameters of which these rows hold a small part of the values."""
+        found = []
+        for each in self.inputs:
+            here = np.unique(each.values[rows])
+            if each.words or len(each.levels):
+                if len(here) <= NARROW * len(np.unique(each.values)):
+                    found.append(f"{each.name} {', '.join(each.text(value) for value in here)} {each.scale.shown_unit}")
+            elif np.ptp(here) <= NARROW * np.ptp(each.values) and len(rows) > 1:
+                span = f"{each.text(here[0])} to {each.text(here[-1])}"
+                found.append(f"{each.name} {span} {each.scale.shown_unit}")
+        return ", ".join(text.rstrip() for text in found)
+
+
+def _label(name: str, unit: Scale) -> str:
+    return f"{name} [{unit.shown_unit}]" if unit.shown_unit else name
+
+
+def _shape(message: str) -> str:
+    """A message without its numbers: what is the same for runs that fail alike."""
+    return re.sub(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", "#", message)

@@ -1,0 +1,190 @@
+"""Pictures of one figure of a study: its distribution with what moves it, and the figure over each parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from feedsim.report.labels import heading, legend_above
+from feedsim.report.people import number, plain
+from feedsim.report.style import BLUE, GRID, INK, MUTED, ORANGE, SKY, VERMILLION, Array, Picture, drawing, finish
+from feedsim.report.sweep.account import QUANTILES, Account, Input, Output
+from feedsim.report.sweep.measures import RANK, TOTAL, Measure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST_BARS = 14
+MOST_PANELS = 12
+PANELS = 4  # in a row
+FEW_BINS, MANY_BINS = 8, 50
+VECTORS = 200  # points of a panel up to which they are drawn as vectors; beyond, as an image
+LEAST_OF_BIN = 25  # rows behind a point of the running median
+MEDIANS = 24  # points of it at most
+GOLDEN = 0.6180339887498949  # spreads points evenly beside a level
+
+
+def distribution_picture(output: Output, inputs: Sequence[Input], measure: Measure, stem: str) -> Picture | None:
+    """Histogram with quantiles, and beside it what moves the figure; None without values."""
+    if not len(output.known):
+        return None
+    telling = measure.telling()[:MOST_BARS]
+    bars = len(telling)
+    with drawing(10.0 if bars else 6.5, max(3.3, 1.5 + 0.27 * bars)) as figure:
+        rooms = figure.subplots(1, 2 if bars else 1, squeeze=False, width_ratios=[1.15, 1][: 2 if bars else 1])[0]
+        _histogram(rooms[0], output)
+        caption = "Left the runs' values with 5 %, 50 % and 95 % quantile; " if bars else "The runs' values with "
+        caption += "" if bars else "5 %, 50 % and 95 % quantile."
+        if bars:
+            _bars(rooms[1], inputs, measure, telling)
+            caption += _right(measure, len(inputs) - bars)
+        return finish(figure, f"distribution-{stem}", f"Distribution of {output.name}", caption)
+
+
+def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, stem: str) -> Picture | None:
+    """The figure over each parameter, the strongest first, every run a point; None without values."""
+    shown = [inputs[k] for k in measure.telling()[:MOST_PANELS] or range(len(inputs))[:MOST_PANELS]]
+    shown = [each for each in shown if len(np.unique(each.values)) > 1]
+    if not len(output.known) or not shown:
+        return None
+    across = min(PANELS, len(shown))
+    down = -(-len(shown) // across)
+    with drawing(max(5.0, 2.6 * across), 0.3 + 2.5 * down) as figure:
+        rooms = figure.subplots(down, across, squeeze=False, sharey=True).ravel()
+        for axes, each in zip(rooms, shown, strict=False):
+            _panel(axes, output, each)
+        for axes in rooms[len(shown) :]:
+            axes.remove()
+        for axes in rooms[::across]:
+            axes.set_ylabel(plain(output.label))
+        left_out = len(inputs) - len(shown)
+        caption = "A point per run; the line is the running median"
+        caption += ", the bars the medians of each value" if any(len(each.levels) for each in shown) else ""
+        caption += f". {left_out} of {len(inputs)} parameters, which move it less, are not drawn." if left_out else "."
+        return finish(figure, f"scatter-{stem}", f"{output.name} over the parameters", caption)
+
+
+def running_median(x: Array, y: Array) -> tuple[Array, Array]:
+    """Medians of x and y of parts with equally many points, in the order of x; empty with too few points."""
+    parts = min(MEDIANS, len(x) // LEAST_OF_BIN)
+    if parts < 2:
+        return x[:0], y[:0]
+    order = np.argsort(x, kind="stable")
+    pieces = np.array_split(order, parts)
+    return np.array([np.median(x[rows]) for rows in pieces]), np.array([np.median(y[rows]) for rows in pieces])
+
+
+def _histogram(axes: Axes, output: Output) -> None:
+    known = output.known
+    edges = _edges(known)
+    counts, edges = np.histogram(known, edges)
+    axes.bar(edges[:-1], counts, np.diff(edges), align="edge", color=SKY, alpha=0.55, linewidth=0)
+    axes.set_ylim(0, 1.14 * counts.max())
+    axes.set_xlabel(plain(output.label))
+    axes.set_ylabel("runs")
+    top = axes.get_xaxis_transform()
+    statistics = output.statistics
+    for share in QUANTILES:
+        value = statistics[f"q{share}"]
+        axes.axvline(value, color=INK if share == 50 else MUTED, linewidth=1.1, linestyle="-" if share == 50 else "--")
+    ends = {5: ("right", -3), 50: ("center", 0), 95: ("left", 3)}
+    if np.ptp(known) > 0:
+        for share, (side, shift) in ends.items():
+            axes.annotate(
+                f"{share} %", (statistics[f"q{share}"], 1.0), xycoords=top, xytext=(shift, 2),
+                textcoords="offset points", ha=side, va="bottom", fontsize=8, color=MUTED, annotation_clip=False,
+            ).set_in_layout(False)  # fmt: skip
+    text = f"mean {number(statistics['mean'])}, std {number(statistics['std'], 3)} {output.scale.shown_unit}".rstrip()
+    heading(axes, text)
+
+
+def _edges(known: Array) -> Array:
+    if np.ptp(known) <= 1e-9 * np.abs(known).max():
+        centre = float(known[0])
+        half = 0.5 * abs(centre) * 0.01 or 0.5
+        return np.array([centre - half, centre + half])
+    many = int(np.clip(len(np.histogram_bin_edges(known, "auto")) - 1, FEW_BINS, MANY_BINS))
+    return np.linspace(known.min(), known.max(), many + 1)
+
+
+def _bars(axes: Axes, inputs: Sequence[Input], measure: Measure, ranked: Sequence[int]) -> None:
+    rows = np.arange(len(ranked))
+    axes.set_yticks(rows, [plain(inputs[k].name) for k in ranked])
+    axes.set_ylim(len(ranked) - 0.4, -0.6)
+    axes.grid(axis="y", visible=False)
+    axes.tick_params(axis="y", length=0)
+    values = measure.values[ranked]
+    if measure.kind == TOTAL:
+        assert measure.first is not None
+        assert measure.first_interval is not None
+        assert measure.interval is not None
+        _with_intervals(axes, rows - 0.19, measure.first[ranked], measure.first_interval[ranked], BLUE, "first order")
+        _with_intervals(axes, rows + 0.19, values, measure.interval[ranked], ORANGE, "total")
+        legend_above(axes)
+        axes.set_xlabel("Sobol index, 95 % interval")
+        axes.set_xlim(min(0.0, *axes.get_xlim()), max(1.0, float(np.nanmax(measure.interval[ranked])) * 1.03))
+    else:
+        if measure.kind == RANK:
+            axes.axvspan(-measure.noise, measure.noise, color=GRID, alpha=0.7, linewidth=0, label="chance")
+            axes.set_xlim(-1, 1)
+            legend_above(axes)
+        else:
+            axes.set_xlim(0, 1)
+        colours = [BLUE if value >= 0 else VERMILLION for value in values]
+        axes.barh(rows, np.nan_to_num(values), 0.6, color=colours, linewidth=0)
+        axes.set_xlabel(measure.kind)
+        for row, value in zip(rows, values, strict=True):
+            if not np.isfinite(value):
+                axes.annotate("not ranked", (0, row), xytext=(4, 0), textcoords="offset points", va="center",
+                              fontsize=8, color=MUTED)  # fmt: skip
+    axes.axvline(0, color=MUTED, linewidth=0.8)
+    heading(axes, "what moves it")
+
+
+def _with_intervals(axes: Axes, rows: Any, values: Array, interval: Array, colour: str, label: str) -> None:
+    axes.barh(rows, values, 0.36, color=colour, linewidth=0, label=label, alpha=0.85)
+    axes.hlines(rows, interval[:, 0], interval[:, 1], color=INK, linewidth=1.0)
+
+
+def _right(measure: Measure, left_out: int) -> str:
+    text = {
+        TOTAL: "right the share of its scatter that each parameter makes alone (first order) and with all its joint "
+        "effects (total), with 95 % intervals. Where both are alike, the parameter acts on its own.",
+        RANK: "right Spearman's rank correlation with each parameter; within the grey band it can be chance.",
+    }.get(measure.kind, "right the share of its scatter that lies between the values of each parameter.")
+    return text + (f" {left_out} more parameters, which move it less, are not drawn." if left_out else "")
+
+
+def _panel(axes: Axes, output: Output, each: Input) -> None:
+    known = np.isfinite(output.sample)
+    x, y = each.sample[known], output.sample[known]
+    many = len(x) > VECTORS
+    size, alpha = (5.0, 0.6) if len(x) <= 200 else (3.0, 0.4) if len(x) <= 2000 else (1.5, 0.2)
+    look: dict[str, Any] = {"s": size, "alpha": alpha, "color": BLUE, "linewidths": 0, "rasterized": many}
+    if len(each.levels):
+        at = np.searchsorted(each.levels, x)
+        beside = 0.5 * ((np.arange(len(x)) * GOLDEN) % 1 - 0.5)
+        axes.scatter(at + beside, y, **look)
+        for k in range(len(each.levels)):
+            if np.any(at == k):
+                axes.hlines(np.median(y[at == k]), k - 0.32, k + 0.32, color=VERMILLION, linewidth=1.8)
+        axes.set_xticks(range(len(each.levels)), [plain(each.text(value)) for value in each.levels])
+        if len(each.levels) > 5 or sum(len(each.text(value)) for value in each.levels) > 18:
+            axes.tick_params(axis="x", labelrotation=45)
+        axes.set_xlim(-0.6, len(each.levels) - 0.4)
+    else:
+        axes.scatter(x, y, **look)
+        axes.plot(*running_median(x, y), color=VERMILLION, linewidth=1.6)
+        if each.logarithmic:
+            axes.set_xscale("log")
+            axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+            axes.xaxis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "")
+    axes.set_xlabel(plain(each.label))
+
+
+def of_account(account: Account, output: Output, measure: Measure, stem: str) -> list[Picture]:
+    """Both pictures, as far as there is something to show."""
+    found = (draw(output, account.inputs, measure, stem) for draw in (distribution_picture, scatter_picture))
+    return [picture for picture in found if picture is not None]

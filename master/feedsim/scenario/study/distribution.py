@@ -1,0 +1,118 @@
+"""Which numbers a distribution, a range or a grid needs, and what is wrong with those that are given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from feedsim.scenario.source import Place
+from feedsim.scenario.study.file import Kind
+from feedsim.scenario.study.study import Distribution
+
+# Kind -> what it needs, what it may have.
+NEEDS: dict[Kind, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "uniform": (("from", "to"), ()),
+    "loguniform": (("from", "to"), ()),
+    "triangular": (("from", "to"), ("mode",)),
+    "normal": (("mean", "deviation"), ("from", "to")),
+    "lognormal": (("mean", "deviation"), ("from", "to")),
+}
+# Deviations from the mean beyond which nothing is left: doubles cannot tell the tail's probability any more.
+FARTHEST = 8.0
+
+Problem = tuple[Place, str]
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What an entry gives: the kind, SI values by key, and the kind of study and key that they are for."""
+
+    kind: Kind | None
+    values: Mapping[str, float]
+    count: int | None
+    grid: bool
+    whole: bool
+
+
+def numbers(given: Numbers) -> tuple[Distribution | None, list[Problem]]:
+    """The distribution, or what is wrong: the key of the entry and a message."""
+    values = given.values
+    if given.kind is None and not values:
+        what = "values, or from, to and count" if given.grid else "values, or a distribution, or from and to"
+        return None, [((), f"nothing is said of its values: {what}")]
+    kind: Kind = given.kind or ("uniform" if not {"mean", "deviation"} & set(values) else "normal")
+    needed, optional = NEEDS[kind]
+    problems: list[Problem] = [((), f"{kind}: missing key {key!r}") for key in needed if key not in values]
+    problems += [
+        ((key,), f"not of a {kind} distribution: it has {', '.join((*needed, *optional))}")
+        for key in values
+        if key not in needed and key not in optional
+    ]
+    problems += [*_for_the_study(given, kind)]
+    if problems:
+        return None, problems
+    found = Distribution(
+        kind, values.get("from"), values.get("to"), values.get("mean"), values.get("deviation"), values.get("mode"),
+        _count(given),
+    )  # fmt: skip
+    problems = _contradictions(found)
+    if given.whole and not problems:
+        problems = _not_whole(found)
+    return (None, problems) if problems else (found, [])
+
+
+def _for_the_study(given: Numbers, kind: Kind) -> list[Problem]:
+    if given.whole and kind != "uniform":
+        return [(("distribution",), "of whole numbers only uniform")]
+    if not given.grid:
+        return [(("count",), "only in a grid; elsewhere sampling.runs tells how many")] if given.count else []
+    if kind not in ("uniform", "loguniform"):
+        return [(("distribution",), "in a grid: uniform (even steps) or loguniform (even ratios), or values: [...]")]
+    if given.count is None and not given.whole:
+        return [((), "missing key 'count': how many values a grid takes from from to to")]
+    if given.count == 1:
+        return [(("count",), "1 value between two limits; at least 2, or values: [...]")]
+    return []
+
+
+def _count(given: Numbers) -> int | None:
+    if given.grid and given.whole and given.count is None:
+        return max(2, round(given.values["to"] - given.values["from"]) + 1)
+    return given.count
+
+
+def _contradictions(found: Distribution) -> list[Problem]:
+    low, high, mean, deviation = found.low, found.high, found.mean, found.deviation
+    problems: list[Problem] = []
+    if low is not None and high is not None and not low < high:
+        problems.append((("to",), f"{high:.9g} is not more than from, {low:.9g} (in SI)"))
+    elif low is not None and low <= 0 and (found.kind == "loguniform" or (found.kind == "lognormal" and low < 0)):
+        least = "more than" if found.kind == "loguniform" else "at least"
+        problems.append((("from",), f"{low:.9g}; of a {found.kind} distribution {least} 0"))
+    elif found.mode is not None and low is not None and high is not None and not low <= found.mode <= high:
+        problems.append((("mode",), f"{found.mode:.9g} is not between from and to (in SI)"))
+    if mean is None or deviation is None:
+        return problems
+    if deviation <= 0:
+        problems.append((("deviation",), f"{deviation:.9g} is outside the allowed range: more than 0"))
+    elif found.kind == "lognormal" and mean <= 0:
+        problems.append((("mean",), f"{mean:.9g}; that of a lognormal distribution is more than 0"))
+    elif low is not None and low > mean + FARTHEST * deviation:
+        problems.append((("from",), "more than 8 deviations above the mean: nothing is left of the distribution"))
+    elif high is not None and high < mean - FARTHEST * deviation:
+        problems.append((("to",), "more than 8 deviations below the mean: nothing is left of the distribution"))
+    elif found.kind == "lognormal" and high is not None and high <= 0:
+        problems.append((("to",), "nothing is left of the distribution: a lognormal one is above 0"))
+    return problems
+
+
+def _not_whole(found: Distribution) -> list[Problem]:
+    assert found.low is not None
+    assert found.high is not None
+    for key, value in (("from", found.low), ("to", found.high)):
+        if not value.is_integer():
+            return [((key,), f"{value:.9g} is no whole number")]
+    if found.count is not None and (found.high - found.low) % (found.count - 1):
+        between = f"{found.low:.0f} to {found.high:.0f}"
+        return [(("count",), f"{found.count} even steps from {between} are no whole numbers")]
+    return []

@@ -1,0 +1,142 @@
+"""What stands in a study file, as it is written: values are read when the scenario is known, which has their units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    field_validator,
+)
+from pydantic_core import core_schema
+
+from feedsim import units
+from feedsim.scenario.fields import File, Model, brief, fault
+
+Method = Literal["grid", "latin_hypercube", "sobol", "sensitivity"]
+Kind = Literal["uniform", "loguniform", "triangular", "normal", "lognormal"]
+
+LONGEST_NAME = 60  # characters of a parameter's name, which heads a column
+MOST_RUNS = 1_000_000
+# Columns of the table that every study has.
+TAKEN = ("run", "status", "message", "warnings", "seconds")
+
+
+class _Written:
+    """A quantity as it is written: a text or a number."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        def validate(value: Any) -> Any:
+            if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+                raise fault(f"{brief(value)} is no number and no quantity")
+            return value
+
+        return core_schema.no_info_plain_validator_function(validate)
+
+    def __get_pydantic_json_schema__(
+        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        text = {"type": "string", "pattern": rf"^\s*{units.NUMBER}", "examples": ["2.5 N.m", "5000 mm/min"]}
+        return {"anyOf": [{"type": "number"}, text]}
+
+
+class _Keys:
+    """One dotted key or a list of them; becomes a tuple."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        def validate(value: Any) -> tuple[str, ...]:
+            keys = value if isinstance(value, list) else [value]
+            if not keys or not all(isinstance(key, str) and key for key in keys):
+                raise fault(f"{brief(value)}; a dotted key is expected, such as motions.0.feed, or a list of them")
+            if len(set(keys)) < len(keys):
+                raise fault("a key stands twice in the list")
+            return tuple(keys)
+
+        return core_schema.no_info_plain_validator_function(validate)
+
+    def __get_pydantic_json_schema__(
+        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        key = {"type": "string", "minLength": 1, "examples": ["machine.axes.*.friction.F_C"]}
+        return {"anyOf": [key, {"type": "array", "items": key, "minItems": 1, "uniqueItems": True}]}
+
+
+Written = Annotated[Any, _Written()]
+Key = Annotated[StrictStr, Field(min_length=1)]
+
+
+class Sampling(Model):
+    """How the runs are spread over the parameters."""
+
+    method: Method = Field(
+        description="grid: every combination; latin_hypercube, sobol: spread evenly; sensitivity: for Sobol indices"
+    )
+    runs: Annotated[StrictInt, Field(ge=1, le=MOST_RUNS)] | None = Field(
+        default=None,
+        description="Number of runs; for sensitivity N, which makes N (d + 2) runs of d parameters; not for a grid",
+    )
+    seed: Annotated[StrictInt, Field(ge=0, lt=2**63)] | None = Field(
+        default=None, description="Seed of the random numbers (default: 1); not for a grid"
+    )
+
+
+class ParameterEntry(Model):
+    """One parameter: the key that it sets, and a distribution, a range or a list of values."""
+
+    keys: Annotated[Any, _Keys()] = Field(
+        alias="key",
+        description="Dotted key as for --set, of the scenario or its machine (machine. ...); * for all; or a list",
+    )
+    factor: StrictBool = Field(default=False, description="Whether what the scenario has is multiplied by the value")
+    distribution: Kind | None = Field(
+        default=None, description="How the values are distributed (default: uniform where there are from and to)"
+    )
+    low: Written | None = Field(default=None, alias="from", description="Least value")
+    high: Written | None = Field(default=None, alias="to", description="Greatest value")
+    count: Annotated[StrictInt, Field(ge=1, le=MOST_RUNS)] | None = Field(
+        default=None, description="In a grid: number of values from from to to"
+    )
+    mean: Written | None = Field(default=None, description="Mean of a normal or lognormal distribution")
+    deviation: Written | None = Field(default=None, description="Standard deviation of a normal or lognormal one")
+    mode: Written | None = Field(
+        default=None, description="Most frequent value of a triangular one (default: the middle)"
+    )
+    choices: Annotated[tuple[Any, ...], Field(min_length=1)] | None = Field(
+        default=None, alias="values", description="Values to choose from, of whatever kind the key takes"
+    )
+
+
+class StudyFile(Model):
+    """A study file."""
+
+    name: StrictStr = Field(description="Name in reports")
+    note: StrictStr = Field(default="", description="Remark")
+    scenario: File = Field(description="Scenario file that all runs start from")
+    settings: dict[Key, Any] = Field(
+        default={}, alias="set", description="Changes of single values by dotted key in every run, as with --set"
+    )
+    sampling: Sampling
+    parameters: Annotated[dict[StrictStr, ParameterEntry], Field(min_length=1)] = Field(
+        description="Name of a column of the table -> what is varied"
+    )
+    figures: Annotated[tuple[Key, ...], Field(min_length=1)] | None = Field(
+        default=None, description='Names or patterns such as "XZ.glitch_*" (default: all figures)'
+    )
+
+    @field_validator("parameters", mode="after")
+    @classmethod
+    def _names(cls, parameters: dict[str, ParameterEntry]) -> dict[str, ParameterEntry]:
+        for name in parameters:
+            if name in TAKEN:
+                raise fault(f"{name!r} is a column of every table; call the parameter otherwise")
+            if not name or len(name) > LONGEST_NAME or not name.isprintable() or set(name) & set(" ,;[]\"'="):
+                raise fault(
+                    f"{brief(name)} cannot be the name of a column: 1 to {LONGEST_NAME} characters, "
+                    "no blank, comma, semicolon, quote, = or bracket"
+                )
+        return parameters

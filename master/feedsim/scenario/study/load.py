@@ -1,0 +1,191 @@
+"""Study file -> Study: read, open its scenario, find what each key takes, check; every problem with its line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from math import prod
+from pathlib import Path
+
+from feedsim.errors import InputError
+from feedsim.scenario.base import Base
+from feedsim.scenario.load import Setting, check, fetch, read_group
+from feedsim.scenario.problems import describe, dotted, in_order
+from feedsim.scenario.source import Source, at, read
+from feedsim.scenario.study.changes import changes_of
+from feedsim.scenario.study.file import MOST_RUNS, StudyFile
+from feedsim.scenario.study.parameter import Reader
+from feedsim.scenario.study.study import Parameter, Sampling, Study
+from feedsim.scenario.study.values import as_text
+
+SEED = 1
+
+
+def is_study(path: Path) -> bool:
+    """Whether a file that can be read is a study, by its keys."""
+    try:
+        data = read(path).data
+    except InputError:
+        return False
+    return isinstance(data, dict) and "sampling" in data and "parameters" in data and "machine" not in data
+
+
+def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | None = None) -> Study:
+    """Read and check a study file, its scenario and what it varies.
+
+    `overrides` are KEY=VALUE texts as behind `--set`; they change the scenario after the study's own `set` group.
+    `runs` takes the place of the file's.
+
+    Raises InputError that lists every problem with file and line.
+    """
+    path = Path(path)
+    source = read_group(path)
+    written = source.copy().data
+    faults: list[str] = []
+    fetch(source, StudyFile, (), faults)
+    entry = check(source, StudyFile, faults)
+    base = _base(source, overrides, faults)
+    parameters: dict[str, Parameter] = {}
+    files: list[Path] = [*base.files] if base is not None else []
+    if base is not None and entry is not None:
+        reader = Reader(source, base, entry.sampling.method == "grid")
+        for name, given in entry.parameters.items():
+            found = reader.read(name, given)
+            if found is not None:
+                parameters[name] = found
+        files += reader.files
+        faults += [*reader.faults, *_overlaps(source, reader)]
+    if entry is not None:
+        sampling, wrong, warnings = _sampling(source, entry, parameters, runs)
+        faults += wrong
+    if faults or entry is None or base is None:
+        raise InputError.of(str(path), in_order(faults))
+    warnings += _middle(base, tuple(parameters.values()))
+    return Study(
+        name=entry.name,
+        note=entry.note,
+        file=path,
+        base=base,
+        sampling=sampling,
+        parameters=tuple(parameters.values()),
+        settings=tuple(_meant(base, _settings(source))),
+        figures=entry.figures,
+        files=tuple(dict.fromkeys(files)),
+        overrides=tuple(overrides),
+        warnings=tuple(warnings),
+        written=written,
+    )
+
+
+def _base(source: Source, overrides: Sequence[str], faults: list[str]) -> Base | None:
+    file = source.data.get("scenario")
+    if not isinstance(file, str) or not Path(file).is_file():
+        return None  # reported where it stands
+    try:
+        return Base.read(Path(file), overrides, _settings(source))
+    except InputError as error:
+        faults += error.problems
+        return None
+
+
+def _settings(source: Source) -> list[Setting]:
+    """The study's `set` group."""
+    settings = source.data.get("set")
+    if not isinstance(settings, dict):
+        return []
+    found = []
+    for key, value in settings.items():
+        inner = {at[2:]: mark for at, mark in source.marks.items() if at[:2] == ("set", key)}
+        found.append((key, Source(value, inner)))
+    return found
+
+
+def _meant(base: Base, settings: Sequence[Setting]) -> list[str]:
+    """Settings as KEY=VALUE, with the files that they name relative to the working folder."""
+    draft = base.draft.copy()
+    draft.apply(draft.own)
+    texts = []
+    for key, value in settings:
+        draft.apply([(key, value)])
+        place = draft.changed[-1][0]
+        texts.append(f"{key}={as_text(value, at(draft.source.data, place))}")
+    return texts
+
+
+def _middle(base: Base, parameters: tuple[Parameter, ...]) -> list[str]:
+    """A warning where the scenario cannot be loaded with a value from the middle of every parameter."""
+    try:
+        base.with_changes(changes_of(parameters, [parameter.middle for parameter in parameters]))
+    except InputError as error:
+        return [f"with every parameter at its middle the scenario is refused: {'; '.join(error.problems)}"]
+    return []
+
+
+def _overlaps(source: Source, reader: Reader) -> list[str]:
+    """Parameters that set the same place, or a place inside one that another replaces later."""
+    found = []
+    for (one, first), (two, second) in combinations(reader.targets.items(), 2):
+        for a, b in ((a.place, b.place) for a in first for b in second):
+            inner, outer = (a, b) if len(a) > len(b) else (b, a)
+            if inner[: len(outer)] != outer:
+                continue
+            who = ("parameters", two, "key")
+            if a == b and {one, two} <= reader.factors:
+                continue  # they multiply one another
+            if a == b:
+                message = f"{one} sets {dotted(a)} already"
+            elif inner == a:
+                message = f"replaces {dotted(b)}, and with it {dotted(a)}, which {one} sets; put {two} before {one}"
+            elif two in reader.factors:
+                message = f"{two} multiplies {dotted(b)}, which {one} replaces with all of {dotted(a)}"
+            else:
+                continue
+            found.append(describe(source, who, message))
+            break
+    return found
+
+
+def _sampling(
+    source: Source, entry: StudyFile, parameters: dict[str, Parameter], runs: int | None
+) -> tuple[Sampling, list[str], list[str]]:
+    """How the runs are spread; what is wrong with it; what a user should know."""
+    given, faults, warnings = entry.sampling, list[str](), list[str]()
+    grid = given.method == "grid"
+
+    def fault(key: str, message: str) -> None:
+        faults.append(describe(source, ("sampling", key), message))
+
+    if grid:
+        for key, value in (("runs", given.runs), ("seed", given.seed)):
+            if value is not None:
+                fault(key, "not for a grid, whose runs are all combinations of the values")
+        if runs is not None:
+            faults.append(f"--runs {runs}: not for a grid, whose runs are all combinations of the values")
+        total = prod(
+            len(p.choices) if p.distribution is None else p.distribution.count or 1 for p in parameters.values()
+        )
+        if total > MOST_RUNS:
+            fault("method", f"{total} combinations; at most {MOST_RUNS} runs")
+        return Sampling("grid", 0, 0), faults, warnings
+    number = runs if runs is not None else given.runs
+    if number is None:
+        fault("runs", f"missing; how many runs a study by {given.method} makes")
+        return Sampling(given.method, 0, 0), faults, warnings
+    if number < 1:
+        faults.append(f"--runs {number}: at least 1")
+    power = number & (number - 1) == 0
+    if given.method == "sensitivity":
+        total = number * (len(entry.parameters) + 2)
+        if not power or number < 2:
+            fault("runs", f"{number} is no power of two; a sensitivity study takes 2, 4, 8, ... (then times d + 2)")
+        elif total > MOST_RUNS:
+            fault("runs", f"{number} x ({len(entry.parameters)} + 2) = {total} runs; at most {MOST_RUNS}")
+    elif number > MOST_RUNS:
+        faults.append(f"--runs {number}: at most {MOST_RUNS}")
+    elif given.method == "sobol" and not power:
+        near = 1 << (number.bit_length() - 1)
+        warnings.append(
+            f"sampling.runs: {number} is no power of two; a Sobol sequence is balanced with {near} or {2 * near} runs"
+        )
+    seed = SEED if given.seed is None else given.seed
+    return Sampling(given.method, number, seed), faults, warnings

@@ -1,0 +1,292 @@
+"""The entries of a study's `parameters`, read with what the scenario tells of their keys: dimension, allowed range."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic_core import PydanticCustomError
+
+from feedsim import units
+from feedsim.errors import InputError
+from feedsim.scenario import overrides as changes
+from feedsim.scenario import shape
+from feedsim.scenario.base import Base, Change, data_files
+from feedsim.scenario.fields import Quantity
+from feedsim.scenario.load import reading
+from feedsim.scenario.model import Scenario
+from feedsim.scenario.problems import describe, dotted, quantity_of
+from feedsim.scenario.source import Mark, Place, Source, at
+from feedsim.scenario.study.distribution import Numbers, numbers
+from feedsim.scenario.study.file import ParameterEntry
+from feedsim.scenario.study.study import Choice, Distribution, Parameter
+from feedsim.scenario.study.values import as_text, number_text
+
+
+@dataclass(frozen=True)
+class Target:
+    """A place that a key reaches: what is allowed there."""
+
+    place: Place
+    annotation: Any
+    quantity: Quantity | None
+    whole: bool
+
+
+class Reader:
+    """Reads one entry after the other; `faults` and the data `files` of the choices add up."""
+
+    def __init__(self, source: Source, base: Base, grid: bool) -> None:
+        """`source`: the study's tree; `base`: its scenario; `grid`: whether the runs are a grid."""
+        self.source, self.base, self.grid = source, base, grid
+        self.faults: list[str] = []
+        self.files: list[Path] = []
+        self.targets: dict[str, list[Target]] = {}
+        self.factors: set[str] = set()  # names of parameters that multiply
+
+    def read(self, name: str, entry: ParameterEntry) -> Parameter | None:
+        """The parameter; None where something is wrong with it."""
+        before = len(self.faults)
+        try:
+            found = self._read(name, entry)
+        except _Told:
+            return None
+        except InputError as error:
+            self.faults += error.problems
+            return None
+        return found if len(self.faults) == before else None
+
+    def _read(self, name: str, entry: ParameterEntry) -> Parameter:
+        targets = self.targets[name] = list(self._reached(name, entry))
+        if entry.factor:
+            self.factors.add(name)
+            return self._factor(name, entry, targets)
+        if entry.choices is not None:
+            return self._choices(name, entry, targets)
+        for target in targets:
+            if target.quantity is None and not target.whole:
+                raise self._fault(
+                    name, ("key",), f"{dotted(target.place)} takes no number; list what it takes: values: [...]"
+                )
+        whole = targets[0].whole
+        unit = self._common_unit(name, targets)
+        own = Quantity("1") if whole else Quantity(unit, example=targets[0].quantity.example)  # type: ignore[union-attr]
+        distribution = self._distribution(name, entry, own, whole)
+        for target in targets:
+            self._check_range(name, entry, target, distribution, 1.0)
+        return Parameter(name, entry.keys, unit, whole=whole, distribution=distribution)
+
+    def _reached(self, name: str, entry: ParameterEntry) -> Iterator[Target]:
+        seen = set()
+        for i, key in enumerate(entry.keys):
+            here = self._at(name, "key", *([i] if len(entry.keys) > 1 else []))
+            where = f"{self.source.mark(here).where}: {dotted(here)}"
+            scratch = self.base.settled.source.copy()
+            found = list(changes.places(scratch, Scenario, key, Mark(where, Path())))
+            if not found:
+                raise InputError(f"{where}: {key} reaches nothing in {self.base.draft.path}")
+            for place in found:
+                if place not in seen:
+                    seen.add(place)
+                    parent = shape.expected(Scenario, scratch.data, place[:-1])
+                    annotation = shape.child(parent, place[-1])
+                    if shape.keys(parent) is None and place[-1] not in at(self.base.settled.source.data, place[:-1]):
+                        raise InputError(f"{where}: {dotted(place[:-1])} has no {place[-1]!r}")
+                    yield Target(place, annotation, quantity_of(annotation), _is_whole(annotation))
+
+    def _common_unit(self, name: str, targets: list[Target]) -> str:
+        """SI unit that all targets share."""
+        found = ["1" if target.quantity is None else target.quantity.unit for target in targets]
+        for target, unit in zip(targets, found, strict=True):
+            if units.unit(unit).dimension != units.unit(found[0]).dimension or target.whole != targets[0].whole:
+                first, other = dotted(targets[0].place), dotted(target.place)
+                kinds = [
+                    "a whole number" if t.whole else units.article(t.quantity.kind) if t.quantity else "no number"
+                    for t in (targets[0], target)
+                ]
+                raise self._fault(name, ("key",), f"{first} is {kinds[0]}, {other} is {kinds[1]}")
+        return found[0]
+
+    def _distribution(self, name: str, entry: ParameterEntry, quantity: Quantity, whole: bool) -> Distribution:
+        def read(key: str, value: Any) -> float:
+            try:
+                return quantity.read(value)
+            except PydanticCustomError as error:
+                raise self._fault(name, (key,), error.message()) from None
+
+        written = {
+            "from": entry.low, "to": entry.high, "mean": entry.mean, "deviation": entry.deviation, "mode": entry.mode,
+        }  # fmt: skip
+        values: dict[str, float] = {}
+        for key, value in written.items():
+            if value is not None:
+                try:
+                    values[key] = read(key, value)
+                except InputError as error:
+                    self.faults += error.problems
+        if len(values) < sum(value is not None for value in written.values()):
+            raise _Told
+        found, problems = numbers(Numbers(entry.distribution, values, entry.count, self.grid, whole))
+        self.faults += [describe(self.source, self._at(name, *key), message) for key, message in problems]
+        if found is None:
+            raise _Told
+        return found
+
+    def _factor(self, name: str, entry: ParameterEntry, targets: list[Target]) -> Parameter:
+        origins = []
+        for target in targets:
+            key = dotted(target.place)
+            if target.quantity is None:
+                raise self._fault(name, ("factor",), f"{key} is no quantity, so that it cannot be multiplied")
+            value = _value(self.base.scenario, target.place)
+            if value is None:
+                raise self._fault(name, ("factor",), f"the scenario has no {key} that could be multiplied")
+            origins.append((key, value, target.quantity.unit))
+        if entry.choices is None:
+            distribution = self._distribution(name, entry, Quantity("1"), False)
+            for target, (_, value, _) in zip(targets, origins, strict=True):
+                self._check_range(name, entry, target, distribution, value)
+            return Parameter(name, entry.keys, "1", True, False, distribution, (), tuple(origins))
+        self._no_numbers(name, entry)
+        choices = []
+        for i, value in enumerate(entry.choices):
+            try:
+                number = Quantity("1").read(value)
+            except PydanticCustomError as error:
+                raise self._fault(name, ("values", i), error.message()) from None
+            choices.append(Choice(f"{number!r}", number, f"{number!r}", number))
+            for target, (_, origin, _) in zip(targets, origins, strict=True):
+                self._check_one(name, ("values", i), target, number, origin, f"{value}")
+        return Parameter(name, entry.keys, "1", True, False, None, tuple(choices), tuple(origins))
+
+    def _choices(self, name: str, entry: ParameterEntry, targets: list[Target]) -> Parameter:
+        self._no_numbers(name, entry)
+        assert entry.choices is not None
+        read = [self._choice(name, i, entry, targets) for i in range(len(entry.choices))]
+        choices = [choice for choice in read if choice is not None]
+        labels = [choice.label for choice in choices]
+        for i, label in enumerate(labels):
+            if label in labels[:i]:
+                self.faults.append(describe(self.source, self._at(name, "values", i), f"{label} stands there twice"))
+        numeric = all(choice.number is not None for choice in choices)
+        unit = self._common_unit(name, targets) if numeric else ""
+        return Parameter(name, entry.keys, unit, choices=tuple(choices), whole=numeric and targets[0].whole)
+
+    def _choice(self, name: str, i: int, entry: ParameterEntry, targets: list[Target]) -> Choice | None:
+        """A value, tried by itself in the scenario."""
+        here = self._at(name, "values", i)
+        marks = {place[len(here) :]: mark for place, mark in self.source.marks.items() if place[: len(here)] == here}
+        value = Source(entry.choices[i] if entry.choices else None, marks)
+        meant = self._meant(entry.keys, value, targets)
+        if meant is _WRONG:
+            return None
+        text = as_text(value, meant)
+        number = None
+        if all(target.quantity for target in targets) and not isinstance(value.data, (dict, list, type(None))):
+            number = targets[0].quantity.read(value.data)  # type: ignore[union-attr]
+        elif all(target.whole for target in targets):
+            number = float(value.data)
+        if number is not None and targets[0].quantity is not None:
+            text = number_text(number, targets[0].quantity.unit)
+            meant = number if targets[0].quantity.unit == "1" else text
+        label = value.data if isinstance(value.data, str) else text
+        return Choice(" ".join(label.split()), number, text, meant)
+
+    def _meant(self, keys: tuple[str, ...], value: Source, targets: list[Target]) -> Any:
+        """The plain value with the files that it names in it; faults are told with the lines of the study."""
+        draft = self.base.draft.copy() if keys == ("machine",) else self.base.settled.copy()
+        draft.apply((key, value) for key in keys)
+        if keys == ("machine",):
+            draft.settle()
+        problems = draft.faults
+        if not problems and not all(
+            _fits(target, at(draft.source.data, target.place), draft.source) for target in targets
+        ):
+            try:
+                draft.scenario()
+            except InputError as error:
+                problems = [*error.problems]
+        if problems:
+            self.faults += problems
+            return _WRONG
+        self.files += [file for target in targets for file in data_files(draft.source, target.place)]
+        return at(draft.source.data, targets[0].place)
+
+    def _check_range(self, name: str, entry: ParameterEntry, target: Target, found: Distribution, times: float) -> None:
+        for key, bound, written in (("from", found.low, entry.low), ("to", found.high, entry.high)):
+            if bound is not None and target.quantity is not None:
+                self._check_one(name, (key,), target, bound, times, f"{written}")
+            elif bound is not None and not _fits(target, int(bound), self.base.settled.source):
+                self._explain(name, (key,), [Change(dotted(target.place), f"{bound:.0f}", int(bound))])
+
+    def _check_one(self, name: str, key: Place, target: Target, value: float, times: float, written: str) -> None:
+        quantity = target.quantity
+        assert quantity is not None
+        number = value * times
+        if not quantity.minimum <= number <= quantity.maximum or number <= quantity.above:
+            shown = written if times == 1.0 else f"{written} times {units.show(times, quantity.unit)}"
+            message = f"{shown} is outside the allowed range of {dotted(target.place)}: {quantity.range}"
+            self.faults.append(describe(self.source, self._at(name, *key), message))
+
+    def _explain(self, name: str, key: Place, made: list[Change]) -> None:
+        """Say why the scenario does not take a value."""
+        try:
+            self.base.with_changes(made)
+        except InputError as error:
+            told = [problem.partition(": ")[2] for problem in error.problems]
+            self.faults += [describe(self.source, self._at(name, *key), problem) for problem in told]
+
+    def _no_numbers(self, name: str, entry: ParameterEntry) -> None:
+        given = {
+            "distribution": entry.distribution, "from": entry.low, "to": entry.high, "count": entry.count,
+            "mean": entry.mean, "deviation": entry.deviation, "mode": entry.mode,
+        }  # fmt: skip
+        for key, value in given.items():
+            if value is not None:
+                self.faults.append(describe(self.source, self._at(name, key), "not beside values"))
+
+    def _at(self, name: str, *key: str | int) -> Place:
+        return ("parameters", name, *key)
+
+    def _fault(self, name: str, key: Place, message: str) -> InputError:
+        return InputError(describe(self.source, self._at(name, *key), message))
+
+
+_WRONG = object()
+
+
+class _Told(Exception):
+    """What is wrong is among the faults already."""
+
+
+def _fits(target: Target, data: Any, source: Source) -> bool:
+    """Whether a value can stand at a place, whatever stands beside it."""
+    try:
+        TypeAdapter(target.annotation).validate_python(data, context=reading(source.data))
+    except ValidationError:
+        return False
+    return True
+
+
+def _is_whole(annotation: Any) -> bool:
+    if annotation is int:
+        return True
+    return any(_is_whole(part) for part in get_args(annotation)) if annotation is not None else False
+
+
+def _value(model: Any, place: Place) -> float | None:
+    """What a checked scenario has at a place of its file."""
+    for key in place:
+        if isinstance(model, BaseModel):
+            names = type(model).model_fields
+            model = getattr(model, next(name for name, info in names.items() if (info.alias or name) == key))
+        elif isinstance(model, dict):
+            model = model.get(key)
+        else:
+            model = model[key]
+        if model is None:
+            return None
+    return float(model)

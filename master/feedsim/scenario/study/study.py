@@ -1,0 +1,152 @@
+"""A study: a scenario, the parameters that are varied from run to run, and how the runs are spread over them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from feedsim.scenario.base import Base
+from feedsim.scenario.study.file import Kind, Method
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """Of a number, in its SI unit. What a kind does not need is None.
+
+    The `low` and `high` of a normal or lognormal one cut it.
+
+    Attributes:
+        low, high: least and greatest value.
+        mean, deviation: of the normal distribution; of a lognormal one those of the quantity, not of its logarithm,
+            both before it is cut.
+        mode: most frequent value of a triangular one.
+        count: number of values in a grid.
+    """
+
+    kind: Kind
+    low: float | None = None
+    high: float | None = None
+    mean: float | None = None
+    deviation: float | None = None
+    mode: float | None = None
+    count: int | None = None
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Least and greatest value that can occur."""
+        least = 0.0 if self.kind == "lognormal" else -inf
+        return (least if self.low is None else self.low, inf if self.high is None else self.high)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of the values that a parameter takes.
+
+    Attributes:
+        label: as the table shows it.
+        number: SI value; None where it is no number.
+        text: as it stands behind KEY= on the command line.
+        data: plain value, with the YAML files that it names in place of their names.
+    """
+
+    label: str
+    number: float | None
+    text: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What is varied.
+
+    Attributes:
+        name: of its column.
+        keys: dotted keys that it sets, all to the same value.
+        unit: SI unit of its values; "" where they are words.
+        factor: whether it multiplies what the scenario has.
+        whole: whether its values are whole numbers.
+        distribution: of its values; None where there are `choices`.
+        choices: values that it takes.
+        origins: of a factor: every key that it sets, without *, the value there and its unit.
+    """
+
+    name: str
+    keys: tuple[str, ...]
+    unit: str
+    factor: bool = False
+    whole: bool = False
+    distribution: Distribution | None = None
+    choices: tuple[Choice, ...] = ()
+    origins: tuple[tuple[str, float, str], ...] = ()
+
+    @property
+    def worded(self) -> bool:
+        """Whether its values are words and no numbers."""
+        return any(choice.number is None for choice in self.choices)
+
+    @property
+    def places(self) -> int:
+        """Number of its values in a grid."""
+        return len(self.choices) if self.distribution is None else self.distribution.count or 1
+
+    @property
+    def middle(self) -> float:
+        """A value from the middle, as a design has it."""
+        found = self.distribution
+        if found is None:
+            number = self.choices[len(self.choices) // 2].number
+            return float(len(self.choices) // 2) if self.worded or number is None else number
+        low, high = found.support
+        if found.mean is not None:
+            return min(max(found.mean, low), high)
+        return low + (high - low) // 2 if self.whole else low + (high - low) / 2
+
+    @property
+    def label(self) -> str:
+        """Head of its column: "X.F_C [N.m]"."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How the runs are spread; `runs` is 0 for a grid, and N of a sensitivity study."""
+
+    method: Method
+    runs: int
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A study that is checked.
+
+    Attributes:
+        file: study file.
+        base: the scenario, with what the study sets in every run.
+        settings: what the study sets in every run, as KEY=VALUE with file names relative to the working folder.
+        figures: patterns of the figures wanted; None: all.
+        files: files of data that runs may read, each once.
+        overrides: what was set from outside, as KEY=VALUE.
+        warnings: what a user should know before the runs are made, a sentence each.
+    """
+
+    name: str
+    note: str
+    file: Path
+    base: Base
+    sampling: Sampling
+    parameters: tuple[Parameter, ...]
+    settings: tuple[str, ...] = ()
+    figures: tuple[str, ...] | None = None
+    files: tuple[Path, ...] = ()
+    overrides: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    written: Mapping[str, Any] = field(default_factory=dict)  # the file as it stands, to be shown
+
+    @property
+    def scenario(self) -> Path:
+        """Scenario file."""
+        return self.base.draft.path

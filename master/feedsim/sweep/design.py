@@ -1,0 +1,200 @@
+"""The runs of a study: which value every parameter has in every run. The study alone decides that."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from math import log1p, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.scenario import Change, Distribution, Parameter, Study
+from feedsim.scenario.study.changes import changes_of
+from feedsim.sweep.task import Task
+
+Array = NDArray[np.float64]
+
+# Shares of a distribution are kept off 0 and 1, where unbounded ones have no value.
+LEAST_SHARE = 2.0**-53
+
+
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """Runs of a sensitivity study as the estimators of Sobol indices want them.
+
+    Attributes:
+        a, b: (N,) runs of the two independent samples.
+        ab: (parameters, N) runs of A with the column of one parameter taken from B.
+    """
+
+    a: NDArray[np.int64]
+    b: NDArray[np.int64]
+    ab: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Attributes:
+
+    parameters: that are varied, one per column.
+    values: (runs, parameters), SI values; where a parameter's values are words, the number of the choice.
+    matrices: of a sensitivity study; else None.
+    """
+
+    parameters: tuple[Parameter, ...]
+    values: Array
+    matrices: Matrices | None = None
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return len(self.values)
+
+    def changes(self, run: int) -> tuple[Change, ...]:
+        """What a run sets in the study's scenario."""
+        row = self.values[run].tolist()
+        return changes_of(self.parameters, row)
+
+    def task(self, run: int) -> Task:
+        """The run for a worker."""
+        return Task(run, self.changes(run))
+
+    def tasks(self, runs: Iterable[int]) -> Iterator[Task]:
+        """Tasks of `runs`, made one after the other."""
+        return map(self.task, runs)
+
+    def options(self, run: int) -> list[str]:
+        """What a run sets, as KEY=VALUE for --set."""
+        return [change.option for change in self.changes(run)]
+
+    def shown(self, run: int) -> list[float | str]:
+        """The values of a run as the table shows them."""
+        pairs = zip(self.parameters, self.values[run].tolist(), strict=True)
+        return [parameter.choices[int(value)].label if parameter.worded else value for parameter, value in pairs]
+
+
+def design(study: Study) -> Design:
+    """The runs of `study`."""
+    from scipy.stats import qmc  # half a second, which workers need not wait for
+
+    sampling, parameters = study.sampling, study.parameters
+    if sampling.method == "grid":
+        return Design(parameters, _grid(parameters))
+    d = len(parameters)
+    if sampling.method == "sensitivity":
+        shares = _sobol(2 * d, sampling.runs, sampling.seed)
+        return _crossed(parameters, _values(parameters, shares[:, :d]), _values(parameters, shares[:, d:]))
+    if sampling.method == "sobol":
+        shares = _sobol(d, sampling.runs, sampling.seed)
+    else:
+        shares = qmc.LatinHypercube(d=d, seed=np.random.default_rng(sampling.seed)).random(sampling.runs)
+    return Design(parameters, _values(parameters, shares))
+
+
+def _sobol(d: int, runs: int, seed: int) -> Array:
+    """(runs, d) points of a scrambled Sobol sequence."""
+    from scipy.stats import qmc
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # runs that are no power of two: the study warns of that
+        points = qmc.Sobol(d=d, scramble=True, seed=np.random.default_rng(seed)).random(runs)
+    return np.asarray(points, dtype=np.float64)
+
+
+def _crossed(parameters: tuple[Parameter, ...], a: Array, b: Array) -> Design:
+    """A, B and the AB_i, sample by sample, so that what an unfinished study has are whole samples."""
+    n, d = a.shape
+    values = np.repeat(a[:, np.newaxis], d + 2, axis=1)  # (N, 2 + d, d)
+    values[:, 1] = b
+    for i in range(d):
+        values[:, 2 + i, i] = b[:, i]
+    runs = np.arange(n * (d + 2)).reshape(n, d + 2)
+    matrices = Matrices(runs[:, 0].copy(), runs[:, 1].copy(), runs[:, 2:].T.copy())
+    return Design(parameters, values.reshape(-1, d), matrices)
+
+
+def _grid(parameters: tuple[Parameter, ...]) -> Array:
+    """Every combination; the last parameter changes fastest."""
+    axes = [_steps(parameter) for parameter in parameters]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+
+def _steps(parameter: Parameter) -> Array:
+    found = parameter.distribution
+    if found is None:
+        return _numbers(parameter, np.arange(len(parameter.choices)))
+    low, high = found.support
+    assert found.count is not None
+    even = np.geomspace if found.kind == "loguniform" else np.linspace
+    return np.asarray(even(low, high, found.count), dtype=np.float64)
+
+
+def _values(parameters: tuple[Parameter, ...], shares: Array) -> Array:
+    """Inverse distribution functions of (runs, parameters) shares, column by column."""
+    columns = [_column(parameter, shares[:, i]) for i, parameter in enumerate(parameters)]
+    return np.stack(columns, axis=1)
+
+
+def _column(parameter: Parameter, shares: Array) -> Array:
+    found = parameter.distribution
+    if found is None:
+        entries = len(parameter.choices)
+        return _numbers(parameter, np.minimum((shares * entries).astype(np.int64), entries - 1))
+    if parameter.whole:
+        low, high = found.support
+        return np.minimum(low + np.floor(shares * (high - low + 1)), high)
+    return quantile(found, shares)
+
+
+def quantile(found: Distribution, shares: Array) -> Array:
+    """The values below which the given shares of a distribution lie."""
+    shares = np.clip(shares, LEAST_SHARE, 1 - LEAST_SHARE)
+    values = np.asarray(frozen(found).ppf(shares), dtype=np.float64)
+    low, high = found.support
+    return np.clip(values, low, high)  # rounding must not lead over a limit
+
+
+def frozen(found: Distribution) -> Any:
+    """The distribution as scipy has it, cut where it is cut."""
+    from scipy import stats
+
+    low, high = found.support
+    if found.kind == "uniform":
+        return stats.uniform(low, high - low)
+    if found.kind == "loguniform":
+        return stats.loguniform(low, high)
+    if found.kind == "triangular":
+        mode = (low + high) / 2 if found.mode is None else found.mode
+        return stats.triang((mode - low) / (high - low), low, high - low)
+    assert found.mean is not None
+    assert found.deviation is not None
+    if found.kind == "normal":
+        mean, deviation = found.mean, found.deviation
+        return stats.truncnorm((low - mean) / deviation, (high - mean) / deviation, mean, deviation)
+    return _Lognormal(found.mean, found.deviation, low, high)
+
+
+class _Lognormal:
+    """Lognormal distribution of which mean and deviation are given, cut to low..high."""
+
+    def __init__(self, mean: float, deviation: float, low: float, high: float) -> None:
+        from scipy import stats
+
+        variance = log1p((deviation / mean) ** 2)
+        middle, spread = np.log(mean) - variance / 2, sqrt(variance)
+        with np.errstate(divide="ignore"):
+            limits = (np.log([low, high]) - middle) / spread
+        self._logarithm = stats.truncnorm(*limits, middle, spread)
+
+    def ppf(self, shares: Array) -> Array:
+        return np.asarray(np.exp(self._logarithm.ppf(shares)), dtype=np.float64)
+
+
+def _numbers(parameter: Parameter, chosen: NDArray[np.int64]) -> Array:
+    """Values of the chosen entries: their numbers, or which they are."""
+    if parameter.worded:
+        return chosen.astype(np.float64)
+    return np.array([choice.number for choice in parameter.choices], dtype=np.float64)[chosen]

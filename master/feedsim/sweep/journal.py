@@ -1,0 +1,227 @@
+"""The journal of a study: a line of JSON for every run that is done, so that a study that was ended can go on.
+
+The first line says what the runs belong to. Lines are only ever added. One that is torn, since the process or the
+machine ended in the middle of it, is dropped when the journal is opened again, and its run is made again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, Self
+
+from feedsim.errors import InputError, OutputError
+from feedsim.sweep.task import Outcome
+
+NAME = "runs.jsonl"
+LOCK = "runs.lock"
+FORMAT = 1
+SYNC = 1.0  # seconds after which what was written is on the disk at the latest
+
+
+class Journal:
+    """The journal of a folder, open for adding; a context manager.
+
+    Attributes:
+        done: runs that are in it.
+        resumed: how many of them were in it when it was opened.
+        failed: how many runs in it failed.
+        damaged: lines, from 1, that could not be read and count as not written.
+    """
+
+    def __init__(self, directory: Path, head: Mapping[str, Any], runs: int, *, restart: bool = False) -> None:
+        """Open the journal in `directory`, which is made where it is missing.
+
+        head: what the runs belong to; `head["parts"]` maps what can differ to its fingerprint. runs: of the study.
+        restart: begin anew, whatever is there.
+
+        Raises:
+            InputError: the journal is that of another study, or another process is at work on it.
+            OutputError: it cannot be written.
+        """
+        self.path = directory / NAME
+        self.runs = runs
+        self.done: set[int] = set()
+        self.failed = 0
+        self.damaged: tuple[int, ...] = ()
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            self._lock = _locked(directory / LOCK)
+        except OSError as error:
+            raise OutputError(f"{directory} cannot be written: {error.strerror or error}") from error
+        try:
+            self._file = self.path.open("ab", buffering=0)
+            self._synced = time.monotonic()
+            if restart:
+                self._file.truncate(0)
+            self._begin(head)
+        except BaseException as error:
+            self._lock.close()
+            if isinstance(error, OSError):
+                raise OutputError(f"{self.path} cannot be written: {error.strerror or error}") from error
+            raise
+        self.resumed = len(self.done)
+
+    def _begin(self, head: Mapping[str, Any]) -> None:
+        """Check the journal against `head`, drop what is torn, take in the runs that are done."""
+        with self.path.open("rb") as file:
+            first = file.readline()
+            if not first.endswith(b"\n"):  # nothing, or a first line that was never finished
+                self._file.truncate(0)
+                self._write({"format": FORMAT, **head})
+                self.sync()
+                return
+            _same_study(self.path, _line(first), head)
+            damaged, end = [], file.tell()
+            for number, line in enumerate(file, start=2):
+                if not line.endswith(b"\n"):
+                    break
+                end += len(line)
+                outcome = _outcome(_line(line), self.runs)
+                if outcome is None:
+                    damaged.append(number)
+                elif outcome.run not in self.done:
+                    self._count(outcome)
+        self.damaged = tuple(damaged)
+        self._file.truncate(end)
+
+    def add(self, outcome: Outcome) -> bool:
+        """Add a run, unless it is there already. OutputError: it cannot be written."""
+        if outcome.run in self.done:
+            return False
+        figures = None
+        if outcome.figures is not None:
+            figures = {name: [_plain(value), unit] for name, (value, unit) in outcome.figures.items()}
+        self._write({
+            "run": outcome.run, "figures": figures, "error": outcome.error, "seconds": outcome.seconds,
+            "warnings": list(outcome.warnings),
+        })  # fmt: skip
+        self._count(outcome)
+        if time.monotonic() - self._synced >= SYNC:
+            self.sync()
+        return True
+
+    def outcomes(self) -> Iterator[Outcome]:
+        """The runs that are done, each once, in the order of the journal."""
+        seen: set[int] = set()
+        for outcome in read(self.path, self.runs):
+            if outcome.run not in seen:
+                seen.add(outcome.run)
+                yield outcome
+
+    def missing(self) -> Iterator[int]:
+        """Runs that are not done, in order."""
+        return (run for run in range(self.runs) if run not in self.done)
+
+    def sync(self) -> None:
+        """Have what was written on the disk."""
+        with suppress(OSError):  # not every file system can
+            os.fsync(self._file.fileno())
+        self._synced = time.monotonic()
+
+    def close(self) -> None:
+        """Close the journal; another process may go on with it."""
+        self.sync()
+        self._file.close()
+        self._lock.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def _count(self, outcome: Outcome) -> None:
+        self.done.add(outcome.run)
+        self.failed += outcome.figures is None
+
+    def _write(self, content: Mapping[str, Any]) -> None:
+        line = memoryview(json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace") + b"\n")
+        try:
+            while line:  # a file that is not buffered may take a part
+                line = line[self._file.write(line) :]
+        except OSError as error:
+            raise OutputError(
+                f"{self.path} cannot be written: {error.strerror or error}; what is in it so far is kept"
+            ) from error
+
+
+def read(path: Path, runs: int) -> Iterator[Outcome]:
+    """What a journal's lines tell, without those that cannot be read."""
+    with path.open("rb") as file:
+        file.readline()
+        for line in file:
+            outcome = _outcome(_line(line), runs) if line.endswith(b"\n") else None
+            if outcome is not None:
+                yield outcome
+
+
+def _same_study(path: Path, found: Any, head: Mapping[str, Any]) -> None:
+    if not isinstance(found, dict) or found.get("format") != FORMAT or not isinstance(found.get("parts"), dict):
+        raise InputError(f"{path}:1: not the journal of a study, or of another version of feedsim; {_ANEW}")
+    if found.get("fingerprint") == head["fingerprint"]:
+        return
+    parts, own = found["parts"], head["parts"]
+    other = [name for name in own if parts.get(name) != own[name]] or ["study"]
+    raise InputError(
+        f"{path}: its runs belong to another state of the study; what differs: {', '.join(other)} "
+        f"(begun as {found.get('study')!r}); {_ANEW}"
+    )
+
+
+_ANEW = "choose another folder with --out, or begin anew with --restart, which discards them"
+
+
+def _line(line: bytes) -> Any:
+    try:
+        return json.loads(line)
+    except ValueError:
+        return None
+
+
+def _outcome(content: Any, runs: int) -> Outcome | None:
+    """A line as an outcome; None where it is none."""
+    try:
+        figures = content["figures"]
+        if figures is not None:
+            figures = {str(name): (_number(value), str(unit)) for name, (value, unit) in figures.items()}
+        outcome = Outcome(
+            content["run"], figures, content["error"], float(content["seconds"]), tuple(content["warnings"])
+        )
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return None
+    return outcome if type(outcome.run) is int and 0 <= outcome.run < runs else None
+
+
+def _plain(value: float) -> float | str:
+    return float(value) if math.isfinite(value) else repr(float(value))
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, str) and value not in ("nan", "inf", "-inf"):
+        raise ValueError(value)
+    return float(value)
+
+
+def _locked(path: Path) -> IO[bytes]:
+    """A file that this process alone has locked. InputError: another has."""
+    file = path.open("ab")
+    try:
+        try:
+            import fcntl
+        except ImportError:  # Windows
+            import msvcrt
+
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+        else:
+            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        file.close()
+        raise InputError(f"{path.parent}: another process is making the runs of this folder") from None
+    return file

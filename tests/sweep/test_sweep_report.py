@@ -1,0 +1,240 @@
+"""The report on a study: what it says of a table whose numbers are known."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from feedsim import report
+from feedsim.report.people import scale
+from feedsim.report.sweep.account import Account
+from feedsim.report.sweep.figure_plots import running_median
+from feedsim.report.sweep.page import page
+from feedsim.report.sweep.plots import pictures_of
+from feedsim.scenario import Study, load_study
+from feedsim.sweep.design import Design, design
+from feedsim.sweep.table import Table
+from feedsim.sweep.table import table_of as made
+from feedsim.sweep.task import Outcome
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SAMPLED = """
+  F_C: {key: machine.axes.X.friction.F_C, from: 1 N.m, to: 3 N.m}
+  feed: {key: motions.0.feed, from: 1000 mm/min, to: 5000 mm/min}
+  scheme: {key: coupling.scheme, values: [extrapolated, parallel]}
+"""
+GRID = """
+  feed: {key: motions.0.feed, from: 1000 mm/min, to: 5000 mm/min, count: 5}
+  radius: {key: motions.0.radius, values: [5 mm, 10 mm, 20 mm]}
+"""
+
+
+def study_of(folder: Path, sampling: str, parameters: str, name: str = "A study") -> tuple[Study, Design]:
+    file = folder / "study.yaml"
+    scenario = ROOT / "scenarios" / "xz_circle.yaml"
+    file.write_text(f"name: {name!r}\nscenario: {scenario}\nsampling: {sampling}\nparameters:{parameters}")
+    study = load_study(file)
+    return study, design(study)
+
+
+def table_of(
+    study: Study,
+    plan: Design,
+    figures: dict[str, tuple[str, Any]],
+    *,
+    failed: Mapping[int, str] | None = None,
+    warned: Mapping[int, str] | None = None,
+    done: int | None = None,
+) -> Table:
+    """A table of the first `done` runs, default all; figures: name -> SI unit and (runs,) values."""
+    messages, told = failed or {}, warned or {}
+    runs = range(plan.runs if done is None else done)
+    outcomes = [
+        Outcome(
+            run,
+            None if run in messages else {name: (float(values[run]), unit) for name, (unit, values) in figures.items()},
+            messages.get(run),
+            0.1,
+            (told[run],) if run in told else (),
+        )
+        for run in runs
+    ]
+    return made(plan, runs, outcomes, None, {})
+
+
+def glitch(plan: Design) -> Any:
+    """[m]: known to hang on F_C alone."""
+    return 4e-6 * plan.values[:, 0]
+
+
+def html(table: Table, study: Study, plan: Design) -> str:
+    account = Account(table, study, plan)
+    return page(account, *pictures_of(account))
+
+
+def cells(text: str, first: str) -> list[str]:
+    """Texts of the first row of a table that begins with a cell."""
+    row = re.search(rf"<tr><td>(?:<code>)?{re.escape(first)}(?:</code>)?</td>.*?</tr>", text)
+    assert row, first
+    return [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<td.*?</td>", row[0])]
+
+
+def test_statistics_in_units_for_people(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 101}", SAMPLED)
+    values = 1e-6 * np.linspace(2, 12, 101)
+    text = html(table_of(study, plan, {"XZ.G": ("m", values)}), study, plan)
+    # mean 7, std of even spacing 10/100 sqrt(101 102/12), quantiles at 5, 50 and 95 of 100 steps
+    assert cells(text, "XZ.G") == ["XZ.G", "µm", "7", "2.93", "2.5", "7", "11.5", "2", "12", "101"]
+    assert "mm/min" in text  # the parameter feed
+
+
+def test_summary_is_in_SI_and_holds_the_indices(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: sensitivity, runs: 64}", SAMPLED)
+    # 320 runs of 0.1 s by two processes within 20 s
+    record = {"began": "2026-01-01T10:00:00+00:00", "ended": "2026-01-01T10:00:20+00:00", "processes": 2}
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "study.json").write_text(json.dumps(record))
+    written = report.write_sweep(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}), study, plan, tmp_path / "out")
+    assert {"report.html", "summary.json"} <= {path.name for path in written}
+    found = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert found["figures"]["XZ.G"]["unit"] == "m"
+    assert found["figures"]["XZ.G"]["q50"] == pytest.approx(8e-6, rel=0.03)
+    indices = found["sobol_indices"]["XZ.G"]["parameters"]
+    assert indices["F_C"]["total"] == pytest.approx(1, abs=0.1)  # 64 points; the truth is 1
+    assert indices["feed"]["total"] == indices["scheme"]["total"] == 0
+    assert found["performance"]["efficiency"] == pytest.approx(0.8)
+    assert found["runs"] == {"asked": 320, "done": 320, "failed": 0}
+    assert set(found["files"]) == {str(path.relative_to(tmp_path / "out")) for path in written}
+
+
+def test_failed_runs_are_grouped_and_located(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 60}", SAMPLED)
+    fast = np.argsort(plan.values[:, 1])[-6:]
+    failed = {int(run): f"axis <Z> reaches {30 + k}.5 m/min" for k, run in enumerate(fast)}
+    slow = int(np.argmin(plan.values[:, 1]))
+    failed[slow] = "something else"
+    table = table_of(study, plan, {"XZ.G": ("m", glitch(plan))}, failed=failed)
+    account = Account(table, study, plan)
+    first, second = account.failures
+    assert (len(first.runs), len(second.runs)) == (6, 1)
+    assert set(first.runs) == set(fast.tolist())
+    low, high = 60e3 * plan.values[fast, 1].min(), 60e3 * plan.values[fast, 1].max()
+    assert f"feed {low:.4g} to {high:.4g} mm/min" in first.where
+    text = html(table, study, plan)
+    assert "axis &lt;Z&gt; reaches" in text
+    assert "<Z>" not in text
+    assert "7 of 60 runs failed and have no figures; statistics are of the others." in text
+    assert cells(text, "XZ.G")[-1] == "53"
+
+
+def test_a_figure_that_some_runs_do_not_have_is_counted(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 40}", SAMPLED)
+    values = np.where(np.arange(40) < 3, np.nan, 0.1 + plan.values[:, 0])
+    account = Account(table_of(study, plan, {"Z.settling_time": ("s", values)}, failed={39: "no"}), study, plan)
+    assert "Z.settling_time could not be determined in 3 of 39 runs." in account.warnings
+    assert account.outputs[0].statistics["min"] > 0
+
+
+def test_warnings_of_runs_are_told_once(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 20}", SAMPLED)
+    told = {k: f"residual {k}.5 J" for k in range(5)}
+    account = Account(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}, warned=told), study, plan)
+    assert "5 of 20 runs warn: residual 0.5 J" in account.warnings
+
+
+def test_too_many_failures_for_indices_leave_rank_correlations(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: sensitivity, runs: 32}", SAMPLED)
+    failed = {5 * k: "no" for k in range(10)}
+    text = html(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}, failed=failed), study, plan)
+    assert "XZ.G: no Sobol indices: 10 of 32 base points have a run without a value" in text
+    assert "rank correlation" in text
+
+
+def test_a_part_of_a_study(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: sensitivity, runs: 32}", SAMPLED)
+    # 16 whole base points and a piece of the next
+    part = table_of(study, plan, {"XZ.G": ("m", glitch(plan))}, done=83)
+    account = Account(part, study, plan)
+    assert account.sensitivities.sobol["XZ.G"].points == 16
+    assert account.sensitivities.sobol["XZ.G"].left_out == 0
+    assert "The study is not finished: 83 of 160 runs are done." in account.warnings
+
+
+def test_constant_figures_are_told_but_not_drawn(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: sensitivity, runs: 16}", SAMPLED)
+    table = table_of(study, plan, {"XZ.G": ("m", glitch(plan)), "XZ.still": ("m", np.full(plan.runs, 3e-6))})
+    account = Account(table, study, plan)
+    whole, single = pictures_of(account)
+    assert [each.stem for each in single] == ["distribution-XZ-G", "scatter-XZ-G"]
+    assert "XZ.still: no Sobol indices: the figure is the same in all runs." in account.warnings
+    assert cells(page(account, whole, single), "XZ.still")[2:4] == ["3", "0"]
+
+
+ONE_RADIUS = GRID.replace("values: [5 mm, 10 mm, 20 mm]", "values: [15 mm]")
+
+
+@pytest.mark.parametrize(("parameters", "compared"), [(GRID, 1), (ONE_RADIUS, 0)], ids=["map", "line"])
+def test_grids_are_drawn_as_such(tmp_path: Path, parameters: str, compared: int) -> None:
+    """A figure that is the feed: all of its scatter lies between feeds; with a run per feed no share can be told."""
+    study, plan = study_of(tmp_path, "{method: grid}", parameters)
+    table = table_of(study, plan, {"XZ.G": ("m", 1e-4 * plan.values[:, 0])}, failed={2: "no"})
+    account = Account(table, study, plan)
+    whole, single = pictures_of(account)
+    assert [each.stem for each in single] == ["grid-XZ-G"]
+    assert len(whole) == compared
+    share = account.sensitivities.trends["XZ.G"].share
+    np.testing.assert_allclose(share[0], 1 if compared else np.nan)
+
+
+def test_names_with_signs_of_other_languages(tmp_path: Path) -> None:
+    """What is markup to HTML, XML or matplotlib is a letter here."""
+    parameters = SAMPLED.replace("F_C:", "a$b^<i>&:")
+    study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 30}", parameters, name="<b>A</b> & $x$")
+    table = table_of(study, plan, {"XZ.glitch_X+": ("m", glitch(plan)), "XZ.glitch_X-": ("m", glitch(plan))})
+    account = Account(table, study, plan)
+    whole, single = pictures_of(account)
+    assert len({each.stem for each in [*whole, *single]}) == len(whole) + len(single)
+    for picture in [*whole, *single]:
+        ElementTree.fromstring(picture.svg.replace("xlink:href", "href"))  # well-formed
+    text = page(account, whole, single)
+    assert "<i>" not in text
+    assert "&lt;b&gt;A&lt;/b&gt; &amp; $x$" in text
+
+
+def test_ten_thousand_rows_stay_small_and_the_same(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 10000}", SAMPLED)
+    noise = 1e-7 * np.random.default_rng(0).standard_normal(10000)
+    table = table_of(study, plan, {"XZ.G": ("m", glitch(plan) + noise)})
+    text = html(table, study, plan)
+    assert len(text) < 1_000_000  # a scatter plot of vectors would have some 10 MB
+    assert text == html(table, study, plan)
+
+
+def test_running_median() -> None:
+    x = np.random.default_rng(1).random(600)
+    at, median = running_median(x, 3 * x)
+    np.testing.assert_allclose(median, 3 * at, atol=1e-12)
+    assert len(at) == 24
+    assert np.all(np.diff(at) > 0)
+    assert len(running_median(x[:20], x[:20])[0]) == 0
+
+
+@pytest.mark.parametrize(
+    ("unit", "largest", "shown"),
+    [("m", 8e-6, "um"), ("m", 0.03, "mm"), ("m/s", 0.05, "mm/min"), ("s", 0.099, "ms"), ("s", 1.2, "s"),
+     ("N.m", 3.0, "N.m"), ("1/s", 66.7, "(m/min)/mm"), ("rad", 0.04, "rad"), ("1", 0.3, "1")],
+)  # fmt: skip
+def test_units_for_people(unit: str, largest: float, shown: str) -> None:
+    from feedsim import units
+
+    found = scale(unit, np.array([np.nan, -largest, 0.0]))
+    assert found.unit == shown
+    assert found.factor == pytest.approx(units.convert(1.0, unit, shown), rel=1e-12)

@@ -5,9 +5,7 @@ Run by ``make bench``. All figures come from one run on one machine; read the ra
 
 from __future__ import annotations
 
-import json
 import os
-import platform
 import shlex
 import statistics
 import subprocess
@@ -15,6 +13,7 @@ import sys
 from pathlib import Path
 
 import fmpy
+from harness import described, write_json
 
 from feedsim import cosim, scenario
 from feedsim.cosim.unit import Archive
@@ -61,7 +60,7 @@ def unit_cost(program: Path, name: str) -> tuple[float, float]:
 def main() -> int:
     program = build(ROOT / "build" / "bench")
     results: dict[str, float] = {}
-    print(f"{platform.platform()}, Python {platform.python_version()}, {os.cpu_count()} cores\n")
+    print(described(), "\n")
     print("| per 125 us cycle | one doStep | with set, slope, get | instances |")
     print("|---|---|---|---|")
     for name, (*_, instances) in CASES.items():
@@ -84,8 +83,7 @@ def main() -> int:
     print(f"\nmaster loop / units: {loop / units:.1f}")
     spent = loop * cycles * 1e-9
     print(f"circle: {simulated:.3f} s simulated in {spent:.2f} s, real-time factor {simulated / spent:.2f}")
-    target = ROOT / "build" / "bench" / "cycle.json"
-    target.write_text(json.dumps(results, indent=2) + "\n")
+    write_json("cycle", results)
     return 0
 
 

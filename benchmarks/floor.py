@@ -8,8 +8,6 @@ the same bits, or it is no floor for this work.
 from __future__ import annotations
 
 import ctypes
-import json
-import statistics
 import subprocess
 import sys
 import time
@@ -17,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from feedsim_packager import compile, toolchain
+from harness import Contestant, described, digits, measure, table, write_json
 
 from feedsim import cosim, nc, scenario
 from feedsim.cosim.system import System
@@ -88,29 +87,38 @@ def main() -> int:
     circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml")
     program = nc.plan(circle)
     simulated = float(program.time[-1])
-    spent: dict[str, list[float]] = {"floor": [], "native loop": [], "Python loop": []}
-    for i in range(REPETITIONS):
-        print(f"circle, run {i + 1} of {REPETITIONS}", end="\r", file=sys.stderr)
-        seconds, table, names = floor(library, circle, program)
-        native = cosim.run(circle, program=program, native=True)
-        spent["floor"].append(seconds)
-        spent["native loop"].append(native.wall_time)
-        spent["Python loop"].append(cosim.run(circle, program=program, native=False).wall_time)
-        different = [name for at, name in enumerate(names) if np.any(native.trace[name] != table[:, at])]
+    cycles = simulated / circle.machine.cycles.T_c
+    left: dict[str, np.ndarray] = {}
+
+    def whole() -> float:
+        seconds, left["table"], _ = floor(library, circle, program)
+        return 1e6 * seconds / cycles
+
+    def looped(native: bool) -> float:
+        run = cosim.run(circle, program=program, native=native)
+        left.update({name: run.trace[name] for name in names})
+        different = [name for at, name in enumerate(names) if np.any(left[name] != left["table"][:, at])]
         if different:
-            print(f"the floor has computed something else: {', '.join(different)}", file=sys.stderr)
-            return 1
-    print("| the circle, per 125 us cycle | median | shortest | of the floor | real-time factor |")
-    print("|---|---|---|---|---|")
-    results: dict[str, float] = {}
-    for name, seconds in spent.items():
-        per_cycle = [1e6 * value * circle.machine.cycles.T_c / simulated for value in seconds]
-        ratio = statistics.median(a / b for a, b in zip(seconds, spent["floor"], strict=True))
-        median = statistics.median(per_cycle)
-        results |= {f"{name} us": median, f"{name} of the floor": ratio}
-        factor = simulated / statistics.median(seconds)
-        print(f"| {name} | {median:.3f} us | {min(per_cycle):.3f} us | {ratio:.2f} | {factor:.3g} |")
-    (ROOT / "build" / "bench" / "floor.json").write_text(json.dumps(results, indent=2) + "\n")
+            raise SystemExit(f"the floor has computed something else: {', '.join(different)}")
+        return 1e6 * run.wall_time / cycles
+
+    names = floor(library, circle, program)[2]
+    contestants = (
+        Contestant("floor", whole),
+        Contestant("native loop", lambda: looped(True)),
+        Contestant("Python loop", lambda: looped(False), rounds=3),
+    )
+    costs = measure(contestants, REPETITIONS, title="circle, round")
+    print(described(), "\n")
+    rows = [
+        [
+            name, f"{costs.median(name):.3f} us", f"{costs.shortest(name):.3f} us",
+            f"{costs.ratio(name, 'floor'):.2f}", digits(1e6 * simulated / cycles / costs.median(name)),
+        ]
+        for name in costs.costs
+    ]  # fmt: skip
+    print(table(["the circle, per 125 us cycle", "median", "shortest", "of the floor", "real-time factor"], rows))
+    write_json("floor", {"us per cycle": costs.as_json("floor")})
     return 0
 
 

@@ -141,13 +141,14 @@ def test_validate_and_schema(scenario_file: Path, fmus: Path, tmp_path: Path) ->
         assert json.loads(done.stdout)["$schema"].startswith("https://json-schema.org/")
 
 
-def test_failed_step_ends_with_3_and_nothing_written(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
+def test_failed_step_ends_with_3_and_no_result(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
     entries = ("K_p=1e300 N.m.s/rad", "M_max=1e308 N.m", "ideal_current_loop=true")
     changes = [word for entry in entries for word in ("--set", f"machine.axes.Z.drive.{entry}")]
     done = feedsim("run", scenario_file, *changes, fmus=fmus, cwd=tmp_path)
     assert done.returncode == 3, done.stderr
     assert " s: step of 0.000125 s failed: " in done.stderr
-    assert not list(tmp_path.rglob("*.csv"))
+    assert {path.name for path in tmp_path.rglob("*.csv")} <= {"result.partial.csv"}
+    assert not list(tmp_path.rglob("report.html"))
 
 
 def test_warnings_reach_console_and_report(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
@@ -173,7 +174,7 @@ def test_recorded_setpoints_from_a_mat_file(scenario_file: Path, fmus: Path, tmp
 
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGINT"])
-def test_signals_leave_nothing_behind(name: str, fmus: Path, tmp_path: Path) -> None:
+def test_signals_leave_no_result(name: str, fmus: Path, tmp_path: Path) -> None:
     number = getattr(signal, name, None)
     if number is None or os.name == "nt":
         pytest.skip("POSIX signals")
@@ -193,7 +194,7 @@ def test_signals_leave_nothing_behind(name: str, fmus: Path, tmp_path: Path) -> 
         process.send_signal(number)
         assert process.wait(60) == {"SIGTERM": 143, "SIGINT": 130}[name]
     assert not list(scratch.iterdir())
-    assert not list(tmp_path.rglob("*.csv"))
+    assert {path.name for path in tmp_path.rglob("*.csv")} <= {"result.partial.csv"}
 
 
 def test_missing_scenario(fmus: Path, tmp_path: Path) -> None:

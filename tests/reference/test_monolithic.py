@@ -6,17 +6,12 @@ figures were printed with three or four digits, so 2 % is the tolerance where no
 
 from __future__ import annotations
 
-import math
-
 import monolithic
 import numpy as np
 import pytest
+from integrated import Integrated
 from monolithic import figures
-from monolithic.machine import Axis, Machine
-from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
-from solve_controller import Cascade
-from solve_friction import engagement, steady_deflection
+from monolithic.machine import Machine
 
 RADIUS, FEED = 0.015, 3.0 / 60
 COARSE = 5e-6  # integration step for figures: costs them 1e-4 nm
@@ -144,71 +139,13 @@ def test_integration_error() -> None:
 # --- a second implementation of everything but the setpoints --------------------------------------------------------
 
 
-class Second:
-    """Plant and frictions by DOP853 at tight tolerance, with the controllers of solve_controller."""
-
-    def __init__(self, m: Machine, x_start: dict[str, float]) -> None:
-        self.m = m
-        self.names = list(m.axes)
-        self.omega = 2 * np.pi * m.frequency
-        self.state = np.zeros(2 * len(self.omega) + 2 * len(self.names))
-        self.M_a = np.zeros(len(self.names))
-        self.controllers = [Cascade(self._parameters(axis), x_start[name]) for name, axis in m.axes.items()]
-
-    def _parameters(self, axis: Axis) -> dict[str, float]:
-        renamed = {"ramp": "ramp_speed_setpoint", "K_p_current": "current.K_p", "T_n_current": "current.T_n"}
-        renamed |= {name: f"filter_1.{name}" for name in ("f", "D_num", "D_den")}
-        values = {renamed.get(name, name): value for name, value in axis.drive.items()}
-        return values | {"T_c": self.m.T_c, "T_pos": self.m.T_pos, "filter_1.type": 1.0}
-
-    def positions(self) -> NDArray[np.float64]:
-        start = np.array([axis.x_0 for axis in self.m.axes.values()])
-        return np.asarray(start + self.state[: len(self.omega)] @ self.m.x)
-
-    def speeds(self) -> NDArray[np.float64]:
-        modes = len(self.omega)
-        return np.asarray(self.state[modes : 2 * modes] @ self.m.n)
-
-    def cycle(self, x_s: list[float], n_ffw: list[float]) -> None:
-        M_next = np.array(
-            [
-                controller.sample(x, n, x_a, n_a)
-                for controller, x, n, x_a, n_a in zip(
-                    self.controllers, x_s, n_ffw, self.positions(), self.speeds(), strict=True
-                )
-            ]
-        )
-        modes, T_c = len(self.omega), self.m.T_c
-        frictions = [axis.friction for axis in self.m.axes.values()]
-
-        def rate(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
-            q, v, z, c = y[:modes], y[modes : 2 * modes], y[2 * modes : -3], y[-3:]
-            n = v @ self.m.n
-            M_fr, dz, dc = np.zeros(3), np.zeros(3), n.copy()
-            for i, p in enumerate(frictions):
-                dz[i] = n[i] - abs(n[i]) / steady_deflection(p, n[i], math.copysign(1, n[i])) * z[i]
-                if abs(c[i]) >= p["W"] / 2 and c[i] * n[i] > 0:
-                    dc[i] = 0
-                k = engagement(p, z[i], c[i])[1]
-                M_fr[i] = k * p["sigma_0"] * z[i] + p["sigma_1"] * dz[i] + p["sigma_2"] * n[i]
-            torque = self.M_a + (M_next - self.M_a) * t / T_c - M_fr
-            acceleration = self.m.n @ torque - self.omega**2 * q - 2 * self.m.damping * self.omega * v
-            return np.concatenate([v, acceleration, dz, dc])
-
-        solution = solve_ivp(rate, (0, T_c), self.state, method="DOP853", rtol=1e-11, atol=1e-15, first_step=T_c / 8)
-        self.state = solution.y[:, -1]
-        half = np.array([p["W"] / 2 for p in frictions])
-        self.state[-3:] = np.clip(self.state[-3:], -half, half)
-        self.M_a = M_next
-
-
 def test_against_second_implementation() -> None:
     # a circle so small that start, both reversals of Z and X and stop fall into half a second
     m = monolithic.machine()
     setpoints = monolithic.circle(m, 0.0012, 0.018, turns=1, rest=0.05)
     first = monolithic.simulate(m, setpoints, step=1e-6)
     names = list(m.axes)
-    second = Second(m, {name: float(setpoints.x_s[name][0]) for name in names})
+    second = Integrated(m, {name: float(setpoints.x_s[name][0]) for name in names})
     ratio = round(m.T_pos / m.T_c)
     cycles = len(first["time"]) - 1
     worst = np.zeros(3)

@@ -26,7 +26,6 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import csd
 
 from feedsim.errors import InputError
 from feedsim.trace import Trace
@@ -162,6 +161,8 @@ def welch(
         raise InputError(
             f"the record of {len(trace) * step:.6g} s holds {blocks} segments of {segment:.6g} s; at least 2 are needed"
         )
+    from scipy.signal import csd  # takes a third of a second, which a plain run should not wait for
+
     frequency = np.fft.rfftfreq(count, step)
     kept = slice(2, (count + 1) // 2)
 

@@ -1,0 +1,41 @@
+"""The synthetic machines that growth with modes and axes is measured on: they run, and do the same at every size."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import machines
+import numpy as np
+import pytest
+
+from feedsim import cosim, scenario
+from feedsim.structure import checked_modes
+
+
+@pytest.mark.parametrize(("axes", "count"), [(1, 2), (1, 10), (3, 10), (3, 300), (12, 30)])
+def test_every_size_runs(axes: int, count: int, tmp_path: Path, fmus: Path) -> None:
+    file = machines.write(tmp_path, axes, count)
+    loaded = scenario.load(file)
+    modes = checked_modes(loaded.machine)
+    assert len(modes.frequency) == count
+    for axis in loaded.machine.axes:
+        # The elastic motion is shared out among the modes, none of it lost: exact but for rounding.
+        assert modes.J_tot(axis) == pytest.approx(machines.J_1 + machines.J_2, rel=1e-12)
+        assert modes.J_inf(axis) == pytest.approx(machines.J_1, rel=1e-12)
+    run = cosim.run(loaded, fmus=fmus)
+    assert run.warnings == ()
+    assert list(loaded.machine.axes) == list(machines.NAMES[:axes])
+    for axis in loaded.machine.axes:
+        # At rest again, within what friction holds of a settled position loop.
+        assert abs(run.trace[f"{axis}.x_a"][-1] - machines.POSE - 5e-3) < 2e-6
+        assert np.ptp(run.trace[f"{axis}.x_a"]) < 5.1e-3
+
+
+def test_same_seed_same_table() -> None:
+    one, other = machines.modes(3, 93), machines.modes(3, 93)
+    assert all(np.array_equal(one.ports[port], other.ports[port]) for port in one.ports)
+
+
+def test_too_few_modes() -> None:
+    with pytest.raises(ValueError, match="3 axes need 6 modes at least, not 5"):
+        machines.modes(3, 5)

@@ -165,16 +165,8 @@ reference: $(VENV)/.dev ## make the pinned reference CSVs anew, from scipy and t
 check-reference: fmus $(VENV)/.run ## compare all units and both scenarios with the pinned reference CSVs
 	$(PY) tests/reference/check_reference.py --junit $(BUILD)/check-reference.xml
 
-bench: fmus $(VENV)/.importers ## measure units, floor, master and other simulators; tables for docs/performance.md (minutes)
-	$(PY) benchmarks/cycle.py
-	$(PY) benchmarks/floor.py
-	$(PY) benchmarks/peers.py
-	$(PY) benchmarks/accuracy.py
-	$(PY) benchmarks/stability.py
-	$(PY) benchmarks/growth.py
-	$(PY) benchmarks/duration.py
-	$(PY) benchmarks/sweep.py
-	$(PY) benchmarks/startup.py
+bench: fmus $(VENV)/.importers ## measure everything, other simulators too; tables in build/bench (a quarter of an hour)
+	$(PY) benchmarks/all.py
 
 worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets
 	$(PY) benchmarks/worst_case.py

@@ -3,21 +3,22 @@
 The truth is the monolithic reference of the tests: continuous plant and friction in one system of equations, without
 FMI, integrated by Runge-Kutta steps of 1.25 us (its own error is told beside). Errors are over all axes and instants at
 the control cycle: one turn of the circle with its reversals, and the Z positioning move. Time is that of the native
-loop, schemes and steps taking turns. With ``--images DIR`` the plots go there.
+loop, schemes and steps taking turns.
 """
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from harness import ROOT, Contestant, Costs, arguments, digits, measure, progress, table
+
 import numpy as np
-from drawings import Curve, Panel, slope, write_svg
-from harness import RESULTS, ROOT, Contestant, Costs, described, digits, measure, progress, table, write_json
+from fits import exponent
 
 from feedsim import cosim, nc, scenario
 from feedsim.cosim.schedule import SCHEMES
@@ -25,7 +26,9 @@ from feedsim.cosim.schedule import SCHEMES
 sys.path.insert(0, str(ROOT / "tests"))
 from reference import monolithic
 
-SUBSTEPS = tuple(range(1, 9))
+SUBSTEPS = (1, 2, 3, 4, 6, 8)
+SHOWN = (1, 2, 4, 8)  # in the table
+DEFAULT = "extrapolated"
 STEP = 1.25e-6  # s, of the reference
 MOTIONS = {
     "circle": """
@@ -106,24 +109,24 @@ def label(scheme: str, m: int) -> str:
 
 def order(errors: dict[str, Error], scheme: str, what: str) -> float:
     """Fitted over all steps T_c/m."""
-    return -slope(SUBSTEPS, [getattr(errors[label(scheme, m)], what) for m in SUBSTEPS])
+    return -exponent(SUBSTEPS, [getattr(errors[label(scheme, m)], what) for m in SUBSTEPS])
 
 
-def text(errors: dict[str, dict[str, Error]], costs: Costs, substeps: tuple[int, ...]) -> str:
+def text(errors: dict[str, dict[str, Error]], costs: Costs) -> str:
     """A row per scheme and number of exchange steps."""
     rows = []
-    baseline = label("extrapolated", 1)
+    baseline = label(DEFAULT, 1)
     for scheme in SCHEMES:
-        for m in substeps:
+        for m in SHOWN:
             circle, move = (errors[name][label(scheme, m)] for name in MOTIONS)
             name = label(scheme, m)
             rows.append(
                 [
-                    f"`{scheme}`" if m == substeps[0] else "", m,
+                    f"`{scheme}`{' (default)' if scheme == DEFAULT else ''}" if m == SHOWN[0] else "", m,
                     *(digits(1e9 * value, 2) for value in (circle.x_a_max, circle.x_a_rms)),
                     *(digits(1e3 * value, 2) for value in (circle.M_fr_max, circle.M_fr_rms)),
                     digits(1e9 * move.x_a_max, 2), digits(1e3 * move.M_fr_max, 2),
-                    f"{digits(1e3 * costs.shortest(name), 2)} ms", digits(costs.ratio(name, baseline), 2),
+                    f"{digits(1e3 * costs.median(name), 2)} ms", costs.ratio_text(name, baseline),
                 ]
             )  # fmt: skip
     header = ["scheme", "m", "circle: x_a max nm", "rms nm", "M_fr max mN.m", "rms mN.m"]
@@ -132,41 +135,45 @@ def text(errors: dict[str, dict[str, Error]], costs: Costs, substeps: tuple[int,
 
 
 def plots(errors: dict[str, Error], costs: Costs, directory: Path) -> None:
-    quantities = (("x_a_max", 1e9, "largest error of x_a [nm]"), ("M_fr_max", 1e3, "largest error of M_fr [mN.m]"))
+    """Errors of the circle over time and over the exchange step."""
+    from drawings import Curve, Panel, write_svg
+
     by_cost, by_step = [], []
-    for what, scale, said in quantities:
-        values = {scheme: [scale * getattr(errors[label(scheme, m)], what) for m in SUBSTEPS] for scheme in SCHEMES}
-        costly = [
-            Curve(
-                scheme,
-                [1e3 * costs.shortest(label(scheme, m)) for m in SUBSTEPS],
-                values[scheme],
-                [str(m) if m in (1, 2, 4, 8) else "" for m in SUBSTEPS],
-            )
-            for scheme in SCHEMES
-        ]
-        steps = [125 / m for m in SUBSTEPS]
-        fitted = [
-            Curve(
-                scheme if scheme == HELD_TORQUE else f"{scheme}: order {order(errors, scheme, what):.2f}",
-                steps,
-                values[scheme],
-            )
-            for scheme in SCHEMES
-        ]
+    for what, scale, said in (
+        ("x_a_max", 1e9, "largest error of x_a [nm]"), ("M_fr_max", 1e3, "largest error of M_fr [mN.m]"),
+    ):  # fmt: skip
+        costly, fitted = [], []
+        for scheme in SCHEMES:
+            values = [scale * getattr(errors[label(scheme, m)], what) for m in SUBSTEPS]
+            times = [1e3 * costs.median(label(scheme, m)) for m in SUBSTEPS]
+            # Numbers beside one curve: the others have theirs in the same order, and would stand on each other.
+            marked = scheme == DEFAULT
+            labels = [f"{m}" if marked and m in SHOWN else "" for m in SUBSTEPS]
+            name = f"{scheme} (ring: default; numbers: m)" if marked else scheme
+            costly.append(Curve(name, times, values, labels, ring=SUBSTEPS.index(1) if marked else None))
+            # One whose error does not vanish has no order.
+            name = scheme if scheme == HELD_TORQUE else f"{scheme}: order {order(errors, scheme, what):.2f}"
+            fitted.append(Curve(name, [125 / m for m in SUBSTEPS], values))
+        level = (1.0, "1 nm") if what == "x_a_max" else None
         time = "time per simulated second [ms]"
-        by_cost.append(Panel("circle, 1 to 8 exchange steps per cycle", time, said, costly, (10, 20, 50, 100)))
-        by_step.append(Panel("circle", "exchange step [us]", said, fitted, (15.625, 31.25, 62.5, 125)))
+        by_cost.append(
+            Panel("circle, 1 to 8 exchange steps per cycle", time, said, costly, (5, 10, 20, 50, 100), level=level)
+        )
+        by_step.append(Panel("circle", "exchange step [us]", said, fitted, (15.625, 31.25, 62.5, 125), level=level))
     for name, panels in (("accuracy-cost", by_cost), ("accuracy-order", by_step)):
         print(f"{write_svg(name, panels, directory)} written", file=sys.stderr)
 
 
-def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=9, help="of time measurement (default: 9)")
-    parser.add_argument("--images", type=Path, default=RESULTS, metavar="DIR", help="folder of the plots")
-    options = parser.parse_args(arguments)
-    with TemporaryDirectory() as folder:
+def orders_table(orders: dict[str, dict[str, float]]) -> str:
+    return table(
+        ["order of", "x_a max", "x_a rms", "M_fr max", "M_fr rms"],
+        [[f"`{scheme}`", *(f"{value:.2f}" for value in found.values())] for scheme, found in orders.items()],
+    )
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    bench = arguments("accuracy", __doc__, words, rounds=7, images=True)
+    with TemporaryDirectory(prefix="feedsim-bench-") as folder:
         driven = cases(Path(folder))
         errors: dict[str, dict[str, Error]] = {case.name: {} for case in driven}
         for case in driven:
@@ -180,32 +187,26 @@ def main(arguments: list[str] | None = None) -> int:
             for scheme in SCHEMES
             for m in SUBSTEPS
         ]
-        costs = measure(contestants, options.rounds, title="time")
-    print(described() + "\n")
-    print(text(errors, costs, (1, 2, 4, 8)) + "\n")
+        costs = measure(contestants, bench.rounds, title="time")
     orders = {
         scheme: {what: order(errors["circle"], scheme, what) for what in asdict(circle.own_error)} for scheme in SCHEMES
     }
-    print(
-        table(
-            ["scheme", "x_a max", "x_a rms", "M_fr max", "M_fr rms"],
-            [[f"`{scheme}`", *(f"{value:.2f}" for value in found.values())] for scheme, found in orders.items()],
-        )
-    )
-    for case in driven:
-        own = case.own_error
-        print(f"\nreference of the {case.name}: x_a to {own.x_a_max:.1e} m, M_fr to {own.M_fr_max:.1e} N.m")
-    plots(errors["circle"], costs, options.images)
-    write_json(
-        "accuracy",
+    own = [
+        f"Reference of the {case.name}: x_a to {1e9 * case.own_error.x_a_max:.0e} nm, M_fr to "
+        f"{1e3 * case.own_error.M_fr_max:.0e} mN.m."
+        for case in driven
+    ]
+    bench.tell(
+        "\n\n".join((text(errors, costs), orders_table(orders), *own)),
         {
             "errors": {case: {name: asdict(error) for name, error in found.items()} for case, found in errors.items()},
             "reference": {case.name: asdict(case.own_error) for case in driven},
             "orders": orders,
-            "seconds per simulated second": costs.as_json(label("extrapolated", 1)),
+            "seconds per simulated second": costs.as_json(label(DEFAULT, 1)),
             "spread": statistics.median(max(costs.values(n)) / costs.shortest(n) for n in costs.costs),
         },
     )
+    plots(errors["circle"], costs, bench.images)
     return 0
 
 

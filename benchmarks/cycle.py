@@ -1,26 +1,27 @@
-"""What a 125 us control cycle costs: each unit's doStep (measured in C), and the master loop in Python (on the circle).
+"""What a 125 us control cycle costs: each unit's doStep (measured in C), and the master's loops (on the circle).
 
-Run by ``make bench``. All figures come from one run on one machine; read the ratios, not the nanoseconds.
+Units and loops take turns. Read the ratios, not the nanoseconds.
 """
 
 from __future__ import annotations
 
 import os
 import shlex
-import statistics
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-import fmpy
-from harness import described, write_json
+from harness import ROOT, Contestant, Costs, arguments, digits, measure, table
 
-from feedsim import cosim, scenario
+import fmpy
+
+from feedsim import cosim, nc, scenario
 from feedsim.cosim.unit import Archive
 
-ROOT = Path(__file__).resolve().parents[1]
 STEPS = 200_000
-REPETITIONS = 5
+ROUNDS = 5
+LOOPS = {"native loop": True, "Python loop": False}
 # unit -> (driven input, amplitude in SI, output read back, instances in the default machine)
 CASES = {
     "plant": ("Z.M_a", 0.5, "Z.n_a", 1),
@@ -41,7 +42,7 @@ def build(directory: Path) -> Path:
 
 
 def unit_cost(program: Path, name: str) -> tuple[float, float]:
-    """Median ns per step of `name`: (doStep alone, with set, set slope and get around it)."""
+    """us per step of `name`: (doStep alone, with set, set slope and get around it)."""
     driven, amplitude, read, _ = CASES[name]
     with Archive(cosim.fmus_directory() / f"{name}.fmu") as archive:
         library = archive.directory / "binaries" / fmpy.platform / f"{name}{fmpy.sharedLibraryExtension}"
@@ -50,40 +51,49 @@ def unit_cost(program: Path, name: str) -> tuple[float, float]:
             str(program), str(library), name, archive.guid, (archive.directory / "resources").as_uri(), str(STEPS),
             str(variables[driven].valueReference), str(amplitude), str(variables[read].valueReference),
         ]  # fmt: skip
-        runs = [
-            [float(line) for line in subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()]
-            for _ in range(REPETITIONS)
-        ]
-    return statistics.median(run[0] for run in runs), statistics.median(run[1] for run in runs)
+        printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    alone, exchanged = (1e-3 * float(line) for line in printed.split())
+    return alone, exchanged
 
 
-def main() -> int:
+def main(given: Sequence[str] | None = None) -> int:
+    bench = arguments("cycle", __doc__, given, rounds=ROUNDS, only=(*CASES, *LOOPS))
     program = build(ROOT / "build" / "bench")
-    results: dict[str, float] = {}
-    print(described(), "\n")
-    print("| per 125 us cycle | one doStep | with set, slope, get | instances |")
-    print("|---|---|---|---|")
-    for name, (*_, instances) in CASES.items():
-        alone, exchanged = unit_cost(program, name)
-        results[f"{name} doStep ns"], results[f"{name} exchanged ns"] = alone, exchanged
-        print(f"| {name} | {alone / 1e3:.3f} us | {exchanged / 1e3:.3f} us | {instances} |")
-    units = sum(results[f"{name} doStep ns"] * case[3] for name, case in CASES.items())
     circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml")
-    runs = []
-    for i in range(REPETITIONS):
-        print(f"circle, run {i + 1} of {REPETITIONS}", end="\r", file=sys.stderr)
-        runs.append(cosim.run(circle, native=False))
-    simulated = float(runs[0].program.time[-1])
+    planned = nc.plan(circle)
+    simulated = float(planned.time[-1])
     cycles = simulated / circle.machine.cycles.T_c
-    loop = statistics.median(run.wall_time for run in runs) / cycles * 1e9
-    results.update({"units ns": units, "master loop ns": loop, "simulated s": simulated})
-    results["real-time factor"] = simulated / (loop * cycles * 1e-9)
-    print(f"| all units together | {units / 1e3:.3f} us | | 7 |")
-    print(f"| whole master loop | {loop / 1e3:.2f} us | | |")
-    print(f"\nmaster loop / units: {loop / units:.1f}")
-    spent = loop * cycles * 1e-9
-    print(f"circle: {simulated:.3f} s simulated in {spent:.2f} s, real-time factor {simulated / spent:.2f}")
-    write_json("cycle", results)
+    exchanged = Costs()  # filled while the units are measured
+    left = dict.fromkeys(CASES, 0)
+
+    def stepped(name: str) -> float:
+        alone, around = unit_cost(program, name)
+        exchanged.costs.setdefault(name, {})[left[name]] = around
+        left[name] += 1
+        return alone
+
+    def looped(native: bool) -> float:
+        return 1e6 * cosim.run(circle, program=planned, native=native).wall_time / cycles
+
+    contestants = [Contestant(name, lambda name=name: stepped(name)) for name in CASES]  # type: ignore[misc]
+    contestants += [Contestant(name, lambda native=native: looped(native)) for name, native in LOOPS.items()]  # type: ignore[misc]
+    costs = measure([each for each in contestants if each.name in bench.only], bench.rounds, title="cycle, round")
+    rows: list[list[object]] = [
+        [name, f"{costs.median(name):.3f} us", f"{exchanged.median(name):.3f} us", CASES[name][3], ""]
+        for name in CASES
+        if name in costs.costs
+    ]
+    if all(name in costs.costs for name in CASES):
+        per_round = [sum(costs.costs[name][i] * CASES[name][3] for name in CASES) for i in range(bench.rounds)]
+        costs.costs["units"] = dict(enumerate(per_round))
+        rows.append(["all units together", f"{costs.median('units'):.3f} us", "", 7, "1.00"])
+        for name in LOOPS:
+            if name in costs.costs:
+                told = [f"the whole {name}", "", f"{digits(costs.median(name))} us", 7, costs.ratio_text(name, "units")]
+                rows.append(list(told))
+    header = ["per 125 us cycle", "doStep alone", "with set, slope and get", "instances", "of all units (quartiles)"]
+    baseline = "units" if "units" in costs.costs else None
+    bench.tell(table(header, rows), {"us": costs.as_json(baseline), "us, set, slope and get": exchanged.as_json()})
     return 0
 
 

@@ -1,17 +1,17 @@
-"""Figures of the benchmarks: curves on logarithmic scales, told apart by marker and dash as well as by colour."""
+"""Figures of the benchmarks: curves told apart by marker and dash as well as by colour."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from harness import RESULTS
+
 from matplotlib import rc_context
 
-from feedsim.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILLION, drawing
+from feedsim.report.style import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILLION, drawing
 
 LOOKS = (
     (BLUE, "o", "-"),
@@ -20,33 +20,44 @@ LOOKS = (
     (PURPLE, "D", ":"),
     (ORANGE, "v", (0, (5, 1, 1, 1, 1, 1))),
     (SKY, "P", (0, (1, 2))),
+    (INK, "X", (0, (8, 2, 1, 2))),
 )
+# Names beyond this length stand one below the other, lest the legend be wider than its panel.
+LONGEST_IN_COLUMNS = 22
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Points with a name; `labels` stand beside the points, "" beside none."""
+    """Points with a name; `labels` stand beside the points, "" beside none. `ring`: index of a point made to stand out.
+
+    `markers`: False where there are too many points for them.
+    """
 
     name: str
     x: Sequence[float]
     y: Sequence[float]
     labels: Sequence[str] = ()
+    ring: int | None = None
+    markers: bool = True
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves over one pair of logarithmic axes. `ticks`: where the x axis is marked; none: decades."""
+    """Curves over one pair of axes.
+
+    Attributes:
+        scales: "log" or "linear", of x and y; a linear axis begins at 0.
+        ticks: where the x axis is marked; none: where it falls.
+        level: y and name of a line across the panel.
+    """
 
     title: str
     x_label: str
     y_label: str
     curves: Sequence[Curve]
-    ticks: Sequence[float] = field(default=())
-
-
-def slope(x: Sequence[float], y: Sequence[float]) -> float:
-    """Slope of y over x on logarithmic scales, by least squares: the exponent of a power law."""
-    return float(np.polyfit(np.log(np.asarray(x)), np.log(np.asarray(y)), 1)[0])
+    ticks: Sequence[float] = ()
+    scales: tuple[str, str] = ("log", "log")
+    level: tuple[float, str] | None = None
 
 
 def write_svg(name: str, panels: Sequence[Panel], directory: Path = RESULTS) -> Path:
@@ -63,16 +74,32 @@ def write_svg(name: str, panels: Sequence[Panel], directory: Path = RESULTS) -> 
 
 def _draw(axes: Any, panel: Panel) -> None:
     for curve, (colour, marker, dashes) in zip(panel.curves, LOOKS, strict=False):
-        axes.plot(curve.x, curve.y, color=colour, marker=marker, linestyle=dashes, markersize=4.5, label=curve.name)
+        shown = marker if curve.markers else ""
+        axes.plot(curve.x, curve.y, color=colour, marker=shown, linestyle=dashes, markersize=4.5, label=curve.name)
         for x, y, label in zip(curve.x, curve.y, curve.labels, strict=False):
             if label:
-                axes.annotate(label, (x, y), (4, 3), textcoords="offset points", fontsize=7, color=INK)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+                place = {"xytext": (-3, -4), "ha": "right", "va": "top"}
+                axes.annotate(label, (x, y), textcoords="offset points", fontsize=7.5, color=INK, **place)
+        if curve.ring is not None:
+            i = curve.ring
+            axes.plot(curve.x[i], curve.y[i], "o", color=colour, markersize=11, fillstyle="none", markeredgewidth=1.4)
+    for axis, scale in zip("xy", panel.scales, strict=True):
+        if scale == "log":
+            axes.set(**{f"{axis}scale": "log"})
+        else:
+            axes.set(**{f"{axis}lim": (0, 1.06 * max(max(getattr(curve, axis)) for curve in panel.curves))})
+    if panel.level is not None:
+        level, name = panel.level
+        axes.axhline(level, color=MUTED, linewidth=1.0, linestyle=(0, (6, 3)))
+        axes.annotate(
+            name, (0, level), xycoords=("axes fraction", "data"), xytext=(4, 2), textcoords="offset points",
+            fontsize=7.5, color=MUTED, va="bottom",
+        )  # fmt: skip
     if panel.ticks:
         axes.set_xticks(panel.ticks, labels=[f"{tick:g}" for tick in panel.ticks])
         axes.minorticks_off()
     axes.set_title(panel.title)
     axes.set_xlabel(panel.x_label)
     axes.set_ylabel(panel.y_label)
-    axes.legend(fontsize=7.5, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
+    columns = 2 if max(len(curve.name) for curve in panel.curves) <= LONGEST_IN_COLUMNS else 1
+    axes.legend(fontsize=7.5, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns)

@@ -1,205 +1,190 @@
 """How time and memory grow with the simulated duration: whole `feedsim run`s of a circle, each in a process of its own.
 
 The circle of 7.5 mm radius at 3000 mm/min on the default machine (synthetic) is driven as often as the duration takes,
-one turn is evaluated. Peak memory is the process's resident set with the pages of its files; anonymous memory, which
-no file backs, is looked at while the run reports its progress, and when it has ended. With ``--images DIR`` the plot
-goes there; ``--hour`` runs an hour, too, which takes minutes and writes gigabytes.
+one turn is evaluated. Time is that of whoever waits, from the start of the process to its end with all files written;
+its parts are told by the process itself (watched.py). Peak memory is the process's resident set with the pages of its
+files; anonymous memory is what no file backs.
+
+An hour: --durations 1 60 600 3600 --only 10ms-6 --rounds 1.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import resource
-import subprocess
 import sys
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from statistics import median
 from tempfile import TemporaryDirectory
-from typing import Any
 
-from drawings import Curve, Panel, slope, write_svg
-from harness import RESULTS, described, digits, progress, table, write_json
+from harness import ROOT, Benchmark, Contestant, arguments, digits, measure, table
 
-ROOT = Path(__file__).resolve().parents[1]
+from fits import Line
+from watched import Watched, watched
+
 SCENARIO = ROOT / "scenarios" / "xz_circle.yaml"
 TURN = 0.9425  # s
 SIX = "[X.x_a, Z.x_a, X.x_e, Z.x_e, X.M_fr, Z.M_fr]"
-DURATIONS = (1, 10, 60, 600)
-HOUR = 3600
-# Slopes belong to the part where what grows outweighs what stays.
-FITTED_FROM = 10
-PARTS = ("plan", "loop", "whole")
+# What grows with the duration, and what is told of it.
+PARTS = {"whole": "whole", "loop": "cycle loop", "rows": "rows into result.csv", "plan": "planning"}
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is recorded; `most`: longest duration [s] that is measured without ``--hour``."""
+    """What is recorded, and the durations that are measured unless others are asked for [s]."""
 
     name: str
     interval: str
     variables: str | None
-    most: float
+    durations: tuple[float, ...]
 
 
-CASES = (
-    Case("every 10 ms, 6 variables", "10 ms", SIX, 600),
-    Case("every 1 ms, 6 variables", "1 ms", SIX, 600),
-    Case("every 1 ms, all 66", "1 ms", None, 60),
-    Case("every cycle, 6 variables", "125 us", SIX, 60),
-)
+CASES = {
+    "10ms-6": Case("every 10 ms, 6 variables", "10 ms", SIX, (1, 60, 180)),
+    "1ms-all": Case("every 1 ms, all 66", "1 ms", None, (1, 20, 60)),
+    "cycle-6": Case("every cycle, 6 variables", "125 us", SIX, (1, 20, 60)),
+}
 
 
-def settings(case: Case, turns: int) -> list[str]:
-    motion = f"{{kind: circle, plane: [X, Z], radius: 7.5 mm, feed: 3000 mm/min, turns: {turns}}}"
-    variables = [] if case.variables is None else [f"recording.variables={case.variables}"]
-    return [
-        f"motions=[{motion}, {{kind: dwell, duration: 50 ms}}]", "evaluate=[{kind: circle}]",
-        f"recording.interval={case.interval}", *variables,
-    ]  # fmt: skip
+@dataclass
+class Point:
+    """A case with a duration, and what has been measured of it."""
 
+    case: Case
+    turns: int
+    runs: list[Watched] = field(default_factory=list)
+    result: float = 0.0  # size of result.csv [MB]
 
-def anonymous() -> float:
-    """Memory of this process that no file backs, as it is now [MB]; 0 where the system does not tell."""
-    try:
-        lines = Path("/proc/self/status").read_text().splitlines()
-    except OSError:
-        return 0.0
-    return next((float(line.split()[1]) / 1024 for line in lines if line.startswith("RssAnon")), 0.0)
+    @classmethod
+    def of(cls, case: Case, duration: float) -> Point:
+        return cls(case, max(1, round(duration / TURN)))
 
+    def __str__(self) -> str:
+        return f"{self.case.name}, {self.turns} turns"
 
-def one(case: Case, turns: int, folder: Path) -> dict[str, float]:
-    """A run as the command makes it, in this process: times [s], memory [MB], size of its result [MB]."""
-    begun = time.perf_counter()
-    from feedsim import analysis, cosim, nc, report, scenario
+    @property
+    def simulated(self) -> float:
+        return self.turns * TURN
 
-    loaded = scenario.load(SCENARIO, settings(case, turns))
-    planning = time.perf_counter()
-    program = nc.plan(loaded, scratch=folder)
-    planned = time.perf_counter() - planning
-    highest = 0.0
-
-    def look(done: int, total: int) -> None:
-        nonlocal highest
-        if done % (64 * 2048) == 0 or done == total:
-            highest = max(highest, anonymous())
-
-    with report.growing(folder / "out") as recorded:
-        run = cosim.run(loaded, program=program, progress=look, scratch=folder, sink=recorded)
-        report.write(run, analysis.evaluate(run), folder / "out", recorded)
-    return {
-        "simulated": program.duration,
-        "plan": planned,
-        "loop": run.wall_time,
-        "whole": time.perf_counter() - begun,
-        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-        "anonymous": max(highest, anonymous()),
-        "result": (folder / "out" / "result.csv").stat().st_size / 1e6,
-        "rows": len(run.trace),
-    }
-
-
-def measured(case: Case, duration: float) -> dict[str, float]:
-    """The same in a process of its own."""
-    with TemporaryDirectory() as folder:
-        words = [
-            sys.executable, __file__, "--one", str(CASES.index(case)), str(max(1, round(duration / TURN))), folder,
+    def words(self, out: Path) -> list[str]:
+        motion = f"{{kind: circle, plane: [X, Z], radius: 7.5 mm, feed: 3000 mm/min, turns: {self.turns}}}"
+        changes = [
+            f"motions=[{motion}, {{kind: dwell, duration: 50 ms}}]", "evaluate=[{kind: circle}]",
+            f"recording.interval={self.case.interval}",
         ]  # fmt: skip
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"{case.name}, {duration} s: {done.stderr}")
-    found: dict[str, float] = json.loads(done.stdout)
-    return found
+        changes += [] if self.case.variables is None else [f"recording.variables={self.case.variables}"]
+        words = ["run", str(SCENARIO), "--quiet", "--out", str(out)]
+        return words + [word for change in changes for word in ("--set", change)]
+
+    def run(self) -> float:
+        """Seconds of a whole run."""
+        with TemporaryDirectory(prefix="feedsim-bench-") as folder:
+            out = Path(folder) / "out"
+            self.runs.append(watched(self.words(out)))
+            self.result = (out / "result.csv").stat().st_size / 1e6
+        return self.runs[-1].whole
+
+    def seconds(self, part: str) -> float:
+        """Median over the runs; "whole" is one of PARTS."""
+        return median(run.whole if part == "whole" else run.parts[0][part] for run in self.runs)
+
+    def memory(self, what: str) -> float | None:
+        """Median over the runs [MB], of "peak" or "anonymous"; None where the system does not tell."""
+        told = [found for run in self.runs if (found := getattr(run, what)) is not None]
+        return median(told) if told else None
 
 
-Found = dict[Case, dict[float, dict[str, float]]]
+Found = Mapping[str, Sequence[Point]]
 
 
-def rows(found: Found) -> list[list[str]]:
-    return [
+def text(found: Found) -> str:
+    header = ["recorded", "simulated", *PARTS.values(), "peak memory", "... anonymous", "result.csv"]
+    rows = [
         [
-            case.name,
-            f"{duration:g} s",
-            *(f"{digits(each[part])} s" for part in PARTS),
-            f"{digits(1e3 * each['loop'] / each['simulated'])} ms",
-            f"{digits(each['memory'])} MB",
-            f"{digits(each['anonymous'])} MB",
-            f"{digits(each['result'])} MB",
+            point.case.name,
+            f"{point.simulated:.0f} s",
+            *(f"{digits(point.seconds(part))} s" for part in PARTS),
+            *("" if (taken := point.memory(what)) is None else f"{taken:.0f} MB" for what in ("peak", "anonymous")),
+            f"{digits(point.result)} MB",
         ]
-        for case, durations in found.items()
-        for duration, each in durations.items()
+        for points in found.values()
+        for point in points
     ]
+    return table(header, rows)
 
 
-def slopes(found: Found) -> dict[str, dict[str, float]]:
-    """Exponents of growth with the duration, from FITTED_FROM on."""
-    fitted: dict[str, dict[str, float]] = {}
-    for case, durations in found.items():
-        kept = {duration: each for duration, each in durations.items() if duration >= FITTED_FROM}
-        x = [each["simulated"] for each in kept.values()]
-        quantities = (*PARTS, "memory", "anonymous")
-        fitted[case.name] = {what: slope(x, [each[what] for each in kept.values()]) for what in quantities}
-    return fitted
+def lines(points: Sequence[Point]) -> dict[str, Line]:
+    """Time by simulated second; empty for a single duration."""
+    if len(points) < 2:
+        return {}
+    x = [point.simulated for point in points]
+    return {part: Line.through(x, [point.seconds(part) for point in points]) for part in PARTS}
+
+
+def fitted(found: Found) -> str:
+    """The lines through what `text` tells."""
+    header = ["recorded", "whole, T s simulated", "off by at most"]
+    header += [f"{name}, per simulated second" for part, name in PARTS.items() if part != "whole"]
+    rows = []
+    for case, points in found.items():
+        if through := lines(points):
+            whole = through["whole"]
+            said = f"{digits(whole.constant)} s + {digits(1e3 * whole.each)} ms x T"
+            others = (f"{digits(1e3 * line.each)} ms" for part, line in through.items() if part != "whole")
+            rows.append([CASES[case].name, said, f"{100 * whole.off:.0f} %", *others])
+    return table(header, rows) if rows else ""
 
 
 def plot(found: Found, images: Path) -> Path:
-    exponents = slopes(found)
+    from drawings import Curve, Panel, write_svg
 
-    def curves(what: str) -> list[Curve]:
+    def curves(of: Callable[[Point], float | None]) -> list[Curve]:
         return [
-            Curve(
-                f"{case.name}: slope {exponents[case.name][what]:.2f}",
-                [each["simulated"] for each in durations.values()],
-                [each[what] for each in durations.values()],
-            )
-            for case, durations in found.items()
+            Curve(CASES[case].name, [point.simulated for point in points], [of(point) or 0.0 for point in points])
+            for case, points in found.items()
         ]
 
+    linear = ("linear", "linear")  # from 0: what is flat looks flat
+    time, memory = curves(lambda point: point.seconds("whole")), curves(lambda point: point.memory("peak"))
     panels = [
-        Panel("whole run, start of the process to files", "simulated [s]", "time [s]", curves("whole")),
-        Panel("peak resident memory", "simulated [s]", "memory [MB]", curves("memory")),
+        Panel("whole run, start of process to files", "simulated [s]", "time [s]", time, scales=linear),
+        Panel("peak resident memory", "simulated [s]", "memory [MB]", memory, scales=linear),
     ]
     return write_svg("growth-duration", panels, images)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--hour", action="store_true", help="measure an hour, and what takes long, too")
-    parser.add_argument("--images", type=Path, default=RESULTS, metavar="DIR", help="folder of the plot")
-    parser.add_argument("--one", nargs=3, metavar=("CASE", "TURNS", "FOLDER"), help=argparse.SUPPRESS)
-    options = parser.parse_args(arguments)
-    if options.one:
-        case, turns, folder = options.one
-        print(json.dumps(one(CASES[int(case)], int(turns), Path(folder))))
-        return 0
-    durations: tuple[float, ...] = (*DURATIONS, HOUR) if options.hour else DURATIONS
-    found: Found = {case: {} for case in CASES}
-    for case in CASES:
-        for duration in durations:
-            if options.hour or duration <= case.most:
-                progress(f"{case.name}: {duration:g} s")
-                found[case][duration] = measured(case, duration)
-    header = [
-        "recorded",
-        "simulated",
-        *PARTS,
-        "loop per simulated second",
-        "peak memory",
-        "... anonymous",
-        "result.csv",
-    ]
-    print(f"{described()}\n\n{table(header, rows(found))}\n")
-    exponents = slopes(found)
-    for name, each in exponents.items():
-        print(f"slopes from {FITTED_FROM} s on, {name}: " + ", ".join(f"{k} {v:.2f}" for k, v in each.items()))
-    print(f"{plot(found, options.images)} written", file=sys.stderr)
-    results: dict[str, Any] = {
-        "runs": {case.name: {f"{d:g} s": each for d, each in durations.items()} for case, durations in found.items()},
-        "slopes": exponents,
+def durations(parser: argparse.ArgumentParser) -> None:
+    said = "; ".join(f"{name}: {' '.join(f'{each:g}' for each in case.durations)}" for name, case in CASES.items())
+    parser.add_argument(
+        "--durations", type=float, nargs="+", metavar="S", help=f"simulated durations of all cases [s] ({said})"
+    )
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    bench: Benchmark = arguments("duration", __doc__, words, rounds=3, only=tuple(CASES), images=True, more=durations)
+    found = {
+        case: [Point.of(CASES[case], duration) for duration in bench.given.durations or CASES[case].durations]
+        for case in bench.only
     }
-    write_json("duration", results)
+    contestants = [Contestant(str(point), point.run) for points in found.values() for point in points]
+    measure(contestants, bench.rounds, title="duration")
+    results = {
+        case: {
+            "runs": [
+                {
+                    "simulated s": point.simulated, "whole s": [run.whole for run in point.runs],
+                    "parts s": [run.parts[0] for run in point.runs], "peak MB": [run.peak for run in point.runs],
+                    "anonymous MB": [run.anonymous for run in point.runs], "result.csv MB": point.result,
+                }
+                for point in points
+            ],
+            "lines": {part: asdict(line) for part, line in lines(points).items()},
+        }
+        for case, points in found.items()
+    }  # fmt: skip
+    bench.tell(f"{text(found)}\n\n{fitted(found)}", results)
+    print(f"{plot(found, bench.images)} written", file=sys.stderr)
     return 0
 
 

@@ -1,8 +1,5 @@
 """What the modes of a large model cost: time and memory, for machines of brick elements with three free axes.
 
-    python benchmarks/eigen.py              the models of docs/performance.md, one after the other
-    python benchmarks/eigen.py box 25       one of them: box or solid, and its length in elements
-
 A bed of steel bricks stands on mounts, hollow with a wall of three bricks (box) or a cube (solid). On it three solid
 slides, each guided by springs and driven through a nut's spring by a rotor, move along X, Y and Z. A model for the
 solver's sake, of a machine's size and nothing else.
@@ -10,10 +7,16 @@ solver's sake, of a machine's size and nothing else.
 
 from __future__ import annotations
 
+import argparse
+import json
 import math
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
+from typing import Any
+
+from harness import arguments, digits, table
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +29,8 @@ from feedsim.structure.solve import solve
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-MODELS = (("box", 10), ("box", 30), ("box", 100), ("solid", 32))
+MODELS = {"box-10": ("box", 10), "box-30": ("box", 30), "box-100": ("box", 100), "solid-32": ("solid", 32)}
+SHAPES = {"box": "hollow bed", "solid": "solid cube"}
 EDGE = 0.04  # of a brick [m]
 MODULUS, POISSON, DENSITY = 2.1e11, 0.3, 7850.0  # steel
 MOUNT, GUIDE, NUT = 5e7, 1e9, 1e9  # [N/m]
@@ -137,8 +141,8 @@ def described(bodies: list[Body], size: int) -> tuple[tuple[str, ...], Geometry]
     return labels, Geometry(nodes, names, owners, dofs, np.empty((0, 2), dtype=np.int64))
 
 
-def one(kind: str, length: int) -> None:
-    """Solve one model and print its row of the table."""
+def one(kind: str, length: int) -> dict[str, object]:
+    """Solve one model."""
     bed = Body("bed", (0, 0, 0), (length, 24, 24), 3) if kind == "box" else Body("bed", (0, 0, 0), (length,) * 3)
     model = machine(bed)
     began = time.monotonic()
@@ -149,25 +153,52 @@ def one(kind: str, length: int) -> None:
     found = solve(model, cutoff=2e3 * math.pi, damping=Damping(ratio=0.02), static_correction=True, progress=progress)
     for i in (3, 4, 5):
         print(f"  {found.modes.frequency[i]:.4g} Hz: {found.moving[i]}", file=sys.stderr)
-    count = len(found.modes.frequency) - found.corrections
-    memory = "unknown" if found.memory is None else f"{found.memory / 1e9:.2f} GB"
-    print(
-        f"| {kind}, {length} bricks long | {model.mass.shape[0]:,} | {count} | {found.seconds:.1f} s | {memory} "
-        f"| {found.error_bound.max():.0e} |",
-        flush=True,
+    return {
+        "degrees of freedom": model.mass.shape[0],
+        "modes": len(found.modes.frequency) - found.corrections,
+        "seconds": found.seconds,
+        "peak memory GB": None if found.memory is None else found.memory / 1e9,
+        "largest error bound": float(found.error_bound.max()),
+    }
+
+
+def apart(kind: str, length: int) -> dict[str, Any]:
+    """The same in a process of its own: peak memory is the process's."""
+    command = [sys.executable, __file__, "--one", kind, str(length)]
+    found: dict[str, Any] = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
+    return found
+
+
+def _options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--model", nargs=2, metavar=("KIND", "LENGTH"), help="box or solid, and its length in bricks, in place of those"
     )
 
 
-def main() -> None:
-    if len(sys.argv) == 3:
-        one(sys.argv[1], int(sys.argv[2]))
-        return
-    print("| model | degrees of freedom | modes to 1000 Hz | time | peak memory | largest error bound |")
-    print("|---|---|---|---|---|---|", flush=True)
-    for kind, length in MODELS:
-        # A process each: peak memory is the process's.
-        subprocess.run([sys.executable, __file__, kind, str(length)], check=True)
+def main(given: Sequence[str] | None = None) -> int:
+    words = sys.argv[1:] if given is None else list(given)
+    if words[:1] == ["--one"]:
+        print(json.dumps(one(words[1], int(words[2]))))
+        return 0
+    bench = arguments("eigen", __doc__, given, only=tuple(MODELS), more=_options)
+    wanted = {name: MODELS[name] for name in bench.only}
+    if bench.given.model:
+        kind, length = bench.given.model
+        wanted = {f"{kind}-{length}": (kind, int(length))}
+    results = {name: apart(*model) for name, model in wanted.items()}
+    rows = []
+    for name, found in results.items():
+        kind, length = wanted[name]
+        memory = found["peak memory GB"]
+        rows.append([
+            f"{SHAPES[kind]}, {length} bricks long", f"{found['degrees of freedom']:,}", found["modes"],
+            f"{digits(found['seconds'], 2)} s", "unknown" if memory is None else f"{digits(memory, 2)} GB",
+            f"{found['largest error bound']:.0e}",
+        ])  # fmt: skip
+    header = ["model", "degrees of freedom", "modes to 1000 Hz", "time", "peak memory", "largest error bound"]
+    bench.tell(table(header, rows), results)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

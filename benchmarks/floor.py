@@ -1,8 +1,8 @@
-"""What the FMI and the master cost: the circle in the native loop and in Python's, against the same models linked
-together and called directly, without FMI (``benchmarks/floor``).
+"""What the FMI and the master cost: the circle in the native loop and in Python's, against the same algorithm without
+FMI: the units' models linked together and called directly (``benchmarks/floor``).
 
-Run by ``make bench``. The three take turns; a ratio is the median of those of neighbouring runs. The floor must leave
-the same bits, or it is no floor for this work.
+The three take turns in one process; a ratio is the median of those of neighbouring runs, with its quartiles. The floor
+must leave the same bits, or it is no floor for this work.
 """
 
 from __future__ import annotations
@@ -11,18 +11,19 @@ import ctypes
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
+
+from harness import ROOT, Contestant, arguments, digits, measure, table
 
 import numpy as np
 from feedsim_packager import compile, toolchain
-from harness import Contestant, described, digits, measure, table, write_json
 
 from feedsim import cosim, nc, scenario
 from feedsim.cosim.system import System
 
-ROOT = Path(__file__).resolve().parents[1]
 FLOOR = ROOT / "benchmarks" / "floor"
-REPETITIONS = 9
+ROUNDS = 9
 # What of a unit's folder is equations rather than FMI.
 EQUATIONS = {
     "plant": ("modal.c",),
@@ -82,7 +83,8 @@ def floor(library: ctypes.CDLL, circle: scenario.Scenario, program: nc.Program) 
         return time.perf_counter() - begun, table, names
 
 
-def main() -> int:
+def main(given: Sequence[str] | None = None) -> int:
+    bench = arguments("floor", __doc__, given, rounds=ROUNDS, only=("native loop", "Python loop"))
     library = build(ROOT / "build" / "bench" / "floor")
     circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml")
     program = nc.plan(circle)
@@ -96,29 +98,27 @@ def main() -> int:
 
     def looped(native: bool) -> float:
         run = cosim.run(circle, program=program, native=native)
-        left.update({name: run.trace[name] for name in names})
-        different = [name for at, name in enumerate(names) if np.any(left[name] != left["table"][:, at])]
+        different = [name for at, name in enumerate(names) if np.any(run.trace[name] != left["table"][:, at])]
         if different:
             raise SystemExit(f"the floor has computed something else: {', '.join(different)}")
         return 1e6 * run.wall_time / cycles
 
     names = floor(library, circle, program)[2]
-    contestants = (
+    contestants = [
         Contestant("floor", whole),
         Contestant("native loop", lambda: looped(True)),
         Contestant("Python loop", lambda: looped(False), rounds=3),
-    )
-    costs = measure(contestants, REPETITIONS, title="circle, round")
-    print(described(), "\n")
+    ]
+    costs = measure([each for each in contestants if each.name in ("floor", *bench.only)], bench.rounds, title="circle")
     rows = [
         [
             name, f"{costs.median(name):.3f} us", f"{costs.shortest(name):.3f} us",
-            f"{costs.ratio(name, 'floor'):.2f}", digits(1e6 * simulated / cycles / costs.median(name)),
+            costs.ratio_text(name, "floor"), digits(1e6 * simulated / cycles / costs.median(name)),
         ]
         for name in costs.costs
     ]  # fmt: skip
-    print(table(["the circle, per 125 us cycle", "median", "shortest", "of the floor", "real-time factor"], rows))
-    write_json("floor", {"us per cycle": costs.as_json("floor")})
+    header = ["the circle, per 125 us cycle", "median", "shortest", "of the floor (quartiles)", "real-time factor"]
+    bench.tell(table(header, rows), {"us per cycle": costs.as_json("floor")})
     return 0
 
 

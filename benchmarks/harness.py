@@ -1,31 +1,109 @@
-"""What all benchmarks share: contestants that take turns, paired ratios, markdown tables, a JSON file per benchmark.
+"""What all benchmarks share: their options, contestants that take turns, paired ratios, tables.
 
 Machines are noisy, and what another program does to one differs from minute to minute. Contestants therefore take turns
 (A B C A B C), and a ratio is the median of the ratios within the rounds: neighbours in time.
-``build/bench/<name>.json`` keeps the figures with all that they depend on.
+``build/bench/<name>.md`` keeps the tables, ``<name>.json`` the figures with all that they depend on
+(``provenance.py``).
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
-import platform
-import shlex
 import statistics
-import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 
-from feedsim_packager import toolchain
+import provenance
+from provenance import ROOT, SETTINGS, Load, command, described, machine, versions
 
-ROOT = Path(__file__).resolve().parents[1]
+# Small matrices: threads for linear algebra only wait for one another. The Makefile does the same. Before numpy is
+# loaded, hence this module ahead of all others (pyproject.toml has ruff sort imports so).
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+__all__ = [
+    "RESULTS", "ROOT", "SETTINGS", "Benchmark", "Contestant", "Costs", "Load", "arguments", "command", "described",
+    "digits", "machine", "measure", "progress", "table", "versions", "write_json", "write_text",
+]  # fmt: skip
 RESULTS = ROOT / "build" / "bench"
-PACKAGES = ("feedsim", "numpy", "scipy", "fmpy", "ecospy", "libcosimpy", "distributed", "pyarrow", "matplotlib")
-SETTINGS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "FEEDSIM_FMUS", "CC")
+
+
+# --- options ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """A benchmark as its command line wants it.
+
+    Attributes:
+        name: of its files. rounds: how often contestants run. only: the cases that are wanted, in their usual order.
+        folder: of <name>.md and <name>.json. images: folder of its plots.
+        given: all options, those of its own among them. load: of the machine, looked at before the start.
+    """
+
+    name: str
+    rounds: int
+    only: tuple[str, ...]
+    folder: Path
+    images: Path
+    given: argparse.Namespace
+    load: Load
+
+    def tell(self, text: str, results: Mapping[str, object]) -> None:
+        """Print `text` under what it depends on; leave it and `results` (Python's own types) in files."""
+        lines = [described(), *filter(None, [self.load.told()]), text.strip()]
+        content = "\n\n".join(lines) + "\n"
+        write_json(self.name, results, self.folder, load=self.load, rounds=self.rounds, only=list(self.only))
+        write_text(self.folder / f"{self.name}.md", content)
+        print(content, end="", flush=True)
+
+
+def arguments(
+    name: str,
+    about: str | None,
+    given: Sequence[str] | None = None,
+    *,
+    rounds: int = 0,
+    only: Sequence[str] = (),
+    images: bool = False,
+    more: Callable[[argparse.ArgumentParser], object] | None = None,
+) -> Benchmark:
+    """Read the command line of benchmark `name`, and look at the machine's load.
+
+    Args:
+        about: its docstring, shown by --help. given: words of the command line; None: this process's.
+        rounds: how often contestants run unless --rounds says so; 0: it has no such option.
+        only: cases that --only may choose from; all of them unless it is given. images: whether it draws plots.
+        more: adds options of its own; found in `given` of what is returned.
+    """
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    if rounds:
+        parser.add_argument("--rounds", type=_count, default=rounds, metavar="N", help=f"how often each runs: {rounds}")
+    if only:
+        parser.add_argument("--only", nargs="+", choices=only, default=list(only), metavar="CASE", help=", ".join(only))
+    folder = RESULTS.relative_to(ROOT)
+    parser.add_argument(
+        "--json", type=Path, default=RESULTS, metavar="DIR", help=f"folder of {name}.json and {name}.md: {folder}"
+    )
+    if images:
+        parser.add_argument("--images", type=Path, default=RESULTS, metavar="DIR", help=f"folder of plots: {folder}")
+    if more is not None:
+        more(parser)
+    options = parser.parse_args(given)
+    wanted = tuple(case for case in only if case in options.only)
+    return Benchmark(
+        name, getattr(options, "rounds", 0), wanted, options.json, getattr(options, "images", RESULTS), options, Load()
+    )
+
+
+def _count(text: str) -> int:
+    if (value := int(text)) < 1:
+        raise argparse.ArgumentTypeError(f"{text}: once at least")
+    return value
 
 
 # --- measuring -------------------------------------------------------------------------------------------------------
@@ -70,13 +148,38 @@ class Costs:
         """Median of the ratios within the rounds."""
         return statistics.median(self.ratios(name, baseline))
 
+    def quartiles(self, name: str, baseline: str) -> tuple[float, float]:
+        """First and third quartile of the ratios within the rounds: how far they scatter."""
+        first, _, third = quartiles(self.ratios(name, baseline))
+        return first, third
+
+    def ratio_text(self, name: str, baseline: str) -> str:
+        """The ratio for a table, with its quartiles where there is more than one round: "1.55 (1.52-1.61)"."""
+        if not self.ratios(name, baseline):
+            return ""
+        shown = digits(self.ratio(name, baseline))
+        if name == baseline or len(self.ratios(name, baseline)) < 2:
+            return shown
+        return f"{shown} ({'-'.join(digits(value) for value in self.quartiles(name, baseline))})"
+
     def as_json(self, baseline: str | None = None) -> dict[str, object]:
-        """Per contestant: all costs, median, shortest, and ratio to `baseline`."""
-        return {
-            name: {"values": self.values(name), "median": self.median(name), "shortest": self.shortest(name)}
-            | ({} if baseline is None else {f"of {baseline}": self.ratio(name, baseline)})
-            for name in self.costs
-        }
+        """Per contestant: all costs, median, shortest, and ratio to `baseline` with its quartiles."""
+        told: dict[str, object] = {}
+        for name in self.costs:
+            one = {"values": self.values(name), "median": self.median(name), "shortest": self.shortest(name)}
+            if baseline is not None and self.ratios(name, baseline):
+                one[f"of {baseline}"] = self.ratio(name, baseline)
+                one[f"of {baseline}, quartiles"] = list(self.quartiles(name, baseline))
+            told[name] = one
+        return told
+
+
+def quartiles(values: Sequence[float]) -> tuple[float, float, float]:
+    """First quartile, median and third quartile, linear between the values, the least and the largest included."""
+    if len(values) < 2:
+        return values[0], values[0], values[0]
+    first, second, third = statistics.quantiles(values, n=4, method="inclusive")
+    return first, second, third
 
 
 def measure(contestants: Sequence[Contestant], rounds: int, *, title: str = "") -> Costs:
@@ -127,99 +230,38 @@ def _exponent(value: float) -> int:
     return int(f"{value:e}".partition("e")[2])
 
 
-def machine() -> dict[str, object]:
-    """Processor, cores, memory [GB], operating system."""
-    return {
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "memory GB": _memory(),
-        "system": platform.platform(),
-        "architecture": platform.machine(),
-    }
-
-
-def _processor() -> str:
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.is_file():
-        for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
-            key, _, value = line.partition(":")
-            if key.strip() == "model name":
-                return value.strip()
-    if sys.platform == "darwin":
-        return _told(["sysctl", "-n", "machdep.cpu.brand_string"]) or platform.processor()
-    return platform.processor() or platform.machine()
-
-
-def _memory() -> float | None:
-    try:
-        return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9, 1)
-    except (AttributeError, OSError, ValueError):  # not on Windows
-        return None
-
-
-def _told(command: Sequence[str]) -> str:
-    """First line of what a command prints; empty where it cannot run."""
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=30)
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return next(iter(done.stdout.splitlines()), "").strip() if done.returncode == 0 else ""
-
-
-def versions() -> dict[str, str]:
-    """Python, compiler, and the packages of PACKAGES that are installed."""
-    found = {"Python": platform.python_version()}
-    try:
-        found["compiler"] = _told([*toolchain.find_compiler(), "--version"]) or "unknown"
-    except toolchain.CompilerError:
-        found["compiler"] = "none"
-    for package in PACKAGES:
-        try:
-            found[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
-
-
-def command() -> str:
-    """The command line of this process, from the folder of the repository."""
-    script = Path(sys.argv[0]).resolve()
-    shown = script.relative_to(ROOT).as_posix() if script.is_relative_to(ROOT) else script.name
-    return shlex.join(["python", shown, *sys.argv[1:]])
-
-
-def described() -> str:
-    """Machine, versions, date and command in one sentence, to stand above a table."""
-    here, used = machine(), versions()
-    packages = ", ".join(f"{name} {version}" for name, version in used.items() if name not in ("compiler", "feedsim"))
-    return (
-        f"feedsim {used.get('feedsim', '?')}, {here['system']}, {here['processor']}, {here['cores']} cores,"
-        f" {here['memory GB']} GB; {packages}; {used['compiler']}; {datetime.now(UTC):%Y-%m-%d}; `{command()}`."
-    )
-
-
-def write_json(name: str, results: Mapping[str, object], directory: Path = RESULTS) -> Path:
+def write_json(
+    name: str,
+    results: Mapping[str, object],
+    directory: Path = RESULTS,
+    *,
+    load: Load | None = None,
+    rounds: int = 0,
+    only: Sequence[str] = (),
+) -> Path:
     """Write `<name>.json` with `results` (Python's own types) and what they depend on; return its path."""
     content = {
         "benchmark": name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command(),
-        "machine": machine() | {"load": _load()},
+        "rounds": rounds or None,
+        "only": list(only),
+        "machine": machine(),
+        "load": None if load is None else load.as_json(),
         "versions": versions(),
+        "sources": provenance.sources(),
+        "binaries": provenance.binaries(),
+        "compiler flags": provenance.flags(),
         "environment": {key: os.environ[key] for key in SETTINGS if key in os.environ},
         "results": dict(results),
     }
-    directory.mkdir(parents=True, exist_ok=True)
-    path = directory / f"{name}.json"
-    fresh = path.with_suffix(".json.part")
-    fresh.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return write_text(directory / f"{name}.json", json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, content: str) -> Path:
+    """Write a file whole or not at all; return its path."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = path.with_name(path.name + ".part")
+    fresh.write_text(content, encoding="utf-8")
     fresh.replace(path)
     return path
-
-
-def _load() -> list[float] | None:
-    """Programs that wanted a core over the last 1, 5 and 15 minutes: tells a busy machine."""
-    try:
-        return [round(value, 2) for value in os.getloadavg()]
-    except (AttributeError, OSError):
-        return None

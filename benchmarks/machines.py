@@ -10,12 +10,15 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from harness import ROOT
+
 import numpy as np
 import yaml
-from harness import ROOT
 from numpy.typing import NDArray
 
+from feedsim.cosim import fmus_directory
 from feedsim.structure.modes import Modes, write_modes
+from feedsim.structure.pack import pack
 
 NAMES = ("X", "Y", "Z", "U", "V", "W", "A", "B", "C", "P", "Q", "R")
 POSE = 0.3  # m, of every axis
@@ -53,8 +56,15 @@ def modes(axes: int, count: int) -> Modes:
     return Modes(Path("modes.csv"), frequency, damping, ports | tcp)
 
 
+PLANT = "plant.fmu"
+THERE_AND_BACK = 8  # with the rests some 6.7 s, 50,000 control cycles and more
+
+
 def write(folder: Path, axes: int, count: int) -> Path:
-    """Write such a machine and a scenario in which all its axes move by 5 mm; return the scenario's path."""
+    """Write such a machine with its packed plant, and a scenario in which all its axes go to and fro; return its path.
+
+    Every machine is packed, that of the general archive's axes too: a start-up is the same for all of them.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     names = NAMES[:axes]
     write_modes(folder / "modes.csv", modes(axes, count))
@@ -65,19 +75,28 @@ def write(folder: Path, axes: int, count: int) -> Path:
         "name": f"{axes} axes, {count} modes",
         "note": "Synthetic; for benchmarks",
         "modes": "modes.csv",
+        "plant": PLANT,
         "pose": dict.fromkeys(names, f"{POSE} m"),
         "axes": {name: {**machine["axes"]["Z"], "travel": ["0 m", "1 m"]} for name in names},
     }
     # Anchors would be legal, but no person writes them here.
     _dump(folder / "machine.yaml", machine)
-    moves = {"kind": "move", "by": dict.fromkeys(names, "5 mm"), "feed": "3000 mm/min"}
+    pack_machine(folder, axes)
+    to, fro = ({"kind": "move", "by": dict.fromkeys(names, by), "feed": "3000 mm/min"} for by in ("5 mm", "-5 mm"))
+    rest = {"kind": "dwell", "duration": "0.2 s"}
     scenario = {
         "name": machine["name"],
         "machine": "machine.yaml",
-        "motions": [moves, {"kind": "dwell", "duration": "0.4 s"}],
+        "motions": [to, rest, fro, rest] * THERE_AND_BACK,
     }
     _dump(folder / "scenario.yaml", scenario)
     return folder / "scenario.yaml"
+
+
+def pack_machine(folder: Path, axes: int) -> None:
+    """Pack the machine of a folder, as ``feedsim machine pack`` does."""
+    pose = dict.fromkeys(NAMES[:axes], POSE)
+    pack(fmus_directory() / "plant.fmu", folder / PLANT, modes=folder / "modes.csv", pose=pose)
 
 
 class _Plain(yaml.SafeDumper):

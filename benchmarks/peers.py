@@ -1,26 +1,25 @@
 """The three-axis circle in this project's master and in other simulators: what a 125 us control cycle costs in each.
 
-Run by ``make bench``; what is not installed is left out, with the reason. All get the same SSP file and step. What a
-contestant computes is checked first: figures of wrong results are refused. Only the stepping is timed, in a process of
-each contestant's own (``peers_contestants.py``), and the other simulators record as little as they can.
+What is not installed is left out, with the reason; the native loop always takes part. All get the same SSP file and
+step. What a contestant computes is checked first: figures of wrong results are refused. Only the stepping is timed,
+once in a process of each contestant's own (``peers_contestants.py``), and the other simulators record as little as
+they can.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
-import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from harness import ROOT, Contestant, Costs, arguments, digits, measure, progress, table
+
 import numpy as np
-from harness import ROOT, Contestant, Costs, described, digits, measure, progress, table, write_json
 from peers_contestants import AXES, STEP, Outcome
 
 from feedsim import nc, scenario, ssp
@@ -29,9 +28,6 @@ CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
 REFERENCE = ROOT / "tests" / "reference" / "system" / "xz_circle_ref.csv"
 ROUNDS = 5
 TIMEOUT = 300.0  # s, a process; the slowest takes 12 s on an idle machine
-
-# Small matrices: threads for linear algebra only wait for one another. The Makefile does the same.
-ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", **os.environ}
 
 # x_a [m]. The same bits, or for tools that count time otherwise the rounding that tests/importers allow as well.
 SAME, ROUNDED = 0.0, 1e-14
@@ -49,9 +45,9 @@ class Entry:
         key: its name in peers_contestants.py. watched: the one there that tells the whole movement, if not this one.
         steps: its order of stepping. records: what it keeps of the motion while it is timed.
         like: key of the contestant whose x_a it must have, within `within` [m]; "reference": the pinned one.
-        rounds: as in harness.Contestant. repeat: runs in a process, of which the median counts.
+        units: how many it steps: those of the SSP file are one more, which plays the setpoints.
+        rounds: as in harness.Contestant.
         asked: how many times as long as the native loop it should take at least; the floor: its inverse at most.
-        whole: whether its process does nothing but this, so that the time of all of it means something.
     """
 
     key: str
@@ -60,30 +56,33 @@ class Entry:
     records: str
     like: str
     within: float
+    units: str = "8, setpoint.fmu among them"
     rounds: int | None = None
-    repeat: int = 1
     asked: float | None = None
     watched: str = ""
-    whole: bool = True
 
 
-OURS = "54 signals every 1 ms"
+RECORDED, UNITS = "54 signals every 1 ms", "7"  # of ours
+OTHERS = "nothing"
 ENTRIES = (
-    Entry("native", "native loop", "default scheme", OURS, "reference", PINNED, repeat=3),
-    Entry("floor", "floor: no FMI", "default scheme", OURS, "native", SAME, repeat=3, asked=1.25, whole=False),
-    Entry("python", "Python loop", "default scheme", OURS, "native", SAME, rounds=2),
-    Entry("native-parallel", "native loop", "parallel", OURS, "", SAME, repeat=3),
-    Entry("ecos", "ecos", "parallel", "nothing", "native-parallel", ROUNDED, asked=3, watched="ecos-watched"),
-    Entry("ecos-one-core", "ecos, on one core", "parallel", "nothing", "native-parallel", ROUNDED, asked=3),
+    Entry("native", "native loop", "default scheme", RECORDED, "reference", PINNED, UNITS),
+    Entry("floor", "floor: no FMI", "default scheme", RECORDED, "native", SAME, "7, linked together", asked=1.25),
+    Entry("python", "Python loop", "default scheme", RECORDED, "native", SAME, UNITS, rounds=2),
+    Entry("native-parallel", "native loop", "parallel", RECORDED, "", SAME, UNITS),
+    Entry("ecos", "ecos", "parallel", OTHERS, "native-parallel", ROUNDED, asked=3, watched="ecos-watched"),
+    Entry("ecos-one-core", "ecos, on one core", "parallel", OTHERS, "native-parallel", ROUNDED, asked=3),
     Entry(
-        "libcosim", "libcosim", "parallel", "nothing", "native-parallel", ROUNDED, asked=20, watched="libcosim-watched"
+        "libcosim", "libcosim", "parallel", OTHERS, "native-parallel", ROUNDED, asked=20, watched="libcosim-watched"
     ),
-    Entry("libcosim-one-core", "libcosim, on one core", "parallel", "nothing", "native-parallel", ROUNDED, asked=20),
+    Entry("libcosim-one-core", "libcosim, on one core", "parallel", OTHERS, "native-parallel", ROUNDED, asked=20),
     Entry(
         "fmpy", "FMPy's SSP runner", "parallel", "all connectors every cycle (always)", "native-parallel", LATE,
         rounds=2, asked=50,
     ),
-    Entry("solve_ivp", "SciPy's solve_ivp", "one system", "x_a every 2 ms", "reference", PINNED, rounds=1, whole=False),
+    Entry(
+        "solve_ivp", "SciPy's solve_ivp", "one system", "x_a every 2 ms", "reference", PINNED,
+        "none, no controllers", rounds=1,
+    ),
 )  # fmt: skip
 NATIVE = "native"
 
@@ -93,8 +92,7 @@ class Bench:
     """Runs contestants in processes of their own and keeps what they tell.
 
     Attributes:
-        told: key -> what its last process left. whole: key -> whole times of its processes [s].
-        left_out: key -> why.
+        told: key -> what its last process left. left_out: key -> why.
     """
 
     file: Path
@@ -102,42 +100,34 @@ class Bench:
     cycles: int
     folder: Path
     told: dict[str, Outcome] = field(default_factory=dict)
-    whole: dict[str, list[float]] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
 
-    def run(self, key: str, repeat: int = 1) -> Outcome | None:
+    def run(self, key: str) -> Outcome | None:
         """One process; None, and a reason in `left_out`, where it fails."""
         out = self.folder / "outcome.json"
         command = [
             sys.executable, str(ROOT / "benchmarks" / "peers_contestants.py"), key, "--ssp", str(self.file),
-            "--scenario", str(CIRCLE), "--cycles", str(self.cycles), "--repeat", str(repeat), "--out", str(out),
+            "--scenario", str(CIRCLE), "--cycles", str(self.cycles), "--out", str(out),
             *(part for each in self.overrides for part in ("--set", each)),
         ]  # fmt: skip
         out.unlink(missing_ok=True)
-        begun = time.perf_counter()
         try:
-            done = subprocess.run(
-                command, capture_output=True, text=True, timeout=TIMEOUT, cwd=self.folder, env=ENVIRONMENT
-            )
+            done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, cwd=self.folder)
         except subprocess.TimeoutExpired:
             self.left_out[key] = f"not done within {TIMEOUT:.0f} s"
             return None
-        whole = time.perf_counter() - begun
         if done.returncode != 0 or not out.is_file():
             lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
             self.left_out[key] = lines[-1] if lines else f"exit code {done.returncode}"
             return None
         told = Outcome(**json.loads(out.read_text(encoding="utf-8")))
-        self.whole.setdefault(key, []).append(whole - told.later)
         self.told[key] = told
         return told
 
     def cost(self, entry: Entry) -> float | None:
         """Microseconds per cycle; None where it fails."""
-        told = self.run(entry.key, entry.repeat)
-        if told is None:
-            return None
-        return 1e6 * statistics.median(told.seconds) / told.cycles
+        told = self.run(entry.key)
+        return None if told is None else 1e6 * told.seconds / told.cycles
 
 
 # --- what is computed ------------------------------------------------------------------------------------------------
@@ -158,7 +148,7 @@ def _pinned() -> Outcome:
         names = [name.strip('"') for name in stream.readline().strip().split(",")]
         columns = dict(zip(names, np.loadtxt(stream, delimiter=",").T, strict=True))
     instants = np.rint(columns["time"] / STEP).astype(int).tolist()
-    return Outcome([], 0, instants, {name: columns[f"{name}.x_a"].tolist() for name in AXES})
+    return Outcome(0.0, 0, instants, {name: columns[f"{name}.x_a"].tolist() for name in AXES})
 
 
 def check(bench: Bench, entries: Sequence[Entry], known: Mapping[str, Outcome]) -> dict[str, float]:
@@ -179,7 +169,6 @@ def check(bench: Bench, entries: Sequence[Entry], known: Mapping[str, Outcome]) 
             if not found <= entry.within:
                 raise SystemExit(f"peers: {entry.label}: x_a is {found:g} m off, {entry.within:g} m are allowed")
     progress("")
-    bench.whole.clear()
     return differs
 
 
@@ -203,7 +192,7 @@ def _verdict(costs: Costs, entry: Entry) -> tuple[str, str]:
 
 
 def _of(costs: Costs, entry: Entry, baseline: str) -> str:
-    return digits(costs.ratio(entry.key, baseline)) if baseline in costs.costs else ""
+    return costs.ratio_text(entry.key, baseline) if baseline in costs.costs else ""
 
 
 def told(bench: Bench, entries: Sequence[Entry], costs: Costs, differs: Mapping[str, float]) -> str:
@@ -217,11 +206,11 @@ def told(bench: Bench, entries: Sequence[Entry], costs: Costs, differs: Mapping[
             entry.label, entry.steps,
             f"{digits(costs.median(entry.key))} us", f"{digits(costs.shortest(entry.key))} us",
             _of(costs, entry, NATIVE), _of(costs, entry, "native-parallel"), asked, reached,
-            f"{digits(statistics.median(bench.whole[entry.key]), 2)} s" if entry.whole else "",
         ])  # fmt: skip
-    header = ["the circle, per 125 us cycle", "steps", "median", "shortest", "of native", "of native, parallel"]
-    lines = [table([*header, "asked", "reached", "whole process"], rows), ""]
-    lines += [table(["", "steps", "cycles", "records", "x_a at the most"], _how(bench, costs, entries, differs)), ""]
+    header = ["the circle, per 125 us cycle", "steps", "median", "shortest", "of native (quartiles)"]
+    lines = [table([*header, "of native, parallel (quartiles)", "asked", "reached"], rows), ""]
+    how = ["", "steps", "units", "cycles", "records", "x_a at the most"]
+    lines += [table(how, _how(bench, costs, entries, differs)), ""]
     if "solve_ivp" in costs.costs:
         details = bench.told["solve_ivp"].details or {}
         tried = ", ".join(
@@ -246,52 +235,42 @@ def _how(bench: Bench, costs: Costs, entries: Sequence[Entry], differs: Mapping[
         if entry.key in costs.costs:
             off = differs.get(entry.key)
             shown = "" if off is None else "same bits as" if off == 0.0 else f"{digits(1e9 * off)} nm from"
-            cycles = str(bench.told[entry.key].cycles)
-            rows.append(
-                [entry.label, entry.steps, cycles, entry.records, f"{shown} {named[entry.like]}" if shown else ""]
-            )
+            cycles, right = str(bench.told[entry.key].cycles), f"{shown} {named[entry.like]}" if shown else ""
+            rows.append([entry.label, entry.steps, entry.units, cycles, entry.records, right])
     return rows
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=ROUNDS, help=f"default {ROUNDS}")
-    parser.add_argument(
-        "--only", nargs="+", choices=[entry.key for entry in ENTRIES], help="these, and the native loop"
-    )
+def _options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--set", dest="overrides", action="append", default=[], help="KEY=VALUE, as in feedsim run")
-    parser.add_argument("--json", type=Path, default=None, help="folder of peers.json; default build/bench")
-    given = parser.parse_args(arguments)
-    loaded = scenario.load(CIRCLE, given.overrides)
+
+
+def main(given: Sequence[str] | None = None) -> int:
+    options = arguments("peers", __doc__, given, rounds=ROUNDS, only=[entry.key for entry in ENTRIES], more=_options)
+    overrides = options.given.overrides
+    loaded = scenario.load(CIRCLE, overrides)
     cycles = round(float(nc.plan(loaded).time[-1]) / STEP)
-    wanted = [entry for entry in ENTRIES if not given.only or entry.key in (*given.only, NATIVE, "native-parallel")]
-    if given.overrides:  # the reference is of the circle as it is
+    wanted = [entry for entry in ENTRIES if entry.key in (*options.only, NATIVE, "native-parallel")]
+    if overrides:  # the reference is of the circle as it is
         wanted = [entry for entry in wanted if entry.key != "solve_ivp"]
     with tempfile.TemporaryDirectory(prefix="feedsim-bench-") as name:
         file = Path(name) / "circle.ssp"
         ssp.export(loaded, file)
-        bench = Bench(file, tuple(given.overrides), cycles, Path(name))
-        differs = check(bench, wanted, {} if given.overrides else {"reference": _pinned()})
+        bench = Bench(file, tuple(overrides), cycles, Path(name))
+        differs = check(bench, wanted, {} if overrides else {"reference": _pinned()})
         running = [entry for entry in wanted if entry.key not in bench.left_out]
         contestants = [
             Contestant(entry.key, lambda entry=entry: bench.cost(entry), entry.rounds)  # type: ignore[misc]
             for entry in running
         ]
-        costs = measure(contestants, given.rounds, title="circle, round")
-    print(described(), "\n")
-    print(told(bench, wanted, costs, differs))
-    write_json(
-        "peers",
-        {
-            "cycles": cycles,
-            "us per cycle": costs.as_json(NATIVE if NATIVE in costs.costs else None),
-            "whole process s": bench.whole,
-            "x_a differs m": differs,
-            "left out": bench.left_out,
-            "solve_ivp": bench.told["solve_ivp"].details if "solve_ivp" in bench.told else None,
-        },
-        **({"directory": given.json} if given.json else {}),
-    )
+        costs = measure(contestants, options.rounds, title="circle, round")
+    results = {
+        "cycles": cycles,
+        "us per cycle": costs.as_json(NATIVE if NATIVE in costs.costs else None),
+        "x_a differs m": differs,
+        "left out": bench.left_out,
+        "solve_ivp": bench.told["solve_ivp"].details if "solve_ivp" in bench.told else None,
+    }
+    options.tell(told(bench, wanted, costs, differs), results)
     return 0
 
 

@@ -34,7 +34,6 @@ class Job:
     scenario: Path
     overrides: tuple[str, ...]
     cycles: int
-    repeat: int
 
 
 @dataclass
@@ -42,27 +41,25 @@ class Outcome:
     """What comes out.
 
     Attributes:
-        seconds: of the stepping, one per repetition. cycles: that these seconds stand for.
+        seconds: of the stepping. cycles: that these seconds stand for.
         x_a: axis -> positions [m] at `instants` (in cycles).
-        later: seconds that repetitions after the first one have taken, set-up included.
         details: what else there is to tell.
     """
 
-    seconds: list[float]
+    seconds: float
     cycles: int
     instants: list[int]
     x_a: dict[str, list[float]]
-    later: float = 0.0
     details: dict[str, Any] | None = None
 
 
-def _from_result(result: Result, seconds: Sequence[float], cycles: int) -> Outcome:
+def _from_result(result: Result, seconds: float, cycles: int) -> Outcome:
     instants = list(range(EVERY, len(next(iter(result.values()))), EVERY))
-    return Outcome(list(seconds), cycles, instants, {n: result["plant", f"{n}.x_a"][instants].tolist() for n in AXES})
+    return Outcome(seconds, cycles, instants, {n: result["plant", f"{n}.x_a"][instants].tolist() for n in AXES})
 
 
-def _last(values: Mapping[str, float], seconds: Sequence[float], cycles: int, job: Job) -> Outcome:
-    return Outcome(list(seconds), cycles, [job.cycles], {name: [float(value)] for name, value in values.items()})
+def _last(values: Mapping[str, float], seconds: float, cycles: int, job: Job) -> Outcome:
+    return Outcome(seconds, cycles, [job.cycles], {name: [float(value)] for name, value in values.items()})
 
 
 # --- ours ------------------------------------------------------------------------------------------------------------
@@ -74,11 +71,8 @@ def _ours(job: Job, scheme: str, native: bool) -> Outcome:
     loaded = scenario.load(job.scenario, (*job.overrides, f"coupling.scheme={scheme}"))
     program = nc.plan(loaded)
     run = cosim.run(loaded, program=program, native=native)
-    begun, seconds = time.perf_counter(), [run.wall_time]
-    seconds += [cosim.run(loaded, program=program, native=native).wall_time for _ in range(job.repeat - 1)]
-    later = time.perf_counter() - begun
     x_a = {name: run.trace[f"{name}.x_a"][1:].tolist() for name in AXES}
-    return Outcome(seconds, job.cycles, [EVERY * (i + 1) for i in range(len(x_a["X"]))], x_a, later)
+    return Outcome(run.wall_time, job.cycles, [EVERY * (i + 1) for i in range(len(x_a["X"]))], x_a)
 
 
 def _floor(job: Job) -> Outcome:
@@ -89,12 +83,9 @@ def _floor(job: Job) -> Outcome:
     library = build(ROOT / "build" / "bench" / "floor")
     loaded = scenario.load(job.scenario, job.overrides)
     program = nc.plan(loaded)
-    first, table, names = floor(library, loaded, program)
-    begun = time.perf_counter()
-    seconds = [first, *(floor(library, loaded, program)[0] for _ in range(job.repeat - 1))]
-    later = time.perf_counter() - begun
+    seconds, table, names = floor(library, loaded, program)
     x_a = {name: table[1:, names.index(f"{name}.x_a")].tolist() for name in AXES}
-    return Outcome(seconds, job.cycles, [EVERY * (i + 1) for i in range(len(table) - 1)], x_a, later)
+    return Outcome(seconds, job.cycles, [EVERY * (i + 1) for i in range(len(table) - 1)], x_a)
 
 
 # --- other simulators ------------------------------------------------------------------------------------------------
@@ -112,7 +103,7 @@ def _ecos(job: Job) -> Outcome:
         begun = time.perf_counter()
         simulation.step(job.cycles)
         seconds = time.perf_counter() - begun
-        return _last({n: simulation.get_real(f"plant::{n}.x_a") for n in AXES}, [seconds], job.cycles, job)
+        return _last({n: simulation.get_real(f"plant::{n}.x_a") for n in AXES}, seconds, job.cycles, job)
 
 
 def _libcosim(job: Job) -> Outcome:
@@ -133,7 +124,7 @@ def _libcosim(job: Job) -> Outcome:
     plant = execution.slave_index_from_instance_name("plant")
     reference = {variable.name.decode(): variable.reference for variable in execution.slave_variables(plant)}
     values = observer.last_real_values(plant, [reference[f"{name}.x_a"] for name in AXES])
-    return _last(dict(zip(AXES, values, strict=True)), [seconds], job.cycles - 2, job)
+    return _last(dict(zip(AXES, values, strict=True)), seconds, job.cycles - 2, job)
 
 
 def _fmpy(job: Job) -> Outcome:
@@ -159,7 +150,7 @@ def _fmpy(job: Job) -> Outcome:
     mark("free_fmu")
     experiment = Experiment(STEP, job.cycles, RECORD)
     result = with_fmpy.run_file(job.ssp, experiment, with_fmpy.parameters(job.ssp))
-    return _from_result(result, [marks[1] - marks[0]], job.cycles)
+    return _from_result(result, marks[1] - marks[0], job.cycles)
 
 
 def _on_one_core(run: Callable[[Job], Outcome], job: Job) -> Outcome:
@@ -175,14 +166,14 @@ def _watched_ecos(job: Job) -> Outcome:
     from importers import with_ecos
     from importers.system import Experiment
 
-    return _from_result(with_ecos.run(job.ssp, Experiment(STEP, job.cycles, RECORD)), [], job.cycles)
+    return _from_result(with_ecos.run(job.ssp, Experiment(STEP, job.cycles, RECORD)), 0.0, job.cycles)
 
 
 def _watched_libcosim(job: Job) -> Outcome:
     from importers import with_libcosim
     from importers.system import Experiment
 
-    return _from_result(with_libcosim.run(job.ssp, Experiment(STEP, job.cycles, RECORD)), [], job.cycles)
+    return _from_result(with_libcosim.run(job.ssp, Experiment(STEP, job.cycles, RECORD)), 0.0, job.cycles)
 
 
 # --- SciPy -----------------------------------------------------------------------------------------------------------
@@ -223,9 +214,9 @@ def _solve_ivp(job: Job) -> Outcome:
                 rows.append(body.positions().tolist())
         error = float(np.max(np.abs(np.array(rows).T - expected[:, 1 : len(rows) + 1])))
         tried[solver[0]] = {"us": 1e6 * body.seconds / cycles, "error m": error, "calls": body.evaluations / cycles}
-        if error < ACCURACY and (best is None or body.seconds < best.seconds[0]):
+        if error < ACCURACY and (best is None or body.seconds < best.seconds):
             x_a = {name: [row[i] for row in rows] for i, name in enumerate(AXES)}
-            best = Outcome([body.seconds], cycles, [kept * (i + 1) for i in range(len(rows))], x_a)
+            best = Outcome(body.seconds, cycles, [kept * (i + 1) for i in range(len(rows))], x_a)
             best.details = {"solver": solver[0], "error m": error, "tried": tried}
     if best is None:
         raise RuntimeError(f"no solver reaches {ACCURACY} m: {tried}")
@@ -255,10 +246,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--scenario", type=Path, required=True)
     parser.add_argument("--set", dest="overrides", action="append", default=[])
     parser.add_argument("--cycles", type=int, required=True)
-    parser.add_argument("--repeat", type=int, default=1)
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args(arguments)
-    job = Job(given.ssp, given.scenario, tuple(given.overrides), given.cycles, given.repeat)
+    job = Job(given.ssp, given.scenario, tuple(given.overrides), given.cycles)
     given.out.write_text(json.dumps(asdict(CONTESTANTS[given.name](job))), encoding="utf-8")
     return 0
 

@@ -7,11 +7,13 @@ by more than 2 F_S, all that a reversal can change, from the same motion with 32
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from harness import ROOT, arguments, digits, progress, table
+
 import numpy as np
-from harness import ROOT, described, digits, progress, table, write_json
 
 from feedsim import cosim, scenario
 from feedsim.cosim.schedule import SCHEMES
@@ -48,25 +50,24 @@ def limit(file: Path, scheme: str, least: float, most: float) -> float:
     return least
 
 
-def main() -> int:
+def main(given: Sequence[str] | None = None) -> int:
+    bench = arguments("stability", __doc__, given, only=tuple(SCHEMES))
     with TemporaryDirectory() as folder:
         file = Path(folder) / "scenario.yaml"
         file.write_text(MOTIONS.format(machine=ROOT / "scenarios" / "machines" / "test_centre"), encoding="utf-8")
         machine = scenario.load(file).machine
         bound = 2 * checked_modes(machine).J_inf("Z") / machine.cycles.T_c
-        derived = {
-            name: each.stable_share * bound - machine.axes["Z"].friction.sigma_2 for name, each in SCHEMES.items()
-        }
+        sigma_2 = machine.axes["Z"].friction.sigma_2
+        derived = {name: SCHEMES[name].stable_share * bound - sigma_2 for name in bench.only}
         found = {name: limit(file, name, 0.5 * value, 2 * value) for name, value in derived.items()}
     progress("")
-    print(described() + "\n")
     header = ["scheme", "share of 2 J_inf/h", "sigma_1 derived", "sigma_1 measured"]
     rows = [
         [f"`{name}`", f"{SCHEMES[name].stable_share:g}", digits(derived[name], 2), digits(found[name], 2)]
-        for name in SCHEMES
+        for name in bench.only
     ]
-    print(table(header, rows))
-    write_json("stability", {"2 J_inf/h": bound, "derived": derived, "measured": found})
+    text = f"Z axis, 2 J_inf/h = {digits(bound)} N.m.s/rad; sigma_1 in N.m.s/rad.\n\n{table(header, rows)}"
+    bench.tell(text, {"2 J_inf/h": bound, "derived": derived, "measured": found})
     return 0
 
 

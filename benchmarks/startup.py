@@ -1,14 +1,12 @@
 """How long people wait: commands from the start of their process to its end, and where the time of a run goes.
 
 Commands take turns; a time is the wall time of the process, Python's own start included. The parts of a run are those
-of processes that make it three times: the first has libraries to load, archives to unpack and poses to solve, the later
-ones find them there (feedsim.cosim.unpacked).
+of ``feedsim run`` itself (watched.py), made three times by one process: the first has libraries to load, archives to
+unpack and poses to solve, the later ones find them there (feedsim.cosim.unpacked).
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import subprocess
 import sys
 import time
@@ -16,9 +14,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from typing import Any
 
-from harness import ROOT, Contestant, described, digits, measure, table, write_json
+from harness import ROOT, Contestant, arguments, digits, measure, progress, table
+
+from watched import watched
 
 CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
 # A short move: what a study makes thousands of. 1 mm in Z and a rest.
@@ -31,18 +30,24 @@ recording: {{interval: 1 ms}}
 evaluate:
   - {{kind: positioning, axis: Z, band: 1 um}}
 """
+FEEDSIM = ["-c", "from feedsim.cli import entry; entry()"]
 RUNS = 3  # in one process
+PROCESSES = 5  # at the most
 PARTS = {
-    "libraries": "loading numpy, scipy, pydantic, FMPy and feedsim",
+    "libraries": "numpy, scipy, pydantic, FMPy, matplotlib and feedsim, loaded where they are needed first",
     "read": "scenario and machine files, checked",
     "plan": "motion: path, profile, interpolation",
     "open": "archives unpacked, units instantiated, parameterised and wired",
     "initialise": "units initialised",
     "loop": "cycle loop",
-    "rest": "pose, trace, warnings",
+    "rows": "rows into result.csv, in their shortest form",
+    "pose": "how far the structure's modes change over the motion",
+    "trace": "trace, energies, warnings",
     "evaluate": "derived figures",
-    "report": "figures, result.csv, summary.json, report.html",
+    "report": "figures, summary.json, report.html",
+    "rest": "arguments, checks, messages",
 }
+PYTHON = "Python: its start and end, its standard library"
 
 
 def waited(words: Sequence[str]) -> Callable[[], float]:
@@ -59,93 +64,67 @@ def waited(words: Sequence[str]) -> Callable[[], float]:
     return run
 
 
-def parts(file: Path, directory: Path) -> list[dict[str, float]]:
-    """Seconds of every part, of RUNS runs in this process. The report is written for the first alone."""
-    begun = time.perf_counter()
-    from feedsim import analysis, cosim, nc, report, scenario
-    from feedsim.cosim.system import System
-
-    found: list[dict[str, float]] = []
-    spent: dict[str, float] = {"libraries": time.perf_counter() - begun}
-
-    def timed(part: str, call: Callable[..., Any]) -> Callable[..., Any]:
-        def wrapper(*arguments: Any, **named: Any) -> Any:
-            begun = time.perf_counter()
-            try:
-                return call(*arguments, **named)
-            finally:
-                spent[part] = time.perf_counter() - begun
-
-        return wrapper
-
-    System.__init__ = timed("open", System.__init__)  # type: ignore[method-assign]
-    System.initialise = timed("initialise", System.initialise)  # type: ignore[method-assign]
-    for i in range(RUNS):
-        loaded = timed("read", scenario.load)(file)
-        program = timed("plan", nc.plan)(loaded)
-        run = timed("rest", cosim.run)(loaded, program=program)
-        spent["loop"] = run.wall_time
-        spent["rest"] -= spent["open"] + spent["initialise"] + spent["loop"]
-        figures = timed("evaluate", analysis.evaluate)(run)
-        if i == 0:
-            timed("report", report.write)(run, figures, directory)
-        found.append(dict(spent))
-        spent.clear()
-    return found
-
-
 def runs(file: Path, times: int) -> list[dict[str, float]]:
-    """Seconds of every part by run, medians of `times` processes."""
-    with TemporaryDirectory(prefix="feedsim-bench-") as folder:
-        words = [sys.executable, __file__, "--parts", str(file), "--out", folder]
-        told = [json.loads(subprocess.run(words, check=True, capture_output=True).stdout) for _ in range(times)]
-    return [{part: median(each[i][part] for each in told) for part in told[0][i]} for i in range(RUNS)]
+    """Seconds of every part of ``feedsim run`` by run, medians of `times` processes that make it RUNS times each."""
+    told: list[list[dict[str, float]]] = []
+    for i in range(times):
+        progress(f"parts of {file.name} {i + 1} of {times}")
+        with TemporaryDirectory(prefix="feedsim-bench-") as folder:
+            one = watched(["run", str(file), "--quiet", "--out", f"{folder}/out"], RUNS)
+        one.parts[0][PYTHON] = one.whole - sum(sum(run.values()) for run in one.parts)
+        told.append(one.parts)
+    progress("")
+    return [{part: median(each[i].get(part, 0.0) for each in told) for part in told[0][i]} for i in range(RUNS)]
 
 
 def parts_table(title: str, found: list[dict[str, float]]) -> str:
-    heads = ("first run", "second", "third")[: len(found)]
+    named = {PYTHON: PYTHON} | {part: f"{part}: {what}" for part, what in PARTS.items()}
     rows: list[list[object]] = [
-        [f"{part}: {what}", *(digits(1e3 * run[part]) + " ms" if part in run else "" for run in found)]
-        for part, what in PARTS.items()
+        [name, *(digits(1e3 * run[part]) + " ms" if part in run else "" for run in found)]
+        for part, name in named.items()
     ]
     rows.append(["**all**", *(f"**{digits(1e3 * sum(run.values()))} ms**" for run in found)])
-    return table([title, *heads], rows)
+    return table([title, *("first run", "second", "third")[: len(found)]], rows)
 
 
-def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    options.add_argument("--rounds", type=int, default=7, help="how often every command runs (default: 7)")
-    options.add_argument("--parts", type=Path, help=argparse.SUPPRESS)  # in a process of its own
-    options.add_argument("--out", type=Path, help=argparse.SUPPRESS)
-    chosen = options.parse_args()
-    if chosen.parts is not None:
-        json.dump(parts(chosen.parts, chosen.out), sys.stdout)
-        return
-    program = [sys.executable, "-c", "from feedsim.cli import entry; entry()"]
+COMMANDS = {
+    "python": ("an empty Python program", ["-c", ""]),
+    "import": ("`import feedsim`", ["-c", "import feedsim"]),
+    "version": ("`feedsim --version`", [*FEEDSIM, "--version"]),
+    "help": ("`feedsim --help`", [*FEEDSIM, "--help"]),
+    "validate": ("`feedsim validate scenarios/xz_circle.yaml`", [*FEEDSIM, "validate", str(CIRCLE)]),
+    "run": ("`feedsim run scenarios/xz_circle.yaml`", [*FEEDSIM, "run", str(CIRCLE), "--quiet", "--out"]),
+}
+FILES = {"circle": "X-Z circle", "short": "move of 1 mm"}  # whose parts are told
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    bench = arguments("startup", __doc__, words, rounds=7, only=(*COMMANDS, *FILES))
+    results: dict[str, object] = {}
+    tables = []
     with TemporaryDirectory(prefix="feedsim-bench-") as folder:
-        out = ["--quiet", "--out", f"{folder}/out"]
-        commands = {
-            "an empty Python program": [sys.executable, "-c", ""],
-            "`import feedsim`": [sys.executable, "-c", "import feedsim"],
-            "`feedsim --version`": [*program, "--version"],
-            "`feedsim --help`": [*program, "--help"],
-            "`feedsim validate scenarios/xz_circle.yaml`": [*program, "validate", str(CIRCLE)],
-            "`feedsim run scenarios/xz_circle.yaml`": [*program, "run", str(CIRCLE), *out],
-        }
-        costs = measure(
-            [Contestant(name, waited(words)) for name, words in commands.items()], chosen.rounds, title="start-up"
-        )
         short = Path(folder) / "short.yaml"
         short.write_text(SHORT, encoding="utf-8")
-        circle, move = runs(CIRCLE, min(chosen.rounds, 5)), runs(short, min(chosen.rounds, 5))
-    print(f"{described()}\n")
-    rows = [[name, f"{digits(costs.median(name))} s", f"{digits(costs.shortest(name))} s"] for name in commands]
-    print(table(["command", "median", "shortest"], rows), end="\n\n")
-    print(parts_table("X-Z circle", circle), end="\n\n")
-    print(parts_table("move of 1 mm", move))
-    path = write_json("startup", {"commands": costs.as_json(), "X-Z circle": circle, "short move": move})
-    print(f"\n{path.relative_to(ROOT)}")
+        contestants = [
+            Contestant(name, waited([sys.executable, *words, *([f"{folder}/out"] if each == "run" else [])]))
+            for each, (name, words) in COMMANDS.items()
+            if each in bench.only
+        ]
+        if contestants:
+            costs = measure(contestants, bench.rounds, title="start-up")
+            results["commands"] = costs.as_json()
+            rows = [
+                [name, f"{digits(costs.median(name))} s", f"{digits(costs.shortest(name))} s"] for name in costs.costs
+            ]
+            tables.append(table(["command", "median", "shortest"], rows))
+        for each, file in zip(FILES, (CIRCLE, short), strict=True):
+            if each in bench.only:
+                found = runs(file, min(bench.rounds, PROCESSES))
+                results[FILES[each]] = found
+                tables.append(parts_table(FILES[each], found))
+    bench.tell("\n\n".join(tables), results)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

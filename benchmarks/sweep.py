@@ -1,11 +1,12 @@
-"""What a study of many runs costs: efficiency of two workers, start-up, memory over ten thousand runs.
+"""What a study of many runs costs: efficiency of two workers, start-up, memory over some thousand runs.
 
-Run by ``make bench``; three to four minutes. Serial is the same engine in one process, which is a plain loop over the
-runs. What two processes reach that know nothing of each other and of the engine is the machine's part of the loss.
+Serial is the plain loop over the runs in one process, whose place stays laid out, as a worker's does. What two
+processes reach that know nothing of each other and of the engine is the machine's part of the loss.
 """
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
 import time
@@ -13,22 +14,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from harness import ROOT, Contestant, Costs, arguments, digits, measure, progress, table
+
 import numpy as np
 import psutil
-from harness import Contestant, Costs, described, digits, measure, progress, table, write_json
 
 from feedsim.cosim import fmus_directory
 from feedsim.scenario import Base, Change
-from feedsim.sweep.bundle import Bundle
+from feedsim.sweep.bundle import Bundle, Place
 from feedsim.sweep.engine import Engine, open_engine
-from feedsim.sweep.task import Task
+from feedsim.sweep.task import Outcome, Task
 
-ROOT = Path(__file__).resolve().parents[1]
-PLOT = ROOT / "docs" / "images" / "sweep-memory.svg"
 WORKERS = 2
-ROUNDS = 3
 MANY = 10_000
-DEADLINE = 150.0  # s for those; the figure says how many were reached
+POINTS = 12  # of each curve in the plot
+DEADLINE = 50.0  # s for those; the figure says how many were reached
 
 
 @dataclass(frozen=True)
@@ -52,70 +52,115 @@ class Case:
 
 CIRCLE = Case("circle", "xz_circle.yaml", (), 40)
 SHORT = Case("short move", "z_positioning.yaml", ("motions.0.by.Z=1 mm", "motions.1.duration=0.05 s"), 400)
-CASES = {case.name: case for case in (CIRCLE, SHORT)}
+CASES = {"circle": CIRCLE, "short": SHORT}
+MEMORY = "memory"
 
 
-def main() -> int:
-    if len(sys.argv) == 3:  # one of the two processes that know nothing of the engine
-        return alone(CASES[sys.argv[1]], int(sys.argv[2]))
+def main(words: Sequence[str] | None = None) -> int:
+    bench = arguments("sweep", __doc__, words, rounds=3, only=(*CASES, MEMORY), images=True, more=deadline)
     results: dict[str, object] = {}
     rows = []
-    for case in CASES.values():
-        costs, startup = efficiency(case)
+    for key in bench.only:
+        if key not in CASES:
+            continue
+        case = CASES[key]
+        costs, startup = efficiency(case, bench.rounds)
         serial, engine = costs.median("serial"), costs.median("engine")
-        reached = 1.0 / (WORKERS * costs.ratio("engine", "serial"))
-        possible = 1.0 / (WORKERS * costs.ratio("apart", "serial"))
+        reached, possible = (
+            [
+                1.0 / (WORKERS * ratio)
+                for ratio in (costs.ratio(name, "serial"), *reversed(costs.quartiles(name, "serial")))
+            ]
+            for name in ("engine", "apart")
+        )
         results[case.name] = {
-            "runs": case.runs, "costs": costs.as_json("serial"), "start-up s": startup, "efficiency": reached,
-            "efficiency without an engine": possible, "runs per second": case.runs / engine,
+            "runs": case.runs, "costs": costs.as_json("serial"), "start-up s": startup,
+            "efficiency, quartiles": reached, "efficiency without an engine, quartiles": possible,
+            "runs per second": case.runs / engine,
         }  # fmt: skip
         rows.append(
             [case.name, case.runs, f"{digits(serial / case.runs * 1e3)} ms", f"{digits(case.runs / serial)} /s",
-             f"{digits(case.runs / engine)} /s", digits(reached, 2), digits(possible, 2), f"{digits(startup, 2)} s"]
+             f"{digits(case.runs / engine)} /s", told(reached), told(possible), f"{digits(startup, 2)} s"]
         )  # fmt: skip
-    memory = many()
-    results["memory"] = memory.as_json()
-    memory.plot()
-    print(f"{described()}\n")
-    print(table(
-        ["run", "runs", "one run", "serial", f"{WORKERS} workers", "efficiency", "of two plain processes", "start-up"],
-        rows,
-    ))  # fmt: skip
-    print()
-    print(memory.told())
-    write_json("sweep", results)
+    tables = []
+    if rows:
+        header = ["run", "runs", "one run", "serial", f"{WORKERS} workers", "efficiency", "of two plain processes"]
+        tables.append(table([*header, "start-up"], rows))
+    memory = many(bench.given.deadline) if MEMORY in bench.only else None
+    if memory is not None:
+        results["memory"] = memory.as_json()
+        tables.append(memory.told())
+    bench.tell("\n\n".join(tables), results)
+    if memory is not None:
+        print(f"{memory.plot(bench.images)} written", file=sys.stderr)
     return 0
 
 
-def efficiency(case: Case) -> tuple[Costs, float]:
+def deadline(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--deadline", type=float, default=DEADLINE, metavar="S",
+        help=f"for the {MANY} runs whose memory is looked at [s] (default: {DEADLINE:g})",
+    )  # fmt: skip
+
+
+def shares(costs: Costs, name: str) -> list[float]:
+    """Time of the serial loop over that of all workers together: median, first and third quartile."""
+    ratios = (costs.ratio(name, "serial"), *reversed(costs.quartiles(name, "serial")))
+    return [1.0 / (WORKERS * ratio) for ratio in ratios]
+
+
+def told(values: Sequence[float]) -> str:
+    """Median and quartiles."""
+    middle, low, high = (f"{100 * value:.0f}" for value in values)
+    return f"{middle} % ({low}-{high})"
+
+
+def efficiency(case: Case, rounds: int) -> tuple[Costs, float]:
     """Seconds for all runs of a case by each contestant, and the start-up of the workers [s]."""
     bundle = case.bundle()
+    place = bundle.open()
     begun = time.perf_counter()
-    with open_engine(bundle, workers=WORKERS) as crowd, open_engine(bundle, workers=0) as here:
-        startup = time.perf_counter() - begun
-        for engine in (crowd, here):
-            timed(engine, case, 4 * WORKERS)  # what only a first run does
-        contestants = [
-            Contestant("serial", lambda: timed(here, case)),
-            Contestant("engine", lambda: timed(crowd, case)),
-            Contestant("apart", lambda: apart(case)),
-        ]
-        return measure(contestants, ROUNDS, title=case.name), startup
+    try:
+        with open_engine(bundle, workers=WORKERS) as crowd:
+            startup = time.perf_counter() - begun
+            # What only a first run does, of the process and of its place.
+            by_engine(crowd, case, 4 * WORKERS)
+            in_place(place, case, 4)
+            contestants = [
+                Contestant("serial", lambda: in_place(place, case)),
+                Contestant("engine", lambda: by_engine(crowd, case)),
+                Contestant("apart", lambda: apart(case)),
+            ]
+            return measure(contestants, rounds, title=case.name), startup
+    finally:
+        place.close()
 
 
-def timed(engine: Engine, case: Case, runs: int | None = None) -> float:
+def by_engine(engine: Engine, case: Case, runs: int | None = None) -> float:
+    """Seconds for the first runs of a case, None: all."""
     begun = time.perf_counter()
     outcomes = list(engine.map(case.tasks(runs=runs)))
-    spent = time.perf_counter() - begun
+    return checked(case, outcomes, runs or case.runs, time.perf_counter() - begun)
+
+
+def in_place(place: Place, case: Case, runs: int | None = None) -> float:
+    """The same, one after the other in this process."""
+    begun = time.perf_counter()
+    outcomes = [place.run(task) for task in case.tasks(runs=runs)]
+    return checked(case, outcomes, runs or case.runs, time.perf_counter() - begun)
+
+
+def checked(case: Case, outcomes: Sequence[Outcome], expected: int, spent: float) -> float:
     failed = [outcome.error for outcome in outcomes if outcome.error]
-    if failed or len(outcomes) != (runs or case.runs):
+    if failed or len(outcomes) != expected:
         raise SystemExit(f"{case.name}: {len(outcomes)} outcomes, {len(failed)} failed: {failed[:1]}")
     return spent
 
 
 def apart(case: Case) -> float:
     """The time of the slower of two processes with half of the runs each, which begin together."""
-    command = [sys.executable, __file__, case.name]
+    key = next(key for key, each in CASES.items() if each is case)
+    command = [sys.executable, __file__, "--apart", key]
     processes = [
         subprocess.Popen([*command, str(i)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         for i in range(WORKERS)
@@ -131,14 +176,17 @@ def apart(case: Case) -> float:
 
 
 def alone(case: Case, first: int) -> int:
-    with open_engine(case.bundle(), workers=0) as engine:
-        list(engine.map(case.tasks(runs=4)))
+    """One of the processes of :func:`apart`."""
+    place = case.bundle().open()
+    try:
+        in_place(place, case, 4)
         print("ready", flush=True)
         sys.stdin.readline()
         begun = time.perf_counter()
-        for _ in engine.map(case.tasks(first, WORKERS)):
-            pass
-        print(time.perf_counter() - begun)
+        outcomes = [place.run(task) for task in case.tasks(first, WORKERS)]
+        print(checked(case, outcomes, len(range(first, case.runs, WORKERS)), time.perf_counter() - begun))
+    finally:
+        place.close()
     return 0
 
 
@@ -158,7 +206,7 @@ class Memory:
 
     def curves(self) -> dict[str, list[float]]:
         by_worker = {f"worker {i + 1}": list(curve) for i, curve in enumerate(zip(*self.workers, strict=True))}
-        return {"client": self.client, **by_worker}
+        return {"client and scheduler": self.client, **by_worker}
 
     def slope(self, curve: Sequence[float]) -> float:
         """kB per 1000 runs, over the second half of the runs."""
@@ -182,26 +230,22 @@ class Memory:
         head = ["process", f"after {self.runs[tenth]}", f"after {self.runs[-1]} runs", "peak", "growth per 1000 runs"]
         return f"{self.runs[-1]} short moves in {self.seconds:.0f} s:\n\n{table(head, rows)}"
 
-    def plot(self) -> None:
-        import matplotlib as mpl
+    def plot(self, images: Path) -> Path:
+        from drawings import Curve, Panel, write_svg
 
-        mpl.use("svg")
-        import matplotlib.pyplot as plt
-
-        with plt.rc_context({"svg.hashsalt": "feedsim", "svg.fonttype": "path", "font.size": 9}):
-            figure, axes = plt.subplots(figsize=(6.4, 3.0), layout="constrained")
-            for name, curve in self.curves().items():
-                axes.plot(self.runs, curve, label=name, linewidth=1.2)
-            axes.set(xlabel="runs", ylabel="resident memory [MB]", xlim=(0, self.runs[-1]), ylim=(0, None))
-            axes.grid(alpha=0.3)
-            axes.legend()
-            PLOT.parent.mkdir(exist_ok=True)
-            figure.savefig(PLOT, metadata={"Date": None, "Creator": None})
-            plt.close(figure)
+        # Workers lie on each other: fewer points than looks, and each curve at others, so that all markers show.
+        curves, count = [], len(self.runs)
+        for first, (name, curve) in enumerate(self.curves().items()):
+            shown = range(min(first * count // (3 * POINTS), count - 1), count, max(1, count // POINTS))
+            curves.append(Curve(name, [self.runs[i] for i in shown], [curve[i] for i in shown]))
+        title = "two workers over many runs"
+        return write_svg(
+            "sweep-memory", [Panel(title, "runs", "resident memory [MB]", curves, scales=("linear", "linear"))], images
+        )
 
 
-def many() -> Memory:
-    """Memory of client and workers over many short runs."""
+def many(seconds: float) -> Memory:
+    """Memory of client and workers over many short runs, or as many as are made in `seconds`."""
     me, found = psutil.Process(), Memory()
     with open_engine(SHORT.bundle(), workers=WORKERS) as engine:
         children = [each for each in me.children(recursive=True) if "spawn_main" in " ".join(each.cmdline())]
@@ -211,7 +255,7 @@ def many() -> Memory:
                 looked = time.perf_counter()
                 found.look(count, me, children)
                 progress(f"memory: {count} of {MANY} runs")
-                if looked - begun > DEADLINE:
+                if looked - begun > seconds:
                     break
         found.seconds = time.perf_counter() - begun
     progress("")
@@ -219,4 +263,6 @@ def many() -> Memory:
 
 
 if __name__ == "__main__":
+    if sys.argv[1:2] == ["--apart"]:
+        sys.exit(alone(CASES[sys.argv[2]], int(sys.argv[3])))
     sys.exit(main())

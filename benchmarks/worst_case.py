@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import platform
 import re
 import shlex
 import shutil
@@ -17,9 +16,11 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+
+from harness import ROOT, arguments, progress, table
 
 import fmpy
 import numpy as np
@@ -28,7 +29,6 @@ from numpy.typing import NDArray
 from feedsim import cosim
 from feedsim.cosim.unit import Archive
 
-ROOT = Path(__file__).resolve().parents[1]
 H = 125e-6  # control cycle [s]
 STEPS = 8000  # 1 s
 REPEATS = 200  # every step must once be left alone by the operating system
@@ -176,12 +176,12 @@ def _instructions(program: Path, binary: Path, script: Path, indices: Path, fold
     return [counts[key] for key in sorted(counts)]
 
 
-def measure(program: Path, case: Case, folder: Path, prefix: Sequence[str] = ()) -> Cost:
-    """Run the case in every mode."""
+def measure(program: Path, case: Case, folder: Path, prefix: Sequence[str] = (), repeats: int = REPEATS) -> Cost:
+    """Run the case in every mode, `repeats` times from the same saved state."""
     with Archive(case.archive or cosim.fmus_directory() / f"{case.unit}.fmu") as archive:
         script, binary, marked = folder / "script.txt", library(archive, case.unit), folder / "indices.txt"
         write_script(script, case, archive)
-        lines = run(program, "time", binary, script, REPEATS, prefix=prefix)
+        lines = run(program, "time", binary, script, repeats, prefix=prefix)
         times = _times(lines)
         first = min(_times(run(program, "time", binary, script, 1, prefix=prefix))[0] for _ in range(COLD))
         median, percentile, largest, *setting = map(float, lines[-1].split()[1:])
@@ -201,43 +201,43 @@ def measure(program: Path, case: Case, folder: Path, prefix: Sequence[str] = ())
     return Cost(median, percentile, largest, first, times[slowest[0]], cold, (setting[0], setting[1]), instructions)
 
 
-def cases(folder: Path) -> list[Case]:
-    """All that is measured."""
-    return [
-        case_of("friction"),
-        _friction(1.0, 20.0),
-        case_of("controller"),
-        case_of("plant"),
-        with_poses(folder, 16),
-        Case("setpoint", "its own table", {}),
-    ]
+CASES: Mapping[str, Callable[[Path], Case]] = {
+    "friction-reversals": lambda folder: case_of("friction"),
+    "friction-presliding": lambda folder: _friction(1.0, 20.0),
+    "controller": lambda folder: case_of("controller"),
+    "plant": lambda folder: case_of("plant"),
+    "plant-poses": lambda folder: with_poses(folder, 16),
+    "setpoint": lambda folder: Case("setpoint", "its own table", {}),
+}
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description="Worst-case time of a unit's doStep.")
+def _options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fifo", type=int, metavar="CORE", help="measure on this core with real-time priority")
-    core = parser.parse_args().fifo
+
+
+def main(given: Sequence[str] | None = None) -> int:
+    bench = arguments("worst_case", __doc__, given, rounds=REPEATS, only=tuple(CASES), more=_options)
+    core = bench.given.fifo
     prefix = [] if core is None else ["taskset", "-c", str(core), "chrt", "-f", "50"]
+    rows, results = [], {}
     with tempfile.TemporaryDirectory(prefix="feedsim-") as name:
         folder = Path(name)
         program = compile_harness(ROOT / "build" / "bench")
-        print(
-            f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores; {STEPS} steps of 125 us, {REPEATS} runs"
-        )
-        print(
-            "\n| unit | case | all steps: median | 99.99 % | longest observed | largest of the steps' shortest times "
-            "| ... with cold caches | first step | setting the inputs, median and largest |",
-            end="",
-        )
-        print(" instructions, usual and most |\n|---|---|---|---|---|---|---|---|---|---|")
-        for case in cases(folder):
-            print(f"{case.unit}: {case.name}", end="\r", file=sys.stderr, flush=True)
-            cost = measure(program, case, folder, prefix)
+        for key in bench.only:
+            progress(key)
+            case = CASES[key](folder)
+            cost = measure(program, case, folder, prefix, bench.rounds)
+            results[key] = asdict(cost)
             times = (cost.median, cost.percentile, cost.largest, cost.worst, cost.cold, cost.first)
-            setting = ", ".join(f"{time / 1e3:.2f} us" for time in cost.setting) if case.inputs else "-"
-            counted = "-" if cost.instructions is None else "{:,}, {:,}".format(*cost.instructions)
-            cells = " | ".join(f"{time / 1e3:.2f} us" for time in times)
-            print(f"| {case.unit} | {case.name} | {cells} | {setting} | {counted} |", flush=True)
+            setting = ", ".join(f"{time / 1e3:.2f} us" for time in cost.setting) if case.inputs else ""
+            counted = ["", ""] if cost.instructions is None else [f"{count:,}" for count in cost.instructions]
+            rows.append([case.unit, case.name, *(f"{time / 1e3:.2f} us" for time in times), setting, *counted])
+    progress("")
+    header = ["unit", "case", "all steps: median", "99.99 %", "longest observed"]
+    header += ["largest of the steps' shortest times", "... with cold caches", "first step"]
+    header += ["setting the inputs: median, largest", "instructions: usual", "most"]
+    text = f"{STEPS} steps of 125 us, {bench.rounds} times from the same saved state.\n\n{table(header, rows)}"
+    bench.tell(text, {"ns": results, "steps": STEPS, "repeats": bench.rounds, "real-time priority on core": core})
     return 0
 
 

@@ -14,12 +14,13 @@ void floor_run(void *plant, void *const controllers[], void *const frictions[], 
                long ratio, const double *setpoints, size_t positions, long every, double *table, double *energies) {
     double measured[2 * MOST_AXES], M_a[MOST_AXES], M_a_start[MOST_AXES], M_a_slope[MOST_AXES];
     double M_fr[MOST_AXES], M_fr_slope[MOST_AXES] = {0}, n[MOST_AXES], n_start[MOST_AXES];
-    plant_floor_prepare(plant, T_c);
+    PlantMotion motion;
+    plant_floor_prepare(plant, T_c, &motion);
     for (size_t i = 0; i < axes; i++) {
         M_fr[i] = friction_floor_torque(frictions[i]);
         n[i] = 0; /* the structure starts at rest */
     }
-    plant_floor_measure(plant, n, measured);
+    plant_floor_measure(plant, &motion, n, measured);
     const double *setpoint = setpoints;
     long due = 0, sent = 0;
     for (long k = 0; k <= total; k++) {
@@ -29,7 +30,7 @@ void floor_run(void *plant, void *const controllers[], void *const frictions[], 
                 friction_floor_record(frictions[i], table + CONTROLLER_ROW);
                 table += CONTROLLER_ROW + FRICTION_ROW;
             }
-            plant_floor_record(plant, measured, table);
+            plant_floor_record(plant, &motion, measured, table);
             table += axes * PLANT_AXIS_ROW + PLANT_TOOL_ROW;
             due += every;
         }
@@ -45,7 +46,7 @@ void floor_run(void *plant, void *const controllers[], void *const frictions[], 
             M_a_start[i] = M_a[i] - T_c * M_a_slope[i];
             n_start[i] = n[i];
         }
-        plant_floor_step(plant, M_a_start, M_a_slope, M_fr, M_fr_slope, T_c, n);
+        plant_floor_step(plant, &motion, M_a_start, M_a_slope, M_fr, M_fr_slope, T_c, n);
         for (size_t i = 0; i < axes; i++) {
             const double assumed = M_fr[i] + T_c * M_fr_slope[i], before = M_fr[i];
             const double n_end = n_start[i] + (n[i] - n_start[i]) / T_c * T_c;
@@ -57,6 +58,6 @@ void floor_run(void *plant, void *const controllers[], void *const frictions[], 
             energy[1] = fmax(energy[1], fabs(energy[0]));
             energy[2] += T_c * taken;
         }
-        plant_floor_measure(plant, n, measured);
+        plant_floor_measure(plant, &motion, n, measured);
     }
 }

@@ -182,12 +182,12 @@ static bool accepts(Unit *unit, const Scalars *scalars, const void *state, size_
 
 /* What the outputs show that belong to the last instant. */
 static void show_instant(Scalars *v, const DriveState *x) {
-    v->x_e = x->position.x_e;
-    v->n_s = x->n_s;
-    v->n_ref = x->n_ref;
-    v->M_s = x->M_s;
-    v->u_d = x->u_d;
-    v->u_q = x->u_q;
+    unit_show(&v->x_e, x->position.x_e);
+    unit_show(&v->n_s, x->n_s);
+    unit_show(&v->n_ref, x->n_ref);
+    unit_show(&v->M_s, x->M_s);
+    unit_show(&v->u_d, x->u_d);
+    unit_show(&v->u_q, x->u_q);
     v->torque_limited = x->speed.limited != 0;
     v->voltage_limited = x->current.limited != 0;
 }
@@ -195,9 +195,9 @@ static void show_instant(Scalars *v, const DriveState *x) {
 /* What runs linearly over the cycle, at `share` [1] of it. */
 static void show_cycle(Scalars *v, const DriveState *x, double share) {
     if (share == 1.0) { /* exactly the cycle's end */
-        v->M_a = x->right.M_a;
-        v->i_d = x->right.i.i_d;
-        v->i_q = x->right.i.i_q;
+        unit_show(&v->M_a, x->right.M_a);
+        unit_show(&v->i_d, x->right.i.i_d);
+        unit_show(&v->i_q, x->right.i.i_q);
         return;
     }
     v->M_a = x->left.M_a + share * (x->right.M_a - x->left.M_a);
@@ -220,6 +220,27 @@ static double margin(double t, double h, double T_c) {
     return drift < 0.5 * h ? drift : 0.5 * h; /* steps of a few grains */
 }
 
+/* Inputs `since` the start of the step [s]. */
+static DriveInputs inputs_at(Unit *unit, double since) {
+    const Scalars *v = unit_scalars(unit);
+    DriveInputs in = {.x_s = v->x_s,
+                      .n_ffw = v->n_ffw,
+                      .x_a = v->x_a,
+                      .n_a = v->n_a,
+                      .n_add = v->n_add,
+                      .M_add = v->M_add,
+                      .release = v->release != 0};
+    if (unit_sloped(unit)) {
+        in.x_s += unit_slope(unit, VR_x_s) * since;
+        in.n_ffw += unit_slope(unit, VR_n_ffw) * since;
+        in.x_a += unit_slope(unit, VR_x_a) * since;
+        in.n_a += unit_slope(unit, VR_n_a) * since;
+        in.n_add += unit_slope(unit, VR_n_add) * since;
+        in.M_add += unit_slope(unit, VR_M_add) * since;
+    }
+    return in;
+}
+
 static bool step(Unit *unit, double t, double h) {
     const Drive *p = unit_derived(unit);
     State *state = unit_state(unit);
@@ -227,13 +248,6 @@ static bool step(Unit *unit, double t, double h) {
     Scalars *v = unit_scalars(unit);
     const double start_time = unit_start_time(unit);
     const double end = t + h;
-    const DriveInputs slope = {.x_s = unit_slope(unit, VR_x_s),
-                               .n_ffw = unit_slope(unit, VR_n_ffw),
-                               .x_a = unit_slope(unit, VR_x_a),
-                               .n_a = unit_slope(unit, VR_n_a),
-                               .n_add = unit_slope(unit, VR_n_add),
-                               .M_add = unit_slope(unit, VR_M_add)};
-
     double t_k = start_time + (double)x->instant * p->T_c;
     if (end - t_k > MOST_INSTANTS * p->T_c) {
         char text[3][NUMBER_TEXT_SIZE];
@@ -245,14 +259,7 @@ static bool step(Unit *unit, double t, double h) {
     }
     const double last = end - margin(t, h, p->T_c);
     while (t_k < last) {
-        const double since = t_k - t;
-        const DriveInputs in = {.x_s = v->x_s + slope.x_s * since,
-                                .n_ffw = v->n_ffw + slope.n_ffw * since,
-                                .x_a = v->x_a + slope.x_a * since,
-                                .n_a = v->n_a + slope.n_a * since,
-                                .n_add = v->n_add + slope.n_add * since,
-                                .M_add = v->M_add + slope.M_add * since,
-                                .release = v->release != 0};
+        const DriveInputs in = inputs_at(unit, t_k - t);
         drive_instant(p, x, state->lines, &in);
         t_k = start_time + (double)x->instant * p->T_c;
     }

@@ -21,7 +21,7 @@ static address take_row(Operation *o) {
     return row;
 }
 
-/* --- what a unit's turn consists of */
+/* --- calls of every cycle */
 
 static inline fmi2Status set_real(const Operation *o, address y) {
     return ((fmi2SetRealTYPE *)o->call)(o->component, o->references, (size_t)o->count, y);
@@ -43,38 +43,28 @@ static inline fmi2Status get_slopes(const Operation *o, address y) {
     return ((fmi2GetRealOutputDerivativesTYPE *)o->call)(o->component, o->references, (size_t)o->count, o->orders, y);
 }
 
-/* Operations mostly come as turns of a unit, in this order: found out by comparisons that always come out the same,
- * which a processor foresees better than where a switch leads. *at: the operation to begin with; where it ends, the one
- * that failed or the first that does not belong to a turn. */
-static inline fmi2Status take_turn(Operation **at, double t) {
-    Operation *o = *at;
-    fmi2Status status = fmi2OK;
-#define PART(part, argument)                                                                                           \
-    if (status <= fmi2Warning && o->kind == EXCHANGE_##part && o->every == 0) {                                        \
-        status = part(o, argument);                                                                                    \
-        o += status <= fmi2Warning;                                                                                    \
+/* --- arithmetic */
+
+static inline void work_out(const Operation *o) {
+    const size_t n = (size_t)o->count;
+    if (o->kind == EXCHANGE_line) {
+        vector_line(n, o->y, o->a, o->s, o->b);
+    } else if (o->kind == EXCHANGE_copy) {
+        vector_copy(n, o->y, o->a);
+    } else if (o->kind == EXCHANGE_rate) {
+        vector_rate(n, o->y, o->a, o->b, o->s);
+    } else {
+        const Bond *b = o->a;
+        bond_exchange(n, o->s, b->M_fr, b->n, b->n_slope, b->assumed_torque, b->n_end, b->residual, b->residual_peak,
+                      b->dissipated);
     }
-    PART(set_real, o->y)
-    PART(set_slopes, o->y)
-    PART(do_step, t)
-    PART(get_real, o->y)
-    PART(get_slopes, o->y)
-#undef PART
-    *at = o;
-    return status;
 }
 
 /* --- any operation */
 
-static void exchange_bond(const Operation *o) {
-    const Bond *b = o->a;
-    bond_exchange((size_t)o->count, o->s, b->M_fr, b->n, b->n_slope, b->assumed_torque, b->n_end, b->residual,
-                  b->residual_peak, b->dissipated);
-}
-
-static fmi2Status execute(const Operation *o, address y, double t) {
+static fmi2Status execute(const Operation *o, int64_t kind, address y, double t) {
     const size_t n = (size_t)o->count;
-    switch ((ExchangeKind)o->kind) {
+    switch ((ExchangeKind)kind) {
     case EXCHANGE_set_real:
         return set_real(o, y);
     case EXCHANGE_set_slopes:
@@ -101,8 +91,7 @@ static fmi2Status execute(const Operation *o, address y, double t) {
         vector_rate(n, y, o->a, o->b, o->s);
         break;
     case EXCHANGE_bond:
-        exchange_bond(o);
-        break;
+    case EXCHANGE_due:
     case EXCHANGE_end:
     case EXCHANGE_KIND_COUNT:
     default:
@@ -111,26 +100,44 @@ static fmi2Status execute(const Operation *o, address y, double t) {
     return fmi2OK;
 }
 
-/* One cycle, from operation *at on; where it ends, the closing one or the one that failed. */
+static fmi2Status work_rest(Operation *o, int64_t k, double t) {
+    if (o->kind != EXCHANGE_due)
+        return execute(o, o->kind, o->y, t);
+    return o->next == k ? execute(o, o->what, take_row(o), t) : fmi2OK;
+}
+
+/* One cycle, from operation *at on; where it ends, the closing one or the one that failed.
+ *
+ * Operations mostly come as turns of a unit: values and slopes set, a step, values and slopes got. Comparisons with
+ * what a turn has next mostly come out the same, which a processor foresees better than where a switch leads. */
 static inline fmi2Status work(Operation **at, int64_t k, double t) {
     Operation *o = *at;
     fmi2Status status = fmi2OK;
-    while (o->kind != EXCHANGE_end) {
-        Operation *const before = o;
-        if (o->kind <= EXCHANGE_get_slopes)
-            status = take_turn(&o, t);
-        if (status > fmi2Warning)
-            break;
-        if (o != before)
+#define PART(part, argument)                                                                                           \
+    if (o->kind == EXCHANGE_##part) {                                                                                  \
+        status = part(o, argument);                                                                                    \
+        if (status > fmi2Warning)                                                                                      \
+            break;                                                                                                     \
+        o++;                                                                                                           \
+    }
+    for (;;) {
+        PART(set_real, o->y)
+        PART(set_slopes, o->y)
+        PART(do_step, t)
+        PART(get_real, o->y)
+        PART(get_slopes, o->y)
+        while (o->kind >= EXCHANGE_copy && o->kind <= EXCHANGE_bond)
+            work_out(o++);
+        if (o->kind < EXCHANGE_get_boolean)
             continue;
-        if (o->every == 0)
-            status = execute(o, o->y, t);
-        else if (o->next == k)
-            status = execute(o, take_row(o), t);
+        if (o->kind == EXCHANGE_end)
+            break;
+        status = work_rest(o, k, t);
         if (status > fmi2Warning)
             break;
         o++;
     }
+#undef PART
     *at = o;
     return status;
 }
@@ -139,7 +146,7 @@ static inline fmi2Status work(Operation **at, int64_t k, double t) {
  * cycle in which one of them is due. */
 static int64_t count_head(const Operation operations[]) {
     int64_t count = 0;
-    while (operations[count].every != 0)
+    while (operations[count].kind == EXCHANGE_due)
         count++;
     return count;
 }

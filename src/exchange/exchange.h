@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 /* To be counted up when an operation comes to mean something else though the tables below stay. */
-#define EXCHANGE_VERSION 2
+#define EXCHANGE_VERSION 3
 
 /* The operations. FMI calls take values (slopes) from y or leave them there:
  *   set_real, set_slopes, get_real, get_slopes, get_boolean (int)   count variables by their references
@@ -23,7 +23,8 @@
  *   line     y = a + s b
  *   rate     y = (a - b) / s
  *   bond     what the exchange between plant and friction does to the energies; a points to a Bond, s is the step
- * and `end` closes the list. */
+ * and `end` closes the list. These are done in every cycle; `due` is an operation of any of these kinds, `what`, that
+ * is done in some cycles only. */
 #define EXCHANGE_KINDS(K)                                                                                              \
     K(set_real)                                                                                                        \
     K(set_slopes)                                                                                                      \
@@ -37,25 +38,28 @@
     K(line)                                                                                                            \
     K(rate)                                                                                                            \
     K(bond)                                                                                                            \
+    K(due)                                                                                                             \
     K(end)
 
 typedef void *address;
 typedef void (*function)(void);
 
-/* An operation is due in every cycle (every = 0, y is a buffer), or in cycle `next` and each `every` cycles from then
- * on; y is then a table of `rows` rows that are `stride` bytes apart, used one after the other and over again. */
+/* y is a buffer. Where an operation is `due` in cycle `next` and each `every` cycles from then on, it is a table of
+ * `rows` rows that are `stride` bytes apart, used one after the other and over again. What most operations need comes
+ * first. */
 #define EXCHANGE_FIELDS(F)                                                                                             \
-    F(int64_t, kind)                                                                                                   \
-    F(int64_t, count)                                                                                                  \
+    F(int32_t, kind)                                                                                                   \
+    F(int32_t, count)                                                                                                  \
     F(function, call)                                                                                                  \
     F(address, component)                                                                                              \
     F(address, references)                                                                                             \
     F(address, orders)                                                                                                 \
     F(address, y)                                                                                                      \
-    F(address, a)                                                                                                      \
-    F(address, b)                                                                                                      \
     F(double, s)                                                                                                       \
     F(double, h)                                                                                                       \
+    F(address, a)                                                                                                      \
+    F(address, b)                                                                                                      \
+    F(int64_t, what)                                                                                                   \
     F(int64_t, every)                                                                                                  \
     F(int64_t, next)                                                                                                   \
     F(int64_t, stride)                                                                                                 \
@@ -99,7 +103,7 @@ typedef struct Fault {
 #define EXCHANGE_API
 #endif
 
-/* Version, kinds in their order, fields in theirs: "2: set_real set_slopes ..; int64_t kind, ..; address M_fr, ..". */
+/* Version, kinds in their order, fields in theirs: "3: set_real set_slopes ..; int32_t kind, ..; address M_fr, ..". */
 EXCHANGE_API const char *exchange_interface(void);
 
 /* Work the cycles k with begin <= k < end, each T_c [s] long. The list is closed by an `end`. The operations keep count

@@ -13,16 +13,26 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     return STATUS(derivatives_get_directional(unit, nUnknown, vUnknown_ref, nKnown, vKnown_ref, dvKnown, dvUnknown));
 }
 
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                       const fmi2Integer order[], const fmi2Real value[]) {
+RARE static fmi2Status set_slopes(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
+                                  const fmi2Real value[]) {
     BEGIN(SetRealInputDerivatives, "nvr = %.0f, vr = %u, ...", (double)nvr, nvr > 0 && vr != NULL ? vr[0] : 0);
     return STATUS(derivatives_set_inputs(unit, nvr, vr, order, value));
 }
 
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                        const fmi2Integer order[], fmi2Real value[]) {
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
+    return derivatives_set_usual(c, nvr, vr, order, value) ? fmi2OK : set_slopes(c, vr, nvr, order, value);
+}
+
+RARE static fmi2Status get_slopes(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
+                                  fmi2Real value[]) {
     BEGIN(GetRealOutputDerivatives, "nvr = %.0f, vr = %u, ...", (double)nvr, nvr > 0 && vr != NULL ? vr[0] : 0);
     return STATUS(derivatives_get_outputs(unit, nvr, vr, order, value));
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                        const fmi2Integer order[], fmi2Real value[]) {
+    return derivatives_get_usual(c, nvr, vr, order, value) ? fmi2OK : get_slopes(c, vr, nvr, order, value);
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,

@@ -28,26 +28,13 @@ static inline bool first_order(Unit *unit, fmi2ValueReference reference, int ord
     return order == 1 || another_order(unit, reference, order, limit);
 }
 
-static inline bool all_first_order(size_t count, const fmi2Integer orders[]) {
-    bool all = true;
-    for (size_t i = 0; i < count; i++)
-        all = all && orders[i] == 1;
-    return all;
-}
-
 /* --- inputs */
-
-static inline bool slopes_usual(const Unit *unit, size_t count, const fmi2ValueReference references[],
-                                const fmi2Integer orders[], const fmi2Real values[]) {
-    return values_all_finite(unit, count, references, values, REAL_INPUT) && all_first_order(count, orders);
-}
 
 bool derivatives_set_inputs(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2Integer orders[],
                             const fmi2Real values[]) {
     if (!values_arrays(unit, count, references, values) || !values_arrays(unit, count, references, orders))
         return false;
-    const bool usual = slopes_usual(unit, count, references, orders, values);
-    for (size_t i = usual ? count : 0; i < count; i++) {
+    for (size_t i = 0; i < count; i++) {
         if (!is(unit, references[i], CAUSALITY_input, "a slope goes with an") ||
             !first_order(unit, references[i], orders[i], "inputs are linear over a step"))
             return false;
@@ -61,41 +48,26 @@ bool derivatives_set_inputs(Unit *unit, size_t count, const fmi2ValueReference r
         unit_slopes(unit)[references[i]] = values[i];
     if (count > 0)
         unit_header(unit)->sloped = 1;
+    unit->tame = false; /* perhaps */
     return true;
 }
 
-RARE static bool inputs_not_finite(Unit *unit, double h) {
+/* Also finds out whether the inputs are tame (again). */
+bool derivatives_inputs_finite_now(Unit *unit, double h) {
+    double probe = 0;
     for (size_t i = 0; i < unit->input_count; i++) {
         const Variable *variable = &unit->variables[unit->inputs[i]];
-        double value = *(const double *)unit_address(unit, variable), slope = unit_slopes(unit)[unit->inputs[i]];
+        const double value = *(const double *)unit_address(unit, variable), slope = unit_slopes(unit)[unit->inputs[i]];
         if (!isfinite(value + slope * h)) {
             char name[VARIABLE_NAME_SIZE], text[2][NUMBER_TEXT_SIZE];
             return unit_fail(unit, "input '%s' does not stay finite over the step: value %s, slope %s/s",
                              values_name(unit, variable, name), number_text(text[0], value),
                              number_text(text[1], slope));
         }
+        probe += number_probe_tame(value) + number_probe_tame(slope);
     }
+    unit->tame = !isnan(probe);
     return true;
-}
-
-bool derivatives_inputs_finite(Unit *unit, double h) {
-    if (!unit_header(unit)->sloped) /* the values themselves were checked when they were set */
-        return true;
-    double probe = 0;
-    for (size_t i = 0; i < unit->input_count; i++) {
-        const unsigned reference = unit->inputs[i];
-        const double value = *(const double *)unit_address(unit, &unit->variables[reference]);
-        probe += number_probe(value + unit_slopes(unit)[reference] * h);
-    }
-    return !isnan(probe) || inputs_not_finite(unit, h);
-}
-
-void derivatives_clear_inputs(Unit *unit) {
-    if (!unit_header(unit)->sloped)
-        return;
-    for (size_t i = 0; i < unit->input_count; i++)
-        unit_slopes(unit)[unit->inputs[i]] = 0;
-    unit_header(unit)->sloped = 0;
 }
 
 /* --- outputs */
@@ -109,8 +81,7 @@ bool derivatives_get_outputs(Unit *unit, size_t count, const fmi2ValueReference 
                              const fmi2Integer orders[], fmi2Real values[]) {
     if (!values_arrays(unit, count, references, values) || !values_arrays(unit, count, references, orders))
         return false;
-    const bool usual = values_all(unit, count, references, REAL_OUTPUT) && all_first_order(count, orders);
-    for (size_t i = usual ? count : 0; i < count; i++)
+    for (size_t i = 0; i < count; i++)
         if (!is(unit, references[i], CAUSALITY_output, "derivatives with respect to time are those of an") ||
             !first_order(unit, references[i], orders[i], "maxOutputDerivativeOrder"))
             return false;

@@ -177,9 +177,13 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 /* --- values */
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
+RARE static fmi2Status get_real(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
     BEGIN(GetReal, "nvr = %.0f, vr = %u, ...", (double)nvr, nvr > 0 && vr != NULL ? vr[0] : 0);
     return STATUS(values_get_real(unit, nvr, vr, value));
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
+    return values_get_usual(c, nvr, vr, value) ? fmi2OK : get_real(c, vr, nvr, value);
 }
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
@@ -197,9 +201,13 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return STATUS(values_get_string(unit, nvr, vr, value));
 }
 
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
+RARE static fmi2Status set_real(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
     BEGIN(SetReal, "nvr = %.0f, vr = %u, ...", (double)nvr, nvr > 0 && vr != NULL ? vr[0] : 0);
     return STATUS(values_set_real(unit, nvr, vr, value));
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
+    return values_set_usual(c, nvr, vr, value) ? fmi2OK : set_real(c, vr, nvr, value);
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[]) {

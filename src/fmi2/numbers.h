@@ -17,6 +17,14 @@ static inline double number_probe(double value) {
     return value - value;
 }
 
+/* The same for a number that is not beyond TAME in size: a tame value that changes by a tame slope over less than
+ * TAME_STEP seconds stays finite. */
+#define TAME 1e150
+#define TAME_STEP 1e150
+static inline double number_probe_tame(double value) {
+    return number_probe(value * (1e308 / TAME));
+}
+
 #define NUMBER_TEXT_SIZE 32
 
 /* Shortest of %.15g, %.16g and %.17g that reads back as `value`, written to text[NUMBER_TEXT_SIZE]; returns text. */

@@ -15,6 +15,7 @@
 #define unit_axes PREFIXED(unit_axes)
 #define unit_axis_name PREFIXED(unit_axis_name)
 #define unit_slope PREFIXED(unit_slope)
+#define unit_sloped PREFIXED(unit_sloped)
 #define unit_state PREFIXED(unit_state)
 #define unit_start_time PREFIXED(unit_start_time)
 #define unit_resources PREFIXED(unit_resources)
@@ -22,6 +23,7 @@
 #define unit_set_axes PREFIXED(unit_set_axes)
 #define unit_derived PREFIXED(unit_derived)
 #define unit_set_derived PREFIXED(unit_set_derived)
+#define unit_show PREFIXED(unit_show)
 #define unit_leave_late PREFIXED(unit_leave_late)
 #define unit_fail PREFIXED(unit_fail)
 #define unit_warn PREFIXED(unit_warn)
@@ -59,8 +61,7 @@
 #define values_set_string PREFIXED(values_set_string)
 
 #define derivatives_set_inputs PREFIXED(derivatives_set_inputs)
-#define derivatives_inputs_finite PREFIXED(derivatives_inputs_finite)
-#define derivatives_clear_inputs PREFIXED(derivatives_clear_inputs)
+#define derivatives_inputs_finite_now PREFIXED(derivatives_inputs_finite_now)
 #define derivatives_get_outputs PREFIXED(derivatives_get_outputs)
 #define derivatives_get_directional PREFIXED(derivatives_get_directional)
 

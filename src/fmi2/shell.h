@@ -29,7 +29,7 @@ typedef struct Header {
 #define SCALARS_AT BLOCK_ALIGNED(sizeof(Header))
 #define AXES_AT (SCALARS_AT + BLOCK_ALIGNED(sizeof(Scalars)))
 
-/* What the calls of every step ask of a variable, in one word. */
+/* What the calls of every step ask of a variable, in two words. */
 enum {
     READY_REAL = 1, /* a Real that holds its value at all times */
     FREE_INPUT = 2, /* a Real input that takes every finite number */
@@ -37,37 +37,49 @@ enum {
     REAL_OUTPUT = 8,
 };
 
+typedef struct Slot {
+    uint32_t offset; /* in the block */
+    uint32_t is;     /* of the above */
+} Slot;
+
 typedef struct Variable {
     const VariableInfo *info;
     size_t offset; /* in the block */
-    unsigned is;   /* of the above */
 } Variable;
 
+/* Doubles that lie one behind the other in the block. */
+typedef struct Stretch {
+    size_t offset, count;
+} Stretch;
+
 struct Unit {
+    /* Ahead, since close together: what the calls of every step need. */
+    unsigned char *block;
+    Slot *slots; /* by value reference */
+    size_t variable_count;
+    size_t slopes_at, state_at;
+    void *derived;
+    unsigned log_categories;
+    Call call; /* the function being executed, and its step: where a message belongs */
+    bool derived_valid;
+    bool parameters_touched; /* they may differ from derived_for */
+    bool late;               /* the late outputs are those of an earlier step */
+    bool tame;               /* no input, and no slope of one, is beyond TAME in size */
+    double step_time, step_size;
+    unsigned *inputs; /* value references of the Real inputs */
+    Stretch *results; /* the Real outputs and locals that a step writes */
+    size_t input_count, result_count;
+
+    Variable *variables; /* by value reference */
+    size_t block_size;
+    unsigned char *start;       /* variables as load() left them, for reset */
+    unsigned char *derived_for; /* variables that the derived data was made from */
+    size_t axes;
+    char **axis_names;
     fmi2CallbackFunctions callbacks; /* memory functions always set, logger may be NULL */
     char *name;
     char guid[GUID_SIZE];
     char *resources;
-    unsigned log_categories;
-    Call call; /* the function being executed, and its step: where a message belongs */
-    double step_time, step_size;
-
-    size_t axes;
-    char **axis_names;
-    Variable *variables; /* by value reference */
-    size_t variable_count;
-    unsigned *inputs; /* value references of the Real inputs */
-    size_t *results;  /* offsets in the block of the Real outputs and locals that a step writes */
-    size_t input_count, result_count;
-
-    unsigned char *block;
-    size_t slopes_at, state_at, block_size;
-    unsigned char *start;       /* variables as load() left them, for reset */
-    unsigned char *derived_for; /* variables that the derived data was made from */
-    bool derived_valid;
-    bool parameters_touched; /* they may differ from derived_for */
-    bool late;               /* the late outputs are those of an earlier step */
-    void *derived;
 };
 
 static inline Header *unit_header(const Unit *unit) {
@@ -80,6 +92,11 @@ static inline double *unit_slopes(const Unit *unit) {
 
 static inline void *unit_address(const Unit *unit, const Variable *variable) {
     return unit->block + variable->offset;
+}
+
+/* The Real of that reference. */
+static inline double *unit_real(const Unit *unit, unsigned reference) {
+    return (double *)(void *)(unit->block + unit->slots[reference].offset);
 }
 
 /* --- table.c */
@@ -110,6 +127,11 @@ void run_reset(Unit *unit);
 #else
 #define RARE
 #endif
+
+/* Between steps, and nobody wants to hear of calls: what the calls of every step need not look at any further. */
+static inline bool unit_usual(const Unit *unit) {
+    return unit != NULL && unit_header(unit)->phase == PHASE_STEPPING && !(unit->log_categories & LOG_CALLS);
+}
 
 /* call_begin(), for a function whose states are known where it is compiled. */
 static inline bool call_begin_in(Unit *unit, Call call, unsigned phases) {

@@ -113,7 +113,7 @@ static bool restore_with_parameters(Unit *unit, const Snapshot *snapshot) {
     bool good = run_derive(unit, true) && accepted(unit, snapshot) && restore_model(unit, snapshot);
     if (good) {
         unit_free(unit, own);
-        unit->late = false;
+        unit->late = unit->tame = false;
         return true;
     }
     unit_free(unit, unit->block);
@@ -140,7 +140,7 @@ bool state_restore(Unit *unit, const Snapshot *snapshot) {
     }
     memcpy(unit->block, content(snapshot), unit->state_at);
     unit->parameters_touched = true;
-    unit->late = false;
+    unit->late = unit->tame = false;
     return true;
 }
 

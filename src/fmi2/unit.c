@@ -65,18 +65,25 @@ static unsigned what_is(const VariableInfo *info, bool late) {
            (info->causality == CAUSALITY_output ? REAL_OUTPUT : 0u);
 }
 
+static void lay_result(Unit *unit, size_t offset) {
+    Stretch *last = unit->result_count > 0 ? &unit->results[unit->result_count - 1] : NULL;
+    if (last != NULL && last->offset + last->count * sizeof(double) == offset)
+        last->count++;
+    else
+        unit->results[unit->result_count++] = (Stretch){offset, 1};
+}
+
 static void lay_row(Unit *unit, size_t base, const VariableInfo *info) {
-    unsigned reference = (unsigned)unit->variable_count++;
-    Variable *variable = &unit->variables[reference];
-    variable->info = info;
-    variable->offset = base + info->offset;
-    variable->is = what_is(info, is_late(reference));
-    write_start(info, unit_address(unit, variable));
+    const unsigned reference = (unsigned)unit->variable_count++;
+    const size_t offset = base + info->offset;
+    unit->variables[reference] = (Variable){info, offset};
+    unit->slots[reference] = (Slot){(uint32_t)offset, what_is(info, is_late(reference))};
+    write_start(info, unit->block + offset);
     if (info->kind == KIND_REAL && info->causality == CAUSALITY_input)
         unit->inputs[unit->input_count++] = reference;
     if (info->kind == KIND_REAL && (info->causality == CAUSALITY_output || info->causality == CAUSALITY_local) &&
         !is_late(reference))
-        unit->results[unit->result_count++] = variable->offset;
+        lay_result(unit, offset);
 }
 
 static void lay_rows(Unit *unit, size_t base, const VariableInfo *rows, size_t count) {
@@ -84,23 +91,32 @@ static void lay_rows(Unit *unit, size_t base, const VariableInfo *rows, size_t c
         lay_row(unit, base, &rows[i]);
 }
 
-/* (Re)build the tables and a block with every variable at its start value, for `axes` axes and no model state. */
-static bool lay_out(Unit *unit, size_t axes) {
-    size_t count = (size_t)SCALAR_ROWS + axes * (size_t)AXIS_ROWS;
+static void free_tables(Unit *unit) {
+    unit_free(unit, unit->slots);
     unit_free(unit, unit->variables);
     unit_free(unit, unit->inputs);
     unit_free(unit, unit->results);
     unit_free(unit, unit->block);
+}
+
+/* (Re)build the tables and a block with every variable at its start value, for `axes` axes and no model state. */
+static bool lay_out(Unit *unit, size_t axes) {
+    size_t count = (size_t)SCALAR_ROWS + axes * (size_t)AXIS_ROWS;
+    free_tables(unit);
     unit->axes = axes;
     unit->variable_count = unit->input_count = unit->result_count = 0;
     unit->slopes_at = AXES_AT + BLOCK_ALIGNED(axes * sizeof(AxisBlock));
     unit->state_at = unit->block_size = unit->slopes_at + BLOCK_ALIGNED(count * sizeof(double));
+    unit->slots = unit_alloc(unit, count, sizeof *unit->slots);
     unit->variables = unit_alloc(unit, count, sizeof *unit->variables);
     unit->inputs = unit_alloc(unit, count, sizeof *unit->inputs);
     unit->results = unit_alloc(unit, count, sizeof *unit->results);
     unit->block = unit_alloc(unit, unit->block_size, 1);
-    if (unit->variables == NULL || unit->inputs == NULL || unit->results == NULL || unit->block == NULL)
+    if (unit->slots == NULL || unit->variables == NULL || unit->inputs == NULL || unit->results == NULL ||
+        unit->block == NULL)
         return false;
+    if (unit->slopes_at > UINT32_MAX)
+        return unit_fail(unit, "%.0f axes are more than this unit can address", (double)axes);
     lay_rows(unit, SCALARS_AT, table_scalars, SCALAR_ROWS);
     for (size_t axis = 0; axis < axes; axis++)
         lay_rows(unit, AXES_AT + axis * sizeof(AxisBlock), table_axis, AXIS_ROWS);
@@ -179,10 +195,7 @@ void unit_destroy(Unit *unit) {
     if (MODEL.release != NULL && unit->derived != NULL)
         MODEL.release(unit);
     free_axis_names(unit);
-    unit_free(unit, unit->variables);
-    unit_free(unit, unit->inputs);
-    unit_free(unit, unit->results);
-    unit_free(unit, unit->block);
+    free_tables(unit);
     unit_free(unit, unit->start);
     unit_free(unit, unit->derived_for);
     unit_free(unit, unit->resources);
@@ -210,6 +223,10 @@ const char *unit_axis_name(const Unit *unit, size_t axis) {
 
 double unit_slope(const Unit *unit, unsigned vr) {
     return unit_slopes(unit)[vr];
+}
+
+bool unit_sloped(const Unit *unit) {
+    return unit_header(unit)->sloped != 0;
 }
 
 void *unit_state(Unit *unit) {

@@ -28,6 +28,8 @@ size_t unit_axes(const Unit *unit);
 const char *unit_axis_name(const Unit *unit, size_t axis);
 /* Slope [unit of the input per second] that goes with input `vr` in the present step; 0 unless the importer set one. */
 double unit_slope(const Unit *unit, unsigned vr);
+/* Whether any input may have a slope in the present step; false: all are 0. */
+bool unit_sloped(const Unit *unit);
 /* The model's own state inside the block; valid after derive(). */
 void *unit_state(Unit *unit);
 /* Start of the experiment [s], as told by fmi2SetupExperiment (0 without it). */
@@ -44,6 +46,12 @@ bool unit_set_axes(Unit *unit, size_t count, const char *const *names);
 
 /* To be called in step(), where it leaves the late outputs (see Model) for when they are asked for. */
 void unit_leave_late(Unit *unit);
+
+/* Write an output or a local by itself. Compilers else take two that lie side by side at once out of the state, and a
+ * processor that has only just written these two one by one waits until they have reached the cache. */
+static inline void unit_show(volatile double *variable, double value) {
+    *variable = value;
+}
 
 /* Pointer to coefficients and tables that the model owns. */
 void *unit_derived(const Unit *unit);

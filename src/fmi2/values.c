@@ -73,12 +73,10 @@ static inline bool readable(Unit *unit, Kind kind, size_t count, const fmi2Value
 }
 
 bool values_get_real(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2Real values[]) {
-    const bool usual = unit_header(unit)->phase == PHASE_STEPPING && references != NULL && values != NULL &&
-                       count <= MOST_ELEMENTS && values_all(unit, count, references, READY_REAL);
-    if (!usual && !readable(unit, KIND_REAL, count, references, values))
+    if (!readable(unit, KIND_REAL, count, references, values))
         return false;
     for (size_t i = 0; i < count; i++)
-        values[i] = *(const double *)unit_address(unit, &unit->variables[references[i]]);
+        values[i] = *unit_real(unit, references[i]);
     return true;
 }
 
@@ -150,22 +148,9 @@ static inline void note_set(Unit *unit, const Variable *variable) {
         unit_header(unit)->stale = 1;
 }
 
-/* What happens between steps: Real inputs that may have any finite value. false, and nothing changed, where it is not
- * that. */
-static inline bool set_free_inputs(Unit *unit, size_t count, const fmi2ValueReference references[],
-                                   const fmi2Real values[]) {
-    if (unit_header(unit)->phase != PHASE_STEPPING || !values_all_finite(unit, count, references, values, FREE_INPUT))
-        return false;
-    for (size_t i = 0; i < count; i++)
-        *(double *)unit_address(unit, &unit->variables[references[i]]) = values[i];
-    return true;
-}
-
 bool values_set_real(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2Real values[]) {
     if (!values_arrays(unit, count, references, values))
         return false;
-    if (set_free_inputs(unit, count, references, values))
-        return true;
     for (size_t i = 0; i < count; i++) {
         const Variable *variable = values_find(unit, references[i], KIND_REAL);
         if (variable == NULL || !settable(unit, variable) || !in_range(unit, variable, values[i]))
@@ -176,6 +161,7 @@ bool values_set_real(Unit *unit, size_t count, const fmi2ValueReference referenc
         *(double *)unit_address(unit, variable) = values[i];
         note_set(unit, variable);
     }
+    unit->tame = false; /* perhaps */
     return true;
 }
 

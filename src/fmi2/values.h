@@ -27,9 +27,16 @@ bool values_no_arrays(Unit *unit, size_t count); /* always false, with the reaso
 
 /* Whether every reference is that of a variable which `is` so (see shell.h), in the fewest instructions. */
 static inline bool values_all(const Unit *unit, size_t count, const fmi2ValueReference references[], unsigned is);
-/* ... and every value that goes with them is finite. */
-static inline bool values_all_finite(const Unit *unit, size_t count, const fmi2ValueReference references[],
-                                     const fmi2Real values[], unsigned is);
+/* ... and every value that goes with them is tame (numbers.h). */
+static inline bool values_all_tame(const Unit *unit, size_t count, const fmi2ValueReference references[],
+                                   const fmi2Real values[], unsigned is);
+
+/* What the calls of every step mostly are: references and values are there, at most one of each variable, there is
+ * nothing to refuse. false, and nothing changed, where it is not that; the functions below then look again. */
+static inline bool values_get_usual(const Unit *unit, size_t count, const fmi2ValueReference references[],
+                                    fmi2Real values[]);
+static inline bool values_set_usual(Unit *unit, size_t count, const fmi2ValueReference references[],
+                                    const fmi2Real values[]);
 
 bool values_get_real(Unit *unit, size_t count, const fmi2ValueReference references[], fmi2Real values[]);
 bool values_set_real(Unit *unit, size_t count, const fmi2ValueReference references[], const fmi2Real values[]);
@@ -43,19 +50,6 @@ bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference refere
  * its Real outputs and locals must be finite as well. */
 bool values_sound(Unit *unit, const unsigned char *block, bool results);
 
-static inline bool values_all_finite(const Unit *unit, size_t count, const fmi2ValueReference references[],
-                                     const fmi2Real values[], unsigned is) {
-    unsigned all = is;
-    double probe = 0;
-    for (size_t i = 0; i < count; i++) {
-        if (references[i] >= unit->variable_count)
-            return false;
-        all &= unit->variables[references[i]].is;
-        probe += number_probe(values[i]);
-    }
-    return all == is && !isnan(probe);
-}
-
 static inline const Variable *values_find(Unit *unit, fmi2ValueReference reference, Kind kind) {
     if (reference < unit->variable_count && unit->variables[reference].info->kind == kind)
         return &unit->variables[reference];
@@ -68,13 +62,50 @@ static inline bool values_arrays(Unit *unit, size_t count, const void *reference
 }
 
 static inline bool values_all(const Unit *unit, size_t count, const fmi2ValueReference references[], unsigned is) {
+    const Slot *slots = unit->slots;
+    const size_t known = unit->variable_count;
     unsigned all = is;
     for (size_t i = 0; i < count; i++) {
-        if (references[i] >= unit->variable_count)
+        if (references[i] >= known)
             return false;
-        all &= unit->variables[references[i]].is;
+        all &= slots[references[i]].is;
     }
     return all == is;
+}
+
+static inline bool values_all_tame(const Unit *unit, size_t count, const fmi2ValueReference references[],
+                                   const fmi2Real values[], unsigned is) {
+    const Slot *slots = unit->slots;
+    const size_t known = unit->variable_count;
+    unsigned all = is;
+    double probe = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (references[i] >= known)
+            return false;
+        all &= slots[references[i]].is;
+        probe += number_probe_tame(values[i]);
+    }
+    return all == is && !isnan(probe);
+}
+
+static inline bool values_get_usual(const Unit *unit, size_t count, const fmi2ValueReference references[],
+                                    fmi2Real values[]) {
+    if (!unit_usual(unit) || references == NULL || values == NULL || count > unit->variable_count ||
+        !values_all(unit, count, references, READY_REAL))
+        return false;
+    for (size_t i = 0; i < count; i++)
+        values[i] = *unit_real(unit, references[i]);
+    return true;
+}
+
+static inline bool values_set_usual(Unit *unit, size_t count, const fmi2ValueReference references[],
+                                    const fmi2Real values[]) {
+    if (!unit_usual(unit) || references == NULL || values == NULL || count > unit->variable_count ||
+        !values_all_tame(unit, count, references, values, FREE_INPUT))
+        return false;
+    for (size_t i = 0; i < count; i++)
+        *unit_real(unit, references[i]) = values[i];
+    return true;
 }
 
 #endif

@@ -56,11 +56,11 @@ static size_t friction_state_size(const Unit *unit) {
 
 /* Outputs and locals that go with z, c and n. */
 static void friction_show(Scalars *v, const State *state, ContactForce force) {
-    v->z = state->contact.z;
-    v->c = state->contact.c;
-    v->lambda = force.lambda;
-    v->k = force.k;
-    v->M_fr = force.M_fr;
+    unit_show(&v->z, state->contact.z);
+    unit_show(&v->c, state->contact.c);
+    unit_show(&v->lambda, force.lambda);
+    unit_show(&v->k, force.k);
+    unit_show(&v->M_fr, force.M_fr);
 }
 
 static void friction_start(Unit *unit) {

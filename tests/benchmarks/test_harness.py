@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
+import re
+import subprocess
 import sys
 from pathlib import Path
 
 import harness
-import pytest
 from harness import Contestant, Costs, digits, measure, table
+
+import provenance
+import psutil
+import pytest
+
+all_benchmarks = importlib.import_module("all")  # as a name of this module it would hide Python's own
 
 
 def _scripted(log: list[str], name: str, costs: list[float | None], rounds: int | None = None) -> Contestant:
@@ -75,17 +83,133 @@ def test_json_says_what_figures_depend_on(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(sys, "argv", [str(harness.ROOT / "benchmarks" / "peers.py"), "--rounds", "2"])
     for name in harness.SETTINGS:
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+    monkeypatch.setenv("FEEDSIM_CFLAGS", "-g")
+    (tmp_path / "plant.fmu").write_bytes(b"abc")
+    monkeypatch.setenv("FEEDSIM_FMUS", str(tmp_path))
     costs = Costs({"a": {0: 2.0}, "b": {0: 1.0}})
-    path = harness.write_json("some", {"costs": costs.as_json("b")}, tmp_path / "bench")
+    path = harness.write_json("some", {"costs": costs.as_json("b")}, tmp_path / "bench", rounds=2, only=["a", "b"])
     assert [file.name for file in path.parent.iterdir()] == ["some.json"]
     found = json.loads(path.read_text(encoding="utf-8"))
-    assert found["command"] == "python benchmarks/peers.py --rounds 2"
+    assert found["command"].endswith("python benchmarks/peers.py --rounds 2")
     assert found["benchmark"] == "some"
+    assert (found["rounds"], found["only"]) == (2, ["a", "b"])
     assert found["versions"].keys() >= {"Python", "compiler", "feedsim", "numpy", "fmpy"}
-    assert found["machine"].keys() >= {"processor", "cores", "memory GB", "system", "architecture", "load"}
-    assert found["results"]["costs"]["a"] == {"values": [2.0], "median": 2.0, "shortest": 2.0, "of b": 2.0}
-    assert found["environment"] == {"OPENBLAS_NUM_THREADS": "1"}
+    assert found["machine"].keys() >= {"processor", "cores", "memory GB", "system", "architecture"}
+    assert found["results"]["costs"]["a"] == {
+        "values": [2.0], "median": 2.0, "shortest": 2.0, "of b": 2.0, "of b, quartiles": [2.0, 2.0]
+    }  # fmt: skip
+    assert found["environment"] == {"FEEDSIM_CFLAGS": "-g", "FEEDSIM_FMUS": str(tmp_path)}
+    assert found["binaries"] == {"plant.fmu": "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"}
+    assert found["compiler flags"] is None or "-g" in found["compiler flags"]
+
+
+def test_sources_are_told_where_there_is_git(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = provenance.sources()
+    assert found is None or (re.fullmatch(r"[0-9a-f]{40}", str(found["commit"])) and isinstance(found["changed"], bool))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert provenance.sources() is None
+
+
+def test_spread_is_told_as_quartiles() -> None:
+    costs = Costs(
+        {"a": {i: float(value) for i, value in enumerate([1, 2, 3, 4, 9])}, "b": dict.fromkeys(range(5), 1.0)}
+    )
+    assert costs.ratio_text("a", "b") == "3.00 (2.00-4.00)"
+    assert costs.ratio_text("b", "b") == "1.00"
+    assert Costs({"a": {0: 2.0}, "b": {0: 1.0}}).ratio_text("a", "b") == "2.00"
+    assert Costs({"a": {0: 2.0}, "b": {1: 1.0}}).ratio_text("a", "b") == ""
+
+
+def test_common_options(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(provenance, "LOOK", 0.01)
+    words = ["--rounds", "2", "--only", "b", "a", "--json", str(tmp_path), "--images", "i", "--own", "x"]
+    bench = harness.arguments(
+        "some", "Text.", words, rounds=5, only=("a", "b", "c"), images=True, more=lambda p: p.add_argument("--own")
+    )
+    assert (bench.rounds, bench.only, bench.images, bench.given.own) == (2, ("a", "b"), Path("i"), "x")
+    bench.tell("| table |", {"figure": 1.5})
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["some.json", "some.md"]
+    printed = (tmp_path / "some.md").read_text(encoding="utf-8")
+    assert printed == capsys.readouterr().out
+    assert printed.startswith("feedsim ")
+    assert printed.endswith("\n\n| table |\n")
+    found = json.loads((tmp_path / "some.json").read_text(encoding="utf-8"))
+    assert found["load"].keys() >= {"cores taken by others before", "cores taken by others during", "busy"}
+    assert harness.arguments("some", "Text.", [], rounds=5, only=("a", "b")).only == ("a", "b")
+
+
+@pytest.mark.parametrize("words", [["--rounds", "0"], ["--only", "d"], ["--images", "i"]])
+def test_wrong_options_are_refused(words: list[str]) -> None:
+    with pytest.raises(SystemExit) as raised:
+        harness.arguments("some", "Text.", words, rounds=5, only=("a", "b"))
+    assert raised.value.code == 2
+
+
+@pytest.mark.parametrize(("before", "during", "busy"), [(0.1, 0.1, False), (1.5, 0.1, True), (0.1, 1.5, True)])
+def test_a_busy_machine_is_told(monkeypatch: pytest.MonkeyPatch, before: float, during: float, busy: bool) -> None:
+    monkeypatch.setattr(provenance, "LOOK", 0.01)
+    monkeypatch.setattr(provenance.os, "cpu_count", lambda: 2)
+    load = harness.Load()
+    load.before = before
+    monkeypatch.setattr(load, "during", lambda: during)
+    assert bool(load.told()) is busy
+    assert load.as_json()["busy"] is busy
+
+
+def test_own_work_is_no_load_of_others() -> None:
+    """Two seconds of work of a child on one core count at most as what the rest of the machine does meanwhile."""
+    load = harness.Load()
+    everybody = psutil.cpu_times()
+    subprocess.run([sys.executable, "-c", "import time\nwhile time.process_time() < 1: pass"], check=True)
+    spent = psutil.cpu_times()
+    whole = (spent.user + spent.system - everybody.user - everybody.system) / load.elapsed()
+    assert load.during() < whole - 0.5 / load.elapsed()
+
+
+def test_numpy_comes_after_the_harness() -> None:
+    """It reads how many threads linear algebra may have when it is loaded."""
+    code = "import sys, harness; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=harness.ROOT / "benchmarks").returncode == 0
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "accuracy",
+        "all",
+        "cycle",
+        "duration",
+        "eigen",
+        "floor",
+        "growth",
+        "peers",
+        "stability",
+        "startup",
+        "sweep",
+        "worst_case",
+    ],
+)
+def test_every_benchmark_tells_its_options(name: str) -> None:
+    command = [sys.executable, str(harness.ROOT / "benchmarks" / f"{name}.py"), "--help"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "--json" in done.stdout
+
+
+def test_all_goes_on_after_a_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    write = "import sys, pathlib; pathlib.Path(sys.argv[2], '{}.md').write_text('new')"
+    (tmp_path / "cycle.py").write_text("import sys; sys.exit(3)\n")
+    (tmp_path / "floor.py").write_text(write.format("floor"))
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "cycle.md").write_text("old")
+    monkeypatch.setattr(all_benchmarks, "HERE", tmp_path)
+    assert all_benchmarks.main(["--only", "cycle", "floor", "--json", str(out)]) == 1
+    assert [file.name for file in out.iterdir()] == ["floor.md"]
+    assert "failed: cycle" in capfd.readouterr().err
+    assert all_benchmarks.main(["--only", "floor", "--json", str(out)]) == 0
 
 
 def test_no_figure_is_not_a_number(tmp_path: Path) -> None:

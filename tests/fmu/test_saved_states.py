@@ -331,3 +331,39 @@ def test_forged_contents_crash_nothing(archive: Archive, part: int) -> None:
         assert slave.state() == keeper.image
     assert refused > 25
     keeper.is_unharmed()
+
+
+@apart
+def test_outputs_left_for_later_need_the_parameters_they_belong_to(plant: Archive, tmp_path: Path) -> None:
+    """A state that its own table belies is refused, and the table of the instance is gone by then: what the steps have
+    left to be computed when it is read would be read past the end of the state."""
+    header, *modes = (plant.folder / "resources" / "modes.csv").read_text(encoding="utf-8").splitlines(True)
+    small, large = tmp_path / "small.csv", tmp_path / "large.csv"
+    small.write_text("".join([header, *modes[:20]]), encoding="utf-8")
+    large.write_text("".join([header, *modes[:20] * 3000]), encoding="utf-8")  # beyond what is mapped
+
+    def stepped(file: Path) -> Slave:
+        slave = Slave(plant)
+        name = (ctypes.c_char_p * 1)(str(file).encode())
+        slave.must("fmi2SetString", references([of(plant, "parameter", "String")["modes_file"]]), 1, name)
+        slave.initialized().set([of(plant, "input")["X.M_a"]], [1.0])
+        slave.step(0.0, 1e-4)
+        return slave
+
+    other = stepped(large)
+    image = other.state()
+    other.free()
+    size, fixed, state = struct.unpack_from("<3Q", image, SIZES)
+    forged = bytearray(image[:size] + bytes(16))
+    struct.pack_into("<3Q", forged, SIZES, size + 16, fixed, state + 16)
+    slave = stepped(small)
+    small.unlink()
+    assert slave.restore(_signed(bytes(forged))) == ERROR
+    outputs = of(plant, "output")
+    assert math.isfinite(slave.get([outputs["X.x_a"]])[0])
+    for _ in range(2):
+        found = reals([0.0])
+        assert slave.call("fmi2GetReal", references([outputs["tool.x_X"]]), 1, found) == ERROR
+        assert "output 'tool.x_X' cannot be computed: the parameters of now were refused" in slave.last
+    assert slave.call("fmi2GetFMUstate", ctypes.byref(ctypes.c_void_p())) == ERROR
+    slave.must("fmi2Reset")

@@ -13,6 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 HEAVY = {"numpy", "scipy", "matplotlib", "fmpy", "pint", "pydantic", "yaml", "ruckig", "distributed", "dask", "pyarrow"}
 # What neither a run nor a check of a scenario needs, beyond the report's own.
 NOT_FOR_A_RUN = {"pint", "scipy.signal", "scipy.stats", "distributed", "dask", "pyarrow", "matplotlib.pyplot"}
+# Nor what reads files of other kinds.
+NOT_FOR_A_RUN |= {"feedsim.scenario.study", "feedsim.scenario.tolerances", "feedsim.ssp"}
 
 
 def loaded(code: str) -> set[str]:
@@ -43,3 +45,21 @@ def test_a_run_loads_what_it_needs(fmus: Path, tmp_path: Path) -> None:
     assert (tmp_path / "out" / "report.html").is_file()
     assert "matplotlib" in names  # so the list is the right one
     assert not names & NOT_FOR_A_RUN
+
+
+def test_only_the_program_itself_tunes_the_garbage_collector() -> None:
+    """Who calls main() from a program of their own keeps their settings."""
+    code = """
+import gc, sys
+from feedsim import cli
+usual = gc.get_threshold()
+assert cli.main(["schema"]) == 0
+assert gc.get_threshold() == usual
+sys.argv = ["feedsim", "schema"]
+try:
+    cli.entry()
+except SystemExit as end:
+    assert end.code == 0
+assert gc.get_threshold()[0] > usual[0] and gc.isenabled()
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)

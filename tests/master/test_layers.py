@@ -11,6 +11,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[2] / "master" / "feedsim"
 # A room may import the rooms below it.
 ORDER = [
+    "__main__",
     "cli",
     "report",
     "sweep",

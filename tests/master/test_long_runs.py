@@ -14,7 +14,7 @@ import pytest
 from feedsim import cosim, nc, report, scenario
 from feedsim.cosim import loop, recording
 from feedsim.cosim.unit import Log
-from feedsim.errors import OutputError, SimulationError
+from feedsim.errors import InputError, OutputError, SimulationError
 from feedsim.nc import path, program, spline
 from feedsim.nc.points import Held, Joined
 from feedsim.trace import Table, Trace, least_and_largest, read_csv, release, stretches, table, write_csv
@@ -219,6 +219,59 @@ def test_finished_run_has_no_partial_file(fmus: Path, tmp_path: Path) -> None:
     assert not partial.path.exists()
     write_csv(tmp_path / "afterwards.csv", run.trace)
     assert (tmp_path / "result.csv").read_bytes() == (tmp_path / "afterwards.csv").read_bytes()
+
+
+def _failing(monkeypatch: pytest.MonkeyPatch, name: str, folder: Path, *, away: bool) -> None:
+    """Let the moving of a file fail once, into the folder or away from it."""
+    real = Path.replace
+    failed: list[str] = []
+
+    def replace(self: Path, target: Path) -> Path:
+        if (self if away else target) == folder / name and not failed:
+            failed.append(name)
+            raise PermissionError(13, "Permission denied")
+        return real(self, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+
+
+@pytest.mark.parametrize(
+    ("name", "away"), [("result.csv", True), ("result.csv", False), ("report.html", False), ("summary.json", False)]
+)
+def test_rows_stay_where_results_cannot_be_written(
+    name: str, away: bool, fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A result.csv that another program holds, a quota: the rows of a good run are not lost, nor is the old result."""
+    loaded = scenario.load(CIRCLE, [*SHORT])
+    for earlier in ("result.csv", "report.html"):
+        (tmp_path / earlier).write_text(f"old {earlier}")
+    partial = report.growing(tmp_path)
+    run = cosim.run(loaded, fmus=fmus, sink=partial)
+    _failing(monkeypatch, name, tmp_path, away=away)
+    with pytest.raises(OutputError, match="Permission denied"), partial:
+        report.write(run, {}, tmp_path, partial)
+    monkeypatch.undo()
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["report.html", "result.csv", "result.partial.csv"]
+    assert (tmp_path / "result.csv").read_text() == "old result.csv"
+    assert (tmp_path / "report.html").read_text() == "old report.html"
+    assert partial.left
+    write_csv(tmp_path / "afterwards.csv", run.trace)
+    assert partial.path.read_bytes() == (tmp_path / "afterwards.csv").read_bytes()
+
+
+def test_run_that_never_begins_takes_no_rows_away(fmus: Path, tmp_path: Path) -> None:
+    kept, target = tmp_path / "result.partial.csv", tmp_path / "elsewhere.csv"
+    target.write_text("of another run")
+    kept.symlink_to(target)
+    with pytest.raises(InputError), report.growing(tmp_path) as partial:
+        cosim.run(scenario.load(CIRCLE, [*SHORT]), fmus=tmp_path / "none", sink=partial)
+    assert kept.read_text() == "of another run"
+    assert not partial.left
+    partial = report.growing(tmp_path)
+    cosim.run(scenario.load(CIRCLE, [*SHORT]), fmus=fmus, sink=partial)
+    assert partial.left
+    assert kept.read_text().startswith("time [s],")
+    assert target.read_text() == "of another run"
 
 
 MEMORY = """

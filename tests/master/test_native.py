@@ -262,6 +262,18 @@ def test_library_that_is_none_is_left_alone(folder: Path, tmp_path: Path, caplog
     assert "cannot be used" in record.getMessage()
 
 
+def test_a_copy_of_a_library_is_not_loaded_again(folder: Path, tmp_path: Path) -> None:
+    """Workers get one with each study, and nothing unloads it."""
+    content = (folder / exchange._LIBRARY).read_bytes()
+    copies = []
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / exchange._LIBRARY).write_bytes(content)
+        copies.append(exchange.library(tmp_path / name))
+    assert copies[0] is not None
+    assert copies[0] is copies[1]
+
+
 def test_stale_library_is_left_alone(folder: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Built from sources with another interface; its loop would do something else."""
     source = tmp_path / "stale.c"

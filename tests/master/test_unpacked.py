@@ -11,6 +11,7 @@ import threading
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -182,3 +183,120 @@ def test_many_runs_leave_no_more_than_one(fmus: Path, tmp_path: Path, scratch: P
     assert used() == before
     # A run's records have some 0.5 MB, its seven instances as much again: one leaked kind would come to tens of MB.
     assert resident() - memory < 8 << 20
+
+
+def test_the_bytes_of_an_archive_at_rest_are_read_once(
+    fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[int] = []
+    real = unpacked.hashlib.file_digest  # type: ignore[attr-defined]
+
+    def spy(file: Any, name: str) -> Any:
+        read.append(1)
+        return real(file, name)
+
+    monkeypatch.setattr(unpacked.hashlib, "file_digest", spy)  # type: ignore[attr-defined]
+    file = Path(shutil.copy(fmus / "friction.fmu", tmp_path / "unit.fmu"))
+    for _ in range(2):  # just written: its times do not yet tell its states apart
+        Archive(file).close()
+    assert len(read) == 2
+    monkeypatch.setattr(unpacked, "RESTED", -(10**12))
+    for _ in range(3):
+        Archive(file).close()
+    assert len(read) == 3
+    with Archive(file) as old:
+        altered(fmus / "friction.fmu", file, "new")
+        with Archive(file) as new:
+            assert new.directory != old.directory
+    assert len(read) == 4
+
+
+@pytest.mark.parametrize("lost", ["modelDescription.xml", "everything"])
+@pytest.mark.parametrize("in_use", [False, True])
+def test_what_a_cleaner_took_away_is_unpacked_anew(fmus: Path, scratch: Path, lost: str, in_use: bool) -> None:
+    """A folder for temporary files is emptied of what has been idle for some days; a process may live longer."""
+    old = Archive(fmus / "friction.fmu")
+    Unit(old, "one").close()
+    if not in_use:
+        old.close()
+    if lost == "everything":
+        shutil.rmtree(old.directory)
+    else:
+        (old.directory / lost).unlink()
+    with Archive(fmus / "friction.fmu") as new:
+        assert new.directory != old.directory
+        assert (new.directory / "modelDescription.xml").is_file()
+        unit = Unit(new, "two")
+        unit.close()
+    old.close()
+    del old
+    with Archive(fmus / "friction.fmu") as again:
+        assert again.directory == new.directory
+    assert list(scratch.iterdir()) == [new.directory]
+
+
+def test_a_file_cut_short_is_noticed(fmus: Path) -> None:
+    with Archive(fmus / "friction.fmu") as old:
+        pass
+    (old.directory / "modelDescription.xml").write_bytes(b"")
+    with Archive(fmus / "friction.fmu") as new:
+        assert new.directory != old.directory
+
+
+WORKERS = """
+import multiprocessing, sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from feedsim.cosim.unit import Archive
+opened = []
+def work(file):
+    with Archive(file) as archive:
+        pass
+    opened.append(Archive(file))  # one that nobody closes
+    return str(archive.directory)
+file = Path(sys.argv[1])
+if sys.argv[3] == "before":
+    Archive(file).close()
+context = multiprocessing.get_context("fork")
+if sys.argv[2] == "pool":
+    pool = context.Pool(2)
+    found = pool.map(work, [file] * 4)
+    pool.close()
+    pool.join()
+else:
+    with ProcessPoolExecutor(2, context) as executor:
+        found = list(executor.map(work, [file] * 4))
+print(*set(found))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+@pytest.mark.parametrize("kind", ["pool", "executor"])
+@pytest.mark.parametrize("begun", ["before", "after"])
+def test_forked_workers_leave_nothing(kind: str, begun: str, fmus: Path, scratch: Path) -> None:
+    words = [sys.executable, "-c", WORKERS, str(fmus / "friction.fmu"), kind, begun]
+    environment = {**os.environ, "TMPDIR": str(scratch)}
+    done = subprocess.run(words, check=True, env=environment, timeout=60, capture_output=True, text=True)
+    assert done.stdout.split()
+    assert not list(scratch.iterdir())
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_lock_held_while_forking_is_renewed(fmus: Path, scratch: Path) -> None:
+    """Another thread of the parent may be loading a library at that moment."""
+    code = f"""
+import os, signal
+from pathlib import Path
+from feedsim.cosim.unit import Archive, Unit
+from feedsim.cosim.unpacked import STORE
+STORE.loading.acquire()
+child = os.fork()
+if child == 0:
+    signal.alarm(20)
+    with Archive(Path({str(fmus / "friction.fmu")!r})) as own:
+        Unit(own, "one").close()
+    STORE.clear()
+    os._exit(0)
+assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60, env={**os.environ, "TMPDIR": str(scratch)})

@@ -57,6 +57,7 @@ STEPS: dict[str, tuple[Callable[..., list[float]], int]] = {
     "extrapolated": (_extrapolated, 2),
     "iterated": (_iterated, 2),
     "gauss_seidel": (_gauss_seidel, 1),
+    "gauss_seidel_friction_first": (_gauss_seidel, 1),  # who steps first, the mass moves under the torque of its n
     "jacobi": (_jacobi, 2),
     "jacobi_extrapolated": (_jacobi_extrapolated, 4),
     "parallel": (_jacobi, 2),  # the motor torque, which it holds, is not part of the bond

@@ -39,7 +39,8 @@ static void tables_are_used_row_by_row(void) {
     Notes setting = {.calls = 0}, getting = {.calls = 0};
     Fault fault = {-1, -1};
     Operation operations[] = {
-        {.kind = EXCHANGE_set_real,
+        {.kind = EXCHANGE_due,
+         .what = EXCHANGE_set_real,
          .count = 2,
          .call = (function)note_set,
          .component = &setting,
@@ -49,7 +50,8 @@ static void tables_are_used_row_by_row(void) {
          .next = 1,
          .stride = sizeof sent[0],
          .rows = 3},
-        {.kind = EXCHANGE_get_real,
+        {.kind = EXCHANGE_due,
+         .what = EXCHANGE_get_real,
          .count = 1,
          .call = (function)note_get,
          .component = &getting,
@@ -169,7 +171,8 @@ static void turns_are_worked_part_by_part(void) {
          .component = &notes,
          .references = references,
          .y = value},
-        {.kind = EXCHANGE_set_real,
+        {.kind = EXCHANGE_due,
+         .what = EXCHANGE_set_real,
          .count = 2,
          .call = (function)note_set,
          .component = &notes,
@@ -201,7 +204,7 @@ static void turns_are_worked_part_by_part(void) {
 }
 
 int main(void) {
-    CHECK_CONTAINS(exchange_interface(), "2: set_real set_slopes do_step");
+    CHECK_CONTAINS(exchange_interface(), "3: set_real set_slopes do_step");
     tables_are_used_row_by_row();
     failure_ends_the_loop();
     states_are_kept_where_y_says();

@@ -80,6 +80,35 @@ static void an_input_that_runs_away_is_refused(void) {
     fmi2FreeInstance(c);
 }
 
+/* Slopes of usual size are not looked at again at the end of a step; every way to an unusual one must be noticed. */
+static void an_input_may_run_away_after_usual_steps(void) {
+    Log log = {.count = 0};
+    fmi2Component c = toy_in(PHASE_STEPPING, &log);
+    for (int way = 0; way < 4; way++) {
+        fmi2FMUstate usual = NULL, wild = NULL;
+        CHECK(set_slope(c, AXIS(1, F), 1) == fmi2OK);
+        step(c, way, 1); /* from here on all inputs are known to be of usual size */
+        CHECK(fmi2GetFMUstate(c, &usual) == fmi2OK);
+        CHECK(set_slope(c, AXIS(1, F), way == 0 ? 1e308 : 1e149) == fmi2OK);
+        if (way > 1)
+            CHECK(set_real(c, AXIS(1, F), 1.7976931348623157e308) == fmi2OK);
+        CHECK(fmi2GetFMUstate(c, &wild) == fmi2OK);
+        if (way == 3) {
+            CHECK(fmi2SetFMUstate(c, usual) == fmi2OK);
+            CHECK(set_slope(c, AXIS(1, F), 1) == fmi2OK);
+            step(c, way + 1, 1);
+            CHECK(fmi2SetFMUstate(c, wild) == fmi2OK);
+        }
+        log.count = 0;
+        CHECK(fmi2DoStep(c, way + 1, way == 0 ? 10 : way == 1 ? 1e200 : 1e145, fmi2True) == fmi2Error);
+        CHECK_CONTAINS(log.message, "input 'B.F' does not stay finite");
+        CHECK(fmi2SetFMUstate(c, usual) == fmi2OK);
+        fmi2FreeFMUstate(c, &usual);
+        fmi2FreeFMUstate(c, &wild);
+    }
+    fmi2FreeInstance(c);
+}
+
 /* --- time */
 
 static fmi2Status step_from(double start, double stop, double t, double h, Log *log) {
@@ -354,6 +383,7 @@ int main(void) {
     a_refused_step_keeps_the_slope();
     bad_slopes();
     an_input_that_runs_away_is_refused();
+    an_input_may_run_away_after_usual_steps();
     communication_points();
     the_importers_time_is_taken();
     step_sizes();

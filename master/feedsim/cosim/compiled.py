@@ -55,15 +55,12 @@ def _compile_exchange(cycle: Cycle, start: float, to: Operations) -> None:
 def _compile_step(cycle: Cycle, start: float, to: Operations) -> None:
     """Cycle._step(t)."""
     system, scheme, h = cycle.system, cycle.scheme, cycle.step
-    to.set(system.plant_inputs)
-    to.set_slopes(system.plant_inputs if scheme.friction_ramp else system.plant_torque)
-    to.step(system.plant, start, h)
-    to.get(system.plant_outputs)
-
-    if scheme.friction_ramp:
-        to.line(cycle.assumed_torque, system.M_fr, h, system.M_fr_slope)
-    else:
-        to.copy(cycle.assumed_torque, system.M_fr)
+    if scheme.friction_first:
+        to.copy(system.n, system.n_start)
+        _compile_friction(cycle, start, to)
+        _compile_plant(cycle, start, to)
+        return
+    _compile_plant(cycle, start, to)
     if scheme.speed == "within":
         to.copy(system.n, system.n_start)
         to.rate(system.n_slope, system.n_end, system.n_start, h)
@@ -75,9 +72,28 @@ def _compile_step(cycle: Cycle, start: float, to: Operations) -> None:
         to.copy(system.n, system.n_start)
         to.copy(system.n_slope, system.n_slope_last)
         to.rate(system.n_slope_last, system.n_end, system.n_start, h)
-    for contact in system.contacts:
+    _compile_friction(cycle, start, to)
+
+
+def _compile_plant(cycle: Cycle, start: float, to: Operations) -> None:
+    """Cycle._step_plant(t)."""
+    system, scheme, h = cycle.system, cycle.scheme, cycle.step
+    to.set(system.plant_inputs)
+    to.set_slopes(system.plant_inputs if scheme.friction_ramp else system.plant_torque)
+    to.step(system.plant, start, h)
+    to.get(system.plant_outputs)
+
+    if scheme.friction_ramp:
+        to.line(cycle.assumed_torque, system.M_fr, h, system.M_fr_slope)
+    else:
+        to.copy(cycle.assumed_torque, system.M_fr)
+
+
+def _compile_friction(cycle: Cycle, start: float, to: Operations) -> None:
+    """Cycle._step_friction(t)."""
+    for contact in cycle.system.contacts:
         to.set(contact.speed)
         to.set_slopes(contact.speed)
-        to.step(contact.unit, start, h)
+        to.step(contact.unit, start, cycle.step)
         to.get(contact.torque)
         to.get_slopes(contact.torque)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import tempfile
+import threading
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from feedsim.cosim.unit import Archive
 from feedsim.errors import InputError
@@ -13,6 +16,9 @@ from feedsim.structure.build import SAME_POSITION
 from feedsim.structure.pack import AXES_IN_ARCHIVE, MODES_IN_ARCHIVE, pack
 
 _START = ".x_0"  # of every axis of a plant
+KEPT = 4  # packed archives, of about 1 MB each: studies run the same machine again and again
+_PACKED: dict[Any, bytes] = {}  # by content of what they are packed from; those used last stand last
+_PACKING = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -45,15 +51,35 @@ def open_plant(machine: Machine, fmus: Path) -> Plant:
     if set(axes_of(general)) == set(machine.axes):
         return Plant(general, machine.modes)
     general.close()
+    return Plant(_packed_for(machine, general.path), None)
+
+
+def _packed_for(machine: Machine, general: Path) -> Archive:
+    """The machine packed into the plant archive `general`; what it was packed to is kept for further runs."""
+    try:
+        content, modes = general.read_bytes(), machine.modes.read_bytes()
+    except OSError as error:
+        raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
+    pose = {axis: machine.pose[axis] for axis in machine.axes}
+    key = hashlib.sha256(content).digest(), hashlib.sha256(modes).digest(), (*pose.items(),), machine.name, machine.note
     with tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True) as folder:
         packed = Path(folder) / "plant.fmu"
-        pose = {axis: machine.pose[axis] for axis in machine.axes}
-        # Without a trial: the unit is instantiated next anyway. Uncompressed: it is unpacked at once.
-        pack(
-            general.path, packed, modes=machine.modes, pose=pose, name=machine.name, note=machine.note, trial=False,
-            level=0,
-        )  # fmt: skip
-        return Plant(Archive(packed), None)
+        with _PACKING:
+            known = _PACKED.pop(key, None)
+        if known is not None:
+            packed.write_bytes(known)
+        else:
+            # Without a trial: the unit is instantiated next anyway. Uncompressed: it is unpacked at once.
+            pack(
+                general, packed, modes=machine.modes, pose=pose, name=machine.name, note=machine.note, trial=False,
+                level=0,
+            )  # fmt: skip
+            known = packed.read_bytes()
+        with _PACKING:
+            _PACKED[key] = known
+            while len(_PACKED) > KEPT:
+                del _PACKED[next(iter(_PACKED))]
+        return Archive(packed)
 
 
 def axes_of(archive: Archive) -> tuple[str, ...]:

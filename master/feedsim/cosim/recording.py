@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +145,8 @@ class Recording:
         return [*(Record(log, when) for log, _ in self._logs), *kept]
 
     def record(self, k: int) -> None:
-        """Record the instant k T_c, where it is one to be recorded."""
+        """Record the instant k T_c, where it is one to be recorded; those before are done."""
+        self.ahead(k, k + 1)
         for activity in self.activities:
             activity(k)
 
@@ -172,10 +174,10 @@ class Recording:
 
     def _block(self, rows: NDArray[np.int64]) -> Floats:
         """Time and columns of rows that the rings hold, (1 + columns, n)."""
-        at, cycle = rows % self._ring, rows * self.every
+        cycle = rows * self.every
         found: dict[str, Floats] = {}
         for log, names in self._logs:
-            reals, flags = log.reals[at].T, log.flags[at].T
+            reals, flags = self._of_rows(log.reals, rows).T, self._of_rows(log.flags, rows).T
             found.update({names[signal]: values for signal, values in zip(log.real_names, reals, strict=True)})
             found.update({names[signal]: values for signal, values in zip(log.flag_names, flags, strict=True)})
         for name in self.limited:
@@ -184,12 +186,17 @@ class Recording:
         low, high = int(position_cycle[0]), int(position_cycle[-1]) + 1
         found |= {name: values[low:high][position_cycle - low] for name, values in self._setpoints.items()}
         if self._residual_names:
-            found |= dict(zip(self._residual_names, self._residual[at].T, strict=True))
+            found |= dict(zip(self._residual_names, self._of_rows(self._residual, rows).T, strict=True))
         block = np.empty((1 + len(self._columns), len(rows)))
         block[0] = cycle * self._T_c
         for i, name in enumerate(self._columns):
             block[1 + i] = found[name]
         return block
+
+    def _of_rows(self, ring: NDArray[Any], rows: NDArray[np.int64]) -> NDArray[Any]:
+        """What a ring holds of consecutive rows; not copied where they do not go over its end."""
+        first, last = int(rows[0]) % self._ring, int(rows[-1]) % self._ring + 1
+        return ring[first:last] if first < last else np.concatenate((ring[first:], ring[:last]))
 
     def share(self, limit: str) -> float:
         """Share of the recorded instants at which a drive was at a limit, "A.torque_limited"."""

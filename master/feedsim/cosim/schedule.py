@@ -24,6 +24,7 @@ class Scheme:
     stable_share: float  # of 2 J_inf/h that the friction's slope sigma_1 + sigma_2 may reach; docs/theory.md derives it
     speed: str  # friction: n_fr linear "within" the step, held at its "end" or its "start", or "extrapolated"
     passes: int = 1  # plant and friction go back and take the step again, with the slope of M_fr that they have found
+    friction_first: bool = False  # friction steps ahead of the plant, which holds the torque found; else the plant does
 
 
 SCHEMES = {
@@ -32,6 +33,14 @@ SCHEMES = {
         Scheme("extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.25, speed="within"),
         Scheme("iterated", torque_ramp=True, friction_ramp=True, stable_share=0.5, speed="within", passes=2),
         Scheme("gauss_seidel", torque_ramp=True, friction_ramp=False, stable_share=0.5, speed="end"),
+        Scheme(
+            "gauss_seidel_friction_first",
+            torque_ramp=True,
+            friction_ramp=False,
+            stable_share=0.5,
+            speed="start",
+            friction_first=True,
+        ),
         Scheme("jacobi", torque_ramp=True, friction_ramp=False, stable_share=0.25, speed="start"),
         Scheme("jacobi_extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.1, speed="extrapolated"),
         Scheme("parallel", torque_ramp=False, friction_ramp=False, stable_share=0.25, speed="start"),
@@ -107,27 +116,39 @@ class Cycle:
         return [self.system.plant, *(contact.unit for contact in self.system.contacts)]
 
     def _step(self, t: float) -> None:
-        """A pass: the plant, then friction."""
+        """A pass: the plant, then friction, or the other way round."""
+        system, h = self.system, self.step
+        if self.scheme.friction_first:
+            system.n[:] = system.n_start
+            self._step_friction(t)
+            self._step_plant(t)
+            return
+        self._step_plant(t)
+        slope = (system.n_end - system.n_start) / h
+        if self.scheme.speed == "within":
+            system.n[:], system.n_slope[:] = system.n_start, slope
+        elif self.scheme.speed == "end":
+            system.n[:] = system.n_end
+        elif self.scheme.speed == "start":
+            system.n[:] = system.n_start
+        else:
+            system.n[:], system.n_slope[:] = system.n_start, system.n_slope_last
+            system.n_slope_last[:] = slope
+        self._step_friction(t)
+
+    def _step_plant(self, t: float) -> None:
+        """With the friction torque that is at hand: that of the last step's end, or what friction has just found."""
         system, scheme, h = self.system, self.scheme, self.step
         system.plant_inputs.set()
         (system.plant_inputs if scheme.friction_ramp else system.plant_torque).set_slopes()
         system.plant.step(t, h)
         system.plant_outputs.get()
-
         self.assumed_torque[:] = system.M_fr + h * system.M_fr_slope if scheme.friction_ramp else system.M_fr
-        slope = (system.n_end - system.n_start) / h
-        if scheme.speed == "within":
-            system.n[:], system.n_slope[:] = system.n_start, slope
-        elif scheme.speed == "end":
-            system.n[:] = system.n_end
-        elif scheme.speed == "start":
-            system.n[:] = system.n_start
-        else:
-            system.n[:], system.n_slope[:] = system.n_start, system.n_slope_last
-            system.n_slope_last[:] = slope
-        for contact in system.contacts:
+
+    def _step_friction(self, t: float) -> None:
+        for contact in self.system.contacts:
             contact.speed.set()
             contact.speed.set_slopes()
-            contact.unit.step(t, h)
+            contact.unit.step(t, self.step)
             contact.torque.get()
             contact.torque.get_slopes()

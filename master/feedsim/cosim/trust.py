@@ -11,7 +11,7 @@ from feedsim.scenario import Dwell, Scenario
 from feedsim.structure import Modes
 
 # Of the friction work, and J (an axis at rest has no work to speak of). On the default machine the first-order schemes
-# lose up to 4e-5 of it, the second-order ones 2e-7; chatter loses 1e-3 and more.
+# lose up to 5e-5 of it, the second-order ones 2e-7; chatter loses 1e-3 and more.
 TRUSTED_SHARE, TRUSTED_ENERGY = 3e-4, 1e-3
 LOAD_TAKEN_UP = 1.0  # s; position and speed controller together settle in some tenths of it
 

@@ -11,7 +11,6 @@ import copy
 import ctypes
 import os
 import re
-import threading
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -30,7 +29,6 @@ from feedsim.errors import InputError, SimulationError
 Floats = NDArray[np.float64]
 
 _DESCRIPTION = "modelDescription.xml"
-_LOADING = threading.Lock()  # FMPy changes the working folder while it loads a library
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 # Compiled ahead: what a signal raises inside a callback is lost, so callbacks are kept short.
 _CALL = re.compile(r"^fmi2[A-Za-z]+: ")
@@ -104,7 +102,7 @@ class Archive:
         """
         if self._content is None:
             raise ValueError(f"{self.path}: the archive is closed")
-        with _LOADING:
+        with STORE.loading:
             if self._content.library is None:
                 loaded = self._load()
                 self._content.library, self._content.unload = loaded, loaded.freeLibrary

@@ -10,11 +10,14 @@ import atexit
 import hashlib
 import os
 import shutil
+import sys
 import tempfile
 import threading
+import time
 import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
 from typing import IO, Any
 
@@ -23,6 +26,10 @@ from feedsim.errors import InputError
 
 KEPT = 8  # contents that no archive uses: the three units', and those of some machines or SSP files
 KEPT_SIZE = 64 << 20  # bytes; what is larger, such as the setpoints of a long program, goes with its last user
+# A file that has rested for so long [ns] has other times after its next change; a younger one may change within the
+# same tick of its file system's clock.
+RESTED = 2_000_000_000
+DIGESTS = 64  # how many are remembered
 
 
 @dataclass
@@ -46,6 +53,7 @@ class Content:
     Attributes:
         directory: the folder; only to be read.
         size: bytes of what is unpacked.
+        files: what is unpacked, and the size of each.
         description: see there.
         library: the loaded shared library, whatever the room that loads it takes for one; None as long as it is not
             needed. `unload` gives it back.
@@ -54,18 +62,31 @@ class Content:
     def __init__(self) -> None:
         self.directory = Path(tempfile.mkdtemp(prefix="feedsim-"))
         # Also when a signal ends the program while the archive is being unpacked, or when nobody closed it.
-        self._remove = weakref.finalize(self, _remove, str(self.directory), os.getpid())
+        self.remove_folder = weakref.finalize(self, _remove, str(self.directory), os.getpid())
         self.size = 0
+        self.files: dict[Path, int] = {}
         self.description: Description
         self.library: Any = None
         self.unload: Callable[[], None] | None = None
         self.users = 0
 
+    def complete(self) -> None:
+        """Take note of what is there."""
+        self.files = {file: file.stat().st_size for file in self.directory.rglob("*") if file.is_file()}
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is still there: what cleans a folder for temporary files takes what has been idle for long."""
+        try:
+            return all(file.stat().st_size == size for file, size in self.files.items())
+        except OSError:
+            return False
+
     def remove(self) -> None:
         unload, self.library, self.unload = self.unload, None, None
         if unload is not None:
             unload()
-        self._remove()
+        self.remove_folder()
 
 
 def _remove(folder: str, owner: int) -> None:
@@ -75,11 +96,17 @@ def _remove(folder: str, owner: int) -> None:
 
 
 class Store:
-    """Contents by what they are, shared by all archives of a process."""
+    """Contents by what they are, shared by all archives of a process.
+
+    Attributes:
+        loading: to be held while a library is being loaded.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        self.loading = threading.Lock()  # FMPy changes the working folder while it loads a library
         self._contents: dict[str, Content] = {}  # those used last stand last
+        self._digests: dict[tuple[int, ...], str] = {}  # by what tells a file from others and from its later states
         self._ends = False
 
     def take(self, path: Path, allowance: untrusted.Allowance, unpack: Callable[[IO[bytes], Content], None]) -> Content:
@@ -96,16 +123,18 @@ class Store:
             file = path.open("rb")
         with file, self._lock:
             with untrusted.readable(f"{path}: not a usable FMI 2.0 archive"):
-                key = hashlib.file_digest(file, "sha256").hexdigest()
-                file.seek(0)
+                key = self._digest(file)
             content = self._contents.pop(key, None)
+            if content is not None and not content.whole:
+                if not content.users:
+                    content.remove()
+                content = None
             if content is None:
                 content = Content()
-                if not self._ends:  # after the first folder's own end is arranged for, so that this comes ahead of it
-                    self._ends = True
-                    atexit.register(self.clear)  # Windows does not remove a library that is loaded
+                self._arrange_for_the_end()  # after the folder's own end is arranged for, so that this comes ahead
                 try:
                     unpack(file, content)
+                    content.complete()
                 except BaseException:
                     content.remove()
                     raise
@@ -115,6 +144,38 @@ class Store:
                 allowance.take(content.size, str(path))
             content.users += 1
             return content
+
+    def _arrange_for_the_end(self) -> None:
+        if self._ends:
+            return
+        self._ends = True
+        atexit.register(self.clear)  # Windows does not remove a library that is loaded
+        # Workers that multiprocessing forks end without what atexit and weakref have been told.
+        processes = sys.modules.get("multiprocessing.process")
+        if processes is not None and processes.parent_process() is not None:
+            from multiprocessing.util import Finalize
+
+            Finalize(None, self._end, exitpriority=-100)  # the last, like multiprocessing's own folders
+
+    def _end(self) -> None:
+        self.clear()
+        for content in self._contents.values():
+            content.remove_folder()
+
+    def _digest(self, file: BufferedReader) -> str:
+        """SHA-256 of an open file, computed once as long as the file stays as it is."""
+        found = os.fstat(file.fileno())
+        state = (found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns)
+        if (known := self._digests.get(state)) is not None:
+            return known
+        rested = time.time_ns() - max(found.st_mtime_ns, found.st_ctime_ns) > RESTED  # asked before it is read
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        file.seek(0)
+        if rested:
+            if len(self._digests) >= DIGESTS:
+                self._digests.clear()
+            self._digests[state] = digest
+        return digest
 
     def give_back(self, content: Content) -> None:
         with self._lock:
@@ -134,8 +195,9 @@ class Store:
 
     def forget(self) -> None:
         """In a process just forked off: its parent's folders may go at any time."""
-        self._lock = threading.Lock()  # another thread of the parent may have held it
+        self._lock, self.loading = threading.Lock(), threading.Lock()  # other threads of the parent may have held them
         self._contents = {}
+        self._ends = False
 
 
 STORE = Store()

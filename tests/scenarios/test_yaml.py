@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from feedsim.errors import InputError
+from feedsim.scenario import source
 from feedsim.scenario.source import LARGEST, Place, parse, read
 
 
@@ -100,6 +101,14 @@ def test_alias_bomb_is_refused_before_it_goes_off() -> None:
         ("a: 1\n---\nb: 2\n", "test.yaml:2: a second document begins"),
         ("a: !!python/object:os.system 1", "tag 'tag:yaml.org,2002:python/object:os.system' is not known here"),
         ("a: !!set {x}", "is not known here"),
+        ("a: !", "test.yaml:1: '!' alone says nothing; text needs quotes"),
+        ("b: 1\na: ! 12", "test.yaml:2: '!' alone says nothing"),
+        ("a:\tb", "test.yaml:1: a tab cannot indent or start a value; use blanks"),
+        ("a: 1\nb: [1,\tb]", "test.yaml:2: a tab cannot"),
+        ("b:\n  a: 1\t# comment", "test.yaml:2: a tab cannot"),
+        ("a\t: 1", "test.yaml:1: a tab cannot"),
+        ("a: >#x\n  t", "test.yaml:1: expected chomping or indentation indicators, but found '#'"),
+        ("a: {x:1?}", "test.yaml:1: "),
         ("a: !!int x", "test.yaml:1: 'x' is no int"),
         ("[a, b]: 1", "test.yaml:1: a key must be a word"),
         ("a: 1\x07", "line 1 holds the control character U+0007"),
@@ -139,3 +148,35 @@ def test_byte_order_mark_and_other_line_ends(tmp_path: Path) -> None:
     source = read(path)
     assert source.data == {"a": 1, "b": 2}
     assert source.mark(("b",)).where == f"{path}:2"
+
+
+@pytest.mark.skipif(source._FastLoader is None, reason="PyYAML has no libyaml here")
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a:\tb", "a: 1\t# comment", "a: 'x\ty'", "a: |\n  x\ty\n", "- \ta", "a:\n\tb: 1", "# a\tb\na: 1", "{a:\t1}",
+        "a: !", "a: ! 12", "a: [!]", "a: !!str 12", "a: !x 1", "a: '!'", "a: b! # !",
+        "a: >#x\n  t\n", "a: |-2#\n  t\n", "a: > # x\n  t\n", "{x:1?}", "a: {b: c?, d: ?e}", "a: [?b]", "? a\n: b",
+        "a: b?", "# why?\na: {b: 1}", "a: b\ufeff", "\ufeffa: 1", "\n\ufeffa: 1", "a: \x85b", "a: \u2028b",
+        "%YAML 1.2\n---\na: 1", "%YAML 1.1#\n---\na: 1", "a: b%", "---\n# nothing", "a:\n# nothing",
+    ],
+)  # fmt: skip
+def test_both_parsers_are_one(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a file means, and what is said of its faults, must not depend on how PyYAML was built."""
+
+    def found() -> object:
+        try:
+            read_back = parse(text, "test.yaml", Path())
+        except InputError as error:
+            return str(error)
+        return read_back.data, read_back.marks
+
+    fast = found()
+    monkeypatch.setattr(source, "_FastLoader", None)
+    assert fast == found()
+
+
+def test_questions_in_comments_are_read_fast(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(source, "_Loader", None)
+    if source._FastLoader is not None:
+        assert values("  # why?\na: {b: 1} \n") == {"a": {"b": 1}}

@@ -23,6 +23,12 @@ CHANGES = [
     [change("machine.axes.*.friction.W", "0 rad")],
     [change("machine.axes.Z.friction.F_C", "1.25 N.m"), change("coupling.scheme", "jacobi")],
     [Change("coupling.substeps", "3", 3), change("recording.interval", "500 us")],
+    [Change("coupling", "{scheme: jacobi, substeps: 2}", {"scheme": "jacobi", "substeps": 2})],
+    [Change("recording.variables", "[Z.x_a, Z.M_a]", ["Z.x_a", "Z.M_a"])],
+    [
+        Change("motions", "[{kind: dwell, duration: 1 s}]", [{"kind": "dwell", "duration": "1 s"}]),
+        Change("evaluate", "[]", []),
+    ],
     [change("machine.axes.X.drive.K_v", "3 (m/min)/mm"), change("machine.axes.X.drive.K_v", "4 (m/min)/mm")],
 ]
 

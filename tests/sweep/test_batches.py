@@ -105,3 +105,26 @@ def test_each_task_comes_to_one_outcome(seed: int) -> None:
     assert {outcome.error for outcome in found if outcome.error} == {
         f"given up: its worker process died, {DEATHS} times"
     }
+
+
+def test_what_a_worker_refuses_is_handed_over_anew_as_it_was() -> None:
+    batches = Batches(Task(run) for run in range(3))
+    first = batches.next(1)
+    assert first is not None
+    batches.refused(first)
+    again = batches.next(1)
+    assert again is not None
+    assert again.tasks == first.tasks
+    batches.died(again, 1, "its worker died")
+    suspect = batches.next(1)
+    assert suspect is not None
+    assert suspect.suspect
+    batches.refused(suspect)
+    again = batches.next(1)
+    assert again is not None
+    assert (again.tasks, again.suspect) == (suspect.tasks, True)
+    batches.done(again, [Outcome(again.tasks[0].run, {})])
+    while (batch := batches.next(1)) is not None:
+        assert batches.waiting or batches.flying
+        batches.done(batch, [Outcome(task.run, {}) for task in batch.tasks])
+    assert not batches.waiting

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from engine_helpers import Chores, chore
+from engine_helpers import Chore, Chores, chore
 from feedsim.errors import InputError
 from feedsim.sweep.engine import Engine, open_engine
 from feedsim.sweep.task import Outcome
@@ -51,6 +51,18 @@ def test_in_this_process() -> None:
     with open_engine(Chores("here"), workers=0) as engine:
         assert engine.workers == 0
         assert squares(list(engine.map(chore(i) for i in range(20)))) == expected(20)
+
+
+def test_a_place_in_this_process_is_kept_from_map_to_map(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    opened = Chores.open
+    monkeypatch.setattr(Chores, "open", lambda work, within=None: told.append("open") or opened(work, within))
+    monkeypatch.setattr(Chore, "close", lambda place: told.append("close"))
+    with open_engine(Chores("kept"), workers=0) as engine:
+        for _ in range(2):
+            assert squares(list(engine.map(chore(i) for i in range(3)))) == expected(3)
+        assert told == ["open"]
+    assert told == ["open", "close"]
 
 
 def test_both_workers_make_runs(crowd: tuple[Engine, Path], notes: Path) -> None:
@@ -134,7 +146,7 @@ def test_an_interrupt_delivers_what_is_there(crowd: tuple[Engine, Path]) -> None
 SCRIPT = """
 import sys
 sys.path[:0] = [{tests!r}, {master!r}]
-from engine_helpers import Chores, chore
+from engine_helpers import Chore, Chores, chore
 from feedsim.sweep.engine import open_engine
 def study():
     with open_engine(Chores("script", {notes!r}), workers=2) as engine:

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import time
+from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from cluster_helpers import Cluster, scheduler
 from engine_helpers import Chores, chore
 from feedsim.errors import InputError, SimulationError
-from feedsim.sweep import cluster, engine, same
+from feedsim.sweep import cluster, engine, same, worker
 from feedsim.sweep.engine import open_engine
+from feedsim.sweep.task import Outcome, Task
 
 
 @pytest.fixture
@@ -47,6 +55,109 @@ def test_a_lost_scheduler_is_told(a_cluster: Cluster, monkeypatch: pytest.Monkey
         for count, _ in enumerate(made.map(chore(i, data=0.02) for i in range(10_000))):
             if count == 20:
                 a_cluster.processes[0].kill()
+
+
+def test_studies_of_the_same_work_leave_each_other_alone(a_cluster: Cluster) -> None:
+    a_cluster.worker("one")
+    work = Chores("same")
+    with open_engine(work, scheduler=a_cluster.address) as long:
+        outcomes = long.map(chore(i, data=0.02) for i in range(100))
+        found = [next(outcomes)]
+        with open_engine(work, scheduler=a_cluster.address) as short:
+            assert len(list(short.map(chore(i) for i in range(5)))) == 5
+        found += outcomes
+    assert sorted(outcome.run for outcome in found if outcome.error is None) == list(range(100))
+
+
+@dataclass
+class Kept:
+    """Work, and its place, that tells how often it was laid out and left."""
+
+    digest: str = "kept"
+    opened: int = 0
+    closed: int = 0
+
+    def open(self, within: Path | None = None) -> Kept:
+        self.opened += 1
+        return self
+
+    def run(self, task: Task) -> Outcome:
+        return Outcome(task.run, {})
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def test_a_place_is_kept_as_long_as_anybody_needs_it(tmp_path: Path) -> None:
+    work, host = Kept(), SimpleNamespace(address="tcp://here:1", local_directory=str(tmp_path))
+    first, second = (worker.Carrier(work, same.told()) for _ in range(2))
+    for carrier in (first, second):
+        carrier.setup(host)
+        assert len(worker.work_batch(carrier.key, (chore(0),), 1.0).outcomes) == 1
+    assert work.opened == 1
+    for carrier, closed in ((first, 0), (second, 1)):
+        carrier.teardown(host)
+        worker._clear(work.digest)  # as its thread does
+        assert work.closed == closed
+    assert worker._carried.keys().isdisjoint({first.key, second.key})
+
+
+def test_a_result_that_dies_with_its_worker_is_waited_for(a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask makes it again, which takes longer than a result has to arrive."""
+    for name in ("one", "two"):
+        a_cluster.worker(name, "--no-nanny")
+    a_cluster.wait_for(2)
+    monkeypatch.setattr(engine, "FETCH", 0.5)
+    fetch, killed = engine._Flight._outcomes, list[str]()
+
+    def fetch_too_late(flight: engine._Flight, future: Any) -> list[Outcome]:
+        if not killed:
+            killed.extend(flight._client.who_has([future])[future.key])
+            process = flight._client.run(os.getpid, workers=killed)[killed[0]]
+            os.kill(process, signal.SIGKILL)
+            time.sleep(0.5)
+        return fetch(flight, future)
+
+    monkeypatch.setattr(engine._Flight, "_outcomes", fetch_too_late)
+    with open_engine(Chores("late"), scheduler=a_cluster.address) as made:
+        found = list(made.map(chore(i, data=2.0) for i in range(3)))
+    assert len(killed) == 1
+    assert sorted(outcome.run for outcome in found if outcome.error is None) == [0, 1, 2]
+
+
+OTHER = "import feedsim.sweep.same as same; told = dict(same.told(), feedsim='0.0.0'); same.told = lambda: told"
+OTHERS = {
+    "that says so": OTHER,
+    "that takes other batches": f"{OTHER}; import feedsim.sweep.worker as worker; worker.work_batch = len",
+}
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_a_late_worker_that_cannot_take_part_is_left_out(
+    a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, other: str
+) -> None:
+    monkeypatch.setattr(engine, "ALONE", 2.0)
+    able = a_cluster.worker("one", "--no-nanny")
+    with open_engine(Chores(other), scheduler=a_cluster.address) as made:
+        outcomes = made.map(chore(i, data=0.02) for i in range(100_000))
+        found = [next(outcomes)]
+        for name in ("two", "three"):
+            a_cluster.worker(name, "--no-nanny", "--preload", OTHERS[other])
+        a_cluster.wait_for(3)
+        end = time.monotonic() + 20
+        while len(made.refused) < 2 and time.monotonic() < end:  # type: ignore[attr-defined]
+            found.append(next(outcomes))
+        found += [next(outcomes) for _ in range(100)]
+        assert all(outcome.error is None for outcome in found)
+        assert len({outcome.run for outcome in found}) == len(found)
+        (warning,) = made.warnings
+        assert warning.startswith("worker tcp://")
+        assert "it is left out" in warning
+        assert [record.getMessage() for record in caplog.records if record.name == engine.__name__] == [warning]
+
+        able.kill()
+        with pytest.raises(InputError, match=r"worker tcp://.*: has"):
+            deque(outcomes, maxlen=0)
 
 
 def test_no_workers(a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:

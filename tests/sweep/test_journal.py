@@ -98,6 +98,36 @@ def test_a_file_that_is_no_journal_is_refused_and_kept(tmp_path: Path) -> None:
     assert (tmp_path / NAME).read_text() == "my notes\n"
 
 
+@pytest.mark.parametrize("content", [b"my notes", b'{"format": 2', b'{"format": 1, "study": "T'])
+def test_a_file_without_a_line_feed_that_is_no_journal_is_kept(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / NAME).write_bytes(content)
+    with pytest.raises(InputError, match="not the journal of a study"):
+        Journal(tmp_path, HEAD, RUNS)
+    assert (tmp_path / NAME).read_bytes() == content
+    with Journal(tmp_path, HEAD, RUNS, restart=True) as journal:
+        assert journal.resumed == 0
+
+
+def test_a_run_that_is_written_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interrupt between the two."""
+    write = Journal._write
+
+    def interrupted(self: Journal, content: dict[str, object]) -> None:
+        write(self, content)
+        if content.get("run") == 2:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Journal, "_write", interrupted)
+    with Journal(tmp_path, HEAD, RUNS) as journal:
+        for run in range(3):
+            if run < 2:
+                journal.add(outcome(run))
+            else:
+                with pytest.raises(KeyboardInterrupt):
+                    journal.add(outcome(run))
+        assert journal.done == {0, 1, 2} == {found.run for found in journal.outcomes()}
+
+
 def test_one_process_at_a_time(tmp_path: Path) -> None:
     code = f"""
         from pathlib import Path

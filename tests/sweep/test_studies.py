@@ -78,15 +78,17 @@ def test_friction_never_breaks_its_rule() -> None:
         for axis in "XZ":
             friction = study.base.with_changes(plan.changes(row)).machine.axes[axis].friction
             assert friction.F_S >= friction.F_C
-            bristles = 2 * friction.F_S / friction.sigma_0  # the engaging zone has to be wider
+            bristles = (
+                2 * (1 + abs(friction.asymmetry)) * friction.F_S / friction.sigma_0
+            )  # the engaging zone has to be wider
             assert bristles < friction.W
 
 
-def test_preload_moves_coulomb_and_static_friction_together() -> None:
+def test_manufacturing_and_wear_multiply_on_coulomb_and_static_friction() -> None:
     study = load_study(FRICTION)
     plan = design(study)
     names = [parameter.name for parameter in study.parameters]
-    row = int(np.argmin(plan.values[:, names.index("X.preload")]))
-    preload, static = (plan.values[row, names.index(name)] for name in ("X.preload", "X.F_S"))
+    row = int(np.argmin(plan.values[:, names.index("X.wear")]))
+    new, wear, static = (plan.values[row, names.index(name)] for name in ("X.new", "X.wear", "X.F_S"))
     friction = study.base.with_changes(plan.changes(row)).machine.axes["X"].friction
-    np.testing.assert_allclose([friction.F_C, friction.F_S], [2.4 * preload, 3.1 * preload * static], rtol=1e-15)
+    np.testing.assert_allclose([friction.F_C, friction.F_S], [2.4 * new * wear, 3.1 * new * wear * static], rtol=1e-15)

@@ -21,7 +21,7 @@ import pytest
 
 from feedsim import analysis, cosim, units
 from feedsim.cli import main
-from feedsim.errors import InputError
+from feedsim.errors import InputError, OutputError, SimulationError
 from feedsim.scenario import load, load_study
 from feedsim.sweep import read_table
 from feedsim.sweep.study import Progress, run
@@ -48,12 +48,18 @@ def test_table_and_record(study: Write, fmus: Path, tmp_path: Path, capsys: pyte
     assert (record["done"], record["failed"], record["partial"]) == (16, 0, False)
     assert re.fullmatch("[0-9a-f]{64}", record["parts"]["plant.fmu"])
     assert (out / "report.html").is_file()
+    unchanged = analysis.evaluate(cosim.run(load_study(study()).base.scenario, fmus=fmus))["Z.overshoot"]
+    assert record["nominal"]["Z.overshoot"] == units.convert(unchanged.value, unchanged.unit, found.unit("Z.overshoot"))
+    assert json.loads((out / "summary.json").read_text())["figures"]["Z.overshoot"]["nominal"] == pytest.approx(
+        record["nominal"]["Z.overshoot"], rel=1e-12
+    )
 
     # Again: nothing is run, the same table is written.
     before = (out / "table.csv").read_bytes()
     assert main(["sweep", str(study()), "--out", str(out), "--workers", "0", "--fmus", str(fmus)]) == 0
     assert "16 of them before" in capsys.readouterr().out
     assert (out / "table.csv").read_bytes() == before
+    assert json.loads((out / "study.json").read_text())["nominal"] == record["nominal"]
 
 
 def test_a_row_made_by_itself_is_the_same(
@@ -126,6 +132,35 @@ def test_interrupted_and_continued(study: Write, fmus: Path, tmp_path: Path) -> 
     assert rows(tmp_path / "parts") == rows(tmp_path / "whole")
 
 
+@pytest.mark.parametrize("end", [SystemExit(143), SimulationError("the scheduler is lost")], ids=["SIGTERM", "lost"])
+def test_other_ends_leave_a_table_too(study: Write, fmus: Path, tmp_path: Path, end: BaseException) -> None:
+    def stop(now: Progress) -> None:
+        if now.done == 3:
+            raise end
+
+    with pytest.raises(type(end)) as raised:
+        run(load_study(study()), tmp_path / "out", workers=0, fmus=fmus, progress=stop)
+    assert raised.value is end
+    assert len(read_table(tmp_path / "out")) == 3
+    assert json.loads((tmp_path / "out" / "study.json").read_text())["partial"]
+
+
+def test_a_table_that_cannot_be_written_leaves_the_end_as_it_is(
+    study: Write, fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def stop(now: Progress) -> None:
+        if now.done == 3:
+            raise SystemExit(143)
+
+    def full(*_: object) -> None:
+        raise OutputError("no space left")
+
+    monkeypatch.setattr("feedsim.sweep.study.write_table", full)
+    with pytest.raises(SystemExit):
+        run(load_study(study()), tmp_path / "out", workers=0, fmus=fmus, progress=stop)
+    assert "no table of the runs that are done: no space left" in caplog.text
+
+
 def test_another_state_of_the_study_is_refused(study: Write, fmus: Path, tmp_path: Path) -> None:
     run(load_study(study(), runs=2), tmp_path / "out", workers=0, fmus=fmus)
     for text, overrides, differs in (
@@ -159,4 +194,4 @@ def test_killed_and_continued(study: Write, fmus: Path, tmp_path: Path) -> None:
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     assert rows(tmp_path / "killed") == rows(tmp_path / "whole")
     lines = journal.read_bytes().splitlines()
-    assert sorted(json.loads(line)["run"] for line in lines[1:]) == [*range(64)]
+    assert sorted(json.loads(line)["run"] for line in lines[2:]) == [*range(64)]

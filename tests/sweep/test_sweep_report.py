@@ -11,13 +11,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from feedsim import report
 from feedsim.report.people import scale
-from feedsim.report.sweep.account import Account
+from feedsim.report.sweep.account import Account, quantile_interval
 from feedsim.report.sweep.figure_plots import running_median
 from feedsim.report.sweep.page import page
 from feedsim.report.sweep.plots import pictures_of
+from feedsim.report.sweep.summary import summary
 from feedsim.scenario import Study, load_study
 from feedsim.sweep.design import Design, design
 from feedsim.sweep.table import Table
@@ -92,8 +94,13 @@ def test_statistics_in_units_for_people(tmp_path: Path) -> None:
     values = 1e-6 * np.linspace(2, 12, 101)
     text = html(table_of(study, plan, {"XZ.G": ("m", values)}), study, plan)
     # mean 7, std of even spacing 10/100 sqrt(101 102/12), quantiles at 5, 50 and 95 of 100 steps
-    assert cells(text, "XZ.G") == ["XZ.G", "µm", "7", "2.93", "2.5", "7", "11.5", "2", "12", "101"]
-    assert "mm/min" in text  # the parameter feed
+    found = cells(text, "XZ.G")
+    assert [*found[:4], *found[7:]] == ["XZ.G", "µm", "7.00", "2.93", "2", "12", "101"]
+    # Of 101 values, the number below the quantile is binomial: 1 to 10 at 5 %, 41 to 60 at 50 % (outside it is
+    # less than 2.5 % on a side), so that the 1st and 11th, the 41st and 61st value enclose it.
+    assert np.all(stats.binom.cdf([0, 40], 101, [0.05, 0.5]) < 0.025)
+    assert np.all(stats.binom.sf([10, 60], 101, [0.05, 0.5]) < 0.025)
+    assert found[4:7] == ["2.50 (2.00 to 3.00)", "7.0 (6.0 to 8.0)", "11.50 (11.00 to 12.00)"]
 
 
 def test_summary_is_in_SI_and_holds_the_indices(tmp_path: Path) -> None:
@@ -127,7 +134,8 @@ def test_failed_runs_are_grouped_and_located(tmp_path: Path) -> None:
     assert (len(first.runs), len(second.runs)) == (6, 1)
     assert set(first.runs) == set(fast.tolist())
     low, high = 60e3 * plan.values[fast, 1].min(), 60e3 * plan.values[fast, 1].max()
-    assert f"feed {low:.4g} to {high:.4g} mm/min" in first.where
+    assert first.where == f"feed {low:.4g} to {high:.4g} mm/min (6 of 6 runs there)"
+    assert second.where == ""  # one run is no place
     text = html(table, study, plan)
     assert "axis &lt;Z&gt; reaches" in text
     assert "<Z>" not in text
@@ -238,3 +246,62 @@ def test_units_for_people(unit: str, largest: float, shown: str) -> None:
     found = scale(unit, np.array([np.nan, -largest, 0.0]))
     assert found.unit == shown
     assert found.factor == pytest.approx(units.convert(1.0, unit, shown), rel=1e-12)
+
+
+def test_the_laws_numbers_and_the_nominal_value_are_told(tmp_path: Path) -> None:
+    parameters = """
+  a: {key: machine.axes.X.friction.F_C, factor: true, distribution: normal, mean: 1, deviation: 0.05, from: 0.8}
+  b: {key: motions.0.feed, distribution: triangular, from: 1000 mm/min, mode: 2000 mm/min, to: 5000 mm/min}
+  c: {key: motions.0.radius, distribution: lognormal, mean: 15 mm, deviation: 1 mm}
+  scheme: {key: coupling.scheme, values: [extrapolated, parallel]}
+"""
+    study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 50}", parameters)
+    table = table_of(study, plan, {"XZ.G": ("m", glitch(plan))})
+    account = Account(table, study, plan, {"nominal": {"XZ.G": 9.6e-6}})
+    text = page(account, *pictures_of(account))
+    listed = text[text.index('id="parameters"') :]
+    assert [cells(listed, name)[2] for name in ("a", "b", "c", "scheme")] == [
+        "factor, normal, mean 1, deviation 0.05, from 0.8",
+        "triangular, from 1000, mode 2000, to 5000",
+        "lognormal, mean 15, deviation 1",
+        "one of 2 values",
+    ]
+    assert cells(text, "XZ.G")[2] == "9.6"
+    assert ">Nominal<" in text
+    assert summary(account, [])["figures"]["XZ.G"]["nominal"] == pytest.approx(9.6e-6)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.95])
+def test_intervals_of_quantiles_hold(share: float) -> None:
+    """Of an exponential distribution; the steps between ranks make it a little more often than they say."""
+    random = np.random.default_rng(6)
+    truth = -np.log(1 - share)
+    studies = 600
+    held = 0
+    for _ in range(studies):
+        low, high = quantile_interval(np.sort(random.exponential(size=120)), share)
+        held += low <= truth <= high
+    assert 0.95 - 3 * np.sqrt(0.95 * 0.05 / studies) < held / studies < 0.995
+    assert np.isnan(quantile_interval(np.arange(20.0), 0.05)).all()
+
+
+def test_a_study_for_indices_shows_the_cheap_measures_too(tmp_path: Path) -> None:
+    study, plan = study_of(tmp_path, "{method: sensitivity, runs: 64}", SAMPLED)
+    text = html(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}), study, plan)
+    row = cells(text[text.index("What moves the figures") :], "F_C")
+    assert row[-2:] == ["1.00", "1.00"]  # rank correlation and regression of a figure that is F_C
+    assert "the regression explains 100 % of the scatter (R²)" in text
+
+
+def test_a_picture_says_by_itself_what_it_shows(tmp_path: Path) -> None:
+    """Title and caption stand above the PNG, and the drawing in the page is without them."""
+    study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 30}", SAMPLED)
+    account = Account(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}), study, plan)
+    whole, single = pictures_of(account)
+    for picture in [*whole, *single]:
+        width, height = (int.from_bytes(picture.png[at : at + 4], "big") for at in (16, 20))
+        box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', picture.svg)
+        assert box
+        inches = float(box[1]) / 72, float(box[2]) / 72
+        assert width == pytest.approx(160 * inches[0], abs=2)
+        assert height >= 160 * (inches[1] + 0.4)  # a line of title and one of caption

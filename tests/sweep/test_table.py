@@ -59,6 +59,13 @@ def test_columns(planned: Design) -> None:
         found["Z.B"]
 
 
+def test_an_outcome_of_a_run_that_is_not_done_is_in_no_row(planned: Design) -> None:
+    """It must not fall into the last one."""
+    other = Outcome(9, {"Z.b": (99.0, "m")}, None, 9.0, ("nine",))
+    found = table_of(planned, range(4), [*outcomes(4), other], None, {})
+    assert equal(found, table_of(planned, range(4), outcomes(4), None, {}))
+
+
 def test_patterns(planned: Design) -> None:
     assert table(planned, patterns=["*.a"]).figures == ("Z.a",)
     with pytest.raises(InputError, match=r"'Z\.c' is none of the figures"):

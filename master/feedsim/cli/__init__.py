@@ -8,6 +8,7 @@ has codes of its own: 0 same, 1 different, 2 unusable for whatever reason.
 from __future__ import annotations
 
 import argparse
+import gc
 import logging
 import os
 import signal
@@ -174,4 +175,7 @@ def _directory(text: str) -> Path:
 
 def entry() -> None:
     """Entry point of the console script."""
+    # Most of what a command makes stays until it ends, so that looking for garbage finds little: with the usual 700
+    # some 0.08 s of a run's 1.9 s. Left alone where main() is called: by a process that is not this program's own.
+    gc.set_threshold(20_000, 20, 20)
     sys.exit(main())

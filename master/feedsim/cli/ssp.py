@@ -49,9 +49,9 @@ def write(options: Namespace) -> None:
     """feedsim ssp."""
     from feedsim import scenario, ssp
 
-    if not ssp.is_ssp(options.out):
+    if not scenario.is_ssp(options.out):
         raise InputError(f"--out {options.out}: an SSP file ends in .ssp; simulators tell it by that")
-    if ssp.is_ssp(options.scenario):
+    if scenario.is_ssp(options.scenario):
         raise InputError(f"{options.scenario}: is an SSP file already; a scenario is expected")
     if not options.out.absolute().parent.is_dir():
         raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
@@ -72,9 +72,9 @@ def subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | None
 
     Scenario, program, folder of archives, and what makes a run's warnings all that is to be told.
     """
-    from feedsim import nc, scenario, ssp
+    from feedsim import nc, scenario
 
-    if not ssp.is_ssp(options.scenario):
+    if not scenario.is_ssp(options.scenario):
         if scenario.is_study(options.scenario):
             raise InputError(f"{options.scenario}: is a study of many runs: feedsim sweep {options.scenario}")
         loaded = scenario.load(options.scenario, options.overrides)
@@ -82,5 +82,7 @@ def subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | None
         return
     if options.fmus is not None:
         raise InputError(f"--fmus {options.fmus}: {options.scenario} has its own archives; leave the option out")
+    from feedsim import ssp  # not for runs of scenario files
+
     with ssp.opened(options.scenario, options.overrides) as found:
         yield found.scenario, found.program, found.fmus, found.told

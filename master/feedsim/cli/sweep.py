@@ -77,7 +77,7 @@ def sweep(options: Namespace) -> int:
     from feedsim import report
     from feedsim.scenario import load_study
     from feedsim.sweep import design
-    from feedsim.sweep.study import run
+    from feedsim.sweep.study import AllFailed, run
 
     study = load_study(options.study, options.overrides, runs=options.runs)
     for warning in study.warnings:
@@ -109,7 +109,12 @@ def sweep(options: Namespace) -> int:
                 restart=options.restart,
                 format=options.format,
                 command=sys.argv,
+                say=None if options.quiet else lambda text: print(f"feedsim: {text}", file=sys.stderr),
+                discard=lambda: report.discard_sweep(directory),
             )
+    except AllFailed as error:
+        report.write_sweep(error.table, study, planned, directory)  # which groups failures by what they have in common
+        raise
     except KeyboardInterrupt:
         done = f"{last[0].done} of {last[0].total} runs are done and kept in" if last else "nothing is lost of"
         print(f"feedsim: interrupted; {done} {directory}; the same command continues", file=sys.stderr)
@@ -159,9 +164,9 @@ def _command(study: Study, planned: Design, row: int, fmus: Path | None) -> str:
 
 
 def _dry_run(study: Study, planned: Design, options: Namespace) -> int:
-    """What the study is, and how long it would take by the duration of one run."""
-    from feedsim import analysis, cosim, nc
+    """What the study is, and how long it would take by the durations of some runs."""
     from feedsim.sweep.table import chosen
+    from feedsim.sweep.trial import trial
 
     print(f"{study.name}: {planned.runs} runs ({study.sampling.method}) of {study.scenario}")
     for i, parameter in enumerate(planned.parameters):
@@ -172,32 +177,38 @@ def _dry_run(study: Study, planned: Design, options: Namespace) -> int:
             told = f"{column.min():.6g} to {column.max():.6g} {parameter.unit}".removesuffix(" 1")
         times = "factor " if parameter.factor else ""
         print(f"  {parameter.name}: {times}{told} ({', '.join(parameter.keys)})")
-    middle = planned.runs // 2
-    subject = study.base.with_changes(planned.changes(middle))
-    program = nc.plan(subject)
-    analysis.check(subject, program)
-    seconds = float("inf")
-    for _ in range(2):  # the first one opens the archives
-        begun = perf_counter()
-        figures = analysis.evaluate(cosim.run(subject, program=program, fmus=options.fmus))
-        seconds = min(seconds, perf_counter() - begun)
-    print(f"  figures: {', '.join(chosen([*figures], study.figures))}")
-    print(f"  run {middle} took {seconds:.3g} s; all together about {_duration(seconds * planned.runs)} on one core")
+    found = trial(study, planned, options.fmus)
+    for run, why in found.failed.items():
+        print(f"feedsim: warning: run {run} fails: {why}", file=sys.stderr)
+    names = ", ".join(chosen(found.figures, study.figures))
+    print(f"  figures: {names}")
+    if found.failed:
+        print(f"  {len(found.failed)} of the {found.tried} runs tried fail")
+    least, most = found.seconds
+    which = f"run{'s'[: len(found.runs) != 1]} {', '.join(map(str, found.runs))}"
+    print(
+        f"  {which} took {_range(least, most, '{:.2g} s'.format)}; all together about "
+        f"{_range(least * planned.runs, most * planned.runs, _duration)} on one core"
+    )
     return 0
 
 
+def _range(least: float, most: float, shown: Callable[[float], str]) -> str:
+    low, high = shown(least), shown(most)
+    return low if low == high else f"{low} to {high}"
+
+
 def validate(options: Namespace) -> None:
-    """feedsim validate of a study: it, its scenario, and the run in the middle, without a step."""
-    from feedsim import analysis, cosim, nc
+    """feedsim validate of a study: it, its scenario, and a run from the middle, without a step."""
     from feedsim.scenario import load_study
     from feedsim.sweep import design
+    from feedsim.sweep.trial import check
 
     study = load_study(options.scenario, options.overrides)
     planned = design(study)
-    subject = study.base.with_changes(planned.changes(planned.runs // 2))
-    program = nc.plan(subject)
-    analysis.check(subject, program)
-    for warning in (*study.warnings, *cosim.check(subject, program, fmus=options.fmus)):
+    run, warnings, failed = check(study, planned, options.fmus)
+    told = [f"run {other} is refused, run {run} is not: {why}" for other, why in failed.items()]
+    for warning in (*study.warnings, *told, *warnings):
         print(f"feedsim: warning: {warning}", file=sys.stderr)
     print(f"{options.scenario}: valid; {planned.runs} runs of {study.scenario}")
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from feedsim.report.identify.summary import terminal_warnings as identification_warnings
     from feedsim.report.identify.write import check_identification_writable, write_identification
     from feedsim.report.machine.write import check_machine_writable, write_machine
-    from feedsim.report.sweep.write import check_sweep_writable, write_sweep
+    from feedsim.report.sweep.write import check_sweep_writable, discard_sweep, write_sweep
 
 __all__ = [
     "Account",
@@ -38,6 +38,7 @@ __all__ = [
     "check_writable",
     "compensation_summary_line",
     "constant_load_hint",
+    "discard_sweep",
     "frf_summary_line",
     "growing",
     "identification_headline",
@@ -67,6 +68,7 @@ _HOMES = {
     "check_sweep_writable": ("sweep.write", "check_sweep_writable"),
     "compensation_summary_line": ("compensate.summary", "summary_line"),
     "constant_load_hint": ("identify.friction", "constant_load_hint"),
+    "discard_sweep": ("sweep.write", "discard_sweep"),
     "frf_summary_line": ("frf.summary", "summary_line"),
     "identification_headline": ("identify.summary", "headline"),
     "identification_table": ("identify.summary", "table_lines"),

@@ -19,7 +19,8 @@ PARTIAL = "result.partial.csv"
 class Partial:
     """result.partial.csv in a directory: called with the rows of a run, a stretch at a time (``cosim.run(sink=...)``).
 
-    A context: behind it the file is there if the block failed, unless there was no row, and gone if it ended well.
+    A context: behind it the file is there if the block failed, unless there was no row, and gone if it ended well. That
+    of another run is replaced with the first row, no sooner: a run that never begins takes nothing away.
 
     rows, time: what it holds so far, up to time [s].
     """
@@ -42,7 +43,8 @@ class Partial:
         try:
             if self._file is None:
                 self._directory.mkdir(parents=True, exist_ok=True)
-                self._file = self.path.open("wb")
+                self.path.unlink(missing_ok=True)  # of another run
+                self._file = self.path.open("xb")
                 self._file.write(heading(part))
             self._file.write(lines_of([part.time, *part.columns.values()]))
             self._file.flush()
@@ -74,10 +76,6 @@ class Partial:
         self._file = None
 
     def __enter__(self) -> Self:
-        try:
-            self.path.unlink(missing_ok=True)  # of another run
-        except OSError as error:
-            raise self._unusable(error) from error
         return self
 
     def __exit__(
@@ -86,7 +84,7 @@ class Partial:
         with contextlib.suppress(OSError):
             if self._file is not None:
                 self._file.close()
-            if kind is None:
+            if kind is None and self.rows:
                 self.path.unlink(missing_ok=True)
 
     def _unusable(self, error: OSError) -> OutputError:

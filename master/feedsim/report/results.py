@@ -6,7 +6,7 @@ import contextlib
 import json
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from feedsim.errors import OutputError
@@ -50,10 +50,13 @@ def write_results(
     files: Sequence[str],
     pictures: Sequence[Picture],
     fill: Callable[[Path, Sequence[str]], None],
+    grown: Mapping[str, Path] | None = None,
 ) -> tuple[Path, ...]:
     """Write the figures and whatever ``fill`` writes; returns the paths.
 
     fill: called with an empty directory, in which it makes ``files``, and with the names of all files and figures.
+    grown: those of ``files`` that are there already, complete behind ``fill``, and where, on the same disk; they are
+    moved from there, and back if moving fails.
     Everything is made in a temporary directory beside the target and moved when complete; files of an earlier result,
     of whatever kind, are replaced, those that this one has not are removed, and both are put back if moving fails. Only
     friction.yaml of an identification stays: scenarios and machine files may name it. Raises OutputError.
@@ -70,8 +73,24 @@ def write_results(
             (fresh / FIGURES / f"{picture.stem}.png").write_bytes(picture.png)
         names = [*(f"{FIGURES}/{picture.stem}.png" for picture in pictures), *files]
         fill(fresh, names)
-        _move(fresh, directory, names, _stale(directory, names), Path(scratch) / "kept")
+        sources = {name: fresh / name for name in names} | dict(grown or {})
+        _move(sources, directory, _stale(directory, names), Path(scratch) / "kept")
     return tuple(directory / name for name in names)
+
+
+def discard(directory: Path | str) -> None:
+    """Remove the report of an earlier result in ``directory``: report.html, summary.json, and what that lists of ours.
+
+    What the summary of a result does not list stays. Raises OutputError.
+    """
+    directory = Path(directory)
+    with _as_output_error(directory):
+        if (listed := _listed(directory)) is None:
+            return
+        for name in (*_stale(directory, ()), *(name for name in (REPORT, SUMMARY) if name in listed)):
+            (directory / name).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # not there, or not empty
+            (directory / FIGURES).rmdir()
 
 
 def write_text(file: Path, text: str) -> None:
@@ -93,37 +112,46 @@ def _same(one: Path, other: Path) -> bool:
 
 def _stale(directory: Path, names: Sequence[str]) -> list[str]:
     """Figures and curves that the summary of an earlier run in ``directory`` lists and this run does not write."""
+    return [
+        name
+        for name in _listed(directory) or ()
+        if _OWN_FILE.fullmatch(name) and name not in names and (directory / name).is_file()
+    ]
+
+
+def _listed(directory: Path) -> list[str] | None:
+    """What the summary of an earlier run in ``directory`` lists."""
     try:
         listed = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))["files"]
-        return [
-            name for name in listed if _OWN_FILE.fullmatch(name) and name not in names and (directory / name).is_file()
-        ]
+        return [name for name in listed if isinstance(name, str)]
     except (OSError, ValueError, KeyError, TypeError):
-        return []  # no earlier run, or a summary of something else: nothing of it is ours to remove
+        return None  # no earlier run, or a summary of something else: nothing of it is ours to remove
 
 
-def _move(fresh: Path, directory: Path, names: Sequence[str], stale: Sequence[str], kept: Path) -> None:
-    """Move ``names`` from ``fresh`` into ``directory`` and ``stale`` files away; on failure everything is put back."""
+def _move(sources: Mapping[str, Path], directory: Path, stale: Sequence[str], kept: Path) -> None:
+    """Move files into ``directory``, name -> from where, and ``stale`` ones away; on failure all are put back."""
     folders = [path for path in (directory / FIGURES, directory, *directory.absolute().parents) if not path.exists()]
     (directory / FIGURES).mkdir(parents=True, exist_ok=True)
     (kept / FIGURES).mkdir(parents=True)
-    done: list[str] = []
+    moves: list[tuple[Path, Path]] = []
+
+    def move(path: Path, to: Path) -> None:
+        moves.append((path, to))
+        path.replace(to)
+
     try:
-        for name in (*names, *stale):
-            done.append(name)
+        for name in (*sources, *stale):
             if (directory / name).exists():
-                (directory / name).replace(kept / name)
-            if name in names:
-                (fresh / name).replace(directory / name)
+                move(directory / name, kept / name)
+            if name in sources:
+                move(sources[name], directory / name)
         with contextlib.suppress(OSError):  # not empty, as a rule
             (directory / FIGURES).rmdir()
     except BaseException:
-        for name in done:
+        for path, to in reversed(moves):
             with contextlib.suppress(OSError):
-                if (kept / name).exists():
-                    (kept / name).replace(directory / name)
-                elif name in names:
-                    (directory / name).unlink(missing_ok=True)
+                if not path.exists():  # else it has not been moved
+                    to.replace(path)
         for path in folders:
             with contextlib.suppress(OSError):
                 path.rmdir()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import re
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
+    from matplotlib.text import Text
 
 Array = NDArray[np.float64]
 
@@ -126,14 +128,22 @@ def remarked(text: str) -> Iterator[None]:
         _REMARK.reset(token)
 
 
-def finish(figure: Drawing, stem: str, title: str, caption: str) -> Picture:
-    """Render ``figure``; call inside its ``drawing``. The result depends on nothing but what was drawn."""
+def finish(figure: Drawing, stem: str, title: str, caption: str, *, worded: bool = False) -> Picture:
+    """Render ``figure``; call inside its ``drawing``. The result depends on nothing but what was drawn.
+
+    worded: title and caption stand above the PNG, which travels alone; the page has them beside the SVG.
+    """
+    head, words_above = _head(figure, title, caption) if worded else (0.0, [])
     if remark := _REMARK.get():
         words = figure.text(0.995, 0.995, remark, fontsize=6.5, color=MUTED, ha="right", va="top")
         words.set_in_layout(False)
-        room = 0.13 * (1 + remark.count("\n")) / figure.get_figheight()  # inches to a share of the height
+        words.set_y(0.995 - head / figure.get_figheight())
+    room = head + (0.13 * (1 + remark.count("\n")) if remark else 0.0)
+    if room:
         layout: Any = figure.get_layout_engine()
-        layout.set(rect=(0, 0, 1, 1 - room))
+        layout.set(rect=(0, 0, 1, 1 - room / figure.get_figheight()))  # inches to a share of the height
+    from matplotlib.transforms import Bbox
+
     png, svg = io.BytesIO(), io.StringIO()
     with catch_warnings():
         # Names in scripts that the font lacks; the page around the picture has them.
@@ -141,8 +151,32 @@ def finish(figure: Drawing, stem: str, title: str, caption: str) -> Picture:
         _lay_out(figure)
         figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
         figure.patch.set_visible(False)
-        figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+        for text in words_above:
+            text.set_visible(False)
+        below = Bbox.from_extents(0, 0, figure.get_figwidth(), figure.get_figheight() - head) if head else None
+        nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
+        figure.savefig(svg, format="svg", metadata=nothing, bbox_inches=below)
     return Picture(stem, title, caption, png.getvalue(), _inline(svg.getvalue(), stem, title))
+
+
+def _head(figure: Drawing, title: str, caption: str) -> tuple[float, list[Text]]:
+    """Make room for title and caption above a figure and write them there: room [inches], and texts."""
+    texts: list[Text] = []
+    lines = textwrap.wrap(caption, int(15.5 * figure.get_figwidth()))
+    head = 0.3 + 0.135 * len(lines)
+    figure.set_figheight(figure.get_figheight() + head)
+    height = figure.get_figheight()
+    for text, top, size, weight, colour in (
+        (title, 0.07, 11.0, "bold", INK),
+        ("\n".join(lines), 0.28, 7.5, "normal", MUTED),
+    ):
+        written = figure.text(
+            0.1 / figure.get_figwidth(), 1 - top / height, text.replace("$", r"\$"),
+            fontsize=size, fontweight=weight, color=colour, va="top", linespacing=1.2,
+        )  # fmt: skip
+        written.set_in_layout(False)
+        texts.append(written)
+    return head, texts
 
 
 def _lay_out(figure: Drawing) -> None:

@@ -40,8 +40,11 @@ def write(
     """Write result.csv, summary.json, report.html, figures/*.png and log.csv, if there is one; returns their paths.
 
     figures: as from ``analysis.evaluate``. recorded: the run's rows where they have been written already, in the same
-    directory; the file becomes result.csv. Files of an earlier run are replaced. Raises OutputError.
+    directory; the file becomes result.csv, or stays as it is where the results cannot be written. Files of an earlier
+    run are replaced. Raises OutputError.
     """
+    if recorded is not None and not recorded.left:
+        recorded = None
     pictures = draw(run, figures)
 
     def fill(fresh: Path, names: Sequence[str]) -> None:
@@ -51,12 +54,11 @@ def write(
             write_csv(fresh / LOG, run.log)
         write_text(fresh / REPORT, page(run, figures, pictures))
         write_text(fresh / SUMMARY, to_json(summary(run, figures, names)))
-        if recorded is not None:  # the last: what fails before leaves the rows where they are
+        if recorded is not None:
             recorded.finished()
-            recorded.path.replace(fresh / RESULT)
 
     files = FILES if run.log is None else (RESULT, LOG, REPORT, SUMMARY)
-    return write_results(directory, files, pictures, fill)
+    return write_results(directory, files, pictures, fill, {} if recorded is None else {RESULT: recorded.path})
 
 
 def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:

@@ -17,7 +17,7 @@ from typing import Any
 from feedsim.scenario import shape
 from feedsim.scenario.load import Draft, Setting, drafted, fetch
 from feedsim.scenario.model import Scenario
-from feedsim.scenario.source import Mark, Place, Source, at
+from feedsim.scenario.source import Mark, Place, Source, at, places
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,8 @@ def _relocate(source: Source, place: Place, moved: Mapping[str, str]) -> None:
 
 def _source(change: Change) -> Source:
     # What files it names are in it already, or relative to the working folder.
-    return Source(change.data, {(): Mark(f"--set {change.option}", Path())})
+    mark = Mark(f"--set {change.option}", Path())
+    return Source(change.data, {place: mark for place in places(change.data)})
 
 
 def _packed(source: Source) -> dict[str, Any]:

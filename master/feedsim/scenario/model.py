@@ -14,7 +14,10 @@ from feedsim.scenario.logging import Logging
 from feedsim.scenario.machine import Machine
 from feedsim.scenario.motion import Motion
 
-Scheme = Literal["extrapolated", "iterated", "gauss_seidel", "jacobi", "jacobi_extrapolated", "parallel"]
+Scheme = Literal[
+    "extrapolated", "iterated", "gauss_seidel", "gauss_seidel_friction_first", "jacobi", "jacobi_extrapolated",
+    "parallel",
+]  # fmt: skip
 
 
 class Coupling(Model):

@@ -24,8 +24,9 @@ def option(text: str, folder: Path) -> tuple[str, Source]:
 def apply(source: Source, model: Any, key: str, value: Source) -> Iterator[Place]:
     """Set `value` at the dotted `key` in the tree; yields the places that were set.
 
-    A number counts from 0 in a list; * stands for every key or entry there is. Groups that the model knows are made
-    where they are missing. InputError: a key that does not belong there, an index out of range.
+    A number counts from 0 in a list; * stands for every key or entry there is, in a list of several kinds for every one
+    that knows the next key. Groups that the model knows are made where they are missing. InputError: a key that does
+    not belong there, an index out of range.
     """
     for place in list(places(source, model, key, value.marks[()])):
         source.put(place, Source(copied(value.data), value.marks))
@@ -45,7 +46,8 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
     data = at(source.data, place)
     here = ".".join(str(item) for item in place) or f"the {model.__name__.lower()}"
     if part == "*" and isinstance(data, (dict, list)):
-        for name in list(data) if isinstance(data, dict) else range(len(data)):
+        names = list(data) if isinstance(data, dict) else _having(source, model, place, rest, f"{mark.where}: ", here)
+        for name in names:
             yield from _places(source, model, (*place, name), rest, key, mark)
         return
     if isinstance(data, list):
@@ -69,3 +71,19 @@ def _places(source: Source, model: Any, place: Place, parts: list[str], key: str
         data[part] = {}
         source.marks[(*place, part)] = mark
     yield from _places(source, model, (*place, part), rest, key, mark)
+
+
+def _having(source: Source, model: Any, place: Place, rest: list[str], where: str, here: str) -> list[int]:
+    """Entries of the list at `place` that know the next key: of several kinds, * means those that have it.
+
+    InputError: none does.
+    """
+    entries = range(len(at(source.data, place)))
+    if not rest or rest[0] == "*":
+        return [*entries]
+    known = [shape.keys(shape.expected(model, source.data, (*place, i))) for i in entries]
+    found = [i for i in entries if known[i] is None or rest[0] in known[i]]  # type: ignore[operator]
+    if entries and not found:
+        words = [*dict.fromkeys(word for keys in known for word in keys or ())]
+        raise InputError(f"{where}unknown key {rest[0]!r} in all entries of {here}{did_you_mean(rest[0], words)}")
+    return found

@@ -8,6 +8,7 @@ dates are words. Stricter than YAML: a duplicate key is an error, a file is one 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,9 @@ Place = tuple[str | int, ...]
 
 LARGEST = 100_000  # values in a file, aliases expanded
 _FAST_DEPTH = 2000
+# Where libyaml has a mind of its own: tabs, tags, byte order marks within a text, directives, "#" at the head of a
+# block of text, "?" within braces (which is looked for outside of lines that are comments).
+_READ_DIFFERENTLY = re.compile(r"[\t!\ufeff]|^%|[|>][-+0-9]*#|^(?! *#).*[?]", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,14 @@ def at(data: Any, place: Place) -> Any:
     for key in place:
         data = data[key]
     return data
+
+
+def places(data: Any, place: Place = ()) -> Iterator[Place]:
+    """`place`, where `data` is, and the places of all that is inside."""
+    yield place
+    if isinstance(data, dict | list):
+        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+            yield from places(value, (*place, key))
 
 
 def copied(data: Any) -> Any:
@@ -117,13 +129,18 @@ def parse(text: str, name: str, folder: Path, *, lines: bool = True) -> Source:
 
 
 def _composed(text: str) -> yaml.Node | None:
-    """The document's root, by libyaml where there is one, ten times faster; PyYAML's own parser words the faults."""
+    """The document's root, by libyaml where there is one, ten times faster.
+
+    PyYAML's own parser words the faults and has the say where the two differ: a file means the same on every machine.
+    """
     # libyaml's binding overruns the stack on text that is nested some ten thousand times. Every level takes a bracket
     # or a column, of which a list and the group that it stands in may share one.
     deepest = text.count("[") + text.count("{") + 2 * max(map(len, text.splitlines()), default=0)
-    if _FastLoader is not None and deepest < _FAST_DEPTH:
+    if _FastLoader is not None and deepest < _FAST_DEPTH and _READ_DIFFERENTLY.search(text) is None:
         with suppress(yaml.YAMLError):
-            return _root(_FastLoader, text)
+            node = _root(_FastLoader, text)
+            if node is None or node.value:  # where nothing stands, the two differ about where
+                return node
     return _root(_Loader, text)
 
 
@@ -140,6 +157,12 @@ class _Loader(yaml.SafeLoader):
     """Composes nodes and resolves plain scalars by the YAML 1.2 core schema."""
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012  (PyYAML's own name; emptied of the 1.1 rules)
+
+    def scan_tag(self) -> Any:
+        """As usual, but a `!` alone, which the standard takes for "text" and PyYAML for nothing, is refused."""
+        if self.peek(1) in "\0 \t\r\n\x85\u2028\u2029":
+            raise yaml.scanner.ScannerError(None, None, "'!' alone says nothing; text needs quotes", self.get_mark())
+        return super().scan_tag()
 
 
 _FastLoader: Any = None

@@ -1,6 +1,6 @@
 """The system of Fig. 2 as one SSP file for other people's simulators, and such a file run by feedsim."""
 
 from feedsim.ssp.export import Exported, export
-from feedsim.ssp.opened import Opened, is_ssp, opened
+from feedsim.ssp.opened import Opened, opened
 
-__all__ = ["Exported", "Opened", "export", "is_ssp", "opened"]
+__all__ = ["Exported", "Opened", "export", "opened"]

@@ -31,7 +31,6 @@ from feedsim.ssp.values import values
 from feedsim.structure.build import SAME_POSITION
 from feedsim.structure.pack import MODES_IN_ARCHIVE
 
-SUFFIX = ".ssp"
 WHOLE = 1e-6  # of a position cycle: a stop time this little behind an instant of the grid lies on it
 
 
@@ -55,11 +54,6 @@ class Opened:
     def told(self, warnings: Iterable[str]) -> tuple[str, ...]:
         """The file's own warnings and those of a run of it, which then speak of the file as well."""
         return (*self.warnings, *(_named(warning, self.path, self.fmus) for warning in warnings))
-
-
-def is_ssp(path: Path) -> bool:
-    """Whether a file is meant as an SSP, by its name."""
-    return path.suffix.lower() == SUFFIX
 
 
 @contextmanager

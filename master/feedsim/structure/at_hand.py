@@ -9,14 +9,23 @@ from feedsim.scenario import Structure, load_structure
 from feedsim.structure.geometry import Assembler
 from feedsim.structure.poses import movable
 
+# What tells a file from a later one of the same name.
+State = tuple[int, int, int]
+
+
+def state_of(file: Path) -> State:
+    """Time of the last change [ns], length [byte] and number of a file. Raises OSError."""
+    found = file.stat()
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
 
 @lru_cache(maxsize=8)
-def structure_of(file: Path, stamp: int) -> Structure:
-    """As load_structure; `stamp` is the file's time, so that a changed file is read anew."""
+def structure_of(file: Path, state: State) -> Structure:
+    """As load_structure; `state` is that of the file, so that a changed one is read anew."""
     return load_structure(file)
 
 
 @lru_cache(maxsize=8)
-def assembler_of(file: Path, stamp: int) -> Assembler:
+def assembler_of(file: Path, state: State) -> Assembler:
     """As movable, of :func:`structure_of`."""
-    return movable(structure_of(file, stamp))
+    return movable(structure_of(file, state))

@@ -100,6 +100,12 @@ class Batches:
         return batch
 
     @property
+    def waiting(self) -> bool:
+        """Whether there are tasks that are to be handed over."""
+        self._read(1)
+        return bool(self._fresh or self._suspects or self._loners)
+
+    @property
     def flying(self) -> int:
         """Batches handed over and not back yet."""
         return len(self._flying)
@@ -109,6 +115,12 @@ class Batches:
         self._flying.remove(batch)
         self._count(outcomes)
         self._fresh.extendleft(reversed(batch.tasks[len(outcomes) :]))
+
+    def refused(self, batch: Batch) -> None:
+        """No run of `batch` was begun: it is handed over anew, as what it was."""
+        self._flying.remove(batch)
+        waiting = self._loners if batch.alone else self._suspects if batch.suspect else self._fresh
+        waiting.extendleft(reversed(batch.tasks))
 
     def died(self, batch: Batch, deaths: int, how: str, outcomes: Sequence[Outcome] = ()) -> list[Outcome]:
         """The worker of `batch` has died `deaths` times over it, or failed as `how` says, after `outcomes`.

@@ -5,9 +5,10 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
+import re
 import signal
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
@@ -21,6 +22,7 @@ _ONE_THREAD = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS",
 _QUIET = {
     "distributed.worker.profile.enabled": False,  # samples the stack 100 times a second
     "distributed.admin.tick.limit": "1 h",  # does not tell that a run has held the interpreter
+    "distributed.admin.low-level-log-length": 100,  # what Dask notes of each batch, some 10 kB, would reach 1000
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
     # A run that eats the memory costs its worker, not the study; none is held back for ever.
@@ -81,12 +83,15 @@ def local(workers: int) -> Iterator[Any]:
 
 
 @contextmanager
-def remote(address: str) -> Iterator[Any]:
+def remote(address: str, say: Callable[[str], None] | None = None) -> Iterator[Any]:
     """A client of the scheduler at `address`, which has one worker at the least.
 
+    say: told when workers have to be waited for.
+
     Raises:
-        InputError: no scheduler answers there, or it has no workers.
+        InputError: no address, no scheduler answers there, or it has no workers.
     """
+    _check_address(address)
     import dask
     import distributed
 
@@ -104,6 +109,8 @@ def remote(address: str) -> Iterator[Any]:
             ) from None
         stack.callback(client.close, timeout=1)
         try:
+            if say is not None and not client.nthreads():
+                say(f"waiting for workers of the scheduler at {address}, up to {JOIN:g} s")
             client.wait_for_workers(1, timeout=JOIN)
         except TimeoutError:
             raise InputError(
@@ -111,6 +118,13 @@ def remote(address: str) -> Iterator[Any]:
                 "--nthreads 1"
             ) from None
         yield client
+
+
+def _check_address(address: str) -> None:
+    """Dask takes half a minute to find out that there is no port, and then tells of itself."""
+    found = re.fullmatch(r"(?:[a-z][a-z0-9+]*://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]]+):(\d+)/?", address)
+    if found is None or not 0 < int(found[1]) < 1 << 16:
+        raise InputError(f"{address!r} is no address of a scheduler; an address reads tcp://host:8786, with its port")
 
 
 def _end(cluster: Any) -> None:

@@ -7,23 +7,28 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import queue
 import time
 import uuid
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from feedsim.errors import InputError, SimulationError
 from feedsim.sweep import cluster, same
 from feedsim.sweep.batches import AIM, LONGEST, Batch, Batches
-from feedsim.sweep.bundle import Work
+from feedsim.sweep.bundle import Place, Work
 from feedsim.sweep.task import Outcome, Task
 
 LOST = 20.0  # s without the scheduler, after which a study is given up
-ALONE = 60.0  # s without any worker, likewise
+ALONE = 60.0  # s without any worker that can take part, likewise
+FETCH = 5.0  # s for a result to arrive; one that is lost with its worker is made again, and may take any time
 _LOOK = 1.0  # s between two looks at the cluster
+
+_log = logging.getLogger(__name__)
 
 
 class Engine(Protocol):
@@ -32,7 +37,7 @@ class Engine(Protocol):
     Attributes:
         workers: processes that make them; 0: this one.
         where: "in this process", "2 local processes", "tcp://..., 8 workers".
-        warnings: sentences for the user.
+        warnings: sentences for the user; more may come while runs are made.
     """
 
     workers: int
@@ -45,18 +50,21 @@ class Engine(Protocol):
         An interrupt is raised after the outcomes that are there already.
 
         Raises:
-            InputError: a worker cannot take part.
+            InputError: no worker can take part.
             SimulationError: the scheduler or all workers are lost.
         """
 
 
 @contextmanager
-def open_engine(bundle: Work, workers: int | None = None, scheduler: str | None = None) -> Iterator[Engine]:
+def open_engine(
+    bundle: Work, workers: int | None = None, scheduler: str | None = None, say: Callable[[str], None] | None = None
+) -> Iterator[Engine]:
     """An engine for the runs of `bundle`; its workers end with the block.
 
     Args:
         workers: processes on this machine; 0: runs are made in this process; default: one for each core it may use.
         scheduler: address of the Dask scheduler of a cluster, in place of local processes: "tcp://host:8786".
+        say: told in words when it takes longer: no worker is there yet.
 
     Raises:
         InputError: the workers cannot be had, or have another version of feedsim.
@@ -66,13 +74,17 @@ def open_engine(bundle: Work, workers: int | None = None, scheduler: str | None 
     if workers is not None and workers < 0:
         raise InputError(f"workers: {workers} is outside the allowed range: at least 0")
     if workers == 0:
-        yield Here(bundle)
+        here = Here(bundle)
+        try:
+            yield here
+        finally:
+            here.leave()
         return
     if scheduler is None:
         count = workers or _cores()
         opened, where = cluster.local(count), f"{count} local process{'es'[: 2 * (count != 1)]}"
     else:
-        opened, where = cluster.remote(scheduler), f"cluster at {scheduler}"
+        opened, where = cluster.remote(scheduler, say), f"cluster at {scheduler}"
     with opened as client:
         engine = Crowd(client, bundle, where, own=scheduler is None)
         try:
@@ -90,17 +102,31 @@ class Here:
 
     def __init__(self, bundle: Work) -> None:
         self._bundle = bundle
+        self._place: Place | None = None
 
     def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
-        place = self._bundle.open()
-        try:
-            for task in tasks:
-                try:
-                    yield place.run(task)
-                except MemoryError:
-                    yield Outcome(task.run, None, "out of memory", 0.0)
-        finally:
-            place.close()
+        if self._place is None:  # kept, as workers keep theirs: what a first run finds out serves all
+            self._place = self._bundle.open()
+        for task in tasks:
+            try:
+                yield self._place.run(task)
+            except MemoryError:
+                yield Outcome(task.run, None, "out of memory", 0.0)
+
+    def leave(self) -> None:
+        """Leave nothing behind."""
+        if self._place is not None:
+            self._place.close()
+            self._place = None
+
+
+@dataclass(frozen=True)
+class _Sent:
+    """A batch under way; `only`: the workers that it may go to, None: any."""
+
+    future: Any
+    batch: Batch
+    only: frozenset[str] | None
 
 
 class Crowd:
@@ -110,8 +136,7 @@ class Crowd:
         from feedsim.sweep import worker
 
         self._client = client
-        self._digest = bundle.digest
-        self._own = own  # a cluster of our own goes as a whole; another's has to be tidied
+        self.own = own  # a cluster of our own goes as a whole; another's has to be tidied
         self.where = where
         answers = client.run(eval, same.QUESTION, on_error="return")
         faults = [found for address, answer in answers.items() if (found := same.fault(address, answer, same.told()))]
@@ -126,10 +151,11 @@ class Crowd:
         )  # fmt: skip
         self._carrier = worker.Carrier(bundle, same.told())
         client.register_plugin(self._carrier)
-        client.run(worker.prepare, self._digest)
+        client.run(worker.prepare, self._carrier.key)
+        self.refused: dict[str, str] = {}
 
     def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
-        flight = _Flight(self._client, self._digest, Batches(tasks), self.where)
+        flight = _Flight(self, self._client, self._carrier.key, Batches(tasks))
         try:
             while (outcomes := flight.next()) is not None:
                 yield from outcomes
@@ -139,9 +165,17 @@ class Crowd:
         finally:
             flight.cancel()
 
+    def refuse(self, worker: str, why: str) -> None:
+        """`worker`, an address, gets no more batches. The first one that cannot take part is told of, as a warning."""
+        if not self.refused:
+            warning = f"{why}; it is left out, as others will be, and the study goes on without it"
+            _log.warning(warning)
+            self.warnings = (*self.warnings, warning)
+        self.refused[worker] = why
+
     def leave(self) -> None:
         """Take away what was brought to workers that are not ours."""
-        if not self._own and self._client.status == "running":
+        if not self.own and self._client.status == "running":
             with suppress(Exception):  # the scheduler may be gone
                 self._client.unregister_worker_plugin(self._carrier.name)
 
@@ -149,16 +183,17 @@ class Crowd:
 class _Flight:
     """The batches of one study that are with the workers."""
 
-    def __init__(self, client: Any, digest: str, batches: Batches, where: str) -> None:
+    def __init__(self, crowd: Crowd, client: Any, key: str, batches: Batches) -> None:
+        self._crowd = crowd
         self._client = client
-        self._digest = digest
+        self._key = key
         self._batches = batches
-        self._where = where
         self._landed: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._of: dict[str, tuple[Any, Batch]] = {}
+        self._of: dict[str, _Sent] = {}
         self._name = f"feedsim-{uuid.uuid4().hex[:12]}"
         self._count = 0
-        self._workers = 0
+        self._given_up: list[Outcome] = []
+        self._there: frozenset[str] = frozenset()  # addresses of the workers
         self._looked = 0.0
         self._healthy = self._manned = time.monotonic()
 
@@ -166,9 +201,14 @@ class _Flight:
         """Outcomes of a batch that has come back; None when all have."""
         while True:
             self._look()
-            while (batch := self._batches.next(max(1, self._workers))) is not None:
+            if self._given_up:
+                given_up, self._given_up = self._given_up, []
+                return given_up
+            fit = self._fit
+            ready = bool(fit) or not self._crowd.refused  # else wait for a worker that can take part
+            while ready and (batch := self._batches.next(max(1, len(fit)))) is not None:
                 self._submit(batch)
-            if not self._of:
+            if not self._of and (ready or not self._batches.waiting):
                 return None
             with suppress(queue.Empty):
                 return self._outcomes(self._landed.get(timeout=_LOOK))
@@ -176,15 +216,15 @@ class _Flight:
     def landed(self) -> list[Outcome]:
         """Outcomes that have come back and were not fetched yet."""
         found: list[Outcome] = []
-        with suppress(queue.Empty):
-            while True:
+        with suppress(queue.Empty, InputError, SimulationError):  # what has called for them is to be raised
+            for _ in range(self._landed.qsize()):  # one that does not arrive comes again
                 future = self._landed.get_nowait()
                 if future.status == "finished":
                     found += self._outcomes(future)
         return found
 
     def cancel(self) -> None:
-        futures = [future for future, _ in self._of.values()]
+        futures = [sent.future for sent in self._of.values()]
         self._of.clear()
         if futures and self._client.status == "running":
             with suppress(Exception):
@@ -192,16 +232,22 @@ class _Flight:
         for future in futures:
             future.release()
 
+    @property
+    def _fit(self) -> frozenset[str]:
+        """The workers that can take part, as far as is known."""
+        return self._there - self._crowd.refused.keys()
+
     def _submit(self, batch: Batch) -> None:
         from feedsim.sweep.worker import work_batch
 
         self._count += 1
         key = f"{self._name}-{self._count}"
+        only = self._fit if self._crowd.refused else None
         future = self._client.submit(
-            work_batch, self._digest, batch.tasks, AIM * LONGEST, key=key, pure=False, retries=0,
-            priority=10 if batch.suspect else 0,
+            work_batch, self._key, batch.tasks, AIM * LONGEST, key=key, pure=False, retries=0,
+            priority=10 if batch.suspect else 0, workers=None if only is None else sorted(only),
         )  # fmt: skip
-        self._of[key] = (future, batch)
+        self._of[key] = _Sent(future, batch, only)
         future.add_done_callback(self._landed.put)
 
     def _outcomes(self, future: Any) -> list[Outcome]:
@@ -209,36 +255,60 @@ class _Flight:
 
         if future.key not in self._of:
             return []
-        _, batch = self._of.pop(future.key)
+        sent = self._of.pop(future.key)
+        batch = sent.batch
         try:
-            done = future.result(timeout=LOST)
+            done = future.result(timeout=FETCH)
         except KilledWorker as error:
             self._looked = 0.0  # one worker less, for a while
+            future.release()
             return self._batches.died(batch, error.allowed_failures + 1, "its worker process died")
         except (KeyboardInterrupt, SystemExit):
-            self._of[future.key] = (future, batch)
+            self._of[future.key] = sent
             self._landed.put(future)
             raise
         except Exception as error:
-            if future.status in ("cancelled", "lost") or self._client.status != "running":
+            running = self._client.status == "running"
+            if running and isinstance(error, TimeoutError) and future.status not in ("cancelled", "error"):
+                self._of[future.key] = sent
+                future.add_done_callback(self._landed.put)
+                return []
+            if not running or future.status in ("cancelled", "lost"):
                 raise self._lost() from None
-            raise SimulationError(
-                f"{self._where}: a worker cannot make runs: {type(error).__name__}: {error}; what is done is kept"
-            ) from error
-        finally:
             future.release()
+            self._ask()
+            if not self._crowd.refused.keys().isdisjoint(self._there if sent.only is None else sent.only):
+                self._batches.refused(batch)  # it may have gone to one that cannot take part
+                return []
+            raise SimulationError(
+                f"{self._crowd.where}: a worker cannot make runs: {type(error).__name__}: {error}; what is done is kept"
+            ) from error
+        future.release()
         if done.refused is not None:
-            raise InputError(done.refused)
+            self._crowd.refuse(done.worker, done.refused)
+            self._batches.refused(batch)
+            return []
         if done.out_of_memory:
             return [*done.outcomes, *self._batches.died(batch, 1, "its worker ran out of memory", done.outcomes)]
         self._batches.done(batch, done.outcomes)
         return list(done.outcomes)
 
+    def _ask(self) -> None:
+        """Find out which of the workers there are now cannot take part."""
+        with suppress(Exception):  # the scheduler may be gone
+            self._there = frozenset(self._client.nthreads())
+            asked = self._client.run(eval, same.QUESTION, workers=sorted(self._fit), on_error="return")
+            for address, answer in asked.items():
+                known = isinstance(answer, dict | ModuleNotFoundError)  # else the worker has gone meanwhile
+                if known and (fault := same.fault(address, answer, same.told())):
+                    self._crowd.refuse(address, fault)
+
     def _look(self) -> None:
-        """How many workers there are now, and whether the scheduler is.
+        """Which workers there are now, and whether the scheduler is.
 
         Raises:
-            SimulationError: it is lost, or all workers are.
+            InputError: for some time none of the workers has been one that can take part.
+            SimulationError: the scheduler is lost, or all workers are.
         """
         now = time.monotonic()
         if now - self._looked < _LOOK:
@@ -246,21 +316,33 @@ class _Flight:
         self._looked = now
         if self._client.status == "running":
             with suppress(Exception):
-                self._workers = len(self._client.nthreads())
+                self._there = frozenset(self._client.nthreads())
                 self._healthy = time.monotonic()
-        if self._workers:
+                self._take_back()
+        if self._fit:
             self._manned = now
         if self._client.status == "closed" or now - self._healthy > LOST:
             raise self._lost()
-        if now - self._manned > ALONE:
+        if now - self._manned > (0.0 if self._crowd.own and self._there else ALONE):
+            if self._there:
+                faults = [why for address, why in self._crowd.refused.items() if address in self._there]
+                raise InputError.of("no worker is left that can be used; what is done is kept", faults)
             raise SimulationError(
-                f"{self._where}: no worker is left (waited {ALONE:g} s); what is done is kept, and the study can be "
-                "continued"
+                f"{self._crowd.where}: no worker is left (waited {ALONE:g} s); what is done is kept, and the study can "
+                "be continued"
             )
+
+    def _take_back(self) -> None:
+        """Batches meant for workers of which none is left: Dask would wait until one comes back."""
+        for key, sent in [*self._of.items()]:
+            if sent.only is not None and not sent.only & self._there:
+                del self._of[key]
+                self._given_up += self._batches.died(sent.batch, 1, "its worker process died")
+                self._client.cancel([sent.future], force=True)
 
     def _lost(self) -> SimulationError:
         return SimulationError(
-            f"{self._where}: the scheduler is lost; what is done is kept, the study can be continued"
+            f"{self._crowd.where}: the scheduler is lost; what is done is kept, the study can be continued"
         )
 
 

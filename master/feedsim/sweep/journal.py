@@ -1,7 +1,8 @@
 """The journal of a study: a line of JSON for every run that is done, so that a study that was ended can go on.
 
-The first line says what the runs belong to. Lines are only ever added. One that is torn, since the process or the
-machine ended in the middle of it, is dropped when the journal is opened again, and its run is made again.
+The first line says what the runs belong to; where a study with more runs begins with the same ones, another line says
+how many they were, and one is added whenever they become more. Lines are only ever added. One that is torn, since the
+process or the machine ended in the middle of it, is dropped when the journal is opened again; its run is made again.
 """
 
 from __future__ import annotations
@@ -10,17 +11,19 @@ import json
 import math
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 
+from feedsim.cosim.signals import held
 from feedsim.errors import InputError, OutputError
 from feedsim.sweep.task import Outcome
 
 NAME = "runs.jsonl"
 LOCK = "runs.lock"
+_EXTENT = "runs"  # key of the lines that say how many
 FORMAT = 1
 SYNC = 1.0  # seconds after which what was written is on the disk at the latest
 
@@ -35,14 +38,24 @@ class Journal:
         damaged: lines, from 1, that could not be read and count as not written.
     """
 
-    def __init__(self, directory: Path, head: Mapping[str, Any], runs: int, *, restart: bool = False) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        head: Mapping[str, Any],
+        runs: int,
+        *,
+        restart: bool = False,
+        first: Callable[[int], str] | None = None,
+    ) -> None:
         """Open the journal in `directory`, which is made where it is missing.
 
         head: what the runs belong to; `head["parts"]` maps what can differ to its fingerprint. runs: of the study.
         restart: begin anew, whatever is there.
+        first: number of runs -> what tells the first so many of them from others, where the study with fewer runs
+            consists of just those; its journal is then gone on with.
 
         Raises:
-            InputError: the journal is that of another study, or another process is at work on it.
+            InputError: the journal is that of another study, or of more runs, or another process is at work on it.
             OutputError: it cannot be written.
         """
         self.path = directory / NAME
@@ -60,7 +73,7 @@ class Journal:
             self._synced = time.monotonic()
             if restart:
                 self._file.truncate(0)
-            self._begin(head)
+            self._begin(head, first)
         except BaseException as error:
             self._lock.close()
             if isinstance(error, OSError):
@@ -68,28 +81,55 @@ class Journal:
             raise
         self.resumed = len(self.done)
 
-    def _begin(self, head: Mapping[str, Any]) -> None:
+    def _begin(self, head: Mapping[str, Any], first_runs: Callable[[int], str] | None) -> None:
         """Check the journal against `head`, drop what is torn, take in the runs that are done."""
         with self.path.open("rb") as file:
             first = file.readline()
-            if not first.endswith(b"\n"):  # nothing, or a first line that was never finished
+            own = {"format": FORMAT, **head}
+            if not first.endswith(b"\n") and _encoded(own).startswith(first):  # nothing, or never finished
                 self._file.truncate(0)
-                self._write({"format": FORMAT, **head})
+                self._write(own)
+                self._extend(None, first_runs)
                 self.sync()
                 return
-            _same_study(self.path, _line(first), head)
-            damaged, end = [], file.tell()
+            _same_study(self.path, _line(first) if first.endswith(b"\n") else None, head)
+            damaged, end, extent = [], file.tell(), None
             for number, line in enumerate(file, start=2):
                 if not line.endswith(b"\n"):
                     break
                 end += len(line)
-                outcome = _outcome(_line(line), self.runs)
+                content = _line(line)
+                if isinstance(content, dict) and type(content.get(_EXTENT)) is int:
+                    extent = content
+                    continue
+                outcome = _outcome(content, self.runs)
                 if outcome is None:
                     damaged.append(number)
                 elif outcome.run not in self.done:
                     self._count(outcome)
         self.damaged = tuple(damaged)
+        self._check_extent(extent, head, first_runs)
         self._file.truncate(end)
+        self._extend(extent, first_runs)
+
+    def _check_extent(
+        self, extent: Mapping[str, Any] | None, head: Mapping[str, Any], first_runs: Callable[[int], str] | None
+    ) -> None:
+        """InputError where the journal's runs are more than the study's, or are not its first ones."""
+        if extent is None or first_runs is None:
+            return
+        known = extent[_EXTENT]
+        if known > self.runs:
+            raise InputError(
+                f"{self.path}: has the study with {known} runs, the first {self.runs} of which are asked for; take "
+                f"{known} runs or more, or another folder with --out"
+            )
+        if first_runs(known) != extent.get("first"):
+            raise InputError(_other_study(self.path, head, "parameters and sampling"))
+
+    def _extend(self, extent: Mapping[str, Any] | None, first_runs: Callable[[int], str] | None) -> None:
+        if first_runs is not None and (extent is None or extent[_EXTENT] < self.runs):
+            self._write({_EXTENT: self.runs, "first": first_runs(self.runs)})
 
     def add(self, outcome: Outcome) -> bool:
         """Add a run, unless it is there already. OutputError: it cannot be written."""
@@ -98,20 +138,21 @@ class Journal:
         figures = None
         if outcome.figures is not None:
             figures = {name: [_plain(value), unit] for name, (value, unit) in outcome.figures.items()}
-        self._write({
-            "run": outcome.run, "figures": figures, "error": outcome.error, "seconds": outcome.seconds,
-            "warnings": list(outcome.warnings),
-        })  # fmt: skip
-        self._count(outcome)
+        with held():  # a run that is written is counted, too
+            self._write({
+                "run": outcome.run, "figures": figures, "error": outcome.error, "seconds": outcome.seconds,
+                "warnings": list(outcome.warnings),
+            })  # fmt: skip
+            self._count(outcome)
         if time.monotonic() - self._synced >= SYNC:
             self.sync()
         return True
 
     def outcomes(self) -> Iterator[Outcome]:
-        """The runs that are done, each once, in the order of the journal."""
+        """The runs that are `done`, each once, in the order of the journal."""
         seen: set[int] = set()
         for outcome in read(self.path, self.runs):
-            if outcome.run not in seen:
+            if outcome.run in self.done and outcome.run not in seen:
                 seen.add(outcome.run)
                 yield outcome
 
@@ -142,7 +183,7 @@ class Journal:
         self.failed += outcome.figures is None
 
     def _write(self, content: Mapping[str, Any]) -> None:
-        line = memoryview(json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace") + b"\n")
+        line = memoryview(_encoded(content))
         try:
             while line:  # a file that is not buffered may take a part
                 line = line[self._file.write(line) :]
@@ -150,6 +191,10 @@ class Journal:
             raise OutputError(
                 f"{self.path} cannot be written: {error.strerror or error}; what is in it so far is kept"
             ) from error
+
+
+def _encoded(content: Mapping[str, Any]) -> bytes:
+    return json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace") + b"\n"
 
 
 def read(path: Path, runs: int) -> Iterator[Outcome]:
@@ -169,9 +214,13 @@ def _same_study(path: Path, found: Any, head: Mapping[str, Any]) -> None:
         return
     parts, own = found["parts"], head["parts"]
     other = [name for name in own if parts.get(name) != own[name]] or ["study"]
-    raise InputError(
-        f"{path}: its runs belong to another state of the study; what differs: {', '.join(other)} "
-        f"(begun as {found.get('study')!r}); {_ANEW}"
+    raise InputError(_other_study(path, found, ", ".join(other)))
+
+
+def _other_study(path: Path, found: Mapping[str, Any], what: str) -> str:
+    return (
+        f"{path}: its runs belong to another state of the study; what differs: {what} (begun as "
+        f"{found.get('study')!r}); {_ANEW}"
     )
 
 

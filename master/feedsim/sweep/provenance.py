@@ -7,7 +7,7 @@ import json
 import os
 import platform
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -19,10 +19,14 @@ from feedsim.scenario import Study
 from feedsim.sweep.design import Design
 
 UNITS = ("plant", "controller", "friction")
+# Methods of which a study with more runs has those of a smaller one, with the same seed, as its first ones: points of a
+# Sobol sequence, and for indices what is made of them sample by sample.
+PREFIXED = ("sobol", "sensitivity")
 
 
 def parts(study: Study, design: Design, fmus: Path) -> dict[str, str]:
-    """What decides the rows -> SHA-256 of it (of the package: its version). Where the files lie is no part of that.
+    """What decides the rows -> SHA-256 of it (of the package: its version). Where the files lie is no part of that, nor
+    how many runs there are where more of them begin with the same ones.
 
     InputError: a file cannot be read.
     """
@@ -30,7 +34,7 @@ def parts(study: Study, design: Design, fmus: Path) -> dict[str, str]:
     text = study.base.content(hashes)
     return {
         "version of feedsim": _version("feedsim"),
-        "parameters and sampling": _of_bytes(_canonical(_plan(study, hashes)) + design.values.tobytes()),
+        "parameters and sampling": _of_bytes(_canonical(_plan(study, hashes)) + _values(study, design)),
         "scenario and machine": _of_bytes(text.encode()),
         **{f"{unit}.fmu": _of_bytes(_read(fmus / f"{unit}.fmu")) for unit in UNITS},
     }
@@ -39,6 +43,17 @@ def parts(study: Study, design: Design, fmus: Path) -> dict[str, str]:
 def fingerprint(found: Mapping[str, str]) -> str:
     """One SHA-256 of all parts."""
     return _of_bytes(_canonical(found))
+
+
+def first_runs(study: Study, design: Design) -> Callable[[int], str] | None:
+    """Number of runs -> SHA-256 of the values of the first so many; None where a study with more runs has others."""
+    if study.sampling.method not in PREFIXED:
+        return None
+    return lambda runs: _of_bytes(design.values[:runs].tobytes())
+
+
+def _values(study: Study, design: Design) -> bytes:
+    return b"" if study.sampling.method in PREFIXED else design.values.tobytes()
 
 
 def _plan(study: Study, hashes: Mapping[str, str]) -> Any:
@@ -51,7 +66,10 @@ def _plan(study: Study, hashes: Mapping[str, str]) -> Any:
             return [told(inner) for inner in value]
         return hashes.get(value, value) if isinstance(value, str) else value
 
-    return told({"sampling": asdict(study.sampling), "parameters": [asdict(p) for p in study.parameters]})
+    sampling = asdict(study.sampling)
+    if study.sampling.method in PREFIXED:
+        del sampling["runs"]
+    return told({"sampling": sampling, "parameters": [asdict(p) for p in study.parameters]})
 
 
 def described(study: Study, design: Design, found: Mapping[str, str]) -> dict[str, Any]:

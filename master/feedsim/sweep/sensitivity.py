@@ -15,7 +15,7 @@ computes, which refuses any N but powers of two and so what failed runs leave of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -33,7 +33,10 @@ CONFIDENCE = 0.95
 # Failed runs are hardly ever spread evenly: they sit where the parameters are extreme, and what is left is another
 # distribution than was asked for. Beyond this share of the base points that is no longer a detail.
 MOST_LEFT_OUT = 0.1
-LEAST_POINTS = 8  # base points below which an interval says nothing
+LEAST_POINTS = 8  # base points below which there are no indices
+# With 16, 95 % intervals of even a linear figure's largest index held in less than one of ten studies.
+USEFUL_POINTS = 64
+SLACK = 0.02  # that indices and their intervals may lie beyond 0 and 1: too little to mislead
 # Scatter below this share of a figure's size is what rounding leaves, not an effect.
 CONSTANT = 1e-12
 _BLOCK = 4_000_000  # numbers of a block of resampling weights, 32 MB
@@ -46,7 +49,9 @@ class Indices:
     Attributes:
         first, total: (d,) [1]; NaN where there are none.
         first_interval, total_interval: (d, 2) lower and upper end at the confidence CONFIDENCE, by bootstrap over the
-            base points (percentiles). A little wide: the points are more even than the random ones that it supposes.
+            base points (percentiles). They suppose random points: those of a Sobol sequence are more even, which makes
+            intervals of additive figures too wide, but which points of A meet which of B is not random, which makes
+            those of others too narrow; BCa and studentised intervals hold no more often (docs/sweeps.md).
         points: base points that were used.
         left_out: base points that were not, because one of their runs has no value.
         reason: why there are no indices; empty where there are.
@@ -125,10 +130,10 @@ def sensitivities(table: Table, design: Design, seed: int = 0) -> Sensitivities:
             f_A, f_B = values[row[matrices.a[done]]], values[row[matrices.b[done]]]
             sobol[name] = sobol_indices(f_A, f_B, values[row[matrices.ab[:, done]]], seed=seed)
     names = tuple(parameter.name for parameter in design.parameters)
-    return Sensitivities(names, sobol, found, _warnings(sobol))
+    return Sensitivities(names, sobol, found, _warnings(sobol, names))
 
 
-def _warnings(sobol: Mapping[str, Indices]) -> tuple[str, ...]:
+def _warnings(sobol: Mapping[str, Indices], parameters: Sequence[str]) -> tuple[str, ...]:
     told: dict[str, list[str]] = {}
     for name, each in sobol.items():
         if each.reason:
@@ -137,6 +142,12 @@ def _warnings(sobol: Mapping[str, Indices]) -> tuple[str, ...]:
             points = each.points + each.left_out
             what = f"Sobol indices without {each.left_out} of {points} base points, of which a run has no value"
             told.setdefault(what, []).append(name)
+        if not each.reason and each.points < USEFUL_POINTS:
+            what = f"Sobol indices from {each.points} base points: they and their intervals can be far off"
+            told.setdefault(f"{what}; at least {USEFUL_POINTS} make a ranking", []).append(name)
+        if impossible := [parameters[k] for k in beyond(each)]:
+            what = f"Sobol indices of {', '.join(impossible)} lie beyond what is possible by more than their intervals"
+            told.setdefault(f"{what}; take more base points", []).append(name)
     return tuple(f"{', '.join(names)}: {text}." for text, names in told.items())
 
 
@@ -171,6 +182,15 @@ def sobol_indices(f_A: Array, f_B: Array, f_AB: Array, *, seed: int = 0) -> Indi
         points=points,
         left_out=left_out,
     )
+
+
+def beyond(found: Indices) -> list[int]:
+    """Parameters of which an interval lies wholly beyond 0 to 1, or the first order wholly above the total."""
+    if found.reason:
+        return []
+    wrong = (found.total_interval[:, 0] > 1 + SLACK) | (found.first_interval[:, 0] > 1 + SLACK)
+    wrong |= (found.first_interval[:, 1] < -SLACK) | (found.first_interval[:, 0] > found.total_interval[:, 1] + SLACK)
+    return [int(k) for k in np.flatnonzero(wrong)]
 
 
 def trends(columns: list[Array | None], groups: list[NDArray[np.int64]], values: Array) -> Trends:

@@ -4,23 +4,37 @@ end the table is made of it."""
 from __future__ import annotations
 
 import json
+import logging
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from feedsim.cosim import fmus_directory
-from feedsim.errors import SimulationError
+from feedsim.errors import FeedsimError, OutputError, SimulationError
 from feedsim.scenario import Study
 from feedsim.sweep import provenance
 from feedsim.sweep.bundle import Bundle
 from feedsim.sweep.design import design
-from feedsim.sweep.engine import open_engine
+from feedsim.sweep.engine import Engine, open_engine
 from feedsim.sweep.journal import Journal
 from feedsim.sweep.table import Table, chosen, table_of
 from feedsim.sweep.table_files import RECORD, STEM, Format, parquet, write_table
+from feedsim.sweep.task import Task
 from feedsim.trace.files import written_whole
+
+_log = logging.getLogger(__name__)
+
+
+class AllFailed(SimulationError):
+    """All runs of a study have failed; `table` has their messages."""
+
+    def __init__(self, message: str, table: Table) -> None:
+        super().__init__(message)
+        self.table = table
 
 
 @dataclass(frozen=True)
@@ -44,6 +58,8 @@ def run(
     restart: bool = False,
     format: Format = "csv",
     command: Sequence[str] = (),
+    say: Callable[[str], None] | None = None,
+    discard: Callable[[], None] | None = None,
 ) -> Table:
     """Make the runs of `study` that `directory` does not have yet, and write its table.
 
@@ -54,13 +70,17 @@ def run(
         restart: discard the runs that the folder has.
         format: of the table.
         command: that was given, for the record.
+        say: told in words when something takes longer.
+        discard: called when a restart has discarded the runs; takes away what else was made of them.
 
-    The folder holds the journal (runs.jsonl), the table and study.json, which says what it comes from. An interrupt
-    leaves a table of the runs that are done, and is raised again.
+    The folder holds the journal (runs.jsonl), the table and study.json, which says what it comes from. An interrupt, a
+    request to end (SystemExit) or a lost scheduler leaves a table of the runs that are done, and is raised again.
+    One run more than the table has is made: the scenario without changes, whose figures study.json holds as nominal.
 
     Raises:
         InputError: a file is missing, or the folder belongs to another state of the study.
-        SimulationError: all runs failed, the first with this message.
+        AllFailed: all runs failed, the first with this message; the table is written.
+        SimulationError: the workers are lost.
         OutputError: a result cannot be written.
     """
     if format == "parquet":
@@ -70,22 +90,37 @@ def run(
     parts = provenance.parts(study, planned, folder)
     record = provenance.described(study, planned, parts)
     head = {name: record[name] for name in ("study", "fingerprint", "parts")}
-    with Journal(directory, head, planned.runs, restart=restart) as journal:
+    first = provenance.first_runs(study, planned)
+    with Journal(directory, head, planned.runs, restart=restart, first=first) as journal:
+        if restart:
+            for name in (*(f"{STEM}.{kind}" for kind in get_args(Format)), RECORD):
+                _remove(directory / name)
+            if discard is not None:
+                discard()
         begun = provenance.now()
+        sessions = _sessions(directory / RECORD, record["fingerprint"], journal.resumed)
         where, processes = "", 0
+        made_by: Engine | None = None
         checked = False
+        nominal = _nominal(directory / RECORD, record)
+
+        def note(ended: str | None, **more: Any) -> None:
+            made = len(journal.done) - journal.resumed
+            own = {"began": begun, "ended": ended, "runs": made if ended else None, "command": [*command]}
+            _write_record(directory / RECORD, {
+                **record, "format": format, "done": len(journal.done), "failed": journal.failed,
+                "partial": len(journal.done) < planned.runs, "resumed": journal.resumed, "began": begun,
+                "ended": ended, "sessions": [*sessions, own] if made or not ended or not sessions else sessions,
+                "nominal": nominal, "workers": where, "processes": processes, **provenance.circumstances(command),
+                "warnings": [*study.warnings, *(made_by.warnings if made_by else ())], **more,
+            })  # fmt: skip
 
         def write() -> Table:
             journal.sync()
             told = Counter(text for outcome in journal.outcomes() for text in outcome.warnings)
             table = table_of(planned, journal.done, journal.outcomes(), study.figures, record)
             write_table(table, directory / f"{STEM}.{format}")
-            _write_record(directory / RECORD, {
-                **record, "format": format, "done": len(journal.done), "failed": journal.failed,
-                "partial": table.partial, "resumed": journal.resumed, "began": begun, "ended": provenance.now(),
-                "workers": where, "processes": processes, **provenance.circumstances(command),
-                "warnings": [*study.warnings], "warnings of runs": dict(told.most_common(20)),
-            })  # fmt: skip
+            note(provenance.now(), **{"warnings of runs": dict(told.most_common(20))})
             return table
 
         def tell() -> None:
@@ -95,23 +130,62 @@ def run(
         tell()
         try:
             if len(journal.done) < planned.runs:
-                with open_engine(Bundle.of(study, folder), workers=workers, scheduler=scheduler) as engine:
-                    where, processes = engine.where, max(engine.workers, 1)
-                    for outcome in engine.map(planned.tasks(journal.missing())):
+                bundle = Bundle.of(study, folder)
+                with open_engine(bundle, workers=workers, scheduler=scheduler, say=say) as engine:
+                    made_by, where, processes = engine, engine.where, max(engine.workers, 1)
+                    note(None)  # also of a session that is killed the record tells
+                    unchanged = [] if nominal else [Task(planned.runs, ())]
+                    for outcome in engine.map(chain(planned.tasks(journal.missing()), unchanged)):
+                        if outcome.run == planned.runs:
+                            found = outcome.figures or {}
+                            nominal = {name: value for name, (value, _) in found.items() if isfinite(value)}
+                            continue
                         journal.add(outcome)
                         if outcome.figures is not None and not checked:
                             chosen([*outcome.figures], study.figures)  # better now than when all runs are made
                             checked = True
                         tell()
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemExit, FeedsimError) as error:
             if journal.done:
-                write()
+                try:
+                    write()
+                except FeedsimError as fault:
+                    if not isinstance(error, FeedsimError):  # most likely this very fault
+                        _log.warning("no table of the runs that are done: %s", fault)
             raise
         if journal.failed == planned.runs:
-            first = min(journal.outcomes(), key=lambda outcome: outcome.run)
-            write()
-            raise SimulationError(f"all {planned.runs} runs failed; run {first.run}: {first.error}")
+            one = min(journal.outcomes(), key=lambda outcome: outcome.run)
+            raise AllFailed(f"all {planned.runs} runs failed; run {one.run}: {one.error}", write())
         return write()
+
+
+def _nominal(path: Path, record: Mapping[str, Any]) -> dict[str, float]:
+    """Figures of the scenario without changes that this same study left in a folder; empty where there are none."""
+    try:
+        before = json.loads(path.read_text(encoding="utf-8"))
+        return dict(before["nominal"]) if before["fingerprint"] == record["fingerprint"] else {}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+
+
+def _sessions(path: Path, fingerprint: str, resumed: int) -> list[dict[str, Any]]:
+    """The sessions in which the `resumed` runs were made, as the record of the last one tells."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        told = [dict(each) for each in found["sessions"]] if resumed and found["fingerprint"] == fingerprint else []
+        for each in told:
+            if each["runs"] is None:  # it was killed
+                each["runs"] = resumed - sum(other["runs"] or 0 for other in told)
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+    return told
+
+
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be removed: {error.strerror or error}") from error
 
 
 def _write_record(path: Path, content: Mapping[str, Any]) -> None:

@@ -74,7 +74,8 @@ def table_of(
     figures: Sequence[str] | None,
     provenance: Mapping[str, Any],
 ) -> Table:
-    """The table of the runs that are `done`; their outcomes may come in any order. `figures`: patterns; None: all.
+    """The table of the runs that are `done`; their outcomes may come in any order, those of other runs are left out.
+    `figures`: patterns; None: all.
 
     InputError: a pattern matches none of the figures.
     """
@@ -89,6 +90,8 @@ def table_of(
     seconds = np.full(rows, np.nan)
     for outcome in outcomes:
         row = place[outcome.run]
+        if row < 0:  # counts from the end
+            continue
         seconds[row] = outcome.seconds
         warnings[row] = _in_one_line(outcome.warnings)
         if outcome.figures is None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import atexit
 import threading
 import time
+import uuid
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from distributed import WorkerPlugin
+from distributed import WorkerPlugin, get_worker
 
 from feedsim.cosim.unpacked import STORE
 from feedsim.sweep import same
@@ -24,65 +25,78 @@ class Done:
     Attributes:
         out_of_memory: the next one has met a MemoryError.
         refused: why this worker cannot take part; None where it can.
+        worker: its address, where it refuses.
     """
 
     outcomes: tuple[Outcome, ...]
     out_of_memory: bool = False
     refused: str | None = None
+    worker: str = ""
 
 
 class Carrier(WorkerPlugin):
-    """Brings the work to all workers, those that come later too. It is laid out when the first batch needs it."""
+    """Brings the work to all workers, those that come later too. It is laid out when the first batch needs it.
+
+    Each engine has one of its own, also where several make the same study: what one takes away, the others keep.
+
+    Attributes:
+        key: what its batches ask for.
+    """
 
     def __init__(self, content: Work, asked: dict[str, str]) -> None:
         self.content = content
         self.asked = asked  # versions where the study is run from
-        self.name = f"feedsim-{content.digest}"
+        self.key = f"{content.digest}-{uuid.uuid4().hex}"
+        self.name = f"feedsim-{self.key}"
         self.address, self.folder = "", Path()  # of the worker that it has come to
 
     def setup(self, worker: Any) -> None:
         self.address, self.folder = str(worker.address), Path(worker.local_directory)
-        _carried[self.content.digest] = self
+        _carried[self.key] = self
 
     def teardown(self, worker: Any) -> None:
-        digest = self.content.digest
-        _carried.pop(digest, None)
+        _carried.pop(self.key, None)
         # Called in the worker's event loop, which must not wait for a run to end.
-        threading.Thread(target=_clear, args=(digest,), daemon=True).start()
+        threading.Thread(target=_clear, args=(self.content.digest,), daemon=True).start()
 
 
-_carried: dict[str, Carrier] = {}
-_places: dict[str, Place] = {}
+_carried: dict[str, Carrier] = {}  # by their keys
+_places: dict[str, Place] = {}  # by the digest of the work, for all carriers of it
 # FMPy changes the working folder of the process, and libraries need not bear threads: one run at a time.
 _lock = threading.Lock()
 
 
-def prepare(digest: str) -> None:
+def prepare(key: str) -> None:
     """Lay the work out, so that the first run need not wait for it; not where another study has a run under way."""
     if _lock.acquire(blocking=False):
         try:
-            _place(digest)
+            if (carrier := _carried.get(key)) is not None:
+                _place(carrier)
         finally:
             _lock.release()
 
 
 def _clear(digest: str) -> None:
     with _lock:
-        if digest not in _carried and (place := _places.pop(digest, None)) is not None:
+        if any(carrier.content.digest == digest for carrier in tuple(_carried.values())):
+            return
+        if (place := _places.pop(digest, None)) is not None:
             place.close()
             STORE.clear()
 
 
-def work_batch(digest: str, tasks: tuple[Task, ...], seconds: float) -> Done:
-    """Work `tasks` in their order, until all are done or `seconds` [s] are over; one at the least."""
+def work_batch(key: str, tasks: tuple[Task, ...], seconds: float) -> Done:
+    """Work `tasks` in their order, until all are done or `seconds` [s] are over; one at the least. `key`: of the
+    carrier that has brought what they need."""
     outcomes: list[Outcome] = []
     with _lock:
-        carrier = _carried.get(digest)
+        carrier = _carried.get(key)
         if carrier is None:
-            return Done((), refused="a worker has not got what the study needs")
+            address = str(get_worker().address)
+            return Done((), refused=f"worker {address}: has not got what the study needs", worker=address)
         if carrier.asked != same.told() and (fault := same.fault(carrier.address, same.told(), carrier.asked)):
-            return Done((), refused=fault)
-        place, begun = _place(digest), time.perf_counter()
+            return Done((), refused=fault, worker=carrier.address)
+        place, begun = _place(carrier), time.perf_counter()
         for task in tasks:
             try:
                 outcomes.append(place.run(task))
@@ -93,9 +107,9 @@ def work_batch(digest: str, tasks: tuple[Task, ...], seconds: float) -> Done:
     return Done(tuple(outcomes))
 
 
-def _place(digest: str) -> Place:
+def _place(carrier: Carrier) -> Place:
+    digest = carrier.content.digest
     if digest not in _places:
-        carrier = _carried[digest]
         _places[digest] = carrier.content.open(carrier.folder)
     return _places[digest]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from feedsim.report.people import Scale, number, scale
 from feedsim.report.style import Array
+from feedsim.report.sweep.failures import Failure, failures, kinds
 from feedsim.sweep.sensitivity import Sensitivities, sensitivities
 
 if TYPE_CHECKING:
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
 
 QUANTILES = (5, 50, 95)
 FEW_LEVELS = 12  # distinct values up to which a parameter is drawn level by level
-NARROW = 0.5  # share of a parameter's span within which failures point at it
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +69,15 @@ class Input:
 class Output:
     """A figure: its column (rows,) in people's units, NaN where a run has none, and what it comes to.
 
-    drawn: rows that statistics and pictures are of.
+    drawn: rows that statistics and pictures are of. nominal: value of the scenario without changes, NaN where it is not
+    known.
     """
 
     name: str
     scale: Scale
     values: Array
     drawn: NDArray[np.int64]
+    nominal: float = np.nan
 
     @property
     def sample(self) -> Array:
@@ -109,14 +109,13 @@ class Output:
             "max": float(known.max()),
         }
 
-
-@dataclass(frozen=True)
-class Failure:
-    """Runs that failed alike: an example of their message, their numbers, and where they lie."""
-
-    message: str
-    runs: tuple[int, ...]
-    where: str
+    @cached_property
+    def quantile_intervals(self) -> Mapping[str, tuple[float, float]]:
+        """95 % intervals of the quantiles, whatever the distribution: between two of the sorted values. NaN where the
+        runs are too few for one.
+        """
+        known = np.sort(self.known)
+        return {f"q{share}": quantile_interval(known, share / 100) for share in QUANTILES}
 
 
 class Account:
@@ -157,8 +156,13 @@ class Account:
         for name in self.table.figures:
             values = np.asarray(self.table[name], dtype=np.float64)
             unit = scale(self.table.unit(name), values)
-            found.append(Output(name, unit, values * unit.factor, self.drawn))
+            found.append(Output(name, unit, values * unit.factor, self.drawn, self._nominal(name) * unit.factor))
         return tuple(found)
+
+    def _nominal(self, name: str) -> float:
+        known = self.record.get("nominal")
+        value = known.get(name) if isinstance(known, Mapping) else None
+        return float(value) if isinstance(value, int | float) else np.nan
 
     @cached_property
     def sensitivities(self) -> Sensitivities:
@@ -210,41 +214,33 @@ class Account:
             missing = int((self.ok & ~np.isfinite(each.values)).sum())
             if missing:
                 found.append(f"{each.name} could not be determined in {missing} of {int(self.ok.sum())} runs.")
-        told = Counter(_shape(str(text)) for text in self.table["warnings"] if text)
-        example = {_shape(str(text)): str(text) for text in reversed(self.table["warnings"]) if text}
-        found += [f"{count} of {len(self.table)} runs warn: {example[key]}" for key, count in told.items()]
+        told = kinds(str(text) for text in self.table["warnings"] if text)
+        found += [f"{count} of {len(self.table)} runs warn: {example}" for example, count in told.values()]
         return tuple(dict.fromkeys([*found, *self.sensitivities.warnings]))
 
     @cached_property
     def failures(self) -> tuple[Failure, ...]:
-        """Failed runs by message, numbers in it aside; the most frequent first."""
-        groups: dict[str, list[int]] = {}
-        for row in np.flatnonzero(~self.ok):
-            groups.setdefault(_shape(str(self.table["message"][row])), []).append(int(row))
-        ordered = sorted(groups.values(), key=lambda rows: (-len(rows), rows[0]))
-        return tuple(
-            Failure(str(self.table["message"][rows[0]]), tuple(int(run) for run in self.runs[rows]), self._where(rows))
-            for rows in ordered
-        )
+        """Failed runs by message, the most frequent first."""
+        return failures(self)
 
-    def _where(self, rows: list[int]) -> str:
-        """The parameters of which these rows hold a small part of the values."""
-        found = []
-        for each in self.inputs:
-            here = np.unique(each.values[rows])
-            if each.words or len(each.levels):
-                if len(here) <= NARROW * len(np.unique(each.values)):
-                    found.append(f"{each.name} {', '.join(each.text(value) for value in here)} {each.scale.shown_unit}")
-            elif np.ptp(here) <= NARROW * np.ptp(each.values) and len(rows) > 1:
-                span = f"{each.text(here[0])} to {each.text(here[-1])}"
-                found.append(f"{each.name} {span} {each.scale.shown_unit}")
-        return ", ".join(text.rstrip() for text in found)
+
+def quantile_interval(ordered: Array, share: float) -> tuple[float, float]:
+    """95 % interval of the quantile at `share` from sorted independent values; NaN where there are too few.
+
+    The number of values below the quantile is binomial, so two of the values enclose it with a known probability
+    (H. A. David, H. N. Nagaraja, Order Statistics, 2003, section 7.1).
+    """
+    from scipy.stats import binom
+
+    n = len(ordered)
+    if not n:
+        return np.nan, np.nan
+    low = int(binom.ppf(0.025, n, share))  # P(fewer than `low` values below) <= 2.5 %
+    high = int(binom.ppf(0.975, n, share)) + 1
+    if low < 1 or high > n:
+        return np.nan, np.nan
+    return float(ordered[low - 1]), float(ordered[high - 1])
 
 
 def _label(name: str, unit: Scale) -> str:
     return f"{name} [{unit.shown_unit}]" if unit.shown_unit else name
-
-
-def _shape(message: str) -> str:
-    """A message without its numbers: what is the same for runs that fail alike."""
-    return re.sub(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", "#", message)

@@ -9,7 +9,20 @@ import numpy as np
 
 from feedsim.report.labels import heading, legend_above
 from feedsim.report.people import number, plain
-from feedsim.report.style import BLUE, GRID, INK, MUTED, ORANGE, SKY, VERMILLION, Array, Picture, drawing, finish
+from feedsim.report.style import (
+    BLUE,
+    GRID,
+    INK,
+    MUTED,
+    ORANGE,
+    SKY,
+    VERMILLION,
+    Array,
+    Picture,
+    drawing,
+    finish,
+    thinned,
+)
 from feedsim.report.sweep.account import QUANTILES, Account, Input, Output
 from feedsim.report.sweep.measures import RANK, TOTAL, Measure
 
@@ -26,21 +39,28 @@ MEDIANS = 24  # points of it at most
 GOLDEN = 0.6180339887498949  # spreads points evenly beside a level
 
 
-def distribution_picture(output: Output, inputs: Sequence[Input], measure: Measure, stem: str) -> Picture | None:
-    """Histogram with quantiles, and beside it what moves the figure; None without values."""
+def distribution_picture(
+    output: Output, inputs: Sequence[Input], measure: Measure, stem: str, exceedance: bool = True
+) -> Picture | None:
+    """Histogram with quantiles, and beside it what moves the figure; None without values.
+
+    exceedance: with the share of runs above each value, which on a grid would be no probability.
+    """
     if not len(output.known):
         return None
     telling = measure.telling()[:MOST_BARS]
     bars = len(telling)
     with drawing(10.0 if bars else 6.5, max(3.3, 1.5 + 0.27 * bars)) as figure:
         rooms = figure.subplots(1, 2 if bars else 1, squeeze=False, width_ratios=[1.15, 1][: 2 if bars else 1])[0]
-        _histogram(rooms[0], output)
-        caption = "Left the runs' values with 5 %, 50 % and 95 % quantile; " if bars else "The runs' values with "
-        caption += "" if bars else "5 %, 50 % and 95 % quantile."
+        _histogram(rooms[0], output, exceedance)
+        caption = "Left the runs' values with 5 %, 50 % and 95 % quantile" if bars else "The runs' values with "
+        caption += "" if bars else "5 %, 50 % and 95 % quantile"
+        caption += ", and the share of the runs that lie above a value (vermillion)" if exceedance else ""
+        caption += "; " if bars else "."
         if bars:
             _bars(rooms[1], inputs, measure, telling)
             caption += _right(measure, len(inputs) - bars)
-        return finish(figure, f"distribution-{stem}", f"Distribution of {output.name}", caption)
+        return finish(figure, f"distribution-{stem}", f"Distribution of {output.name}", caption, worded=True)
 
 
 def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, stem: str) -> Picture | None:
@@ -49,6 +69,7 @@ def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, s
     shown = [each for each in shown if len(np.unique(each.values)) > 1]
     if not len(output.known) or not shown:
         return None
+    missing = len(output.known) < len(output.sample)
     across = min(PANELS, len(shown))
     down = -(-len(shown) // across)
     with drawing(max(5.0, 2.6 * across), 0.3 + 2.5 * down) as figure:
@@ -60,10 +81,11 @@ def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, s
         for axes in rooms[::across]:
             axes.set_ylabel(plain(output.label))
         left_out = len(inputs) - len(shown)
-        caption = "A point per run; the line is the running median"
+        caption = "A point per run, a cross on the axis one without a value" if missing else "A point per run"
+        caption += "; the line is the running median"
         caption += ", the bars the medians of each value" if any(len(each.levels) for each in shown) else ""
         caption += f". {left_out} of {len(inputs)} parameters, which move it less, are not drawn." if left_out else "."
-        return finish(figure, f"scatter-{stem}", f"{output.name} over the parameters", caption)
+        return finish(figure, f"scatter-{stem}", f"{output.name} over the parameters", caption, worded=True)
 
 
 def running_median(x: Array, y: Array) -> tuple[Array, Array]:
@@ -76,7 +98,7 @@ def running_median(x: Array, y: Array) -> tuple[Array, Array]:
     return np.array([np.median(x[rows]) for rows in pieces]), np.array([np.median(y[rows]) for rows in pieces])
 
 
-def _histogram(axes: Axes, output: Output) -> None:
+def _histogram(axes: Axes, output: Output, exceedance: bool) -> None:
     known = output.known
     edges = _edges(known)
     counts, edges = np.histogram(known, edges)
@@ -96,8 +118,25 @@ def _histogram(axes: Axes, output: Output) -> None:
                 f"{share} %", (statistics[f"q{share}"], 1.0), xycoords=top, xytext=(shift, 2),
                 textcoords="offset points", ha=side, va="bottom", fontsize=8, color=MUTED, annotation_clip=False,
             ).set_in_layout(False)  # fmt: skip
-    text = f"mean {number(statistics['mean'])}, std {number(statistics['std'], 3)} {output.scale.shown_unit}".rstrip()
+    text = (
+        f"mean {number(statistics['mean'], 3)}, std {number(statistics['std'], 3)} {output.scale.shown_unit}".rstrip()
+    )
     heading(axes, text)
+    if exceedance and np.ptp(known) > 0:
+        _exceedance(axes, known)
+
+
+def _exceedance(axes: Axes, known: Array) -> None:
+    """Share of the runs whose figure is larger than a limit, over the limit: the empirical distribution turned over."""
+    limits = np.sort(known)
+    share = 100 * (1 - np.arange(1, len(limits) + 1) / len(limits))
+    limits, share = thinned(np.concatenate([limits[:1], limits]), np.concatenate([[100.0], share]))
+    beside = axes.twinx()
+    beside.plot(limits, share, color=VERMILLION, linewidth=1.3, drawstyle="steps-post")
+    beside.set_ylim(0, 114)  # the histogram leaves as much above its highest bar
+    beside.set_yticks(range(0, 101, 25))
+    beside.set_ylabel("runs above [%]", color=VERMILLION)
+    beside.grid(visible=False)
 
 
 def _edges(known: Array) -> Array:
@@ -124,7 +163,9 @@ def _bars(axes: Axes, inputs: Sequence[Input], measure: Measure, ranked: Sequenc
         _with_intervals(axes, rows + 0.19, values, measure.interval[ranked], ORANGE, "total")
         legend_above(axes)
         axes.set_xlabel("Sobol index, 95 % interval")
-        axes.set_xlim(min(0.0, *axes.get_xlim()), max(1.0, float(np.nanmax(measure.interval[ranked])) * 1.03))
+        ends = np.concatenate([measure.interval[ranked], measure.first_interval[ranked]])
+        low, high = (float(pick([*ends.ravel(), *measure.first[ranked]])) for pick in (np.nanmin, np.nanmax))
+        axes.set_xlim(min(0.0, 1.05 * low), max(1.0, 1.03 * high))
     else:
         if measure.kind == RANK:
             axes.axvspan(-measure.noise, measure.noise, color=GRID, alpha=0.7, linewidth=0, label="chance")
@@ -160,6 +201,13 @@ def _right(measure: Measure, left_out: int) -> str:
 def _panel(axes: Axes, output: Output, each: Input) -> None:
     known = np.isfinite(output.sample)
     x, y = each.sample[known], output.sample[known]
+    without = each.sample[~known]  # failed, or not determined
+    if len(each.levels):
+        without = np.searchsorted(each.levels, without) + 0.5 * ((np.arange(len(without)) * GOLDEN) % 1 - 0.5)
+    axes.plot(
+        without, np.full(len(without), 0.02), "x", markersize=4, markeredgewidth=0.9, color=VERMILLION,
+        transform=axes.get_xaxis_transform(), rasterized=len(without) > VECTORS,
+    )  # fmt: skip
     many = len(x) > VECTORS
     size, alpha = (5.0, 0.6) if len(x) <= 200 else (3.0, 0.4) if len(x) <= 2000 else (1.5, 0.2)
     look: dict[str, Any] = {"s": size, "alpha": alpha, "color": BLUE, "linewidths": 0, "rasterized": many}
@@ -186,5 +234,9 @@ def _panel(axes: Axes, output: Output, each: Input) -> None:
 
 def of_account(account: Account, output: Output, measure: Measure, stem: str) -> list[Picture]:
     """Both pictures, as far as there is something to show."""
-    found = (draw(output, account.inputs, measure, stem) for draw in (distribution_picture, scatter_picture))
+    random = account.study.sampling.method != "grid"
+    found = (
+        distribution_picture(output, account.inputs, measure, stem, random),
+        scatter_picture(output, account.inputs, measure, stem),
+    )
     return [picture for picture in found if picture is not None]

@@ -41,7 +41,7 @@ def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
             axes = figure.subplots()
             _line(axes, inputs[0], output.values, inputs[0].values, BLUE, None)
             _finish_line(axes, inputs[0], output)
-            return finish(figure, f"grid-{stem}", title, "A point per run.")
+            return finish(figure, f"grid-{stem}", title, "A point per run.", worded=True)
     first, second = inputs
     few = [each for each in inputs if each.words and len(np.unique(each.values)) <= len(LINES)]
     if few:  # words have no order that a map could show: a line each
@@ -54,10 +54,12 @@ def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
                 _line(axes, along, output.values[rows], along.values[rows], colour, plain(lines.text(level)))
             legend_above(axes)
             _finish_line(axes, along, output)
-            return finish(figure, f"grid-{stem}", title, f"A line for each {lines.name}.")
+            return finish(figure, f"grid-{stem}", title, f"A line for each {lines.name}.", worded=True)
     with drawing(7.5, 4.6) as figure:
         _map(figure, figure.subplots(), first, second, output)
-        return finish(figure, f"grid-{stem}", title, "Empty: the run failed, or the figure could not be determined.")
+        return finish(
+            figure, f"grid-{stem}", title, "Empty: the run failed, or the figure could not be determined.", worded=True
+        )
 
 
 def _line(axes: Axes, along: Input, values: Array, x: Array, colour: str, label: str | None) -> None:

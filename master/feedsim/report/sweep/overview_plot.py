@@ -27,7 +27,9 @@ def overview_picture(account: Account) -> Picture | None:
         _matrix(figure.subplots(), account, found, columns)
         left_out = len(account.inputs) - len(columns)
         more = f" {left_out} parameters that move no figure more are left out." if left_out else ""
-        return finish(figure, "sensitivities", "Which parameter moves which figure", found[0].caption + more)
+        return finish(
+            figure, "sensitivities", "Which parameter moves which figure", found[0].caption + more, worded=True
+        )
 
 
 def _matrix(axes: object, account: Account, found: Sequence[Measure], columns: Sequence[int]) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from html import escape
 
 from feedsim.report.frame import Tile, frame, picture_section
 from feedsim.report.people import number
 from feedsim.report.style import Picture
-from feedsim.report.sweep.account import Account
+from feedsim.report.sweep.account import QUANTILES, Account
+from feedsim.report.sweep.parameters import parameters_section
 from feedsim.report.sweep.plots import drawn, varying
 from feedsim.report.sweep.provenance import provenance_section
 from feedsim.report.sweep.sensitivity_tables import sensitivity_tables
@@ -50,7 +52,7 @@ def page(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) 
             *(picture_section(picture) for picture in single),
             sensitivity_tables(account),
             _failures(account),
-            _parameters(account),
+            parameters_section(account),
             provenance_section(account),
         ],
         footer="Every run is a row of the table beside this page; values here in full precision: summary.json. Figures "
@@ -79,24 +81,55 @@ def _tiles(account: Account) -> list[Tile]:
 
 
 def _statistics(account: Account) -> str:
+    grid = account.study.sampling.method == "grid"
+    nominal = any(math.isfinite(each.nominal) for each in account.outputs)
     rows = []
     for each in account.outputs:
         statistics = each.statistics
-        keys = ("mean", "std", "q5", "q50", "q95", "min", "max")
-        cells = "".join(f'<td class="number">{number(statistics[key])}</td>' for key in keys)
+        cells = [number(each.nominal, 3)] if nominal else []
+        mean, std = statistics["mean"], statistics["std"]
+        cells += [number(mean) if grid else rounded(mean, std / math.sqrt(max(len(each.known), 1)))]
+        cells.append(number(std, 4 if grid else 3))
+        for share in QUANTILES:
+            value, ends = statistics[f"q{share}"], each.quantile_intervals[f"q{share}"]
+            cells.append(number(value) if grid else with_interval(value, ends))
+        cells += [number(statistics["min"]), number(statistics["max"]), str(len(each.known))]
         rows.append(
-            f"<tr><td><code>{escape(each.name)}</code></td><td>{escape(each.scale.shown_unit)}</td>{cells}"
-            f'<td class="number">{len(each.known)}</td></tr>'
+            f"<tr><td><code>{escape(each.name)}</code></td><td>{escape(each.scale.shown_unit)}</td>"
+            + "".join(f'<td class="number">{cell}</td>' for cell in cells)
+            + "</tr>"
         )
-    heads = [("Figure", False), ("Unit", False)]
+    heads = [("Figure", False), ("Unit", False)] + ([("Nominal", True)] if nominal else [])
     heads += [(text, True) for text in ("Mean", "Std", "5 %", "50 %", "95 %", "Min", "Max", "Runs")]
     told = {
         "grid": "On a grid the numbers describe the grid, no probability.",
         "sensitivity": "Here and in the pictures these are the runs of the samples A and B, which are independent; the "
         "others serve the Sobol indices.",
     }.get(account.study.sampling.method, "They are worth what the distributions of the parameters are worth.")
+    if not grid:
+        told += (
+            " In brackets the 95 % interval of a quantile, between two of the sorted values; none where the runs are "
+            "too few."
+        )
+    told += " Nominal: the scenario without changes." if nominal else ""
     note = f'<p class="muted">Over the runs that have the figure. {told}</p>'
     return '<h2 id="figures">Figures of all runs</h2>\n' + table(heads, rows) + note if rows else ""
+
+
+def with_interval(value: float, ends: tuple[float, float]) -> str:
+    """A value with its interval, both with the digits that the interval leaves."""
+    low, high = ends
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return number(value, 3)
+    width = max(value - low, high - value)
+    return " ".join([rounded(value, width), f"({rounded(low, width)} to {rounded(high, width)})"])
+
+
+def rounded(value: float, doubt: float) -> str:
+    """A number to the second digit of its doubt."""
+    if not (math.isfinite(value) and math.isfinite(doubt) and doubt > 0):
+        return number(value)
+    return minus(f"{value:.{max(0, 1 - math.floor(math.log10(doubt)))}f}")
 
 
 def _failures(account: Account) -> str:
@@ -113,28 +146,10 @@ def _failures(account: Account) -> str:
     left = len(account.failures) - MOST_FAILURES
     heads = [("Runs", True), ("Message (of the first)", False), ("Where", False), ("Numbers", False)]
     note = (
-        '<p class="muted">Messages that differ in numbers only are one. Where: parameters of which these runs hold a '
-        f"small part of the values.{f' {left} more kinds of messages in the table.' if left > 0 else ''}</p>"
+        '<p class="muted">Messages that differ in numbers only are one. Where: parameters whose values tell '
+        "these runs from those that are done by more than chance (5 %, corrected for the number of tests), "
+        "with the range that the runs lie in and how many of all runs there failed so; empty where no parameter does, "
+        "or too few runs are done."
+        f"{f' {left} more kinds of messages in the table.' if left > 0 else ''}</p>"
     )
     return '<h2 id="failed">Failed runs</h2>\n' + table(heads, rows) + note
-
-
-def _parameters(account: Account) -> str:
-    rows = []
-    for each in account.inputs:
-        law = each.parameter.distribution
-        kind: str = law.kind if law is not None else "values"
-        kind += " factor" if each.parameter.factor else ""
-        if each.words:
-            span = ", ".join(each.words)
-        elif len(each.values):
-            span = f"{number(each.values.min())} to {number(each.values.max())}"
-        else:
-            span = ""
-        keys = "<br>".join(f"<code>{escape(key)}</code>" for key in each.parameter.keys)
-        rows.append(
-            f"<tr><td>{escape(each.name)}</td><td>{keys}</td><td>{escape(kind)}</td><td>{escape(minus(span))}</td>"
-            f"<td>{escape(each.scale.shown_unit)}</td></tr>"
-        )
-    heads = [("Parameter", False), ("Key", False), ("Distribution", False), ("Drawn", False), ("Unit", False)]
-    return '<h2 id="parameters">Parameters</h2>\n' + table(heads, rows)

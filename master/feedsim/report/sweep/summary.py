@@ -43,7 +43,12 @@ def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
                 "unit": account.table.unit(each.name),
                 "runs": len(each.known),
                 "missing": int((account.ok & ~np.isfinite(each.values)).sum()),
+                "nominal": _finite(each.nominal / each.scale.factor),
                 **{key: _finite(value / each.scale.factor) for key, value in each.statistics.items()},
+                **{
+                    f"{key}_interval": _interval(np.asarray(ends) / each.scale.factor)
+                    for key, ends in each.quantile_intervals.items()
+                },
             }
             for each in account.outputs
         },

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feedsim.report.parts import to_json
-from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, write_text
+from feedsim.report.results import REPORT, SUMMARY, check_place, discard, write_results, write_text
 from feedsim.report.style import remarked
 from feedsim.report.sweep.account import Account
 from feedsim.report.sweep.page import page
@@ -31,6 +31,11 @@ def check_sweep_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> 
     inputs: files that are read. Leaves nothing behind.
     """
     check_place(directory, (REPORT, SUMMARY), inputs)
+
+
+def discard_sweep(directory: Path | str) -> None:
+    """Remove what :func:`write_sweep` has written. Raises OutputError."""
+    discard(directory)
 
 
 def write_sweep(table: Table, study: Study, design: Design, directory: Path | str) -> tuple[Path, ...]:

@@ -1,6 +1,6 @@
 """Study files: a scenario, what is varied in it from run to run, and how the runs are spread."""
 
-from feedsim.scenario.study.load import is_study, load_study
+from feedsim.scenario.study.load import load_study
 from feedsim.scenario.study.study import Choice, Distribution, Parameter, Sampling, Study
 
-__all__ = ["Choice", "Distribution", "Parameter", "Sampling", "Study", "is_study", "load_study"]
+__all__ = ["Choice", "Distribution", "Parameter", "Sampling", "Study", "load_study"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import erfc, inf, log, log1p, sqrt
 
 from feedsim.scenario.source import Place
 from feedsim.scenario.study.file import Kind
@@ -116,3 +117,32 @@ def _not_whole(found: Distribution) -> list[Problem]:
         between = f"{found.low:.0f} to {found.high:.0f}"
         return [(("count",), f"{found.count} even steps from {between} are no whole numbers")]
     return []
+
+
+def outside(found: Distribution, low: float, high: float) -> float:
+    """Probability that a normal or lognormal distribution, as it is cut, is below `low` or above `high`.
+
+    0 for distributions of other kinds: their limits themselves are checked.
+    """
+    if found.mean is None or found.deviation is None:
+        return 0.0
+    lognormal = found.kind == "lognormal"
+    deviation = sqrt(log1p((found.deviation / found.mean) ** 2)) if lognormal else found.deviation
+    mean = log(found.mean) - deviation**2 / 2 if lognormal else found.mean
+
+    def distance(value: float) -> float:
+        """From the mean, in deviations times the root of two."""
+        if lognormal:
+            value = log(value) if value > 0 else -inf
+        return (value - mean) / (deviation * sqrt(2))
+
+    def below(value: float) -> float:
+        return erfc(-distance(value)) / 2
+
+    def above(value: float) -> float:
+        return erfc(distance(value)) / 2
+
+    least, most = found.support
+    all_of_it = 1 - below(least) - above(most)
+    out = max(0.0, below(low) - below(least)) + max(0.0, above(high) - above(most))
+    return min(1.0, out / all_of_it) if all_of_it > 0 else 0.0

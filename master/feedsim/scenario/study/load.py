@@ -11,23 +11,15 @@ from feedsim.errors import InputError
 from feedsim.scenario.base import Base
 from feedsim.scenario.load import Setting, check, fetch, read_group
 from feedsim.scenario.problems import describe, dotted, in_order
-from feedsim.scenario.source import Source, at, read
+from feedsim.scenario.source import Source, at
 from feedsim.scenario.study.changes import changes_of
+from feedsim.scenario.study.figures import pattern_faults
 from feedsim.scenario.study.file import MOST_RUNS, StudyFile
 from feedsim.scenario.study.parameter import Reader
 from feedsim.scenario.study.study import Parameter, Sampling, Study
 from feedsim.scenario.study.values import as_text
 
 SEED = 1
-
-
-def is_study(path: Path) -> bool:
-    """Whether a file that can be read is a study, by its keys."""
-    try:
-        data = read(path).data
-    except InputError:
-        return False
-    return isinstance(data, dict) and "sampling" in data and "parameters" in data and "machine" not in data
 
 
 def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | None = None) -> Study:
@@ -47,6 +39,7 @@ def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | N
     base = _base(source, overrides, faults)
     parameters: dict[str, Parameter] = {}
     files: list[Path] = [*base.files] if base is not None else []
+    notes: list[str] = []
     if base is not None and entry is not None:
         reader = Reader(source, base, entry.sampling.method == "grid")
         for name, given in entry.parameters.items():
@@ -55,12 +48,14 @@ def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | N
                 parameters[name] = found
         files += reader.files
         faults += [*reader.faults, *_overlaps(source, reader)]
+        faults += pattern_faults(source, entry, base, parameters)
+        notes = reader.warnings
     if entry is not None:
         sampling, wrong, warnings = _sampling(source, entry, parameters, runs)
         faults += wrong
     if faults or entry is None or base is None:
         raise InputError.of(str(path), in_order(faults))
-    warnings += _middle(base, tuple(parameters.values()))
+    warnings += [*notes, *_middle(base, tuple(parameters.values()))]
     return Study(
         name=entry.name,
         note=entry.note,

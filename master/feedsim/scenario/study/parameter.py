@@ -20,7 +20,7 @@ from feedsim.scenario.load import reading
 from feedsim.scenario.model import Scenario
 from feedsim.scenario.problems import describe, dotted, quantity_of
 from feedsim.scenario.source import Mark, Place, Source, at
-from feedsim.scenario.study.distribution import Numbers, numbers
+from feedsim.scenario.study.distribution import Numbers, numbers, outside
 from feedsim.scenario.study.file import ParameterEntry
 from feedsim.scenario.study.study import Choice, Distribution, Parameter
 from feedsim.scenario.study.values import as_text, number_text
@@ -37,12 +37,13 @@ class Target:
 
 
 class Reader:
-    """Reads one entry after the other; `faults` and the data `files` of the choices add up."""
+    """Reads one entry after the other; `faults`, `warnings` and the data `files` of the choices add up."""
 
     def __init__(self, source: Source, base: Base, grid: bool) -> None:
         """`source`: the study's tree; `base`: its scenario; `grid`: whether the runs are a grid."""
         self.source, self.base, self.grid = source, base, grid
         self.faults: list[str] = []
+        self.warnings: list[str] = []
         self.files: list[Path] = []
         self.targets: dict[str, list[Target]] = {}
         self.factors: set[str] = set()  # names of parameters that multiply
@@ -93,6 +94,8 @@ class Reader:
                     seen.add(place)
                     parent = shape.expected(Scenario, scratch.data, place[:-1])
                     annotation = shape.child(parent, place[-1])
+                    if place[-1] in _WORDS and shape.keys(parent) is not None:
+                        raise InputError(f"{where}: {dotted(place)} is only shown; it changes no run")
                     if shape.keys(parent) is None and place[-1] not in at(self.base.settled.source.data, place[:-1]):
                         raise InputError(f"{where}: {dotted(place[:-1])} has no {place[-1]!r}")
                     yield Target(place, annotation, quantity_of(annotation), _is_whole(annotation))
@@ -221,6 +224,22 @@ class Reader:
                 self._check_one(name, (key,), target, bound, times, f"{written}")
             elif bound is not None and not _fits(target, int(bound), self.base.settled.source):
                 self._explain(name, (key,), [Change(dotted(target.place), f"{bound:.0f}", int(bound))])
+        if target.quantity is not None and times != 0.0:
+            self._doubt_range(name, target, target.quantity, found, times)
+
+    def _doubt_range(self, name: str, target: Target, quantity: Quantity, found: Distribution, times: float) -> None:
+        """Warn of a distribution that is not cut and leads out of the allowed range."""
+        low, high = sorted((max(quantity.minimum, quantity.above) / times, quantity.maximum / times))
+        share = outside(found, low, high)
+        if share >= RARE:
+            self.warnings.append(
+                describe(
+                    self.source,
+                    self._at(name),
+                    f"{100 * share:.2g} % of the distribution are outside the allowed range of {dotted(target.place)}, "
+                    f"{quantity.range}; such runs fail. Cut it with from and to",
+                )
+            )
 
     def _check_one(self, name: str, key: Place, target: Target, value: float, times: float, written: str) -> None:
         quantity = target.quantity
@@ -256,6 +275,8 @@ class Reader:
 
 
 _WRONG = object()
+_WORDS = ("name", "note")  # keys that are there to be read
+RARE = 1e-6  # share of a distribution that no study meets
 
 
 class _Told(Exception):

@@ -62,7 +62,7 @@ class Entry:
     watched: str = ""
 
 
-RECORDED, UNITS = "54 signals every 1 ms", "7"  # of ours
+RECORDED, UNITS = "60 signals every 1 ms", "7"  # of ours
 OTHERS = "nothing"
 ENTRIES = (
     Entry("native", "native loop", "default scheme", RECORDED, "reference", PINNED, UNITS),

@@ -144,7 +144,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"feedsim: {error}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print("feedsim: interrupted; no result was written", file=sys.stderr)
+        print("feedsim: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
         sys.stdout = None  # who read the output has gone; Python would flush into the closed pipe once more

@@ -26,8 +26,8 @@ Latin hypercube or a Sobol sequence. Writes table.csv or table.parquet with a ro
 from, and report.html. Runs that fail are rows with their message. A study that was interrupted or killed goes on where
 it was when the same command is given again."""
 EPILOG = """exit codes:
-  0 done, also where some runs failed    2 bad input or usage    3 all runs failed    4 results cannot be written
-  130 interrupted (143, 129: by SIGTERM, SIGHUP); the same command continues
+  0 done, also where some runs failed    2 bad input or usage    3 all runs failed, or all workers were lost
+  4 results cannot be written    130 interrupted (143, 129: by SIGTERM, SIGHUP); the same command continues
 
 examples:
   feedsim sweep scenarios/studies/friction_wear.yaml
@@ -116,7 +116,7 @@ def sweep(options: Namespace) -> int:
         report.write_sweep(error.table, study, planned, directory)  # which groups failures by what they have in common
         raise
     except KeyboardInterrupt:
-        done = f"{last[0].done} of {last[0].total} runs are done and kept in" if last else "nothing is lost of"
+        done = f"{last[0].done} of {last[0].total} runs are done and kept in" if last else "what is done is kept in"
         print(f"feedsim: interrupted; {done} {directory}; the same command continues", file=sys.stderr)
         return 130
     report.write_sweep(table, study, planned, directory)

@@ -26,9 +26,11 @@ def test_every_size_runs(axes: int, count: int, tmp_path: Path, fmus: Path) -> N
     assert run.warnings == ()
     assert list(loaded.machine.axes) == list(machines.NAMES[:axes])
     for axis in loaded.machine.axes:
-        # At rest again, within what friction holds of a settled position loop.
-        assert abs(run.trace[f"{axis}.x_a"][-1] - machines.POSE - 5e-3) < 2e-6
-        assert np.ptp(run.trace[f"{axis}.x_a"]) < 5.1e-3
+        x_a = run.trace[f"{axis}.x_a"] - machines.POSE
+        # To and fro over 5 mm; at rest again where it began, within what friction holds of a settled position loop.
+        assert x_a.max() == pytest.approx(5e-3, abs=1e-4)
+        assert x_a.min() > -1e-4
+        assert abs(x_a[-1]) < 3e-6
 
 
 def test_same_seed_same_table() -> None:

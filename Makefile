@@ -165,7 +165,7 @@ reference: $(VENV)/.dev ## make the pinned reference CSVs anew, from scipy and t
 check-reference: fmus $(VENV)/.run ## compare all units and both scenarios with the pinned reference CSVs
 	$(PY) tests/reference/check_reference.py --junit $(BUILD)/check-reference.xml
 
-bench: fmus $(VENV)/.importers ## measure everything, other simulators too; tables in build/bench (a quarter of an hour)
+bench: fmus $(VENV)/.importers ## measure everything, other simulators too; tables in build/bench (seven minutes)
 	$(PY) benchmarks/all.py
 
 worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets

@@ -158,7 +158,10 @@ def command() -> str:
     shown = script.relative_to(ROOT).as_posix() if script.is_relative_to(ROOT) else script.name
     python = Path(sys.executable)  # a link in an environment: not resolved
     started = python.relative_to(ROOT).as_posix() if python.is_relative_to(ROOT) else "python"
-    return shlex.join([started, shown, *sys.argv[1:]])
+    given = [
+        Path(word).relative_to(ROOT).as_posix() if Path(word).is_relative_to(ROOT) else word for word in sys.argv[1:]
+    ]
+    return shlex.join([started, shown, *given])
 
 
 def described() -> str:

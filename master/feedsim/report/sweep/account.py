@@ -25,15 +25,13 @@ QUANTILES = (5, 50, 95)
 FEW_LEVELS = 12  # distinct values up to which a parameter is drawn level by level
 
 
-@dataclass(frozen=True, eq=False)
-class Input:
-    """A parameter: its column (rows,) in people's units, or the numbers of its words; drawn: rows that are drawn."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Column:
+    """A column of the table (rows,) in people's units; drawn: rows that statistics and pictures are of."""
 
     name: str
-    parameter: Parameter
     scale: Scale
     values: Array
-    words: tuple[str, ...]  # empty for numbers
     drawn: NDArray[np.int64]
 
     @property
@@ -45,6 +43,14 @@ class Input:
     def label(self) -> str:
         """Name with unit."""
         return _label(self.name, self.scale)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Input(Column):
+    """A parameter; where it is a choice of words, its values are their numbers."""
+
+    parameter: Parameter
+    words: tuple[str, ...]  # empty for numbers
 
     @cached_property
     def levels(self) -> Array:
@@ -65,29 +71,14 @@ class Input:
         return self.words[int(value)] if self.words else number(value)
 
 
-@dataclass(frozen=True, eq=False)
-class Output:
-    """A figure: its column (rows,) in people's units, NaN where a run has none, and what it comes to.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Output(Column):
+    """A figure, NaN where a run has none, and what it comes to.
 
-    drawn: rows that statistics and pictures are of. nominal: value of the scenario without changes, NaN where it is not
-    known.
+    nominal: value of the scenario without changes, NaN where it is not known.
     """
 
-    name: str
-    scale: Scale
-    values: Array
-    drawn: NDArray[np.int64]
     nominal: float = np.nan
-
-    @property
-    def sample(self) -> Array:
-        """The values that are drawn."""
-        return self.values[self.drawn]
-
-    @property
-    def label(self) -> str:
-        """Name with unit."""
-        return _label(self.name, self.scale)
 
     @cached_property
     def known(self) -> Array:
@@ -146,7 +137,12 @@ class Account:
             values = column[self.runs]
             words = tuple(choice.label for choice in parameter.choices) if parameter.worded else ()
             unit = Scale(1.0, "") if words else scale(parameter.unit, values)
-            found.append(Input(parameter.name, parameter, unit, values * unit.factor, words, self.drawn))
+            column = values * unit.factor
+            found.append(
+                Input(
+                    name=parameter.name, scale=unit, values=column, drawn=self.drawn, parameter=parameter, words=words
+                )
+            )
         return tuple(found)
 
     @cached_property
@@ -156,7 +152,8 @@ class Account:
         for name in self.table.figures:
             values = np.asarray(self.table[name], dtype=np.float64)
             unit = scale(self.table.unit(name), values)
-            found.append(Output(name, unit, values * unit.factor, self.drawn, self._nominal(name) * unit.factor))
+            nominal = self._nominal(name) * unit.factor
+            found.append(Output(name=name, scale=unit, values=values * unit.factor, drawn=self.drawn, nominal=nominal))
         return tuple(found)
 
     def _nominal(self, name: str) -> float:

@@ -23,8 +23,8 @@
  *   line     y = a + s b
  *   rate     y = (a - b) / s
  *   bond     what the exchange between plant and friction does to the energies; a points to a Bond, s is the step
- * and `end` closes the list. These are done in every cycle; `due` is an operation of one of these kinds but bond, `what`,
- * that is done in some cycles only. */
+ * and `end` closes the list. These are done in every cycle; `due` is an operation of one of these kinds but bond,
+ * `what`, that is done in some cycles only. */
 #define EXCHANGE_KINDS(K)                                                                                              \
     K(set_real)                                                                                                        \
     K(set_slopes)                                                                                                      \

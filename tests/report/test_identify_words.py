@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_report import Page
 
 from feedsim.identify import Options
 from feedsim.identify.result import Estimate, Identification, Stationary
@@ -23,6 +22,7 @@ from feedsim.report.identify.stribeck_plots import stribeck_picture, stribeck_ti
 from feedsim.report.identify.summary import summary
 from feedsim.report.words import counted, powers
 from identification_helpers import I_P, TRUE, J, account, curve, identification, records
+from report_helpers import Page
 
 room = import_module("feedsim.identify.identify")  # its name in the package is that of the function
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_report import Page
 
 from feedsim.errors import OutputError
 from feedsim.identify.result import NORMAL_95, Balance, Correlation, Estimate, Identification
@@ -46,7 +45,7 @@ from identification_helpers import (
     records,
     stretch,
 )
-from report_helpers import contents
+from report_helpers import Page, contents
 from scenario_helpers import MACHINE
 
 FIGURES = {"stribeck", "plateaus", "loops-speed", "loops-position", "residuals", "correlation"}

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from test_report import Page
 
 from feedsim.analysis import Figure, compensation
 from feedsim.cli import main
@@ -23,7 +22,7 @@ from feedsim.errors import SimulationError
 from feedsim.report.compensate.page import _um
 from feedsim.report.compensate.summary import table_csv
 from feedsim.trace import read_csv
-from report_helpers import contents
+from report_helpers import Page, contents
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / "scenarios"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[2] / "master" / "feedsim"
+PACKAGE = Path(__file__).resolve().parents[1] / "master" / "feedsim"
 # A room may import the rooms below it.
 ORDER = [
     "__main__",

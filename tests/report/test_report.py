@@ -8,7 +8,6 @@ import math
 import re
 import stat
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -26,46 +25,8 @@ from feedsim.report.summary import HEADER, real_time_factor, summary
 from feedsim.report.words import duration
 from feedsim.scenario import Arc, Dwell, Move, load
 from feedsim.trace import Trace, read_csv
-from report_helpers import FakeRun, circle_run, contents, positioning_run, run_of, small_run
+from report_helpers import FakeRun, Page, circle_run, contents, positioning_run, run_of, small_run
 from scenario_helpers import MACHINE, scenario
-
-
-class Page(HTMLParser):
-    """Ids, references and text of a page; fails on tags that are not closed."""
-
-    VOID = ("meta", "img", "br", "link")
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.ids: list[str] = []
-        self.references: list[str] = []
-        self.tags: list[str] = []
-        self.open: list[str] = []
-        self.words: list[str] = []
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        if tag not in self.VOID:
-            self.open.append(tag)
-        for name, value in attributes:
-            if name == "id":
-                self.ids.append(str(value))
-            if name in ("src", "href", "xlink:href", "data", "action"):
-                self.references.append(str(value))
-
-    def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        self.handle_starttag(tag, attributes)
-        if tag not in self.VOID:
-            self.open.pop()
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.words.append(data)
-
 
 # -- what is written --------------------------------------------------------------------------------------------------
 

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_report import Page
 
 from feedsim import report
 from feedsim.analysis import Figure
@@ -31,7 +30,7 @@ from feedsim.structure import checked_modes
 from feedsim.trace.response import FrequencyResponse
 from feedsim.trace.response_csv import read_response_csv, write_response
 from frf_helpers import responses, subject
-from report_helpers import contents
+from report_helpers import Page, contents
 from scenario_helpers import MACHINE, default_machine
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -45,7 +45,7 @@ $(VENV)/.created:
 	$(PYTHON) -m venv $(VENV)
 	@touch $@
 
-$(VENV)/.run: $(VENV)/.created requirements.lock pyproject.toml setup.py
+$(VENV)/.run: $(VENV)/.created requirements.lock pyproject.toml
 	@echo "installing the locked packages (requirements.lock)"
 	$(PIP) install -r requirements.lock
 	@# setuptools warns of what holds for every installation that is linked to its sources
@@ -79,15 +79,15 @@ ansys: $(VENV)/.ansys ## install the optional reader of ANSYS .full files
 
 fmus: $(FMUS) ## build the four FMUs and the native cycle loop into fmus/
 
-PACKAGER := $(wildcard src/fmi2/packager/*.py src/fmi2/terminals/*)
+PACKAGER := $(wildcard src/packager/feedsim_packager/*.py src/fmi2/terminals/*)
 SHELL_SOURCES := $(wildcard src/fmi2/*.[ch] src/fmi2/standard/*.h)
 
 fmus/%.fmu: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml LICENSE
-	$(PY) src/fmi2/packager build $* --out $@ --build-dir $(BUILD)/fmus
+	$(PY) -m feedsim_packager build $* --out $@ --build-dir $(BUILD)/fmus
 
 # The native cycle loop lies beside the archives.
 EXCHANGE := exchange$(if $(filter Windows_NT,$(OS)),.dll,$(if $(filter Darwin,$(shell uname -s)),.dylib,.so))
-EXCHANGE_SOURCES := $(wildcard src/exchange/*.[ch] src/exchange/*.py) $(addprefix src/fmi2/packager/,compile.py toolchain.py)
+EXCHANGE_SOURCES := $(wildcard src/exchange/*.[ch] src/exchange/*.py) $(addprefix src/packager/feedsim_packager/,checkout.py compile.py toolchain.py)
 
 fmus: fmus/$(EXCHANGE)
 fmus/$(EXCHANGE): $(VENV)/.run $(COMPILER) $(EXCHANGE_SOURCES)
@@ -106,7 +106,7 @@ fmus-all: $(ALL_FMUS) ## build the FMUs for Linux, Windows and macOS into fmus/,
 	    if [ $$built -nt $$fmu ] || ! cmp -s $$built $$fmu; then cp $$built $$fmu.part && mv $$fmu.part $$fmu; fi; echo "$$fmu holds all platforms"; done
 
 $(BUILD)/fmus-all/%.fmu: $(VENV)/.run $(ZIG_HERE) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml LICENSE
-	$(PY) src/fmi2/packager build $* --platforms all --cc '$(ZIG)' --out $@ --build-dir $(BUILD)/fmus-all
+	$(PY) -m feedsim_packager build $* --platforms all --cc '$(ZIG)' --out $@ --build-dir $(BUILD)/fmus-all
 
 $(foreach unit,$(UNITS),$(eval $(BUILD)/fmus-all/$(unit).fmu: $(wildcard src/$(unit)_fmu/*.* src/$(unit)_fmu/resources/*)))
 $(BUILD)/fmus-all/plant.fmu: scenarios/machines/test_centre/modes.csv
@@ -135,7 +135,7 @@ ASAN_RUNTIME = $(shell $(CC) -print-file-name=libasan.so 2>/dev/null | grep /)
 SANITIZED := $(BUILD)/sanitized-fmus
 
 $(SANITIZED)/%.fmu: fmus/%.fmu
-	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) src/fmi2/packager build $* --out $@ --build-dir $(SANITIZED)
+	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) -m feedsim_packager build $* --out $@ --build-dir $(SANITIZED)
 
 $(SANITIZED)/$(EXCHANGE): fmus/$(EXCHANGE)
 	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) src/exchange/build.py --out $(@D)
@@ -186,7 +186,6 @@ lint: $(VENV)/.dev ## style, types, formatting
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
 	$(PY) -m mypy
-	$(PY) -m mypy --strict src/fmi2/packager
 	@echo clang-format --dry-run
 	@$(VENV)/bin/clang-format --dry-run --Werror $(C_FILES)
 

@@ -17,10 +17,10 @@ from pathlib import Path
 from harness import ROOT, Contestant, arguments, digits, measure, table
 
 import numpy as np
-from feedsim_packager import compile, toolchain
 
 from feedsim import cosim, nc, scenario
 from feedsim.cosim.system import System
+from feedsim_packager import compile, toolchain
 
 FLOOR = ROOT / "benchmarks" / "floor"
 ROUNDS = 9

@@ -18,6 +18,7 @@ from importlib import metadata
 from pathlib import Path
 
 import psutil
+
 from feedsim_packager import compile, toolchain
 
 ROOT = Path(__file__).resolve().parents[1]

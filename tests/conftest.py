@@ -15,6 +15,7 @@ def _inputs() -> list[Path]:
     references = ROOT / "tests" / "reference"
     folders = [
         ROOT / "src" / "fmi2",
+        ROOT / "src" / "packager",
         *(ROOT / "src" / f"{unit}_fmu" for unit in UNITS),
         *(references / u for u in UNITS),
     ]
@@ -47,7 +48,7 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if _up_to_date([folder / f"{unit}.fmu" for unit in UNITS]):
         return folder
 
-    from packager import build, toolchain
+    from feedsim_packager import build, toolchain
 
     folder = tmp_path_factory.mktemp("fmus")
     compiler = toolchain.find_compiler()

@@ -13,11 +13,10 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "fmi2"))
+from feedsim_packager import checkout, compile, toolchain
+from feedsim_packager.errors import PackagerError
 
-from packager import compile, toolchain  # noqa: E402
-from packager.errors import PackagerError  # noqa: E402
+HERE = Path(__file__).resolve().parent
 
 SOURCES = ("exchange.c",)
 
@@ -26,7 +25,7 @@ def build(folder: Path, compiler: Sequence[str]) -> Path:
     """Compile the library into `folder`, whole or not at all; a process that has the old one loaded keeps it."""
     folder = folder.resolve()
     target = compile.host_target()
-    command = [*compiler, *compile.FLAGS, f"-I{HERE.parent / 'fmi2' / 'standard'}"]
+    command = [*compiler, *compile.FLAGS, f"-I{checkout.STANDARD}"]
     if toolchain.is_zig(compiler) and not any(part.startswith(("-target", "--target")) for part in compiler):
         command += ["-target", target.zig[0]]
     command += ["-shared", *shlex.split(os.environ.get(compile.EXTRA_FLAGS, ""))]

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from feedsim_packager import toolchain
 from fmu.unpacked import UNITS, Archive, unpack
-from packager import toolchain
 
 
 @pytest.fixture(scope="session", params=UNITS)

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from feedsim_packager import setpoints
+from feedsim_packager.machine import named
+from feedsim_packager.repack import repack
+from feedsim_packager.resources import File
 from fmu.unpacked import Archive, unpack
-from packager import setpoints
-from packager.machine import named
-from packager.repack import repack
-from packager.resources import File
 
 NS = 1_000_000_000
 AXES = ("Z", "X_1")  # not in the order of the alphabet

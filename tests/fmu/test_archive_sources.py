@@ -9,10 +9,10 @@ import fmpy
 import pytest
 from lxml import etree
 
+from feedsim_packager import build, checkout, compile, machine_tables, toolchain, variables
 from fmu.unpacked import PLATFORM, UNITS, Archive, initialize, instantiate, unpack
-from packager import build, compile, machine_tables, toolchain, variables
 
-HEADERS = f"-I{build.STANDARD}"  # an importer has them
+HEADERS = f"-I{checkout.STANDARD}"  # an importer has them
 
 
 def test_rebuilding_gives_the_same_bytes(unit: str, tmp_path: Path) -> None:

@@ -21,8 +21,8 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from packager import build, cli, reference, toolchain
-from packager.errors import InputError
+from feedsim_packager import build, cli, reference, toolchain
+from feedsim_packager.errors import InputError
 
 ROOT = "extra/org.fmi-standard.fmi-ls-ref/"
 UNITS = ("friction", "plant", "controller", "setpoint")

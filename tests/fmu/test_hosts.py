@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from feedsim_packager import repack, setpoints
+from feedsim_packager.machine import named
+from feedsim_packager.resources import File
 from fmu.binary import of
 from fmu.unpacked import ROOT, Archive, unpack
-from packager import repack, setpoints
-from packager.machine import named
-from packager.resources import File
 
 UNIT_C = ROOT / "tests/unit_c"
 HEADERS = f"-I{ROOT / 'src/fmi2/standard'}"

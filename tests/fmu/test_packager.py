@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from feedsim_packager import archive, build, cli, compile, documentation, machine, machine_tables, toolchain, variables
+from feedsim_packager.errors import CompilerError, InputError, OutputError
 from fmu.toy_table import GOOD, HEAD, read, toy
-from packager import archive, build, cli, compile, documentation, machine, machine_tables, toolchain, variables
-from packager.errors import CompilerError, InputError, OutputError
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -346,11 +346,6 @@ def test_file_names_must_differ_in_the_flat_folder(tmp_path: Path, compiler: tup
         build.load(unit, compiler)
 
 
-def test_runs_as_directory_and_as_module() -> None:
-    folder = ROOT / "src" / "fmi2" / "packager"
-    as_directory = [sys.executable, str(folder), "describe", "friction"]
-    as_module = [sys.executable, "-m", "packager", "describe", "friction"]
-    first = subprocess.run(as_directory, capture_output=True, check=True)
-    second = subprocess.run(as_module, capture_output=True, check=True, cwd=folder.parent)
-    assert first.stdout == second.stdout
-    assert first.stdout.startswith(b"<?xml")
+def test_runs_as_module(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "feedsim_packager", "describe", "friction"]
+    assert subprocess.run(command, capture_output=True, check=True, cwd=tmp_path).stdout.startswith(b"<?xml")

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from feedsim_packager import checkout, table, units, variables
+from feedsim_packager.errors import CompilerError, InputError
 from fmu.toy_table import GOOD, HEAD, read
-from packager import build, table, units, variables
-from packager.errors import CompilerError, InputError
 
 # --- units
 
@@ -189,4 +189,4 @@ def test_empty_table_is_refused(tmp_path: Path, compiler: tuple[str, ...]) -> No
 
 def test_folder_without_table_is_refused(tmp_path: Path, compiler: tuple[str, ...]) -> None:
     with pytest.raises(InputError, match=r"variables\.def: no such file"):
-        table.read(tmp_path, (build.SHELL,), compiler)
+        table.read(tmp_path, (checkout.SHELL,), compiler)

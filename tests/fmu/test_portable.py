@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 import setuptools
 
+from feedsim_packager import binary, compile, portable, targets, universal
+from feedsim_packager.errors import CompilerError, InputError
 from fmu.unpacked import PLATFORM, Archive
-from packager import binary, compile, portable, targets, universal
-from packager.errors import CompilerError, InputError
 
 # --- universal files
 

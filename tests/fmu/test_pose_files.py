@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from feedsim_packager import machine_tables, poses
+from feedsim_packager.errors import InputError
 from fmu.pose_file import AXES, Grid, table
 from machine_helpers import modes_csv
-from packager import machine_tables, poses
-from packager.errors import InputError
 
 
 def _swapped(rows: np.ndarray, where: tuple[int, int], value: float) -> np.ndarray:

@@ -12,14 +12,14 @@ import fmpy
 import numpy as np
 import pytest
 
+from feedsim_packager import build, cli, machine_tables, toolchain
+from feedsim_packager.errors import InputError
+from feedsim_packager.machine import named
+from feedsim_packager.repack import repack
 from fmu import test_archives as built
 from fmu.pose_file import AXES, Grid
 from fmu.unpacked import PLATFORM, ROOT, Archive, unpack
 from machine_helpers import modes_csv
-from packager import build, cli, machine_tables, toolchain
-from packager.errors import InputError
-from packager.machine import named
-from packager.repack import repack
 
 POSE = (0.5, -0.25, 1.0)
 NAME, NOTE = "Lathe <5>", 'Shop 2 & "others"'

@@ -25,7 +25,7 @@ FIRST, MORE = 40, 60
 def _elsewhere(archive: Archive, first: int, count: int, state: Path | None = None) -> tuple[list[list[float]], bytes]:
     command = [sys.executable, "-m", "fmu.continued", archive.unit, str(archive.path), str(archive.folder)]
     command += [str(first), str(count), *([str(state)] if state else [])]
-    paths = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "tests"), str(ROOT / "src/fmi2")])}
+    paths = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "tests"), str(ROOT / "src/packager")])}
     done = subprocess.run(command, capture_output=True, text=True, env=paths)
     assert done.returncode == 0, done.stderr
     rows = [[float.fromhex(each) for each in line.split()] for line in done.stdout.splitlines()]
@@ -96,7 +96,7 @@ def test_states_of_other_resources_are_refused(plant: Archive, tmp_path: Path) -
     shutil.copy(resources / "axes.csv", tmp_path / "axes.csv")
     (tmp_path / "modes.csv").write_text("\n".join([lines[0], *stiffer]) + "\n", encoding="utf-8")
     out = tmp_path / "packed" / "plant.fmu"
-    command = [sys.executable, str(ROOT / "src/fmi2/packager"), "repack", str(plant.path), "--axes"]
+    command = [sys.executable, "-m", "feedsim_packager", "repack", str(plant.path), "--axes"]
     command += [str(tmp_path / "axes.csv"), "--modes", str(tmp_path / "modes.csv"), "--name", "stiffer"]
     done = subprocess.run([*command, "--out", str(out)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
+from feedsim_packager import cli, setpoints, toolchain
 from fmu.setpoint_table import AXES, CYCLE, NS, ROWS, numbers, pack, text
 from fmu.unpacked import PLATFORM, ROOT, Archive, instantiate, unpack
-from packager import cli, setpoints, toolchain
 
 DEFAULT = ROOT / "src/setpoint_fmu/resources/setpoints.csv"
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
+from feedsim_packager import setpoints
+from feedsim_packager.errors import InputError
+from feedsim_packager.resources import File
 from fmu.setpoint_table import pack, text
 from fmu.unpacked import Archive, instantiate
-from packager import setpoints
-from packager.errors import InputError
-from packager.resources import File
 
 
 @pytest.fixture(scope="module")

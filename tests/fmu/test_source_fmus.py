@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from feedsim_packager import toolchain
 from fmu.unpacked import PLATFORM, UNITS, Archive, unpack
-from packager import toolchain
 from platforms import hosts
 from platforms.cases import Floats, cases
 

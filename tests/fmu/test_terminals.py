@@ -17,11 +17,11 @@ from lxml import etree
 from PIL import Image
 
 from feedsim.cosim import wiring
+from feedsim_packager import build, cli
+from feedsim_packager.errors import InputError
 from fmu.toy_table import toy
 from fmu.unpacked import ROOT, Archive, axes, unpack
 from machine_helpers import modes_csv
-from packager import build, cli
-from packager.errors import InputError
 
 FILE = "terminalsAndIcons/terminalsAndIcons.xml"
 AXES = tuple(name for name, _ in axes())
@@ -252,7 +252,7 @@ REAL = 'REAL({}, {}, continuous, 0, "1", "1", NO_MIN, NO_MAX, "", "Text")\n'
 
 
 def _pack(folder: Path, compiler: tuple[str, ...], *rows: str) -> tuple[dict[str, bytes], list[str]]:
-    from packager import terminals as under_test
+    from feedsim_packager import terminals as under_test
 
     directory = toy(folder, "/* toy: a unit for tests. */\n" + "".join(rows))
     unit = build.load(directory, compiler)

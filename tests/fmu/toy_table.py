@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from packager import build, table
+from feedsim_packager import checkout, table
 
 HEAD = "/* toy: a unit for tests. Second sentence. */\n"
 GOOD = HEAD + (
@@ -27,4 +27,4 @@ def toy(folder: Path, rows: str) -> Path:
 
 
 def read(folder: Path, rows: str, compiler: tuple[str, ...]) -> table.Table:
-    return table.read(toy(folder, rows), (build.SHELL, build.STANDARD), compiler)
+    return table.read(toy(folder, rows), (checkout.SHELL, checkout.STANDARD), compiler)

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import fmpy
 from fmpy.fmi2 import FMU2Slave
 
-from packager import compile
+from feedsim_packager import compile
 
 ROOT = Path(__file__).resolve().parents[2]
 UNITS = ("plant", "controller", "friction", "setpoint")

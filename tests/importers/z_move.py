@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from feedsim_packager import repack, setpoints
-from feedsim_packager.machine import named
-from feedsim_packager.resources import File
 
 from feedsim import cosim, nc, scenario
 from feedsim.cosim.system import controller_parameters, plant_parameters
 from feedsim.trace import Trace
+from feedsim_packager import repack, setpoints
+from feedsim_packager.machine import named
+from feedsim_packager.resources import File
 from importers.system import Component, Experiment, Floats, Result, System, difference
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -14,7 +14,7 @@ import numpy as np
 from fmpy import read_model_description
 from numpy.typing import NDArray
 
-from packager import targets
+from feedsim_packager import targets
 from platforms.cases import STEPS, Case, H
 
 HERE = Path(__file__).parent

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from packager import binary, build, portable, targets, toolchain, universal
+from feedsim_packager import binary, build, checkout, portable, targets, toolchain, universal
 from platforms import hosts, signature
 from platforms.cases import Case, Floats, cases
 
@@ -156,7 +156,7 @@ def test_archives_hold_every_platform(unit: str, unpacked: dict[str, Path]) -> N
         content = _library(unpacked, unit, name).read_bytes()
         own = portable.own_functions(unit, unpacked[unit] / "sources")
         assert portable.problems(content, target, own=own) == []
-        for trace in (str(build.PROJECT), str(Path.home()) + "/", "packager-", "ziglang", "/tmp/"):
+        for trace in (str(checkout.PROJECT), str(Path.home()) + "/", "packager-", "ziglang", "/tmp/"):
             assert trace.encode() not in content, (name, trace)
 
 

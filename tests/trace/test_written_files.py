@@ -11,12 +11,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from feedsim_packager import archive
-from feedsim_packager import errors as packager_errors
 
 from feedsim.errors import OutputError
 from feedsim.ssp import archive as ssp_archive
 from feedsim.trace import written_whole
+from feedsim_packager import archive
+from feedsim_packager import errors as packager_errors
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pipes and links of POSIX")
 CONTENT = b"what is written"

@@ -130,7 +130,7 @@ test-sanitize: $(C_TESTS:%=$(C_BUILD)/sanitized/%) $(foreach unit,$(UNITS),$(C_B
 	@$(C_BUILD)/sanitized/one_program $(foreach unit,friction controller plant setpoint,"$(call GUID_OF,$(unit))" $(C_BUILD)/packed/$(unit)/resources)
 
 # An archive may hold binaries of other platforms as well.
-HOST_FOLDER = $(shell cd src/fmi2 && $(abspath $(PY)) -c 'from packager import targets; print(targets.host_target().folder)')
+HOST_FOLDER = $(shell $(PY) -c 'from feedsim_packager import targets; print(targets.host_target().folder)')
 
 test-valgrind: $(C_BUILD)/plain/lifecycle $(PACKED) ## leak check of the units as packed
 	@if ! command -v valgrind >/dev/null 2>&1; then echo "valgrind is not installed: leak check left out"; exit 0; fi; \

@@ -48,14 +48,15 @@ def pack_setpoints(base: Path, out: Path, program: Program, *, name: str, note: 
         InputError: `base` is no such archive.
         OutputError: `out` cannot be written.
     """
-    from feedsim_packager import errors, repack, setpoints
+    from feedsim_packager import errors, setpoints
     from feedsim_packager.machine import named
+    from feedsim_packager.repack import repack
     from feedsim_packager.resources import File
 
     columns = {axis: (program.x_s[axis], program.n_ffw[axis]) for axis in program.x_s}
     try:
         given = setpoints.check(File("setpoints.csv", setpoints.write(program.time, columns)))
-        repack.repack(base, given, named(name, note), out, trial_run=False)
+        repack(base, given, named(name, note), out, trial_run=False)
     except errors.OutputError as error:
         raise OutputError(str(error)) from error
     except errors.InputError as error:

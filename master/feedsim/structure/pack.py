@@ -61,8 +61,9 @@ def pack(
         InputError: a file is not what it should be, or the unit refuses the machine.
         OutputError: `out` cannot be written.
     """
-    from feedsim_packager import errors, machine_tables, repack
+    from feedsim_packager import errors, machine_tables
     from feedsim_packager.machine import named
+    from feedsim_packager.repack import repack
     from feedsim_packager.resources import File
 
     if isinstance(modes, Modes):
@@ -78,7 +79,7 @@ def pack(
             File.at(modes),
             File.at(poses) if poses is not None else None,
         )
-        done = repack.repack(base, given, named(name, note), out, trial_run=trial, level=level)
+        done = repack(base, given, named(name, note), out, trial_run=trial, level=level)
     except errors.OutputError as error:
         raise OutputError(str(error)) from error
     except errors.InputError as error:

@@ -7,7 +7,7 @@ columns per axis, position setpoint and speed feedforward; one row per position 
 import io
 import math
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -107,7 +107,7 @@ _EMBEDDED_HEAD_LARGE = """\
 """
 
 
-def write(time: Sequence[float], axes: Mapping[str, tuple[Sequence[float], Sequence[float]]]) -> bytes:
+def write(time: Iterable[float], axes: Mapping[str, tuple[Iterable[float], Iterable[float]]]) -> bytes:
     """setpoints.csv of rows at `time` [s] with the columns x_s [m] and n_ffw [rad/s] of each axis, all of one length.
 
     The shortest digits that read back the same: no bit is lost.

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import machine_tables, setpoints
+from .checkout import DEFAULT_MODES
 from .errors import InputError
 from .resources import File, Resources
-
-PROJECT = Path(__file__).resolve().parents[3]
-DEFAULT_MODES = PROJECT / "scenarios" / "machines" / "test_centre" / "modes.csv"
 
 
 @dataclass(frozen=True)

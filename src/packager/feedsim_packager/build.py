@@ -23,6 +23,7 @@ from . import (
     trial,
     variables,
 )
+from .checkout import PROJECT, REFERENCES, SHELL, SOURCES, STANDARD
 from .errors import CompilerError, InputError
 from .machine import Machine, named
 from .resources import Experiment, Resources
@@ -30,10 +31,6 @@ from .table import Table
 from .targets import Target
 from .variables import Variable
 
-SHELL = Path(__file__).resolve().parent.parent  # src/fmi2
-PROJECT = SHELL.parent.parent
-STANDARD = SHELL / "standard"
-REFERENCES = PROJECT / "tests" / "reference"
 EMBEDDED = "embedded_resources.c"
 CARRIED = carried.PATH.removeprefix("sources/")
 
@@ -85,12 +82,12 @@ class Result:
 
 def unit_directory(name: str) -> Path:
     """`name` is a unit's name (src/<name>_fmu) or the path of its folder."""
-    directory = PROJECT / "src" / f"{name}_fmu"
+    directory = SOURCES / f"{name}_fmu"
     if directory.is_dir():
         return directory
     if Path(name).is_dir():
         return Path(name)
-    known = ", ".join(sorted(path.name.removesuffix("_fmu") for path in (PROJECT / "src").glob("*_fmu")))
+    known = ", ".join(sorted(path.name.removesuffix("_fmu") for path in SOURCES.glob("*_fmu")))
     raise InputError(f"no unit '{name}' (units: {known}; or the path of a unit's folder)")
 
 
@@ -203,7 +200,7 @@ def build(
 def _references(unit: Unit) -> dict[str, bytes]:
     """Pinned reference results, which are of the project's own units with their default resources."""
     name = unit.table.unit
-    if not unit.machine.default or unit.directory.resolve() != PROJECT / "src" / f"{name}_fmu":
+    if not unit.machine.default or unit.directory.resolve() != SOURCES / f"{name}_fmu":
         return {}
     return reference.files(REFERENCES / name, unit.variables)
 

@@ -23,8 +23,9 @@
     build          all of the above, in order
     carried        the table as an archive carries it
     repack         an archive and other resources -> the archive of that machine or motion, without a compiler
+    checkout       where a checkout has what archives are made from
     cli            commands
 
 The package builds without anything from `master/`. Building needs markdown-it-py, repacking the standard library alone.
-With feedsim it is installed as `feedsim_packager`; from the checkout it runs as `python src/fmi2/packager`.
+It is installed with feedsim; in a checkout without an installation, `PYTHONPATH=src/packager` serves as well.
 """

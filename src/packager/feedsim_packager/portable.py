@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from . import binary
+from .checkout import STANDARD
 from .symbols import Binary
 from .targets import OLDEST_GLIBC, OLDEST_MACOS, Target
 
-HEADER = Path(__file__).resolve().parent.parent / "standard" / "fmi2Functions.h"
+HEADER = STANDARD / "fmi2Functions.h"
 
 # What linkers export by themselves; no importer looks for them, and none takes them for its own.
 _LINKERS = frozenset({"_mh_dylib_header", "__dso_handle", "_init", "_fini", "_edata", "_end", "__bss_start"})

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from .checkout import SHELL
 from .errors import InputError
 from .variables import Variable
 
 FOLDER = "terminalsAndIcons"
 DESCRIPTION = f"{FOLDER}/terminalsAndIcons.xml"
 MODEL_PICTURE = "model.png"  # the icon where importers of FMI 2.0 look for it
-PICTURES = Path(__file__).resolve().parent.parent / "terminals"  # one PNG and SVG per kind
+PICTURES = SHELL / "terminals"  # one PNG and SVG per kind
 
 _FMI_VERSION = "3.0"  # of the format; its schema wants it, in archives of FMI 2.0 as well
 _EXTENT = 100  # the icon reaches from -100 to 100, the standard's default

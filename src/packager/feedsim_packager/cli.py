@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import build, kinds, repack, targets
+from . import build, checkout, kinds, repack, targets
 from .compile import EXTRA_FLAGS
 from .errors import InputError, PackagerError
 from .machine import named
@@ -111,7 +111,7 @@ def _build(options: argparse.Namespace) -> None:
         )
     for name in options.unit:
         unit = _load(name, compiler, options)
-        out = options.out or build.PROJECT / "fmus" / f"{unit.table.unit}.fmu"
+        out = options.out or checkout.PROJECT / "fmus" / f"{unit.table.unit}.fmu"
         result = build.build(
             unit, out, compiler, options.build_dir, targets=platforms, progress=_tell if platforms else None
         )

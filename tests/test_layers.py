@@ -24,6 +24,7 @@ ORDER = [
     "nc",
     "scenario",
     "trace",
+    "fields",
     "units",
     "errors",
 ]

@@ -9,6 +9,7 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from feedsim import units
+from feedsim.fields import Quantity, is_multiple
 from feedsim.scenario import (
     Arc,
     Circle,
@@ -29,7 +30,6 @@ from feedsim.scenario import (
     load,
     load_machine,
 )
-from feedsim.scenario.fields import Quantity, is_multiple
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / "scenarios"

@@ -8,8 +8,8 @@ from math import inf, isfinite
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.fields import Quantity
 from feedsim.scenario import Friction
-from feedsim.scenario.fields import Quantity
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.fields import no_axis
 from feedsim.identify.even_time import stretches
 from feedsim.identify.record import Array, Record
 from feedsim.identify.signals import Channel, Chosen, choose
 from feedsim.identify.signs import checked
 from feedsim.scenario import Columns, Machine
-from feedsim.scenario.fields import no_axis
 from feedsim.trace import Recording, read_recording
 
 # Values given twice are the same up to the rounding of what people write.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
+from feedsim.fields import Quantity
 from feedsim.scenario import Axis, Drive, Friction, Machine, MeasuredSetpoints, Scenario
-from feedsim.scenario.fields import Quantity
 
 Parameter = float | int | bool | str
 

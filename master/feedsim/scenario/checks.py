@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from feedsim.fields import is_multiple, no_axis
 from feedsim.scenario.experiment import ConstantSpeed, Sine
-from feedsim.scenario.fields import is_multiple, no_axis
 from feedsim.scenario.motion import Arc, Circle, MeasuredSetpoints, Motion, Move
 
 if TYPE_CHECKING:

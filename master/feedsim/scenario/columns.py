@@ -12,7 +12,7 @@ from pydantic import model_validator as whole
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.scenario.fields import AxisName, Model, Quantity, fault
+from feedsim.fields import AxisName, Model, Quantity, fault
 from feedsim.scenario.load import check, fetch, read_group
 from feedsim.scenario.problems import describe, in_order
 from feedsim.scenario.source import Place

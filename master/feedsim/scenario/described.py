@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import ConfigDict, Field, StrictStr
 
 from feedsim.errors import InputError
-from feedsim.scenario.fields import AxisName, File, Model, Quantity
+from feedsim.fields import AxisName, File, Model, Quantity
 from feedsim.scenario.load import MACHINE_FILE, STRUCTURE_FILE, check, fetch, load, load_structure, read_group
 from feedsim.scenario.machine import Machine
 from feedsim.scenario.problems import dotted, in_order

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Discriminator, Field, StrictInt, Tag, model_validator
 
-from feedsim.scenario.fields import AxisName, Model, Quantity, fault
+from feedsim.fields import AxisName, Model, Quantity, fault
 
 Speed = Annotated[float, Quantity("m/s", above=0)]
 

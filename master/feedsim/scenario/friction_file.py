@@ -16,7 +16,7 @@ import yaml
 
 from feedsim import units
 from feedsim.errors import OutputError
-from feedsim.scenario.fields import Quantity
+from feedsim.fields import Quantity
 from feedsim.scenario.load import read_checked
 from feedsim.scenario.machine import Friction
 from feedsim.trace.files import written_whole

@@ -13,10 +13,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
 
 from feedsim.errors import InputError
+from feedsim.fields import Quantity, Reading, brief, did_you_mean, is_multiple
 from feedsim.scenario import overrides as changes
 from feedsim.scenario import shape
 from feedsim.scenario.checks import contradictions
-from feedsim.scenario.fields import Quantity, Reading, brief, did_you_mean, is_multiple
 from feedsim.scenario.machine import Cycles, Machine
 from feedsim.scenario.model import Scenario
 from feedsim.scenario.problems import describe, explain, in_order

@@ -18,8 +18,8 @@ from pydantic_core import core_schema
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.fields import AxisName, Model, Quantity, Reading, fault
 from feedsim.scenario.checks import interval_fault
-from feedsim.scenario.fields import AxisName, Model, Quantity, Reading, fault
 
 Signal = Literal[
     "x_s", "n_ffw", "x_a", "n_a", "M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q",
@@ -69,9 +69,7 @@ class _Level:
     def __get_pydantic_json_schema__(
         self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        from feedsim.scenario.schema import quantity_schema
-
-        absolute = quantity_schema(Quantity(self.unit))
+        absolute = Quantity(self.unit).json_schema()
         share = {"type": "string", "pattern": rf"^\s*{units.NUMBER}\s*(?:%|percent)\s*$", "examples": ["5 %"]}
         return {"anyOf": [share, absolute]} if self.share else absolute
 

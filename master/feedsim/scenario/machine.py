@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, PrivateAttr, StrictBool, StrictInt, StrictStr, ValidationInfo, field_validator
 
-from feedsim.scenario.fields import AxisName, File, Model, Quantity, Reading, fault, is_multiple
+from feedsim.fields import AxisName, File, Model, Quantity, Reading, fault, is_multiple
 
 Parameter = float | int | bool | str
 FilterType = Literal["off", "second_order", "band_stop", "low_pass"]

@@ -9,8 +9,8 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr, ValidationInfo, fi
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.fields import AxisName, File, Model, Quantity, fault
 from feedsim.scenario.experiment import ConstantSpeed, Sine
-from feedsim.scenario.fields import AxisName, File, Model, Quantity, fault
 
 Position = Annotated[float, Quantity("m")]
 Feed = Annotated[float, Quantity("m/s", above=0)]

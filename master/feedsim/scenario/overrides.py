@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.errors import InputError
+from feedsim.fields import brief, did_you_mean
 from feedsim.scenario import shape
-from feedsim.scenario.fields import brief, did_you_mean
 from feedsim.scenario.source import Mark, Place, Source, at, copied, parse
 
 

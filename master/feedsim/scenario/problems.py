@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from feedsim import units
+from feedsim.fields import Quantity, brief, did_you_mean
 from feedsim.scenario import shape
-from feedsim.scenario.fields import Quantity, brief, did_you_mean
 from feedsim.scenario.source import Place, Source
 
 if TYPE_CHECKING:

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
-from math import inf
 from typing import TYPE_CHECKING, Any, Literal
 
 from feedsim import units
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
-
-    from feedsim.scenario.fields import Quantity
 
 Kind = Literal["scenario", "machine", "structure", "columns", "tolerances", "study"]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -76,37 +72,6 @@ def _structure_schema() -> dict[str, Any]:
         model = schema["$defs"][option["$ref"].rpartition("/")[2]]
         model["required"] = ["kind", *model.get("required", [])]
     return schema | {"type": "object", "oneOf": options}
-
-
-def quantity_schema(quantity: Quantity) -> dict[str, Any]:
-    """Schema of a quantity: a number and known symbols; a symbol that stands alone must have the right dimension."""
-    dimension = units.unit(quantity.unit).dimension
-    symbols = sorted(_symbols(), key=len, reverse=True)
-    alone = "|".join(symbol for symbol in symbols if _symbols()[symbol] != dimension)
-    refused = rf"\s*{units.NUMBER}\s*(?:{alone})\s*$"
-    if quantity.unit != "1":
-        refused += rf"|\s*{units.NUMBER}\s*$"
-    expression = rf"(?:{'|'.join(symbols)}|[-0-9 .*/^()·⋅²³+])*"
-    example = quantity.example or units.example(quantity.unit)
-    text: dict[str, Any] = {
-        "type": "string",
-        "pattern": rf"^(?!{refused})\s*{units.NUMBER}\s*{expression}\s*$",
-        "examples": [example],
-    }
-    if quantity.unit != "1":
-        return text
-    number: dict[str, Any] = {"type": "number"}
-    if quantity.minimum > -inf:
-        number["minimum"] = quantity.minimum
-    if quantity.maximum < inf:
-        number["maximum"] = quantity.maximum
-    return {"anyOf": [number, text], "examples": [example]}
-
-
-@cache
-def _symbols() -> dict[str, str]:
-    """Symbol as a pattern -> its dimension."""
-    return {symbol: units.unit(symbol).dimension for symbol in (*units.DEFINITIONS, *units.ALIASES)}
 
 
 def _open_to_files(group: dict[str, Any], definitions: dict[str, Any]) -> None:

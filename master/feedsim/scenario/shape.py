@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from feedsim.scenario.fields import ExistingFile
+from feedsim.fields import ExistingFile
 from feedsim.scenario.source import Place
 
 

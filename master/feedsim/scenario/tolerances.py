@@ -13,7 +13,7 @@ from pydantic_core import core_schema
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.scenario.fields import Model, Quantity, brief, fault
+from feedsim.fields import Model, Quantity, brief, fault
 from feedsim.scenario.load import read_checked
 
 Time = Annotated[float, Quantity("s", minimum=0, example="1 ms")]

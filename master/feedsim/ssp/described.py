@@ -14,8 +14,8 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel
 
+from feedsim.fields import Quantity
 from feedsim.scenario import MeasuredSetpoints, Scenario, load_structure
-from feedsim.scenario.fields import Quantity
 from feedsim.scenario.structure.geometry import GeometryStructure
 
 RECORDINGS = "resources/recordings"

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from feedsim.cosim.unit import Archive
 from feedsim.errors import InputError
-from feedsim.scenario.fields import did_you_mean
+from feedsim.fields import did_you_mean
 from feedsim.ssp import parameter_set
 from feedsim.ssp.parameter_set import Parameter, ParameterSet, Value
 from feedsim.ssp.system_structure import Binding, Structure

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
+from feedsim.fields import did_you_mean
 from feedsim.scenario import Parameter
-from feedsim.scenario.fields import did_you_mean
 from feedsim.sweep.design import Design
 from feedsim.sweep.task import Outcome
 from feedsim.trace import matches

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, StrictStr
 
-from feedsim.scenario.fields import Model, Quantity
+from feedsim.fields import Model, Quantity
 
 
 class DampingStep(Model):

@@ -7,7 +7,7 @@ from math import dist, hypot
 from typing import NamedTuple
 
 from feedsim.errors import InputError
-from feedsim.scenario.fields import did_you_mean, no_axis
+from feedsim.fields import did_you_mean, no_axis
 from feedsim.scenario.source import Place
 from feedsim.scenario.structure.fields import FRAME
 from feedsim.scenario.structure.geometry import Body, GeometryStructure

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StrictInt, field_validator
 
-from feedsim.scenario.fields import Model, Quantity, fault
+from feedsim.fields import Model, Quantity, fault
 from feedsim.scenario.structure.fields import BodyNode, Hold, Inertia, Name, Point, Stiffness, StiffnessOrNone
 
 End = Literal["start", "end"]

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import core_schema
 
-from feedsim.scenario.fields import Quantity, brief, fault
+from feedsim.fields import Quantity, brief, fault
 
 NAME = r"[A-Za-z][A-Za-z0-9_]*"
 NODE = rf"{NAME}(?:\.[0-9]+)?"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StrictInt, field_validator, model_validator
 
-from feedsim.scenario.fields import AxisName, Model, Quantity, fault
+from feedsim.fields import AxisName, Model, Quantity, fault
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.drive import Drive, Scale, Tool
 from feedsim.scenario.structure.fields import (

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from feedsim.scenario.fields import AxisName, File, Model, Quantity, fault
+from feedsim.fields import AxisName, File, Model, Quantity, fault
 from feedsim.scenario.structure import Structure
 
 

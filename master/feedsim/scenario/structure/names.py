@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from feedsim.errors import InputError
-from feedsim.scenario.fields import did_you_mean
+from feedsim.fields import did_you_mean
 from feedsim.scenario.structure.geometry import GeometryStructure
 
 

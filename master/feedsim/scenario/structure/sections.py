@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from feedsim.scenario.fields import Model, Quantity, fault
+from feedsim.fields import Model, Quantity, fault
 from feedsim.scenario.structure.fields import Name
 
 Size = Annotated[float, Quantity("m", above=0)]

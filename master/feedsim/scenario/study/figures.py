@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from feedsim.errors import InputError
+from feedsim.fields import did_you_mean
 from feedsim.scenario.base import Base
-from feedsim.scenario.fields import did_you_mean
 from feedsim.scenario.model import Positioning, Scenario
 from feedsim.scenario.motion import Circle, MeasuredSetpoints
 from feedsim.scenario.problems import describe

@@ -16,7 +16,7 @@ from pydantic import (
 from pydantic_core import core_schema
 
 from feedsim import units
-from feedsim.scenario.fields import File, Model, brief, fault
+from feedsim.fields import File, Model, brief, fault
 
 Method = Literal["grid", "latin_hypercube", "sobol", "sensitivity"]
 Kind = Literal["uniform", "loguniform", "triangular", "normal", "lognormal"]

@@ -12,10 +12,10 @@ from pydantic_core import PydanticCustomError
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.fields import Quantity
 from feedsim.scenario import overrides as changes
 from feedsim.scenario import shape
 from feedsim.scenario.base import Base, Change, data_files
-from feedsim.scenario.fields import Quantity
 from feedsim.scenario.load import reading
 from feedsim.scenario.model import Scenario
 from feedsim.scenario.problems import describe, dotted, quantity_of

@@ -1,4 +1,7 @@
-"""Field types of the scenario models: quantities with units, axis names, files."""
+"""Field types of the files that people write: quantities with units, axis names, files; the base of their models.
+
+May use: units, errors. Start reading at Quantity.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import cache, lru_cache
 from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any
@@ -110,6 +113,26 @@ class Quantity:
             return f"at least {low}"
         return f"at most {high}" if self.minimum == -inf else f"from {low} to {high}"
 
+    def json_schema(self) -> dict[str, Any]:
+        """A number and known symbols; a symbol that stands alone must have the right dimension."""
+        dimension = units.unit(self.unit).dimension
+        symbols = sorted(_symbols(), key=len, reverse=True)
+        refused = rf"\s*{units.NUMBER}\s*(?:{'|'.join(each for each in symbols if _symbols()[each] != dimension)})\s*$"
+        if self.unit != "1":
+            refused += rf"|\s*{units.NUMBER}\s*$"
+        expression = rf"(?:{'|'.join(symbols)}|[-0-9 .*/^()·⋅²³+])*"
+        shown = self.example or units.example(self.unit)
+        pattern = rf"^(?!{refused})\s*{units.NUMBER}\s*{expression}\s*$"
+        text: dict[str, Any] = {"type": "string", "pattern": pattern, "examples": [shown]}
+        if self.unit != "1":
+            return text
+        number: dict[str, Any] = {"type": "number"}
+        if self.minimum > -inf:
+            number["minimum"] = self.minimum
+        if self.maximum < inf:
+            number["maximum"] = self.maximum
+        return {"anyOf": [number, text], "examples": [shown]}
+
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         def validate(value: Any, info: ValidationInfo) -> float:
             return self.read(value, text=isinstance(info.context, Reading))
@@ -121,9 +144,13 @@ class Quantity:
     def __get_pydantic_json_schema__(
         self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        from feedsim.scenario.schema import quantity_schema
+        return self.json_schema()
 
-        return quantity_schema(self)
+
+@cache
+def _symbols() -> dict[str, str]:
+    """Symbol as a pattern -> its dimension."""
+    return {symbol: units.unit(symbol).dimension for symbol in (*units.DEFINITIONS, *units.ALIASES)}
 
 
 class _AxisName:

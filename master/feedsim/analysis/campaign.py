@@ -92,12 +92,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def run_campaign(
-    machine: Machine,
-    axes: Sequence[str],
-    plan: Plan,
-    *,
-    fmus: Path | None = None,
-    progress: Progress | None = None,
+    machine: Machine, axes: Sequence[str], plan: Plan, *, fmus: Path | None = None, progress: Progress | None = None
 ) -> Campaign:
     """Measure the responses of `axes`, one after the other.
 
@@ -176,13 +171,7 @@ def _inputs(machine: Machine, axes: Sequence[str], plan: Plan) -> Iterator[tuple
 
 
 def _measure(
-    machine: Machine,
-    axis: str,
-    inject: str,
-    plan: Plan,
-    realisation: int,
-    fmus: Path | None,
-    progress: Progress | None,
+    machine: Machine, axis: str, inject: str, plan: Plan, realisation: int, fmus: Path | None, progress: Progress | None
 ) -> Measurement:
     rms = plan.rms if plan.rms is not None and inject == plan.inject else usual_rms(machine, axis, inject)
     what = inject if inject.startswith("tool.") else f"{axis}.{inject}"

@@ -144,9 +144,7 @@ def _ringing(time: Array, speed: Array, approach: Approach, what: str) -> Figure
 def _torques(trace: Trace, approach: Approach) -> dict[str, Figure]:
     torque = column(trace, f"{approach.axis}.M_a", "positioning")
     rows = _rows(trace, approach)
-    figures = {
-        "peak_torque": Figure(float(np.abs(torque[rows]).max()), "N.m", "largest magnitude of the motor torque"),
-    }
+    figures = {"peak_torque": Figure(float(np.abs(torque[rows]).max()), "N.m", "largest magnitude of the motor torque")}
     if approach.steady is not None:
         begin, end = (approach.steady[0] + share * (approach.steady[1] - approach.steady[0]) for share in PLATEAU)
         inside = (trace.time >= begin) & (trace.time <= end)

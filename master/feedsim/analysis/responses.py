@@ -112,9 +112,7 @@ def frequencies(machine: Machine, modes: Modes, band: tuple[float, float]) -> Fl
 def closed_form(system: linear.LinearSystem, wanted: Sequence[str], frequency: Floats) -> FrequencyResponse:
     """The named responses in closed form at `frequency` (F,) [Hz]."""
     return FrequencyResponse(
-        frequency,
-        {name: one(system, name, frequency) for name in wanted},
-        {name: unit_of(name) for name in wanted},
+        frequency, {name: one(system, name, frequency) for name in wanted}, {name: unit_of(name) for name in wanted}
     )
 
 

@@ -76,12 +76,7 @@ class _Run:
     """One identification: steps, how long each took, and what there is to say."""
 
     def __init__(
-        self,
-        records: Sequence[Record],
-        law: Law,
-        options: Options,
-        progress: Progress,
-        free_axis: FreeAxis | None,
+        self, records: Sequence[Record], law: Law, options: Options, progress: Progress, free_axis: FreeAxis | None
     ) -> None:
         self.records, self.law, self.options, self.progress = records, law, options, progress
         self.free_axis = free_axis
@@ -204,12 +199,7 @@ class _Run:
             return None
         self.progress("open loop", 0, 1)
         found = balanced(
-            transitions(self.records),
-            self.free_axis,
-            estimates,
-            self.law,
-            hold=self.options.hold,
-            I_P=self.options.I_P,
+            transitions(self.records), self.free_axis, estimates, self.law, hold=self.options.hold, I_P=self.options.I_P
         )
         self.progress("open loop", 1, 1)
         return found

@@ -34,10 +34,7 @@ def figures(result: LinearResult | LinearSystem) -> dict[str, Figure]:
     }
     for axis, of_axis in result.axes.items():
         found |= {f"{axis}.{name}": figure for name, figure in _axis(of_axis).items()}
-    for drives, compliance in (
-        ("as they are", result.compliance),
-        ("without torque", result.structure_compliance),
-    ):
+    for drives, compliance in (("as they are", result.compliance), ("without torque", result.structure_compliance)):
         prefix = "tool" if compliance is result.compliance else "tool.free"
         for direction, peak in compliance.items():
             name = f"{prefix}.compliance_{direction}"

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from feedsim.identify import Identified
 from feedsim.identify.read import Provenance
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import (
@@ -22,7 +23,6 @@ from feedsim.identify.result import (
     Stationary,
     Stretch,
 )
-from feedsim.report.identify.account import Account
 from feedsim.scenario import load_subject
 from feedsim.trace import Trace
 from scenario_helpers import MACHINE
@@ -154,9 +154,9 @@ def provenance(file: Path | str = "sine.csv", **changes: Any) -> Provenance:
     )  # fmt: skip
 
 
-def account(**changes: Any) -> Account:
+def identified(**changes: Any) -> Identified:
     sources = (provenance("constant.csv"), provenance("sine.csv"))
-    whole = Account(identification(), records(), sources, load_subject(MACHINE), {"hold": "beta=1"}, "2026-01-31")
+    whole = Identified(identification(), records(), sources, load_subject(MACHINE), {"hold": "beta=1"}, "2026-01-31")
     return replace(whole, **changes)
 
 

@@ -22,7 +22,7 @@ from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.identify import Options, identify
 from feedsim.identify.identify import ORDER, merged_correlation, transitions
-from feedsim.identify.names import distinct
+from feedsim.identify.read import distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate
 from feedsim.scenario import load_machine

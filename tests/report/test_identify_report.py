@@ -14,22 +14,21 @@ import numpy as np
 import pytest
 
 from feedsim.errors import OutputError
-from feedsim.identify.result import NORMAL_95, Balance, Correlation, Estimate, Identification
+from feedsim.identify.friction_file import open_loop_line
+from feedsim.identify.result import Balance, Correlation, Identification
 from feedsim.report import (
     check_identification_writable,
-    constant_load_hint,
     identification_headline,
     identification_table,
     identification_warnings,
-    open_loop_line,
     rigid_line,
     write_identification,
 )
-from feedsim.report.identify.account import at_slide, curve_error, interval_text, relative_text, value_text
 from feedsim.report.identify.correlation_plot import correlation_picture
 from feedsim.report.identify.loop_plots import _length, describe, loops_picture, residuals_picture
 from feedsim.report.identify.open_loop_plot import open_loop_picture
 from feedsim.report.identify.page import page
+from feedsim.report.identify.quantities import at_slide, curve_error
 from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_picture
 from feedsim.report.provenance import friction_origins
 from feedsim.scenario import load_machine
@@ -38,9 +37,9 @@ from identification_helpers import (
     I_P,
     TRUE,
     J,
-    account,
     balance,
     identification,
+    identified,
     provenance,
     records,
     stretch,
@@ -54,7 +53,7 @@ FIGURES = {"stribeck", "plateaus", "loops-speed", "loops-position", "residuals",
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("identified") / "out"
-    write_identification(account(), folder)
+    write_identification(identified(), folder)
     return folder
 
 
@@ -71,33 +70,11 @@ def test_everything_is_there_and_listed(written: Path) -> None:
     assert set(told(written)["files"]) == files
 
 
-def test_friction_file_is_a_friction(written: Path) -> None:
-    friction = read_friction(written / "friction.yaml")
-    for name, value in friction.parameters().items():
-        assert value == pytest.approx(TRUE[name][0], rel=1e-7)
-    group = friction.identified
-    assert group["axis"] == "Z"
-    assert group["constant_load"]["value"] == "0.25 N.m"
-    assert group["inertia"] == {"value": "0.0164 kg.m^2", "status": "given", "reason": "of the machine's modes"}
-    assert group["parameters"]["beta"] == {"status": "held", "reason": "usual value"}
-    low, high = (float(text.split()[0]) for text in group["parameters"]["F_C"]["interval"])
-    assert (low + high) / 2 == pytest.approx(1.6, rel=1e-7)
-    assert high - low == pytest.approx(2 * NORMAL_95 * 0.0014 * 1.6, rel=1e-4)
-    assert [trace["file"] for trace in group["traces"]] == ["constant.csv", "sine.csv"]
-    assert len(group["correlation"]["names"]) == len(group["correlation"]["matrix"])
-    assert "Synthetic" in group["machine"]["note"]
-    text = (written / "friction.yaml").read_text(encoding="utf-8")
-    head = [line for line in text.splitlines() if line.startswith("#")]
-    assert "identified by feedsim" in head[0]
-    assert any("Synthetic machine" in line for line in head)
-    assert any('machine.axes.Z.constant_load="0.25 N.m"' in line for line in head)
-
-
 def test_a_friction_that_cannot_be_is_not_written(tmp_path: Path) -> None:
     found = identification()
     wrong = {**found.estimates, "gamma": replace(found.estimates["gamma"], value=1.2)}
     with pytest.raises(OutputError, match=r"friction\.yaml is not written: gamma"):
-        write_identification(account(found=replace(found, estimates=wrong)), tmp_path / "out")
+        write_identification(identified(found=replace(found, estimates=wrong)), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -122,8 +99,8 @@ def test_the_simple_model_stands_beside(written: Path) -> None:
     assert set(told(written)["rigid_axis"]) == {"J", "F_C"}
     text = (written / "report.html").read_text(encoding="utf-8")
     assert "Rigid axis with simple friction" in text
-    assert rigid_line(account()).startswith("rigid axis with simple friction: J 0.01640 kg.m^2, F_C 1.9000 N.m")
-    without = account(found=identification(rigid={}))
+    assert rigid_line(identified()).startswith("rigid axis with simple friction: J 0.01640 kg.m^2, F_C 1.9000 N.m")
+    without = identified(found=identification(rigid={}))
     assert rigid_line(without) == ""
     assert "Rigid axis" not in page(without, [])
 
@@ -169,14 +146,14 @@ def test_page(written: Path) -> None:
 
 def open_loop_text(found: Identification) -> str:
     """The section of the page, without its tags."""
-    text = page(account(found=found), [])
+    text = page(identified(found=found), [])
     start = text.index('id="position-in-open-loop"')
     return re.sub(r"<[^>]+>", " ", text[start : text.index("<h2", start)])
 
 
 def test_position_in_open_loop(tmp_path: Path) -> None:
     found = identification(balance=balance())
-    write_identification(account(found=found), tmp_path)
+    write_identification(identified(found=found), tmp_path)
     before = balance().position[0]
     assert open_loop_line(found) == (
         f"position off by {100 * before * I_P:.3g} mm rms instead of {1e3 * before * I_P:.3g} mm; "
@@ -203,13 +180,13 @@ def test_position_in_open_loop(tmp_path: Path) -> None:
     drift = balance().drifts[0]
     for column, values in zip((1, 2, 3, 4), (drift.time, drift.angle, drift.before, drift.after), strict=True):
         assert [float(row[column]) for row in rows[1:]] == list(values)
-    write_identification(account(), tmp_path)
+    write_identification(identified(), tmp_path)
     assert not (tmp_path / "open_loop.csv").exists()
 
 
 def test_open_loop_that_was_tried_and_refused(tmp_path: Path) -> None:
     found = identification(balance=balance(applied=False, reason="F_C would change by +23 %"))
-    write_identification(account(found=found), tmp_path)
+    write_identification(identified(found=found), tmp_path)
     assert open_loop_line(found) == "not applied: F_C would change by +23 %"
     text = open_loop_text(found)
     assert "Not applied: F_C would change by +23 %." in text
@@ -221,7 +198,7 @@ def test_open_loop_that_was_tried_and_refused(tmp_path: Path) -> None:
 def test_open_loop_is_not_spoken_of_where_it_is_none(tmp_path: Path) -> None:
     sines = Balance({}, False, "sine.csv: sines; the open loop needs general motion", applies=False)
     found = identification(balance=sines)
-    write_identification(account(found=found), tmp_path)
+    write_identification(identified(found=found), tmp_path)
     assert open_loop_line(found) == ""
     assert "sine.csv: sines" in open_loop_text(found)
     assert "rms" not in open_loop_text(found)
@@ -231,14 +208,14 @@ def test_open_loop_is_not_spoken_of_where_it_is_none(tmp_path: Path) -> None:
     assert "open_loop" not in read_friction(tmp_path / "friction.yaml").identified
     assert not (tmp_path / "open_loop.csv").exists()
     assert open_loop_line(identification()) == ""
-    assert "open-loop" not in page(account(), [])
+    assert "open-loop" not in page(identified(), [])
 
 
 def test_doubts_of_a_stage_1_that_was_not_used(tmp_path: Path) -> None:
     stage = identification().stationary
     assert stage is not None
     doubtful = replace(stage, warnings=("F_log sits at its bound 0",))
-    apart = account(found=identification(stationary=doubtful, prior=False))
+    apart = identified(found=identification(stationary=doubtful, prior=False))
     write_identification(apart, tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert text.index("<main>") < text.index("F_log sits at its bound 0")  # in its section, not above all
@@ -246,7 +223,7 @@ def test_doubts_of_a_stage_1_that_was_not_used(tmp_path: Path) -> None:
     assert told(tmp_path)["curve"]["used"] is False
     assert "F_log sits at its bound 0" not in told(tmp_path)["warnings"]
     assert identification_headline(apart).startswith("curve of stage 1 alone within")
-    assert 'id="stage-1"' not in page(account(found=identification(stationary=doubtful)), [])
+    assert 'id="stage-1"' not in page(identified(found=identification(stationary=doubtful)), [])
 
 
 def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
@@ -257,7 +234,7 @@ def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
     repeating = ("F_S: known to +-281 % only (95 %)", "v_s is not estimated but held at 2: no Stribeck effect shows",
                  "F_S and W: known to +-281 % only (95 %)")  # fmt: skip
     telling = ("sigma_1 is known to 6.7 % only", "W: known to +-281 % only (95 %)", "no Stribeck effect shows")
-    whole = account(found=replace(found, estimates=both, warnings=(*repeating, *telling)))
+    whole = identified(found=replace(found, estimates=both, warnings=(*repeating, *telling)))
     assert identification_warnings(whole) == list(telling)
     assert whole.warnings == [*repeating, *telling]
 
@@ -265,7 +242,7 @@ def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
 @pytest.mark.parametrize("absent", ["stationary", "dynamic", "both warnings"])
 def test_a_stage_may_be_absent(tmp_path: Path, absent: str) -> None:
     changes: dict[str, Any] = {absent: None} if absent != "both warnings" else {"warnings": (), "advice": ()}
-    whole = account(found=identification(**changes), subject=None)
+    whole = identified(found=identification(**changes), subject=None)
     names = {path.name for path in write_identification(whole, tmp_path)}
     assert ("plateaus.csv" in names) == (absent != "stationary")
     assert ("residuals.csv" in names) == (absent != "dynamic")
@@ -277,8 +254,8 @@ def test_a_stage_may_be_absent(tmp_path: Path, absent: str) -> None:
 
 
 def test_files_of_an_earlier_run_go(tmp_path: Path) -> None:
-    write_identification(account(), tmp_path)
-    write_identification(account(found=identification(dynamic=None)), tmp_path)
+    write_identification(identified(), tmp_path)
+    write_identification(identified(found=identification(dynamic=None)), tmp_path)
     assert set(contents(tmp_path)) == set(told(tmp_path)["files"])
     assert not (tmp_path / "residuals.csv").exists()
 
@@ -292,7 +269,7 @@ def test_place_is_checked_ahead(tmp_path: Path) -> None:
 
 
 def test_table_for_the_terminal() -> None:
-    lines = identification_table(account())
+    lines = identification_table(identified())
     assert len(lines) == 1 + len(TRUE)
     assert any(re.fullmatch(r"  F_C +1\.6000 N\.m +1\.5956 to 1\.6044 +0\.27 %", line) for line in lines)
     assert any(line.startswith("  delay") and "0.50 ms" in line for line in lines)
@@ -303,29 +280,13 @@ def test_reasons_are_cut_at_a_word() -> None:
     found = identification()
     reason = "the first words say what matters and all others may as well be left out where there is no room for them"
     long = {**found.estimates, "W": replace(found.estimates["W"], status="undetermined", reason=reason)}
-    lines = identification_table(account(found=replace(found, estimates=long)))
+    lines = identification_table(identified(found=replace(found, estimates=long)))
     (line,) = (line for line in lines if line.startswith("  W "))
     said = line[line.index("undetermined: ") + len("undetermined: ") :].removesuffix(" ...")
     assert line.endswith(" ...")
     assert len(line) <= 120
     assert reason.startswith(f"{said} ")
     assert len(said) > 30
-
-
-@pytest.mark.parametrize(
-    ("value", "sigma", "texts"),
-    [
-        (1.6, 0.0022, ("1.6000", "1.5957 to 1.6043", "0.27 %")),
-        (-0.25, 0.04, ("-0.250", "-0.328 to -0.172", "31 %")),
-        (300.0, 100.0, ("300", "104 to 496", "65 %")),
-        (0.04, math.nan, ("0.04", "", "")),
-        (1e-9, 1.0, ("0.0", "-2.0 to 2.0", "over 100 %")),
-        (3.0, 0.0, ("3", "", "")),
-    ],
-)
-def test_numbers_in_words(value: float, sigma: float, texts: tuple[str, str, str]) -> None:
-    estimate = Estimate("F_C", value, "N.m", "", sigma)
-    assert (value_text(estimate), interval_text(estimate), relative_text(estimate)) == texts
 
 
 def test_values_at_the_slide() -> None:
@@ -352,14 +313,6 @@ def test_error_of_the_curve_is_that_between_the_plateaus() -> None:
     assert stage is not None
     wide = replace(stage, sigma=np.where(stage.speeds > 50, 1.0, stage.sigma), range=(stage.range[0], 40.0))
     assert curve_error(wide) < 0.01 < curve_error(replace(wide, range=stage.range))
-
-
-def test_constant_load_is_told_where_there_is_one() -> None:
-    whole = account()
-    assert 'machine.axes.Z.constant_load="0.25 N.m"' in constant_load_hint(whole)
-    none = {name: each for name, each in whole.found.estimates.items() if name != "M_0"}
-    assert constant_load_hint(account(found=replace(whole.found, estimates=none))) == ""
-    assert "0.245" in constant_load_hint(whole)
 
 
 class TestFigures:
@@ -436,7 +389,7 @@ class TestFigures:
 
 
 def test_text_of_others_is_escaped() -> None:
-    whole = account(sources=(provenance("<b>.csv", note="a < b"),))
+    whole = identified(sources=(provenance("<b>.csv", note="a < b"),))
     text = page(whole, [])
     assert "<b>.csv" not in text
     assert "&lt;b&gt;.csv" in text

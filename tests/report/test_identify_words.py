@@ -16,12 +16,12 @@ from feedsim.identify.result import Estimate, Identification, Stationary
 from feedsim.report import identification_headline
 from feedsim.report.frame import STYLE, Tile, frame
 from feedsim.report.identify import stribeck_plots
-from feedsim.report.identify.account import speeds_of
 from feedsim.report.identify.page import page
+from feedsim.report.identify.quantities import speeds_of
 from feedsim.report.identify.stribeck_plots import stribeck_picture, stribeck_title
 from feedsim.report.identify.summary import summary
 from feedsim.report.words import counted, powers
-from identification_helpers import I_P, TRUE, J, account, curve, identification, records
+from identification_helpers import I_P, TRUE, J, curve, identification, identified, records
 from report_helpers import Page
 
 room = import_module("feedsim.identify.identify")  # its name in the package is that of the function
@@ -40,7 +40,7 @@ def stage_of(found: Identification) -> Stationary:
 
 
 def tiles(found: Identification) -> str:
-    text = page(account(found=found), [])
+    text = page(identified(found=found), [])
     return " ".join(Page(text[text.index('<div class="keys">') : text.index("</header>")]).words)
 
 
@@ -51,14 +51,14 @@ def test_few_speeds_make_no_curve(count: int) -> None:
     assert speeds_of(stage) == count
     texts = {
         "title": stribeck_title(found, stage),
-        "headline": identification_headline(account(found=found)),
+        "headline": identification_headline(identified(found=found)),
         "tiles": tiles(found),
         "caption": stribeck_picture(found, stage).caption,
     }
     known = ("known to ±", "curve within", "error of the curve", "95 % band of the curve")
     for (where, text), words in zip(texts.items(), known, strict=True):
         assert (words in text) == (count == 3), where
-    said = summary(account(found=found), [])["curve"]
+    said = summary(identified(found=found), [])["curve"]
     assert (said["error"]["value"] is None, said["distinct_speeds"]) == (count < 3, count)
     if count < 3:
         speeds = "1 speed" if count == 1 else "2 speeds"
@@ -77,7 +77,7 @@ def test_one_is_not_many() -> None:
         stationary=replace(stage, plateaus=stage.plateaus[:1]),
         dynamic=replace(dynamic, stretches=dynamic.stretches[:1]),
     )
-    line = identification_headline(account(found=one))
+    line = identification_headline(identified(found=one))
     assert "no curve: 1 speed, 1 plateau; pre-sliding from 1 stretch, " in line
     assert [counted(n, "speed") for n in (0, 1, 2)] == ["0 speeds", "1 speed", "2 speeds"]
 
@@ -134,7 +134,7 @@ def test_small_values_in_tiles_and_table() -> None:
     found = identification()
     small = replace(found.estimates["sigma_2"], value=1.47e-5, sigma=2e-7)
     light = replace(found.estimates["J"], value=1.5057e-5)
-    text = page(account(found=replace(found, estimates={**found.estimates, "sigma_2": small, "J": light})), [])
+    text = page(identified(found=replace(found, estimates={**found.estimates, "sigma_2": small, "J": light})), [])
     assert "<b>1.470×10⁻⁵ <small>N·m·s/rad</small></b>" in text
     assert "<b>1.5057×10⁻⁵ <small>kg·m²</small></b>" in text
     assert '<td class="number">1.431×10⁻⁵ to 1.509×10⁻⁵</td>' in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 
 from feedsim.errors import InputError, OutputError
 from feedsim.scenario import Friction, json_schema, load, load_machine
-from feedsim.scenario.friction_file import Line, friction_text, read_friction, write_friction
+from feedsim.scenario.friction_file import Line, friction_text, read_friction
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIO = ROOT / "scenarios" / "xz_circle.yaml"
@@ -31,19 +32,22 @@ TOLD: dict[str, Any] = {
 }
 
 
+def text_of(lines: Mapping[str, Line], told: Mapping[str, Any] = TOLD, head: Sequence[str] = ()) -> str:
+    return friction_text(lines, told, head, name="friction.yaml")
+
+
 def test_what_is_written_is_read(tmp_path: Path) -> None:
     file = tmp_path / "friction.yaml"
-    write_friction(file, LINES, TOLD, ["Friction of axis Z", "", "two\nlines"])
+    file.write_text(text_of(LINES, head=["Friction of axis Z", "", "two\nlines"]), encoding="utf-8")
     friction = read_friction(file)
     for name, value in VALUES.items():
         assert getattr(friction, name) == pytest.approx(value, rel=1e-7)
     assert friction.F_log == 0.0  # not given: the unit's start value
     assert friction.identified == TOLD
-    assert [path.name for path in tmp_path.iterdir()] == ["friction.yaml"]
 
 
 def test_a_person_reads_one_line_per_parameter() -> None:
-    lines = friction_text(LINES, TOLD, ["Friction of axis Z", "", "two\nlines"]).splitlines()
+    lines = text_of(LINES, head=["Friction of axis Z", "", "two\nlines"]).splitlines()
     assert lines[:4] == ["# Friction of axis Z", "#", "# two", "# lines"]
     assert lines[4] == "sigma_0: 301.23457 N.m/rad   # 95 %: remark on sigma_0"
     assert f"{'gamma: 0.352':<29}# 95 %: remark on gamma" in lines
@@ -55,7 +59,7 @@ def test_a_person_reads_one_line_per_parameter() -> None:
 @given(st.floats(1e-6, 1e9), st.floats(0, 1e4), st.floats(1e-9, 1e3), st.floats(0, 1), st.floats(0, 1))
 def test_values_keep_eight_digits(sigma_0: float, sigma_1: float, F_C: float, rise: float, gamma: float) -> None:
     values = VALUES | {"sigma_0": sigma_0, "sigma_1": sigma_1, "F_C": F_C, "F_S": F_C * (1 + rise), "gamma": gamma}
-    data = yaml.safe_load(friction_text({name: Line(value) for name, value in values.items()}, {}))
+    data = yaml.safe_load(text_of({name: Line(value) for name, value in values.items()}, {}))
     for name, value in values.items():
         # 8 significant digits: half a unit of the last one
         assert float(str(data[name]).split()[0]) == pytest.approx(value, rel=5.1e-8, abs=1e-300)
@@ -65,7 +69,7 @@ def test_values_keep_eight_digits(sigma_0: float, sigma_1: float, F_C: float, ri
 def test_scenarios_take_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str) -> None:
     """--set counts from the working folder, a file from its own folder."""
     (tmp_path / "results").mkdir()
-    write_friction(tmp_path / "results" / "friction.yaml", LINES, TOLD)
+    (tmp_path / "results" / "friction.yaml").write_text(text_of(LINES), encoding="utf-8")
     if where == "--set":
         monkeypatch.chdir(tmp_path)
         scenario = load(SCENARIO, ["machine.axes.Z.friction=results/friction.yaml"])
@@ -97,15 +101,14 @@ def test_what_is_told_is_no_parameter_of_the_unit() -> None:
 
 def test_a_parameter_indented_too_far_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "friction.yaml"
-    write_friction(file, LINES, TOLD)
-    file.write_text(file.read_text(encoding="utf-8") + "  F_log: 0.4 N.m\n", encoding="utf-8")
+    file.write_text(text_of(LINES) + "  F_log: 0.4 N.m\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"friction\.yaml:\d+: identified: 'F_log' has no effect inside 'identified'"):
         read_friction(file)
 
 
 def test_faults_have_their_line(tmp_path: Path) -> None:
     file = tmp_path / "friction.yaml"
-    file.write_text(friction_text(LINES, TOLD).replace("F_C: 1.61 N.m", "F_C: 1.61 N"), encoding="utf-8")
+    file.write_text(text_of(LINES).replace("F_C: 1.61 N.m", "F_C: 1.61 N"), encoding="utf-8")
     with pytest.raises(InputError, match=r"friction\.yaml:4: F_C: .*torque is expected"):
         read_friction(file)
     with pytest.raises(InputError, match="no such file"):
@@ -121,20 +124,14 @@ def test_faults_have_their_line(tmp_path: Path) -> None:
         ({"sigma_3": Line(1.0)}, "'sigma_3' is no friction parameter"),
     ],
 )
-def test_what_could_not_be_read_is_not_written(tmp_path: Path, changes: dict[str, Line], words: str) -> None:
-    file = tmp_path / "friction.yaml"
-    file.write_text("kept", encoding="utf-8")
-    with pytest.raises(OutputError, match=words):
-        write_friction(file, LINES | changes, TOLD)
-    assert file.read_text(encoding="utf-8") == "kept"
-    assert len(list(tmp_path.iterdir())) == 1
+def test_what_could_not_be_read_is_not_composed(changes: dict[str, Line], words: str) -> None:
+    with pytest.raises(OutputError, match=f"friction.yaml is not written: .*{words}"):
+        text_of(LINES | changes)
 
 
-def test_missing_parameters_and_folders(tmp_path: Path) -> None:
+def test_missing_parameters() -> None:
     with pytest.raises(OutputError, match="sigma_0: "):
-        write_friction(tmp_path / "f.yaml", {name: line for name, line in LINES.items() if name != "sigma_0"}, {})
-    with pytest.raises(OutputError, match="cannot be written"):
-        write_friction(tmp_path / "no" / "f.yaml", LINES, {})
+        text_of({name: line for name, line in LINES.items() if name != "sigma_0"}, {})
 
 
 def test_editors_know_the_group() -> None:

@@ -98,8 +98,10 @@ def identify(options: Namespace) -> None:
     """Read, identify, write."""
     from feedsim import report
     from feedsim.cosim.friction_law import FrictionLaw
-    from feedsim.identify import identify as identified
-    from feedsim.identify.names import named_apart
+    from feedsim.identify import Identified
+    from feedsim.identify import identify as identified_from
+    from feedsim.identify.friction_file import FRICTION, constant_load_hint, open_loop_line
+    from feedsim.identify.read import named_apart
     from feedsim.scenario import load_subject
 
     subject = load_subject(options.machine) if options.machine is not None else None
@@ -114,25 +116,25 @@ def identify(options: Namespace) -> None:
         records = named_apart(recorded)
         with FrictionLaw(options.fmus) as law:
             known = _options(options, axis, sources, subject)
-            found = identified(records, law, known, progress, free_axis=law.free_axis)
+            found = identified_from(records, law, known, progress, free_axis=law.free_axis)
     found = replace(found, seconds=reading | dict(found.seconds))
-    account = report.Account(found, records, tuple(sources), subject, _settings(options), date.today().isoformat())
-    report.write_identification(account, directory)
+    identified = Identified(found, records, tuple(sources), subject, _settings(options), date.today().isoformat())
+    report.write_identification(identified, directory)
     # Without the table, all of them: it holds the reasons that some only repeat.
-    for warning in account.warnings if options.quiet else report.identification_warnings(account):
+    for warning in identified.warnings if options.quiet else report.identification_warnings(identified):
         print(f"feedsim: warning: {warning}", file=sys.stderr)
     if not options.quiet:
-        print(f"axis {axis}: {report.identification_headline(account)} -> {directory / 'report.html'}")
-        print("\n".join(report.identification_table(account)))
-        if line := report.open_loop_line(found):
+        print(f"axis {axis}: {report.identification_headline(identified)} -> {directory / 'report.html'}")
+        print("\n".join(report.identification_table(identified)))
+        if line := open_loop_line(found):
             print(f"  open loop: {line}")
-        if line := report.rigid_line(account):
+        if line := report.rigid_line(identified):
             print(f"  {line}")
         for advice in found.advice:
             print(f"  advice: {advice}")
-        if hint := report.constant_load_hint(account):
+        if hint := constant_load_hint(found):
             print(f"  {hint}")
-        setting = shlex.quote(f"machine.axes.{axis}.friction={directory / 'friction.yaml'}")
+        setting = shlex.quote(f"machine.axes.{axis}.friction={directory / FRICTION}")
         print(f"  use: feedsim run SCENARIO.yaml --set {setting}")
 
 

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from feedsim.report.compensate.write import check_compensation_writable, write_compensation
     from feedsim.report.frf.summary import summary_line as frf_summary_line
     from feedsim.report.frf.write import check_frf_writable, write_frf
-    from feedsim.report.identify.account import Account
-    from feedsim.report.identify.friction import constant_load_hint
-    from feedsim.report.identify.open_loop import open_loop_line
     from feedsim.report.identify.summary import headline as identification_headline
     from feedsim.report.identify.summary import rigid_line
     from feedsim.report.identify.summary import table_lines as identification_table
@@ -27,7 +24,6 @@ if TYPE_CHECKING:
     from feedsim.report.sweep.write import check_sweep_writable, discard_sweep, write_sweep
 
 __all__ = [
-    "Account",
     "Run",
     "check_comparison_writable",
     "check_compensation_writable",
@@ -37,7 +33,6 @@ __all__ = [
     "check_sweep_writable",
     "check_writable",
     "compensation_summary_line",
-    "constant_load_hint",
     "discard_sweep",
     "frf_summary_line",
     "growing",
@@ -45,7 +40,6 @@ __all__ = [
     "identification_table",
     "identification_warnings",
     "input_paths",
-    "open_loop_line",
     "rigid_line",
     "summary_line",
     "write",
@@ -59,7 +53,6 @@ __all__ = [
 
 # Loaded on first use: the report of a run should not wait for what identifications and responses calculate with.
 _HOMES = {
-    "Account": ("identify.account", "Account"),
     "check_comparison_writable": ("compare.write", "check_comparison_writable"),
     "check_compensation_writable": ("compensate.write", "check_compensation_writable"),
     "check_frf_writable": ("frf.write", "check_frf_writable"),
@@ -67,13 +60,11 @@ _HOMES = {
     "check_machine_writable": ("machine.write", "check_machine_writable"),
     "check_sweep_writable": ("sweep.write", "check_sweep_writable"),
     "compensation_summary_line": ("compensate.summary", "summary_line"),
-    "constant_load_hint": ("identify.friction", "constant_load_hint"),
     "discard_sweep": ("sweep.write", "discard_sweep"),
     "frf_summary_line": ("frf.summary", "summary_line"),
     "identification_headline": ("identify.summary", "headline"),
     "identification_table": ("identify.summary", "table_lines"),
     "identification_warnings": ("identify.summary", "terminal_warnings"),
-    "open_loop_line": ("identify.open_loop", "open_loop_line"),
     "rigid_line": ("identify.summary", "rigid_line"),
     "write_comparison": ("compare.write", "write_comparison"),
     "write_compensation": ("compensate.write", "write_compensation"),

@@ -19,7 +19,6 @@ from feedsim.errors import OutputError
 from feedsim.fields import Quantity
 from feedsim.scenario.load import read_checked
 from feedsim.scenario.machine import Friction
-from feedsim.trace.files import written_whole
 
 # Relative 5e-8 at most: what is calculated from the file is that of the fit to 1e-6, and a person can still read it.
 DIGITS = 8
@@ -34,29 +33,15 @@ class Line:
     remark: str = ""
 
 
-def write_friction(
-    path: str | Path, parameters: Mapping[str, Line], identified: Mapping[str, Any], head: Sequence[str] = ()
-) -> None:
-    """Write a friction file, whole or not at all.
+def friction_text(
+    parameters: Mapping[str, Line], identified: Mapping[str, Any], head: Sequence[str] = (), *, name: str
+) -> str:
+    """Content of a friction file.
 
     parameters: keys of Friction, SI values. identified: plain values (text, numbers, lists, groups), kept by readers
-    and not calculated with. head: lines of the comment at the top. Raises OutputError: a value is outside its allowed
-    range or not finite, a key is unknown or missing, or the file cannot be written.
+    and not calculated with. head: lines of the comment at the top. name: of the file, for messages. Raises OutputError:
+    a value is outside its allowed range or not finite, a key is unknown or missing.
     """
-    path = Path(path)
-    text = friction_text(parameters, identified, head, name=str(path))
-    with written_whole(path) as file:
-        file.write(text.encode("utf-8"))
-
-
-def friction_text(
-    parameters: Mapping[str, Line],
-    identified: Mapping[str, Any],
-    head: Sequence[str] = (),
-    *,
-    name: str = "friction file",
-) -> str:
-    """Content of a friction file; see write_friction()."""
     known = _units()
     if unknown := [key for key in parameters if key not in known]:
         raise OutputError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from feedsim.identify.result import Correlation
-from feedsim.report.identify.account import SYMBOLS
+from feedsim.report.identify.quantities import SYMBOLS
 from feedsim.report.style import BLUE, GRID, MUTED, VERMILLION, Picture, drawing, finish
 
 STRONG = 0.9  # printed bold

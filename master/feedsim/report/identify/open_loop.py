@@ -1,4 +1,4 @@
-"""Position in open loop: what the step found, for terminal, page, summary.json, friction.yaml and CSV."""
+"""Position in open loop: what the step found, for page, summary.json and CSV."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from feedsim.identify.friction_file import change_text
 from feedsim.identify.result import Balance, Identification
 from feedsim.report.tables import table
 from feedsim.report.words import minus, typeset
@@ -19,20 +20,6 @@ METHOD = (
     "wrong all through the record shows there, and is lost in the residual of the torque. Constant load M_0 and "
     "Coulomb friction F_C are therefore taken from the position in open loop, F_S moves with F_C."
 )
-
-
-def open_loop_line(found: Identification) -> str:
-    """What the step did, in one line; empty where there is nothing to say: it was not asked for, or all are sines."""
-    balance = found.balance
-    if balance is None or not balance.applies:
-        return ""
-    if not balance.applied:
-        return f"not applied: {balance.reason}"
-    before, after = (1e3 * found.I_P * rms for rms in balance.position)
-    parts = [f"position off by {after:.3g} mm rms instead of {before:.3g} mm"]
-    if moved := _moved(balance):
-        parts.append(", ".join(moved))
-    return "; ".join([*parts, f"torque residual {_percent(*balance.torque)}"])
 
 
 def open_loop_section(found: Identification) -> str:
@@ -47,11 +34,11 @@ def open_loop_section(found: Identification) -> str:
         return head + note
     mm = 1e3 * found.I_P
     rows = [
-        _row("Error of the position, rms", balance.position, "rad", mm, "mm", _percent(*balance.position)),
-        _row("Residual of the torque, rms", balance.torque, "N·m", 1 / found.I_P, "N", _percent(*balance.torque)),
+        _row("Error of the position, rms", balance.position, "rad", mm, "mm", change_text(*balance.position)),
+        _row("Residual of the torque, rms", balance.torque, "N·m", 1 / found.I_P, "N", change_text(*balance.torque)),
     ]
     for name, pair in balance.changes.items():
-        change = f"{pair[1] - pair[0]:+.3g} N·m" if name == "M_0" else _percent(*pair)
+        change = f"{pair[1] - pair[0]:+.3g} N·m" if name == "M_0" else change_text(*pair)
         rows.append(_row(f"<code>{name}</code>", pair, "N·m", 1 / found.I_P, "N", change))
     last = "After" if balance.applied else "Tried"
     heads = [
@@ -99,23 +86,6 @@ def _row(name: str, pair: tuple[float, float], unit: str, factor: float, unit_th
         f"<tr><td>{name}</td>{here}<td>{unit}</td>{there}<td>{unit_there}</td>"
         f'<td class="number">{minus(change)}</td></tr>'
     )
-
-
-def _moved(balance: Balance) -> list[str]:
-    """ "F_C and F_S -1.2 %" and "M_0 +0.0034 N.m", of those that did."""
-    words: dict[str, list[str]] = {}
-    for name, (before, after) in balance.changes.items():
-        if after != before:
-            text = f"{after - before:+.3g} N.m" if name == "M_0" else _percent(before, after)
-            words.setdefault(text, []).append(name)
-    return [f"{' and '.join(names)} {text}" for text, names in words.items()]
-
-
-def _percent(before: float, after: float) -> str:
-    """Change in percent of what was before; empty where that says nothing."""
-    if not (math.isfinite(after) and math.isfinite(before) and before > 0):
-        return ""
-    return f"{100 * (after / before - 1):+.2g} %"
 
 
 def _pair(pair: tuple[float, float], unit: str) -> dict[str, Any]:

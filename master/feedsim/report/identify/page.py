@@ -5,24 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from feedsim.identify.result import NORMAL_95, Estimate, Identification
-from feedsim.report.frame import Tile, frame, picture_section
-from feedsim.report.identify.account import (
-    Account,
-    at_slide,
-    curve_error,
+from feedsim.identify import Identified
+from feedsim.identify.friction_file import (
+    FRICTION,
+    constant_load_hint,
     interval_text,
-    is_curve,
     relative_text,
     remark_text,
+    value_text,
+)
+from feedsim.identify.result import NORMAL_95, Estimate, Identification
+from feedsim.report.frame import Tile, frame, picture_section
+from feedsim.report.identify.loop_plots import describe
+from feedsim.report.identify.open_loop import open_loop_section
+from feedsim.report.identify.quantities import (
+    at_slide,
+    curve_error,
+    input_files,
+    is_curve,
     shown_unit,
     speeds_of,
     unit_text,
-    value_text,
 )
-from feedsim.report.identify.friction import FRICTION, constant_load_hint
-from feedsim.report.identify.loop_plots import describe
-from feedsim.report.identify.open_loop import open_loop_section
 from feedsim.report.parts import software
 from feedsim.report.style import Picture
 from feedsim.report.tables import files_table, pairs_table, table
@@ -39,37 +43,37 @@ METHOD = (
 )
 
 
-def page(account: Account, pictures: Sequence[Picture]) -> str:
+def page(identified: Identified, pictures: Sequence[Picture]) -> str:
     """HTML text of the report."""
-    found = account.found
-    machine = f"{account.subject.machine.name} · " if account.subject is not None else ""
-    traces = ", ".join(account.traces)
+    found = identified.found
+    machine = f"{identified.subject.machine.name} · " if identified.subject is not None else ""
+    traces = ", ".join(identified.traces)
     drifts = found.balance is not None and found.balance.drifts
     tables = ", ".join(["plateaus.csv", "residuals.csv", *(["open_loop.csv"] if drifts else [])])
     return frame(
         f"Friction of axis {found.axis}",
-        f"{machine}identified from {traces} · {account.date}",
-        warnings=account.warnings,
-        notes=account.notes,
-        tiles=list(_tiles(account)),
+        f"{machine}identified from {traces} · {identified.date}",
+        warnings=identified.warnings,
+        notes=identified.notes,
+        tiles=list(_tiles(identified)),
         main=[
-            _use(account),
+            _use(identified),
             _advice(found.advice),
             *(picture_section(picture) for picture in pictures),
-            _parameters(account),
+            _parameters(identified),
             _stage_1(found),
             open_loop_section(found),
-            _rigid(account),
-            _stretches(account),
-            _provenance(account),
+            _rigid(identified),
+            _stretches(identified),
+            _provenance(identified),
         ],
         footer=f"{METHOD} Values in full precision: summary.json; the parameters as files take them: {FRICTION}; "
         f"what the figures show: {tables}.",
     )
 
 
-def _tiles(account: Account) -> Iterator[Tile]:
-    found = account.found
+def _tiles(identified: Identified) -> Iterator[Tile]:
+    found = identified.found
     if (stage := found.stationary) is not None:
         alone = "" if found.prior else ", stage 1 alone"
         if is_curve(stage):
@@ -98,10 +102,10 @@ def _tiles(account: Account) -> Iterator[Tile]:
         )
 
 
-def _use(account: Account) -> str:
-    axis = account.found.axis
+def _use(identified: Identified) -> str:
+    axis = identified.found.axis
     command = f"feedsim run SCENARIO.yaml --set machine.axes.{axis}.friction={FRICTION}"
-    hint = constant_load_hint(account)
+    hint = constant_load_hint(identified.found)
     tail = f"<p>The {escape(typeset(hint))}.</p>" if hint else ""
     return f"<h2>Use</h2>\n<p><code>{escape(command)}</code> (with the file's path)</p>{tail}"
 
@@ -111,12 +115,12 @@ def _advice(advice: Sequence[str]) -> str:
     return f"<h2>What further moves would tell</h2>\n<ul>{items}</ul>" if items else ""
 
 
-def _parameters(account: Account) -> str:
-    rows = [_row(estimate, account.found.I_P) for estimate in account.found.estimates.values()]
+def _parameters(identified: Identified) -> str:
+    rows = [_row(estimate, identified.found.I_P) for estimate in identified.found.estimates.values()]
     note = (
         '<p class="muted">Values count on the motor\'s side; at the slide with the lead I_P = pitch/(2π), '
-        f"{account.found.I_P * 1e3:.5g} mm/rad: forces F/I_P, stiffness σ₀/I_P², mass J/I_P². Intervals come from the "
-        "model linearised at the optimum; they know scatter, not a wrong model.</p>"
+        f"{identified.found.I_P * 1e3:.5g} mm/rad: forces F/I_P, stiffness σ₀/I_P², mass J/I_P². Intervals come from "
+        "the model linearised at the optimum; they know scatter, not a wrong model.</p>"
     )
     return '<h2 id="parameters">Parameters</h2>\n' + table(HEADS, rows) + note
 
@@ -134,8 +138,8 @@ def _stage_1(found: Identification) -> str:
     )
 
 
-def _rigid(account: Account) -> str:
-    rows = [_row(estimate, account.found.I_P) for estimate in account.found.rigid.values()]
+def _rigid(identified: Identified) -> str:
+    rows = [_row(estimate, identified.found.I_P) for estimate in identified.found.rigid.values()]
     if not rows:
         return ""
     note = (
@@ -161,12 +165,12 @@ def _row(estimate: Estimate, I_P: float) -> str:
     )
 
 
-def _stretches(account: Account) -> str:
-    stage = account.found.dynamic
+def _stretches(identified: Identified) -> str:
+    stage = identified.found.dynamic
     if stage is None or not stage.stretches:
         return ""
     rows = [
-        f"<tr><td>{escape(stretch.record)}</td><td>{escape(describe(stretch, account.found.I_P))}</td>"
+        f"<tr><td>{escape(stretch.record)}</td><td>{escape(describe(stretch, identified.found.I_P))}</td>"
         f'<td class="number">{stretch.time[0]:.3f}</td><td class="number">{stretch.time[-1]:.3f}</td>'
         f'<td class="number">{stretch.rms:.3g}</td><td class="number">{stretch.weight:.3g}</td></tr>'
         for stretch in stage.stretches
@@ -186,24 +190,24 @@ def _stretches(account: Account) -> str:
     return "<h2>Stretches of stage 2</h2>\n" + table(heads, rows) + known
 
 
-def _provenance(account: Account) -> str:
+def _provenance(identified: Identified) -> str:
     rows = []
-    for name, source in zip(account.traces, account.sources, strict=True):
+    for name, source in zip(identified.traces, identified.sources, strict=True):
         columns = ", ".join(f"{role} from {column}" for role, column in source.columns.items())
         given = [f"pitch {source.pitch * 1e3:.9g} mm"] if source.pitch is not None else []
         given += [f"torque constant {source.torque_constant:.9g} N·m/A"] if source.torque_constant is not None else []
         rows.append((name, "; ".join([columns, *given])))
-    if account.subject is not None:
-        subject = account.subject
+    if identified.subject is not None:
+        subject = identified.subject
         rows.append((subject.kind.capitalize(), f"{subject.name} ({subject.file.name})"))
         rows.append(("Set on the command line", ", ".join(subject.overrides) or "nothing"))
-    rows += [(f"--{name}", value) for name, value in account.settings.items()]
-    rows.append(("Duration", ", ".join(f"{step} {taken:.3g} s" for step, taken in account.found.seconds.items())))
+    rows += [(f"--{name}", value) for name, value in identified.settings.items()]
+    rows.append(("Duration", ", ".join(f"{step} {taken:.3g} s" for step, taken in identified.found.seconds.items())))
     rows.append(("Software", ", ".join(f"{name} {text}" for name, text in software().items())))
     parts = [
         '<section class="provenance">\n<h2>Where the numbers come from</h2>',
         pairs_table(rows),
-        files_table(account.input_files()),
+        files_table(input_files(identified)),
         "</section>",
     ]
     return "\n".join(parts)

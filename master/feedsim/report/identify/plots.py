@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from feedsim.report.identify.account import Account
+from feedsim.identify import Identified
 from feedsim.report.identify.correlation_plot import correlation_picture
 from feedsim.report.identify.loop_plots import loops_picture, residuals_picture
 from feedsim.report.identify.open_loop_plot import open_loop_picture
@@ -10,12 +10,12 @@ from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_pi
 from feedsim.report.style import Picture
 
 
-def pictures_of(account: Account) -> list[Picture]:
+def pictures_of(identified: Identified) -> list[Picture]:
     """All pictures that the stages give."""
-    found = account.found
+    found = identified.found
     pictures: list[Picture | None] = []
     if (stage := found.stationary) is not None:
-        pictures += [stribeck_picture(found, stage), plateaus_picture(found, stage, account.records)]
+        pictures += [stribeck_picture(found, stage), plateaus_picture(found, stage, identified.records)]
     if (dynamic := found.dynamic) is not None:
         pictures += [loops_picture(found, dynamic, "speed"), loops_picture(found, dynamic, "position")]
         pictures.append(residuals_picture(found, dynamic))

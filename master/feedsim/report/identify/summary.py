@@ -9,21 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from feedsim.identify import Identified
+from feedsim.identify.friction_file import interval_text, relative_text, remark_text, value_text
 from feedsim.identify.result import Estimate, Identification
-from feedsim.report.identify.account import (
+from feedsim.report.identify.open_loop import open_loop_part
+from feedsim.report.identify.quantities import (
     MM_PER_MIN,
-    Account,
     at_slide,
     curve_error,
-    interval_text,
+    input_files,
     is_curve,
-    relative_text,
-    remark_text,
     shown_unit,
     speeds_of,
-    value_text,
 )
-from feedsim.report.identify.open_loop import open_loop_part
 from feedsim.report.parts import inputs_part, machine_part, software
 from feedsim.report.words import counted
 from feedsim.trace.csv import quoted, shortest
@@ -32,15 +30,15 @@ FORMAT = 1
 WIDTH = 118  # columns of the terminal's table
 
 
-def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
+def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
     """Content of summary.json; what could not be determined is null."""
-    found = account.found
+    found = identified.found
     return {
         "format": FORMAT,
-        "warnings": account.warnings,
+        "warnings": identified.warnings,
         "advice": list(found.advice),
         "axis": found.axis,
-        "date": account.date,
+        "date": identified.date,
         "lead": {"value": found.I_P, "unit": "m/rad"},
         "parameters": {name: _estimate(estimate, found.I_P) for name, estimate in found.estimates.items()},
         "rigid_axis": {name: _estimate(estimate, found.I_P) for name, estimate in found.rigid.items()},
@@ -48,8 +46,8 @@ def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
         "curve": _curve(found),
         "pre_sliding": _pre_sliding(found),
         "open_loop": open_loop_part(found),
-        "settings": dict(account.settings),
-        "machine": machine_part(account.subject.machine) if account.subject is not None else None,
+        "settings": dict(identified.settings),
+        "machine": machine_part(identified.subject.machine) if identified.subject is not None else None,
         "traces": [
             {
                 "file": name,
@@ -59,21 +57,21 @@ def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
                 "pitch": {"value": source.pitch, "unit": "m"},
                 "torque_constant": {"value": source.torque_constant, "unit": "N.m/A"},
             }
-            for name, source in zip(account.traces, account.sources, strict=True)
+            for name, source in zip(identified.traces, identified.sources, strict=True)
         ],
         "records": [
-            {"name": r.name, "rows": len(r), "interval": {"value": r.interval, "unit": "s"}} for r in account.records
+            {"name": r.name, "rows": len(r), "interval": {"value": r.interval, "unit": "s"}} for r in identified.records
         ],
-        "inputs": inputs_part(account.input_files()),
+        "inputs": inputs_part(input_files(identified)),
         "software": software(),
         "performance": {f"{step}": {"value": taken, "unit": "s"} for step, taken in found.seconds.items()},
         "files": list(files),
     }
 
 
-def table_lines(account: Account) -> list[str]:
+def table_lines(identified: Identified) -> list[str]:
     """Parameter, value, 95 % interval, relative, note: a line each, for the terminal."""
-    found = account.found
+    found = identified.found
     rows = [("", "value", "95 % interval", "+-", "")]
     for estimate in found.estimates.values():
         factor, unit = shown_unit(estimate)
@@ -96,10 +94,10 @@ def table_lines(account: Account) -> list[str]:
     return lines
 
 
-def terminal_warnings(account: Account) -> list[str]:
+def terminal_warnings(identified: Identified) -> list[str]:
     """Warnings without those that say no more than the reason of a parameter, which the table holds."""
-    estimates = [each for each in account.found.estimates.values() if each.reason]
-    return [text for text in account.warnings if not any(_repeats(text, each) for each in estimates)]
+    estimates = [each for each in identified.found.estimates.values() if each.reason]
+    return [text for text in identified.warnings if not any(_repeats(text, each) for each in estimates)]
 
 
 def _repeats(text: str, estimate: Estimate) -> bool:
@@ -108,9 +106,9 @@ def _repeats(text: str, estimate: Estimate) -> bool:
     return head != text and head.split(" ")[0] == estimate.name
 
 
-def headline(account: Account) -> str:
+def headline(identified: Identified) -> str:
     """How well curve and pre-sliding are known, in one line."""
-    found, parts = account.found, []
+    found, parts = identified.found, []
     if (stage := found.stationary) is not None:
         low, high = (n * found.I_P * MM_PER_MIN for n in stage.range)
         what = "curve" if found.prior else "curve of stage 1 alone"
@@ -219,10 +217,10 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def rigid_line(account: Account) -> str:
+def rigid_line(identified: Identified) -> str:
     """The simple model in one line; empty where there is none."""
     parts = []
-    for estimate in account.found.rigid.values():
+    for estimate in identified.found.rigid.values():
         if estimate.status == "estimated":
             parts.append(f"{estimate.name} {value_text(estimate)} {estimate.unit}")
     return f"rigid axis with simple friction: {', '.join(parts)}" if parts else ""

@@ -6,13 +6,14 @@ import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
-from feedsim.report.identify.account import Account
-from feedsim.report.identify.friction import FRICTION, friction_file
+from feedsim.identify import Identified
+from feedsim.identify.friction_file import FRICTION, friction_yaml
 from feedsim.report.identify.open_loop import open_loop_csv
 from feedsim.report.identify.page import page
 from feedsim.report.identify.plots import pictures_of
+from feedsim.report.identify.quantities import remark
 from feedsim.report.identify.summary import plateaus_csv, residuals_csv, summary
-from feedsim.report.parts import to_json
+from feedsim.report.parts import software, to_json
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, write_text
 from feedsim.report.style import remarked
 
@@ -28,16 +29,16 @@ def check_identification_writable(directory: Path | str, inputs: Sequence[Path] 
     check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs)
 
 
-def write_identification(account: Account, directory: Path | str) -> tuple[Path, ...]:
+def write_identification(identified: Identified, directory: Path | str) -> tuple[Path, ...]:
     """Write friction.yaml, plateaus.csv, residuals.csv and open_loop.csv (where there are any), summary.json,
     report.html, figures.
 
     Returns the paths. Files of an earlier run are replaced. Raises OutputError.
     """
-    found = account.found
-    friction = friction_file(account)
-    with remarked("\n".join(textwrap.wrap(account.remark, REMARK_WIDTH)[:REMARK_LINES])):
-        pictures = pictures_of(account)
+    found = identified.found
+    friction = friction_yaml(identified, software())
+    with remarked("\n".join(textwrap.wrap(remark(identified), REMARK_WIDTH)[:REMARK_LINES])):
+        pictures = pictures_of(identified)
     files = [FRICTION]
     files += [PLATEAUS] if found.stationary is not None else []
     files += [RESIDUALS] if found.dynamic is not None else []
@@ -53,7 +54,7 @@ def write_identification(account: Account, directory: Path | str) -> tuple[Path,
             write_text(fresh / RESIDUALS, residuals_csv(found))
         if balance is not None:
             write_text(fresh / OPEN_LOOP, open_loop_csv(balance))
-        write_text(fresh / REPORT, page(account, pictures))
-        write_text(fresh / SUMMARY, to_json(summary(account, names)))
+        write_text(fresh / REPORT, page(identified, pictures))
+        write_text(fresh / SUMMARY, to_json(summary(identified, names)))
 
     return write_results(directory, files, pictures, fill)

@@ -1,0 +1,206 @@
+"""friction.yaml, what an identification leaves: values with their intervals, and where they come from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from feedsim import units
+from feedsim.identify.read import Provenance, distinct
+from feedsim.identify.record import Record
+from feedsim.identify.result import NORMAL_95, Estimate, Identification
+from feedsim.scenario import Friction, Subject
+from feedsim.scenario.friction_file import Line, friction_text
+
+FRICTION = "friction.yaml"
+EXACT = 8  # significant digits of the other values of a group `identified`
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """An identification with what it rests on.
+
+    Attributes:
+        records: what was identified from, in the order of their files.
+        sources: of each file.
+        subject: the machine that pitch, torque constant or inertia are from; None where none was named.
+        settings: option -> value, as the user gave them.
+        date: day of the identification, ISO 8601.
+    """
+
+    found: Identification
+    records: tuple[Record, ...]
+    sources: tuple[Provenance, ...]
+    subject: Subject | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
+    date: str = ""
+
+    @property
+    def traces(self) -> tuple[str, ...]:
+        """Names of the traces, in the order of the sources."""
+        return distinct([source.file for source in self.sources])
+
+    @property
+    def warnings(self) -> list[str]:
+        """Of reading and of identifying, each once."""
+        reading = (warning for source in self.sources for warning in source.warnings)
+        return list(dict.fromkeys((*reading, *self.found.warnings)))
+
+    @property
+    def notes(self) -> list[str]:
+        """What the numbers are worth: the notes of the mappings, and the machine's with whose it is."""
+        notes = [source.note for source in self.sources]
+        if self.subject is not None:
+            notes += [f"{self.subject.machine.name}: {note}" for note in self.subject.notes]
+        return [note for note in dict.fromkeys(notes) if note]
+
+
+def friction_yaml(identified: Identified, software: Mapping[str, str]) -> str:
+    """Text of friction.yaml. software: versions, of feedsim and what it calculates with.
+
+    Raises OutputError where the values make no friction, e.g. one beyond its range.
+    """
+    estimates = identified.found.estimates
+    lines = {name: _line(estimates[name]) for name in Friction.model_fields if name in estimates}
+    origin = _origin(identified, software)
+    return friction_text(lines, origin, _head(identified, software["feedsim"]), name=FRICTION)
+
+
+def constant_load_hint(found: Identification) -> str:
+    """How to set the constant load, which is no friction; empty where there is none beyond doubt."""
+    load = found.estimates.get("M_0")
+    if load is None or load.status == "held" or not abs(load.value) > NORMAL_95 * np.nan_to_num(load.sigma):
+        return ""
+    key = f"machine.axes.{found.axis}.constant_load"
+    interval = f" (95 %: {interval_text(load)})" if interval_text(load) else ""
+    text = f"constant load M_0 {value_text(load)} N.m{interval} is no part of the friction"
+    lean = found.estimates.get("asymmetry")
+    if lean is not None and lean.status == "estimated" and abs(lean.value) > NORMAL_95 * lean.sigma:
+        text += ", but goes with this asymmetry (either alone is wrong)"
+    return f'{text}; set it with {key}="{load.value:.6g} N.m"'
+
+
+def open_loop_line(found: Identification) -> str:
+    """What the position in open loop changed, in one line; empty where there is nothing to say: it was not asked for,
+    or all records are of sines."""
+    balance = found.balance
+    if balance is None or not balance.applies:
+        return ""
+    if not balance.applied:
+        return f"not applied: {balance.reason}"
+    before, after = (1e3 * found.I_P * rms for rms in balance.position)
+    parts = [f"position off by {after:.3g} mm rms instead of {before:.3g} mm"]
+    words: dict[str, list[str]] = {}  # "F_C and F_S -1.2 %" and "M_0 +0.0034 N.m", of those that moved
+    for name, (old, new) in balance.changes.items():
+        if new != old:
+            words.setdefault(f"{new - old:+.3g} N.m" if name == "M_0" else change_text(old, new), []).append(name)
+    if words:
+        parts.append(", ".join(f"{' and '.join(names)} {text}" for text, names in words.items()))
+    return "; ".join([*parts, f"torque residual {change_text(*balance.torque)}"])
+
+
+def change_text(before: float, after: float) -> str:
+    """Change in percent of what was before; empty where that says nothing."""
+    if not (math.isfinite(after) and math.isfinite(before) and before > 0):
+        return ""
+    return f"{100 * (after / before - 1):+.2g} %"
+
+
+def value_text(estimate: Estimate, factor: float = 1.0) -> str:
+    """A value to two digits of its interval, five where there is none."""
+    if not 0 < estimate.sigma < math.inf:
+        return f"{factor * estimate.value:.5g}"
+    return f"{factor * estimate.value:.{_places(estimate, factor)}f}"
+
+
+def interval_text(estimate: Estimate, factor: float = 1.0) -> str:
+    """ "1.597 to 1.603"; empty where there is no interval."""
+    if not 0 < estimate.sigma < math.inf:
+        return ""
+    places = _places(estimate, factor)
+    return " to ".join(f"{factor * end:.{places}f}" for end in estimate.interval)
+
+
+def relative_text(estimate: Estimate) -> str:
+    """Half the interval in percent of the value; empty where that says nothing."""
+    if not 0 < estimate.sigma < math.inf or estimate.value == 0 or estimate.name in ("delay", "M_0", "asymmetry"):
+        return ""
+    share = 100 * NORMAL_95 * estimate.sigma / abs(estimate.value)
+    return f"{share:.2g} %" if share < 100 else "over 100 %"
+
+
+def remark_text(estimate: Estimate) -> str:
+    """What to know of a value that was not simply estimated."""
+    word = "" if estimate.status == "estimated" or estimate.reason.startswith(estimate.status) else estimate.status
+    return ": ".join(part for part in (word, estimate.reason) if part)
+
+
+def _places(estimate: Estimate, factor: float) -> int:
+    """Decimal places that show two digits of half the interval."""
+    half = abs(factor) * NORMAL_95 * estimate.sigma
+    return min(12, max(0, 1 - math.floor(math.log10(half))))
+
+
+def _line(estimate: Estimate) -> Line:
+    interval, relative = interval_text(estimate), relative_text(estimate)
+    spread = f"95 %: {interval}" + (f" (+-{relative})" if relative else "") if interval else ""
+    return Line(estimate.value, "; ".join(part for part in (spread, remark_text(estimate)) if part))
+
+
+def _head(identified: Identified, version: str) -> Sequence[str]:
+    axis = identified.found.axis
+    machine = f" of {identified.subject.machine.name}" if identified.subject is not None else ""
+    lines = [
+        f"Friction of axis {axis}{machine}, identified by feedsim {version} on {identified.date} from",
+        *(f"  {name}" for name in identified.traces),
+        *identified.notes,
+        "Motor side. Behind a value its 95 % confidence interval, from the model linearised at the optimum.",
+        f"To use: feedsim run SCENARIO.yaml --set machine.axes.{axis}.friction={FRICTION}",
+    ]
+    hint = constant_load_hint(identified.found)
+    return [*lines, f"The {hint}"] if hint else lines
+
+
+def _origin(identified: Identified, software: Mapping[str, str]) -> dict[str, Any]:
+    """The group `identified`: where the values come from, for people and programs."""
+    found, subject = identified.found, identified.subject
+    sources = zip(identified.traces, identified.sources, strict=True)
+    content: dict[str, Any] = {
+        "axis": found.axis,
+        "date": identified.date,
+        "traces": [{"file": name, "sha256": source.sha256} for name, source in sources],
+    }
+    if subject is not None:
+        content["machine"] = {"name": subject.machine.name, "note": subject.machine.note}
+    if identified.settings:
+        content["settings"] = dict(identified.settings)
+    content["lead"] = _quantity(found.I_P, "m/rad")
+    named = {"M_0": "constant_load", "J": "inertia", "delay": "delay"}
+    for name, key in named.items():
+        if (estimate := found.estimates.get(name)) is not None:
+            content[key] = {"value": _quantity(estimate.value, estimate.unit), **_interval(estimate)}
+    if line := open_loop_line(found):
+        content["open_loop"] = line
+    content["parameters"] = {name: _interval(each) for name, each in found.estimates.items() if name not in named}
+    if found.correlation.names:
+        matrix = [[round(float(value), 4) for value in row] for row in found.correlation.matrix]
+        content["correlation"] = {"names": list(found.correlation.names), "matrix": matrix}
+    if identified.warnings:
+        content["warnings"] = identified.warnings
+    content["software"] = {name: software[name] for name in ("feedsim", "python", "numpy", "scipy")}
+    return content
+
+
+def _interval(estimate: Estimate) -> Mapping[str, Any]:
+    content: dict[str, Any] = {"status": estimate.status}
+    if all(math.isfinite(end) for end in estimate.interval):
+        content["interval"] = [_quantity(end, estimate.unit) for end in estimate.interval]
+    return content | ({"reason": estimate.reason} if estimate.reason else {})
+
+
+def _quantity(value: float, unit: str) -> str | float:
+    return float(f"{value:.{EXACT}g}") if unit == units.DIMENSIONLESS else f"{value:.{EXACT}g} {unit}"

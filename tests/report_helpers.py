@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from feedsim.cosim import PoseUse
+from feedsim.motions import Circle, Dwell, Move
 from feedsim.nc import Program, plan
-from feedsim.scenario import Circle, CircleTest, Dwell, Move, Positioning, Scenario
+from feedsim.scenario import CircleTest, Positioning, Scenario
 from feedsim.trace import Trace
 from scenario_helpers import scenario
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from feedsim.scenario import Machine, Motion, Recording, Scenario
+from feedsim.motions import Motion
+from feedsim.scenario import Machine, Recording, Scenario
 from feedsim.scenario.load import load_machine
 
 MACHINE = Path(__file__).resolve().parent.parent / "scenarios" / "machines" / "test_centre"

@@ -11,8 +11,9 @@ from pydantic import ValidationError
 
 from feedsim.analysis import CircleTask, Figure, Turn, circularity, contour, tasks
 from feedsim.errors import InputError
+from feedsim.motions import Circle, Dwell, Move
 from feedsim.nc import plan
-from feedsim.scenario import Circle, CircleTest, Dwell, Move
+from feedsim.scenario import CircleTest
 from feedsim.trace import Trace
 from scenario_helpers import scenario
 

@@ -12,8 +12,9 @@ from pydantic import ValidationError
 
 from feedsim.analysis import CircleTask, Turn, tasks
 from feedsim.errors import InputError
+from feedsim.motions import Circle, Column, MeasuredSetpoints, Move
 from feedsim.nc import plan
-from feedsim.scenario import Circle, CircleTest, Column, MeasuredSetpoints, Move
+from feedsim.scenario import CircleTest
 from feedsim.trace import Trace
 from scenario_helpers import scenario
 

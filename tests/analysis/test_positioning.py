@@ -15,8 +15,9 @@ from scipy.optimize import brentq
 
 from feedsim.analysis import Approach, Figure, PositioningTask, check, positioning, tasks
 from feedsim.errors import InputError
+from feedsim.motions import Circle, Dwell, Move
 from feedsim.nc import plan
-from feedsim.scenario import Circle, Dwell, Move, Positioning, Recording, load
+from feedsim.scenario import Positioning, Recording, load
 from feedsim.trace import Trace
 from scenario_helpers import MACHINE, scenario
 

@@ -13,7 +13,8 @@ from feedsim import cosim, report, scenario
 from feedsim.cosim import logged
 from feedsim.cosim.recording import recorded_columns
 from feedsim.errors import InputError
-from feedsim.nc import Strokes
+from feedsim.motions import Move
+from feedsim.motions.constant_speed import Strokes
 from feedsim.scenario import Logging
 from feedsim.trace import Trace, read_csv
 from scenario_helpers import MACHINE
@@ -236,7 +237,7 @@ def test_all_keys_can_be_set_from_outside(tmp_path: Path) -> None:
 
 
 def test_every_recorded_signal_of_an_axis_can_be_logged() -> None:
-    names = {name.partition(".")[2] for name in recorded_columns(described(scenario.Move(by={"Z": 1.0}, feed=1.0)))
+    names = {name.partition(".")[2] for name in recorded_columns(described(Move(by={"Z": 1.0}, feed=1.0)))
              if name.startswith("Z.")}  # fmt: skip
     assert set(scenario.logging.Signal.__args__) == names
 

@@ -15,8 +15,9 @@ from feedsim import cosim, nc, report, scenario
 from feedsim.cosim import loop, recording
 from feedsim.cosim.unit import Log
 from feedsim.errors import InputError, OutputError, SimulationError
-from feedsim.nc import path, program, spline
-from feedsim.nc.points import Held, Joined
+from feedsim.motions import circular
+from feedsim.nc import program, spline
+from feedsim.nc.spline import Held, Joined
 from feedsim.trace import Table, Trace, least_and_largest, read_csv, release, stretches, table, write_csv
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,7 +35,7 @@ def everything_is_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table, "STRETCH", 101)
     monkeypatch.setattr(program, "BLOCK", 64)
     monkeypatch.setattr(spline.LongSpline.__init__, "__defaults__", (64,))
-    monkeypatch.setattr(path, "INSTANTS", 77)
+    monkeypatch.setattr(circular, "INSTANTS", 77)
     for room in (loop, recording):
         monkeypatch.setattr(room, "RING", 3)
         monkeypatch.setattr(room, "REPORTED_EVERY", 203)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.nc import Oscillations, Program, Strokes, plan
-from feedsim.nc.sine import faded_sine
-from feedsim.scenario import ConstantSpeed, Dwell, Move, Sine, SineMove, SpeedRange
+from feedsim.motions import ConstantSpeed, Dwell, Move, Sine, SineMove, SpeedRange
+from feedsim.motions.constant_speed import Strokes
+from feedsim.motions.sine import Oscillations, faded_sine
+from feedsim.nc import Program, plan
 from scenario_helpers import scenario
 
 LEAD = 0.020 / (2 * math.pi)

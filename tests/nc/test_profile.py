@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feedsim.errors import InputError
-from feedsim.nc.profile import rest_to_rest
+from feedsim.motions.profile import rest_to_rest
 from feedsim.nc.spline import RestSpline
 
 JERK = 150.0

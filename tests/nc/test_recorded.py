@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
+from feedsim.motions import Column, MeasuredSetpoints, Move
 from feedsim.nc import plan
-from feedsim.scenario import Column, MeasuredSetpoints, Move
 from feedsim.trace import convert_mat, read_csv
 from scenario_helpers import scenario
 

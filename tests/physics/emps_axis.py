@@ -20,7 +20,8 @@ from scipy.signal import butter, cheby1, filtfilt
 from feedsim import units
 from feedsim.cosim import run
 from feedsim.identify.record import Record
-from feedsim.nc import Program, Recorded
+from feedsim.motions.setpoints import Recorded
+from feedsim.nc import Program
 from feedsim.scenario import load, load_machine
 
 Floats = NDArray[np.float64]

@@ -13,9 +13,10 @@ import pytest
 from feedsim import cosim, report
 from feedsim.cli import main
 from feedsim.errors import InputError
+from feedsim.motions import Dwell, Move
 from feedsim.report.page import page
 from feedsim.report.summary import summary
-from feedsim.scenario import Dwell, Machine, Move, load_structure
+from feedsim.scenario import Machine, load_structure
 from feedsim.structure.geometry import assemble
 from feedsim.structure.pose_change import LARGE, LOOKED_AT, PoseChange, pose_change, warnings
 from report_helpers import positioning_run

@@ -17,13 +17,14 @@ import pytest
 from feedsim import report
 from feedsim.analysis import Figure, evaluate
 from feedsim.errors import OutputError
+from feedsim.motions import Arc, Dwell, Move
 from feedsim.report.page import tile
 from feedsim.report.provenance import archives, input_files
-from feedsim.report.run_tables import path, provenance
+from feedsim.report.run_tables import provenance
 from feedsim.report.style import PALETTE
 from feedsim.report.summary import HEADER, real_time_factor, summary
 from feedsim.report.words import duration
-from feedsim.scenario import Arc, Dwell, Move, load
+from feedsim.scenario import load
 from feedsim.trace import Trace, read_csv
 from report_helpers import FakeRun, Page, circle_run, contents, positioning_run, run_of, small_run
 from scenario_helpers import MACHINE, scenario
@@ -151,12 +152,12 @@ def test_page_fits_on_paper(tmp_path: Path) -> None:
 def test_motions_have_their_path_and_a_note_on_their_start(tmp_path: Path) -> None:
     arc = Arc(plane=("X", "Z"), centre_by={"X": 0.015, "Z": 0.0}, angle=math.pi / 2, feed=0.05)
     run = run_of(scenario(arc, Dwell(duration=0.1), Move(by={"X": 0.003, "Y": 0.004}, feed=0.05)))
-    assert [path(segment) for segment in run.program.segments] == ["R 15 mm, 90°", "", "length 5 mm"]
+    assert [segment.way for segment in run.program.segments] == ["R 15 mm, 90°", "", "length 5 mm"]
     report.write(run, {}, tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "R 15 mm, 90°" in text
     assert "next instant of the interpolator (T_ipo 2 ms)" in text
-    circle = path(circle_run().program.segments[0])
+    circle = circle_run().program.segments[0].way
     assert circle == "R 15 mm, 1080° (3 full turns)"
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import Figure, PositioningTask, evaluate, tasks
+from feedsim.motions import Dwell, Move
 from feedsim.report import circle_plots, overview_plots, stop_plots
 from feedsim.report.circle_plots import ring_step
 from feedsim.report.labels import clearest, mark_instant, place_beside_level
@@ -16,7 +17,7 @@ from feedsim.report.overview_plots import overview_picture
 from feedsim.report.stop_plots import positioning_picture
 from feedsim.report.style import LARGEST_SVG, MOST_POINTS, drawing, finish, thinned
 from feedsim.report.write import draw
-from feedsim.scenario import Axis, Dwell, Move, Positioning
+from feedsim.scenario import Axis, Positioning
 from report_helpers import FakeRun, circle_run, positioning_run, run_of, small_run
 from scenario_helpers import default_machine, scenario
 

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.scenario import Friction, Move, Scenario, load
+from feedsim.motions import Move
+from feedsim.scenario import Friction, Scenario, load
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 Z = SCENARIOS / "z_positioning.yaml"

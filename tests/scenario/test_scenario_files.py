@@ -10,20 +10,15 @@ from pydantic import BaseModel, ValidationError
 
 from feedsim import units
 from feedsim.fields import Quantity, is_multiple
+from feedsim.motions import Arc, Circle, Column, Dwell, MeasuredSetpoints, Move
 from feedsim.scenario import (
-    Arc,
-    Circle,
     CircleTest,
-    Column,
     CurrentController,
     Cycles,
     Drive,
-    Dwell,
     Filter,
     Friction,
     Machine,
-    MeasuredSetpoints,
-    Move,
     Positioning,
     Recording,
     Scenario,

@@ -10,7 +10,10 @@ from feedsim.analysis.figures import Figure
 from feedsim.analysis.fitted import recorded_circle
 from feedsim.analysis.positioning import LEAST_REST, Approach, positioning
 from feedsim.errors import InputError
-from feedsim.nc import Circular, Program, Recorded, Segment, Straight
+from feedsim.motions.circular import Circular
+from feedsim.motions.move import Straight
+from feedsim.motions.setpoints import Recorded
+from feedsim.nc import Program, Segment
 from feedsim.scenario import CircleTest, Positioning, Scenario
 from feedsim.trace import Trace, matches
 

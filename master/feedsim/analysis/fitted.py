@@ -10,7 +10,9 @@ import numpy as np
 
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
-from feedsim.nc import Circular, Program, Recorded, Segment
+from feedsim.motions.circular import Circular
+from feedsim.motions.setpoints import Recorded
+from feedsim.nc import Program, Segment
 
 # How far setpoints may leave the circle [m]: compensations that a control adds to them are some micrometres, while a
 # lead-in or a wrong centre makes far more, and figures that have nothing to do with the machine.

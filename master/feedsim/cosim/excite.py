@@ -24,10 +24,11 @@ from feedsim.cosim.system import System
 from feedsim.cosim.trust import LOAD_TAKEN_UP
 from feedsim.cosim.unit import Floats, Log, Port
 from feedsim.errors import InputError
+from feedsim.motions.kind import Peaks
+from feedsim.motions.profile import speed_change
 from feedsim.nc import Program
 from feedsim.nc.excitation import Excitation
 from feedsim.nc.limits import violations
-from feedsim.nc.run_in import speed_change
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
 from feedsim.trace import Trace
@@ -224,7 +225,8 @@ def _setpoints(machine: Machine, axis: str, speed: float, wait: float, duration:
             )
         pose[axis] = _start(axis, machine, float(travelled[-1]), float(travelled[first]))
         reached = pose[axis] + travelled
-        problems = violations(axis, described, math.nan, reached.min(), reached.max(), abs(v), acceleration)
+        peaks = Peaks(reached.min(), reached.max(), abs(v), acceleration)
+        problems = violations(axis, described, math.nan, peaks)
         if problems:
             raise InputError(f"offset speed {speed:.5g} rad/s: {'; '.join(problems)}")
     x_s = {name: np.full(count + 1, pose[name]) for name in machine.axes}

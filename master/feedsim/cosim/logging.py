@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from feedsim.cosim.unit import Floats
 from feedsim.errors import InputError
-from feedsim.scenario import Level, Logging, Scenario, moved_axes
+from feedsim.scenario import Level, Logging, Scenario
 from feedsim.trace import Table, Trace, least_and_largest, release, stretches
 
 LINEAR = ("i_d", "i_q", "M_a", "M_fr", "z", "c")
@@ -149,7 +149,7 @@ def logged_axes(scenario: Scenario) -> tuple[str, ...]:
     """Axes of a scenario's log, in the machine's order unless named."""
     if scenario.logging is None:
         return ()
-    moved = {axis for motion in scenario.motions for axis in moved_axes(motion)}
+    moved = {axis for motion in scenario.motions for axis in motion.axes}
     return scenario.logging.axes or tuple(axis for axis in scenario.machine.axes if axis in moved)
 
 

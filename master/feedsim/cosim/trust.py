@@ -7,7 +7,7 @@ import numpy as np
 from feedsim.cosim.recording import Recording
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
-from feedsim.scenario import Dwell, Scenario
+from feedsim.scenario import Scenario
 from feedsim.structure import Modes
 
 # Of the friction work, and J (an axis at rest has no work to speak of). On the default machine the first-order schemes
@@ -54,8 +54,7 @@ def _stability(scenario: Scenario, modes: Modes) -> list[str]:
 
 def _unbalanced_loads(scenario: Scenario) -> list[str]:
     """The drive's integrators start empty: an axis under load sags before it holds."""
-    first = scenario.motions[0]
-    if isinstance(first, Dwell) and first.duration >= LOAD_TAKEN_UP:
+    if scenario.motions[0].held >= LOAD_TAKEN_UP:
         return []
     return [
         f"axis {name}: the constant load of {axis.M_0:g} N.m is not carried at the start, the axis sags while the "

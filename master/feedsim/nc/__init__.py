@@ -1,27 +1,10 @@
-"""The NC: from a scenario's motions to setpoints at the position cycle."""
+"""The NC: a scenario's motions laid end to end, as setpoints at the position cycle; signals that excite a drive.
+
+May use the scenario with its motions, and trace. Sole user of the splines through points.
+Start with program.py: ``plan``.
+"""
 
 from feedsim.nc.program import plan
-from feedsim.nc.segment import (
-    Circular,
-    Oscillation,
-    Oscillations,
-    Program,
-    Recorded,
-    Segment,
-    Straight,
-    Stroke,
-    Strokes,
-)
+from feedsim.nc.segment import Program, Segment
 
-__all__ = [
-    "Circular",
-    "Oscillation",
-    "Oscillations",
-    "Program",
-    "Recorded",
-    "Segment",
-    "Straight",
-    "Stroke",
-    "Strokes",
-    "plan",
-]
+__all__ = ["Program", "Segment", "plan"]

@@ -1,47 +1,29 @@
-"""Plan a scenario's motions: from geometry and limits to setpoints at the position cycle.
+"""Plan a scenario's motions: from the courses of its motions to setpoints at the position cycle.
 
-Every motion runs from rest to rest. It starts on the T_ipo grid: at 0, or at the first instant of the grid at or after
-the exact end of the motion before it. Its path is sampled at T_ipo, and one C2 cubic spline per axis runs through the
-samples of all motions (from one recording to the next, where there are recordings). Setpoints are its values at T_pos.
-They are computed stretch by stretch, so that planning needs no more memory for an hour than for a minute.
+Every motion runs from rest to rest and plans its own course (:mod:`feedsim.motions`). It starts on the T_ipo grid: at
+0, or at the first instant of the grid at or after the exact end of the motion before it. Its course is sampled at
+T_ipo, and one C2 cubic spline per axis runs through the samples of all motions (from one recording to the next, where
+there are recordings). Setpoints are its values at T_pos. They are computed stretch by stretch, so that planning needs
+no more memory for an hour than for a minute.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
-from feedsim.nc.constant_speed import strokes
-from feedsim.nc.limits import violations
-from feedsim.nc.path import CircularPath, Line, arc, full_circle, line
-from feedsim.nc.points import Along, Held, Joined
-from feedsim.nc.profile import Profile, rest_to_rest
-from feedsim.nc.recorded import recorded, recording_violations
-from feedsim.nc.segment import Circular, Program, Recorded, Segment, Straight, whole_cycles
-from feedsim.nc.sine import sines
-from feedsim.nc.spline import BLOCK, LongSpline, Points
-from feedsim.scenario import (
-    Arc,
-    Circle,
-    ConstantSpeed,
-    Dwell,
-    MeasuredSetpoints,
-    Motion,
-    Move,
-    Scenario,
-    Sine,
-    moved_axes,
-)
+from feedsim.motions import Motion
+from feedsim.motions.kind import Array, Course, Points, Start
+from feedsim.nc.limits import recording_violations, violations
+from feedsim.nc.segment import Program, Segment
+from feedsim.nc.spline import BLOCK, Held, Joined, LongSpline
+from feedsim.scenario import Machine, Scenario
 from feedsim.trace import Table
-
-Array = NDArray[np.float64]
 
 # Position cycles that a program may have; its setpoints then take about 2 GB for three axes, in a file.
 LONGEST = 40_000_000
@@ -57,11 +39,10 @@ class _Stretch:
 
 @dataclass
 class _Inset:
-    """Recorded setpoints, from grid instant ``first`` on."""
+    """Recorded setpoints, from grid instant ``first`` on: axis -> position [m] and speed [m/s] at T_pos."""
 
     first: int
-    x_s: Mapping[str, Array]
-    v_s: Mapping[str, Array]
+    setpoints: Mapping[str, tuple[Array, Array]]
 
 
 @dataclass
@@ -95,18 +76,14 @@ def plan(scenario: Scenario, *, scratch: Path | None = None) -> Program:
     for index, motion in enumerate(scenario.motions):
         found: list[str] = []
         try:
-            if _depends_on(motion, state.lost):
-                _leave_out(state, motion)
-            elif isinstance(motion, MeasuredSetpoints):
-                found = _append_recording(state, scenario, index, motion)
-            elif isinstance(motion, ConstantSpeed | Sine):
-                found = _append_experiment(state, scenario, index, motion)
+            if state.lost.isdisjoint(motion.needs):
+                found = _append(state, scenario, index, motion)
             else:
-                found = _append_planned(state, scenario, index, motion)
+                _leave_out(state, motion)
         except InputError as error:
             found = list(error.problems)
             _leave_out(state, motion)
-        cycles = state.instant * machine.cycles.T_ipo / machine.cycles.T_pos
+        cycles = state.instant * _ratio(machine)
         if cycles > LONGEST:
             found.append(
                 f"the program lasts {cycles * machine.cycles.T_pos:.6g} s up to its end, which is {cycles:.3g} "
@@ -120,152 +97,74 @@ def plan(scenario: Scenario, *, scratch: Path | None = None) -> Program:
     return _sample(state, scenario, scratch)
 
 
-def _depends_on(motion: Motion, lost: set[str]) -> bool:
-    """Whether nothing can be said of a motion as long as the positions of the ``lost`` axes are not known."""
-    if isinstance(motion, Move):
-        return not lost.isdisjoint(motion.to)
-    if isinstance(motion, Arc):
-        return bool(motion.centre or motion.to) and not lost.isdisjoint(motion.plane)
-    if isinstance(motion, ConstantSpeed):
-        return motion.axis in lost
-    return isinstance(motion, MeasuredSetpoints) and motion.relative and not lost.isdisjoint(motion.columns)
+def _ratio(machine: Machine) -> int:
+    """Position cycles per cycle of the interpolator."""
+    return round(machine.cycles.T_ipo / machine.cycles.T_pos)
 
 
 def _leave_out(state: _Plan, motion: Motion) -> None:
     """Go on behind a motion that cannot be planned: its axes are where it says, if it says so."""
-    if isinstance(motion, ConstantSpeed | Sine):
-        return  # ends where it begins
-    if isinstance(motion, MeasuredSetpoints):
-        ends: Mapping[str, float] = {}
-    else:
-        ends = motion.to if isinstance(motion, Move | Arc) else {}
-    state.lost = (state.lost | set(moved_axes(motion))) - set(ends)
-    state.position |= ends
+    if not motion.returns:
+        state.lost = (state.lost | set(motion.axes)) - set(motion.ends)
+        state.position |= motion.ends
 
 
-def _append_planned(state: _Plan, scenario: Scenario, index: int, motion: Motion) -> list[str]:
+def _append(state: _Plan, scenario: Scenario, index: int, motion: Motion) -> list[str]:
     """Plan a motion and append it; what is wrong with it."""
-    limits, cycles = scenario.machine.path, scenario.machine.cycles
-    start = state.instant * cycles.T_ipo
-    origin = dict(state.position)
-    if isinstance(motion, Dwell):
-        profile, path = None, None
-        duration = motion.duration
+    machine = scenario.machine
+    cycles, origin = machine.cycles, dict(state.position)
+    start = Start(
+        position=origin,
+        time=state.instant * cycles.T_ipo,
+        T_ipo=cycles.T_ipo,
+        T_pos=cycles.T_pos,
+        most=LONGEST // _ratio(machine) - state.instant,
+        acceleration=machine.path.acceleration,
+        jerk=machine.path.jerk,
+        travel={name: axis.travel for name, axis in machine.axes.items()},
+    )
+    course = motion.plan(start)
+    problems = _violations(state, machine, course)
+    if course.setpoints:
+        state.pieces.append(_Inset(state.instant, course.setpoints))
     else:
-        assert isinstance(motion, Move | Arc | Circle)
-        path = _path(motion, origin)
-        profile = rest_to_rest(
-            path.length, motion.feed, motion.acceleration or limits.acceleration, motion.jerk or limits.jerk
-        )
-        duration = profile.duration
-    count = whole_cycles(duration, cycles.T_ipo)
-    if (state.instant + count) * (cycles.T_ipo / cycles.T_pos) > LONGEST:
-        state.instant += count
-        return []  # plan() reports it; looking at all of it would take long
-    samples: Mapping[str, Points] = {}
-    problems: list[str] = []
-    if profile is not None and path is not None:
-        samples = {axis: Along(path, profile, axis, cycles.T_ipo, count) for axis in path.axes}
-        for axis, peaks in path.peaks(profile, cycles.T_ipo).items():
-            if axis in state.lost:
-                peaks = (origin[axis], origin[axis], *peaks[2:])
-            problems += violations(axis, scenario.machine.axes[axis], origin[axis], *peaks)
-    _append_points(state, samples, count)
-    if path is not None:
-        state.position |= {axis: float(x[0]) for axis, x in path.position(np.array([path.length])).items()}
-    if isinstance(motion, Move):
-        state.position |= motion.to
-    elif isinstance(motion, Circle):
-        state.position = dict(origin)
+        stretch = state.pieces[-1]
+        if isinstance(stretch, _Inset):
+            stretch = _stretch(state)
+            state.pieces.append(stretch)
+        for axis, points in stretch.points.items():
+            points.append(course.points[axis] if axis in course.points else Held(origin[axis], course.cycles))
+    state.instant += course.cycles
+    state.position |= course.target
+    if course.absolute:
+        state.lost -= set(course.target)
     state.segments.append(
         Segment(
             kind=motion.kind,
             index=index,
-            start=start,
-            end=start + duration,
-            description=_describe(motion),
+            start=start.time,
+            end=start.time + course.duration,
+            description=motion.description,
             origin=origin,
             target=dict(state.position),
-            axes=() if path is None else path.moving,
-            geometry=_geometry(path, profile, start) if path is not None and profile is not None else None,
+            axes=course.moving,
+            geometry=course.geometry,
         )
     )
     return problems
 
 
-def _append_points(state: _Plan, samples: Mapping[str, Points], count: int) -> None:
-    """The next ``count`` points of all axes; those without ``samples`` are held."""
-    stretch = state.pieces[-1]
-    if isinstance(stretch, _Inset):
-        stretch = _stretch(state)
-        state.pieces.append(stretch)
-    for axis, points in stretch.points.items():
-        points.append(samples[axis] if axis in samples else Held(state.position[axis], count))
-    state.instant += count
-
-
-def _append_experiment(state: _Plan, scenario: Scenario, index: int, motion: ConstantSpeed | Sine) -> list[str]:
-    """Plan an experiment and append it; what is wrong with it."""
-    machine, cycle = scenario.machine, scenario.machine.cycles.T_ipo
-    start, origin = state.instant * cycle, dict(state.position)
-    axis, here = machine.axes[motion.axis], origin[motion.axis]
-    most = int(LONGEST * machine.cycles.T_pos / cycle) - state.instant
-    if isinstance(motion, ConstantSpeed):
-        course = strokes(motion, axis, here, machine.path, cycle, start, most)
-    else:
-        course = sines(motion, cycle, start, most)
-    low, high = (here, here) if motion.axis in state.lost else (here + course.low, here + course.high)
-    _append_points(state, {motion.axis: here + course.points}, len(course.points))
-    state.segments.append(
-        Segment(
-            kind=motion.kind,
-            index=index,
-            start=start,
-            end=start + course.duration,
-            description=_describe(motion),
-            origin=origin,
-            target=dict(origin),
-            axes=(motion.axis,),
-            geometry=course.geometry,
-        )
-    )
-    return violations(motion.axis, axis, here, low, high, course.speed, course.acceleration)
-
-
-def _append_recording(state: _Plan, scenario: Scenario, index: int, motion: MeasuredSetpoints) -> list[str]:
-    """Append recorded setpoints; what is wrong with them."""
-    cycles = scenario.machine.cycles
-    start = state.instant * cycles.T_ipo
-    origin = dict(state.position)
-    recording = recorded(motion, origin, cycles.T_pos, scenario.machine.path)
+def _violations(state: _Plan, machine: Machine, course: Course) -> list[str]:
+    """Limits of the axes that a course from where the axes are does not keep."""
     problems: list[str] = []
-    for axis, x_s in recording.x_s.items():
-        begin = float(x_s[0]) if axis in state.lost else origin[axis]
-        limits = scenario.machine.axes[axis]
-        problems += recording_violations(axis, limits, begin, x_s, recording.v_s[axis], cycles.T_pos)
-    if not motion.relative:
-        state.lost -= set(motion.columns)
-    state.pieces.append(_Inset(state.instant, recording.x_s, recording.v_s))
-    state.position |= {axis: float(x[-1]) for axis, x in recording.x_s.items()}
-    state.instant += whole_cycles(recording.duration, cycles.T_ipo)
-    state.segments.append(
-        Segment(
-            kind=motion.kind,
-            index=index,
-            start=start,
-            end=start + recording.duration,
-            description=_describe(motion),
-            origin=origin,
-            target=dict(state.position),
-            axes=tuple(axis for axis, x in recording.x_s.items() if np.any(x != origin[axis])),
-            geometry=Recorded(
-                begin=start + recording.run_in,
-                end=start + recording.run_in + recording.length,
-                file=motion.file,
-                axes=tuple(motion.columns),
-            ),
-        )
-    )
+    for axis, peaks in course.peaks.items():
+        here = state.position[axis]
+        if axis in state.lost:  # nothing is known of its travel
+            peaks = replace(peaks, low=here, high=here)
+        problems += violations(axis, machine.axes[axis], here, peaks)
+    for axis, (x_s, v_s) in course.setpoints.items():
+        here = float(x_s[0]) if axis in state.lost else state.position[axis]
+        problems += recording_violations(axis, machine.axes[axis], here, x_s, v_s, machine.cycles.T_pos)
     return problems
 
 
@@ -273,7 +172,7 @@ def _sample(state: _Plan, scenario: Scenario, scratch: Path | None) -> Program:
     """Setpoints at T_pos: pieces in their order, each from its first instant on; the next one begins on its last."""
     machine, cycles = scenario.machine, scenario.machine.cycles
     axes = tuple(machine.axes)
-    ratio = round(cycles.T_ipo / cycles.T_pos)
+    ratio = _ratio(machine)
     total = state.instant * ratio + 1
     table = Table(1 + 2 * len(axes), total, scratch)
     starts = [piece.first * ratio for piece in state.pieces]
@@ -309,8 +208,7 @@ def _sampled(
             return x, v / T_ipo
 
         return stretch
-    x_s = piece.x_s.get(axis, np.array([held]))
-    v_s = piece.v_s.get(axis, np.zeros(1))
+    x_s, v_s = piece.setpoints.get(axis, (np.array([held]), np.zeros(1)))
 
     def inset(instants: NDArray[np.int64]) -> tuple[Array, Array]:
         at = np.minimum(instants, len(x_s) - 1)
@@ -323,54 +221,8 @@ def _end(piece: _Stretch | _Inset, axis: str, held: float) -> float:
     """Where a piece leaves an axis [m]."""
     if isinstance(piece, _Stretch):
         return float(piece.points[axis][-1][-1:][0])
-    return float(piece.x_s[axis][-1]) if axis in piece.x_s else held
+    return float(piece.setpoints[axis][0][-1]) if axis in piece.setpoints else held
 
 
 def _stretch(state: _Plan) -> _Stretch:
     return _Stretch(state.instant, {axis: [Held(x, 1)] for axis, x in state.position.items()})
-
-
-def _path(motion: Move | Arc | Circle, start: Mapping[str, float]) -> Line | CircularPath:
-    if isinstance(motion, Move):
-        return line(motion, start)
-    return full_circle(motion, start) if isinstance(motion, Circle) else arc(motion, start)
-
-
-def _geometry(path: Line | CircularPath, profile: Profile, start: float) -> Straight | Circular:
-    steady = None if profile.steady is None else (start + profile.steady[0], start + profile.steady[1])
-    if isinstance(path, Line):
-        return Straight(path.length, steady)
-    turns = math.floor(path.sweep / (2 * math.pi) + 1e-9)
-    instants = start + profile.time_at(path.radius * (2 * math.pi * np.arange(turns + 1, dtype=np.float64)))
-    return Circular(
-        axes=path.axes,
-        centre=path.centre,
-        radius=path.radius,
-        sense=path.sense,
-        start_angle=path.start_angle,
-        sweep=path.sweep,
-        turns=tuple(pairwise(instants.tolist())),
-        steady=steady,
-    )
-
-
-def _describe(motion: Motion) -> str:
-    if isinstance(motion, Dwell):
-        return f"dwell {motion.duration:g} s"
-    if isinstance(motion, MeasuredSetpoints):
-        return f"recorded setpoints of {', '.join(motion.columns)} from {motion.file.name}"
-    if isinstance(motion, ConstantSpeed):
-        feeds = [feed * 6e4 for feed in motion.feeds]
-        return f"constant speeds of {motion.axis}: {len(feeds)}, {min(feeds):.6g} to {max(feeds):.6g} mm/min"
-    if isinstance(motion, Sine):
-        sizes = ", ".join(f"{move.amplitude * 1e6:.6g} um at {move.frequency:.6g} Hz" for move in motion.moves[:4])
-        return f"sines of {motion.axis}: {sizes}{' ...' if len(motion.moves) > 4 else ''}"
-    feed = f"at {motion.feed * 6e4:.6g} mm/min"
-    if isinstance(motion, Move):
-        by = [f"{axis} by {d * 1e3:.6g} mm" for axis, d in motion.by.items()]
-        to = [f"{axis} to {x * 1e3:.6g} mm" for axis, x in motion.to.items()]
-        return f"move {', '.join(by + to)} {feed}"
-    plane = f"in {motion.plane[0]}-{motion.plane[1]}, {motion.direction}"
-    if isinstance(motion, Circle):
-        return f"circle {plane}, R {motion.radius * 1e3:.6g} mm, {motion.turns} turn{'s'[: motion.turns != 1]}, {feed}"
-    return f"arc {plane}, {feed}"

@@ -2,129 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from feedsim.motions.kind import Array, Geometry
 from feedsim.trace import least_and_largest
-
-Array = NDArray[np.float64]
-
-# An instant within this share of a cycle of the grid lies on it: exact ends carry rounding errors.
-ON_GRID = 1e-6
-
-
-def whole_cycles(duration: float, cycle: float) -> int:
-    """Cycles up to the first instant of the grid at or after ``duration`` [s]."""
-    return max(0, math.ceil(duration / cycle - ON_GRID))
-
-
-@dataclass(frozen=True)
-class Straight:
-    """Straight line in the space of the axes."""
-
-    length: float
-    """Length of the path [m]."""
-    steady: tuple[float, float] | None
-    """Begin and end of the constant-speed phase [s], program time; None where there is none."""
-
-
-@dataclass(frozen=True)
-class Circular:
-    """Circular path in the plane of two axes."""
-
-    axes: tuple[str, str]
-    """First and second axis of the plane; angles run from the first towards the second."""
-    centre: tuple[float, float]
-    """Programmed centre [m], first and second axis."""
-    radius: float
-    """Programmed radius [m]."""
-    sense: int
-    """+1 counterclockwise (from the first axis towards the second), -1 clockwise."""
-    start_angle: float
-    """Angle of the start as seen from the centre [rad]."""
-    sweep: float
-    """Angle that the path covers, positive [rad]."""
-    turns: tuple[tuple[float, float], ...]
-    """Begin and end of every full turn [s], program time: where the path length is a multiple of 2 pi R."""
-    steady: tuple[float, float] | None
-    """Begin and end of the constant-speed phase [s], program time; None where there is none."""
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """Recorded setpoints.
-
-    begin, end: instants [s] of the recording's first and last row; a run-in lies ahead, a run-out behind.
-    """
-
-    begin: float
-    end: float
-    file: Path
-    axes: tuple[str, ...]
-    """Axes with a column of their own."""
-
-
-@dataclass(frozen=True)
-class Stroke:
-    """A move at constant speed, from rest to rest."""
-
-    speed: float
-    """Constant speed [m/s], signed."""
-    steady: tuple[float, float]
-    """Begin and end of the constant speed [s], program time."""
-    start: float
-    end: float
-    """Exact begin and end of the stroke [s], program time."""
-
-
-@dataclass(frozen=True)
-class Strokes:
-    """Strokes of an axis there and back, in the order in which they are driven."""
-
-    axis: str
-    strokes: tuple[Stroke, ...]
-
-
-@dataclass(frozen=True)
-class Oscillation:
-    """A sine, amplitude sin(2 pi frequency (t - full[0]) + phase) about where the axis was while at full amplitude."""
-
-    amplitude: float
-    """Amplitude [m]."""
-    frequency: float
-    """Frequency [Hz]."""
-    phase: float
-    """Phase at the begin of the full amplitude [rad]."""
-    full: tuple[float, float]
-    """Begin and end of the full amplitude [s], program time."""
-    start: float
-    end: float
-    """Exact begin and end with the fading [s], program time."""
-
-
-@dataclass(frozen=True)
-class Oscillations:
-    """Sines of an axis, in the order in which they are driven."""
-
-    axis: str
-    moves: tuple[Oscillation, ...]
-
-
-Geometry = Straight | Circular | Recorded | Strokes | Oscillations
 
 
 @dataclass(frozen=True)
 class Segment:
     """One motion of the program.
 
-    kind: that of the motion (move, arc, circle, dwell, setpoints, constant_speed, sine); index: its place in the
-    scenario's list, from 0; start, end: exact begin and end of the motion [s], the start on the T_ipo grid; origin,
-    target: positions of all axes there [m]; axes: those whose setpoint it moves; geometry: None for a dwell.
+    kind: that of the motion, as scenarios name it; index: its place in the scenario's list, from 0; start, end: exact
+    begin and end of the motion [s], the start on the T_ipo grid; origin, target: positions of all axes there [m]; axes:
+    those whose setpoint it moves; geometry: None for a dwell.
     """
 
     kind: str
@@ -141,6 +32,11 @@ class Segment:
     def duration(self) -> float:
         """Exact duration [s]."""
         return self.end - self.start
+
+    @property
+    def way(self) -> str:
+        """Its way in a cell of a table; empty for a dwell."""
+        return "" if self.geometry is None else self.geometry.text
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,28 +7,21 @@ cent). The points are extended by rest points on both sides; there the spline is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-Array = NDArray[np.float64]
+from feedsim.motions.kind import Array, Points
 
 # A disturbance of a cubic spline decays by 2 - sqrt(3) = 0.268 per knot: after 28 knots it is below 1e-16 of its size.
 REST_POINTS = 28
 # Points between which a spline is solved at a time, and how far it then reaches on to either side: what begins
 # differently there is the same to the last bit long before.
 BLOCK, OVERLAP = 1 << 14, 96
-
-
-class Points(Protocol):
-    """Points that may be computed when they are asked for."""
-
-    def __len__(self) -> int: ...
-    def __getitem__(self, rows: slice, /) -> Array:
-        """Points of a range of rows; step 1, within the length."""
 
 
 class RestSpline:
@@ -92,3 +85,39 @@ class LongSpline:
             )
             self._at = block
         return self._solved
+
+
+@dataclass(frozen=True)
+class Held:
+    """An axis that stays at ``value`` for ``count`` points."""
+
+    value: float
+    count: int
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, rows: slice) -> Array:
+        return np.full(len(range(self.count)[rows]), self.value)
+
+
+class Joined:
+    """Points one after the other."""
+
+    def __init__(self, pieces: Sequence[Points]) -> None:
+        self._pieces = tuple(pieces)
+        self._ends = np.cumsum([len(piece) for piece in self._pieces])
+
+    def __len__(self) -> int:
+        return int(self._ends[-1])
+
+    def __getitem__(self, rows: slice) -> Array:
+        wanted = range(len(self))[rows]
+        found = []
+        i, first = int(np.searchsorted(self._ends, wanted.start, side="right")), wanted.start
+        while first < wanted.stop:
+            begin, end = int(self._ends[i]) - len(self._pieces[i]), int(self._ends[i])
+            last = min(end, wanted.stop)
+            found.append(self._pieces[i][first - begin : last - begin])
+            i, first = i + 1, last
+        return np.concatenate(found) if found else np.zeros(0)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from feedsim.fields import Quantity
-from feedsim.scenario import Axis, Drive, Friction, Machine, MeasuredSetpoints, Scenario
+from feedsim.scenario import Axis, Drive, Friction, Machine, Scenario
 
 Parameter = float | int | bool | str
 
@@ -51,9 +51,7 @@ def _inputs(scenario: Scenario) -> list[tuple[str, Path]]:
     named.append(("modes", scenario.machine.modes))
     if scenario.machine.plant is not None:
         named.append(("plant archive", scenario.machine.plant))
-    named += [
-        ("recorded setpoints", motion.file) for motion in scenario.motions if isinstance(motion, MeasuredSetpoints)
-    ]
+    named += [("recorded setpoints", path) for motion in scenario.motions for path in motion.files.values()]
     return named
 
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from html import escape
 
-from feedsim.nc import Circular, Oscillations, Recorded, Segment, Straight, Strokes
 from feedsim.report.log_part import log_text
 from feedsim.report.parts import software
 from feedsim.report.provenance import friction_origins, input_files
@@ -22,7 +21,7 @@ def motions_table(run: Run) -> str:
     segments = run.program.segments
     rows = [
         f'<tr><td class="number">{segment.index}</td><td>{escape(segment.description)}</td>'
-        f'<td>{escape(path(segment))}</td><td class="number">{segment.start:.4f}</td>'
+        f'<td>{escape(segment.way)}</td><td class="number">{segment.start:.4f}</td>'
         f'<td class="number">{segment.end:.4f}</td></tr>'
         for segment in segments[:MOST_MOTIONS]
     ]
@@ -35,23 +34,6 @@ def motions_table(run: Run) -> str:
     )
     heads = [("No.", True), ("Motion", False), ("Path", False), ("Start [s]", True), ("End [s]", True)]
     return "<h2>Motions</h2>\n" + table(heads, rows) + tail + note
-
-
-def path(segment: Segment) -> str:
-    """Length, or radius and angle, of a motion's path."""
-    geometry = segment.geometry
-    if isinstance(geometry, Straight):
-        return f"length {geometry.length * 1e3:.6g} mm"
-    if isinstance(geometry, Circular):
-        angle = f"{math.degrees(geometry.sweep):.6g}°"
-        turns = f" ({len(geometry.turns)} full turn{'s'[: len(geometry.turns) != 1]})" if geometry.turns else ""
-        return f"R {geometry.radius * 1e3:.6g} mm, {angle}{turns}"
-    if isinstance(geometry, Strokes):
-        shortest = min(stroke.steady[1] - stroke.steady[0] for stroke in geometry.strokes)
-        return f"{len(geometry.strokes)} strokes, {shortest:.3g} s or more at constant speed"
-    if isinstance(geometry, Oscillations):
-        return f"{len(geometry.moves)} sine{'s'[: len(geometry.moves) != 1]}"
-    return f"recording of {', '.join(geometry.axes)}" if isinstance(geometry, Recorded) else ""
 
 
 def provenance(run: Run) -> str:

@@ -6,15 +6,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from feedsim.scenario.base import Base, Change
-from feedsim.scenario.checks import moved_axes
 from feedsim.scenario.columns import Columns, load_columns
-from feedsim.scenario.experiment import ConstantSpeed, Sine, SineMove, SpeedRange
 from feedsim.scenario.file_kind import is_ssp, is_study
 from feedsim.scenario.load import load, load_machine, load_structure
 from feedsim.scenario.logging import Delay, Level, Logging, Noise, Quantisation
 from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine, PathLimits
 from feedsim.scenario.model import CircleTest, Coupling, Evaluation, Positioning, Recording, Scenario
-from feedsim.scenario.motion import Arc, Circle, Column, Dwell, MeasuredSetpoints, Motion, Move
 from feedsim.scenario.structure import Damping, DampingStep, Structure
 from feedsim.scenario.subject import Subject, load_subject
 
@@ -25,16 +22,12 @@ if TYPE_CHECKING:
     from feedsim.scenario.tolerances import ToleranceFile, load_tolerances
 
 __all__ = [
-    "Arc",
     "Axis",
     "Base",
     "Change",
     "Choice",
-    "Circle",
     "CircleTest",
-    "Column",
     "Columns",
-    "ConstantSpeed",
     "Coupling",
     "CurrentController",
     "Cycles",
@@ -44,16 +37,12 @@ __all__ = [
     "Described",
     "Distribution",
     "Drive",
-    "Dwell",
     "Evaluation",
     "Filter",
     "Friction",
     "Level",
     "Logging",
     "Machine",
-    "MeasuredSetpoints",
-    "Motion",
-    "Move",
     "Noise",
     "Parameter",
     "PathLimits",
@@ -62,9 +51,6 @@ __all__ = [
     "Recording",
     "Sampling",
     "Scenario",
-    "Sine",
-    "SineMove",
-    "SpeedRange",
     "Structure",
     "Study",
     "Subject",
@@ -80,7 +66,6 @@ __all__ = [
     "load_study",
     "load_subject",
     "load_tolerances",
-    "moved_axes",
 ]
 
 # Loaded on first use: a run should not wait for the models of files that it does not read.

@@ -6,26 +6,12 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from feedsim.fields import is_multiple, no_axis
-from feedsim.scenario.experiment import ConstantSpeed, Sine
-from feedsim.scenario.motion import Arc, Circle, MeasuredSetpoints, Motion, Move
+from feedsim.motions import Circle, MeasuredSetpoints
 
 if TYPE_CHECKING:
     from feedsim.scenario.model import CircleTest, Scenario
 
 Place = tuple[str | int, ...]
-
-
-def moved_axes(motion: Motion) -> tuple[str, ...]:
-    """Axes that a motion names, in its order."""
-    if isinstance(motion, Move):
-        return (*motion.by, *motion.to)
-    if isinstance(motion, (Arc, Circle)):
-        return motion.plane
-    if isinstance(motion, MeasuredSetpoints):
-        return tuple(motion.columns)
-    if isinstance(motion, (ConstantSpeed, Sine)):
-        return (motion.axis,)
-    return ()
 
 
 def interval_fault(interval: float, control_cycle: float) -> str | None:
@@ -57,7 +43,7 @@ def _logging_faults(scenario: Scenario) -> Iterator[tuple[Place, str]]:
     for i, axis in enumerate(logging.axes or ()):
         if axis not in scenario.machine.axes:
             yield ("logging", "axes", i), no_axis(axis, scenario.machine.axes)
-    if logging.axes is None and not any(map(moved_axes, scenario.motions)):
+    if logging.axes is None and not any(motion.axes for motion in scenario.motions):
         yield ("logging",), "no motion moves an axis; name the axes to be logged, for example axes: [Z]"
     for group, signals in logging.disturbed().items():
         for signal in signals:
@@ -72,7 +58,7 @@ def contradictions(scenario: Scenario) -> Iterator[tuple[Place, str]]:
         yield ("recording", "interval"), message
     yield from _logging_faults(scenario)
     for i, motion in enumerate(scenario.motions):
-        for axis in moved_axes(motion):
+        for axis in motion.axes:
             if axis not in machine.axes:
                 yield ("motions", i), no_axis(axis, machine.axes)
     for i, item in enumerate(scenario.evaluate):
@@ -83,7 +69,7 @@ def contradictions(scenario: Scenario) -> Iterator[tuple[Place, str]]:
             continue
         motions = scenario.motions if chosen is None else scenario.motions[chosen : chosen + 1]
         if item.kind == "positioning":
-            if not any(item.axis in moved_axes(motion) for motion in motions):
+            if not any(item.axis in motion.axes for motion in motions):
                 which = "no motion moves" if chosen is None else f"motions.{chosen} ({motions[0].kind}) does not move"
                 yield ("evaluate", i), f"positioning of axis {item.axis}, which {which}"
             continue

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr, StrictInt, StrictStr, ValidationInfo, field_validator, model_validator
 
 from feedsim.fields import AxisName, Model, Quantity, Reading, fault
+from feedsim.motions import Motion
 from feedsim.scenario.checks import Place, contradictions, interval_fault
 from feedsim.scenario.logging import Logging
 from feedsim.scenario.machine import Machine
-from feedsim.scenario.motion import Motion
 
 Scheme = Literal[
     "extrapolated", "iterated", "gauss_seidel", "gauss_seidel_friction_first", "jacobi", "jacobi_extrapolated",

@@ -15,7 +15,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from feedsim.fields import Quantity
-from feedsim.scenario import MeasuredSetpoints, Scenario, load_structure
+from feedsim.scenario import Scenario, load_structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 
 RECORDINGS = "resources/recordings"
@@ -28,8 +28,7 @@ def text(scenario: Scenario) -> str:
     machine = whole["machine"]
     places = {path: name for name, path in recordings(scenario).items()}
     for motion, data in zip(scenario.motions, whole["motions"], strict=True):
-        if isinstance(motion, MeasuredSetpoints):
-            data["file"] = places[motion.file]
+        data |= {key: places[path] for key, path in motion.files.items()}
     own = ("pitch", "travel", "max_speed", "max_acceleration", "display_sign")
     axes = {}
     for name, axis in machine["axes"].items():
@@ -60,7 +59,7 @@ def structure(scenario: Scenario) -> bytes | None:
 
 def recordings(scenario: Scenario) -> dict[str, Path]:
     """Place inside the SSP -> file, of the recorded setpoints that the motions name."""
-    files = dict.fromkeys(motion.file for motion in scenario.motions if isinstance(motion, MeasuredSetpoints))
+    files = dict.fromkeys(path for motion in scenario.motions for path in motion.files.values())
     return {f"{RECORDINGS}/{i}.csv": path for i, path in enumerate(files)}
 
 

@@ -18,7 +18,8 @@ from feedsim import units
 from feedsim.cosim.unit import Archive
 from feedsim.cosim.untrusted import readable
 from feedsim.errors import InputError
-from feedsim.nc import Program, Recorded, Segment, plan
+from feedsim.motions.setpoints import Recorded
+from feedsim.nc import Program, Segment, plan
 from feedsim.nc.program import LONGEST
 from feedsim.scenario import Scenario, load
 from feedsim.ssp import archive, rebuilt, stop_time, system_structure

@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.nc import Circular, Program, Recorded, Segment
+from feedsim.motions.circular import Circular
+from feedsim.motions.setpoints import Recorded
+from feedsim.nc import Program, Segment
 from feedsim.scenario import CircleTest, Positioning, Scenario
 
 LEAST_REST = 0.050  # s, behind a motion whose positioning is evaluated (feedsim.analysis)

@@ -1,0 +1,270 @@
+"""Arcs and circles in the plane of two axes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import chain, pairwise
+from math import pi
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, StrictInt, field_validator, model_validator
+
+from feedsim.errors import InputError
+from feedsim.fields import AxisName, Quantity, fault
+from feedsim.motions.kind import Array, Geometry, Peaks
+from feedsim.motions.path import Path, PathMotion, Position, steady
+from feedsim.motions.profile import Profile
+
+Direction = Literal["counterclockwise", "clockwise"]
+
+# How far an arc's programmed end point may lie off the circle through its start [m]; it then ends on the circle.
+END_POINT_TOLERANCE = 1e-6
+# Phases of the profile may be shorter than a cycle; the peak of the combined acceleration lies within one.
+POINTS_PER_PHASE = 33
+# Instants that are looked at together: a long circle has millions.
+INSTANTS = 1 << 15
+
+
+class PlaneMotion(PathMotion):
+    """A motion in the plane of two axes. Counterclockwise turns from the first axis towards the second."""
+
+    plane: tuple[AxisName, AxisName] = Field(description="First and second axis of the plane, for example [X, Z]")
+    direction: Direction = Field(
+        default="counterclockwise", description="Counterclockwise turns the first axis towards the second"
+    )
+
+    @field_validator("plane")
+    @classmethod
+    def _two_axes(cls, plane: tuple[str, str]) -> tuple[str, str]:
+        if plane[0] == plane[1]:
+            raise fault(f"a plane needs two different axes, not {plane[0]} twice")
+        return plane
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        return self.plane
+
+    @property
+    def sense(self) -> int:
+        """+1 counterclockwise, -1 clockwise."""
+        return 1 if self.direction == "counterclockwise" else -1
+
+    @property
+    def in_plane(self) -> str:
+        """Plane and direction as reports tell them."""
+        return f"in {self.plane[0]}-{self.plane[1]}, {self.direction}"
+
+
+class Arc(PlaneMotion):
+    """A circular arc from where the axes are, about a centre, to an end point or through an angle."""
+
+    kind: Literal["arc"] = "arc"
+    centre: dict[AxisName, Position] = Field(default={}, description="Centre, as positions of both axes of the plane")
+    centre_by: dict[AxisName, Position] = Field(default={}, description="Centre, relative to the start of the arc")
+    to: dict[AxisName, Position] = Field(default={}, description="End point, as positions of both axes of the plane")
+    by: dict[AxisName, Position] = Field(default={}, description="End point, relative to the start of the arc")
+    angle: Annotated[float, Quantity("rad", above=0, example="90 deg")] | None = Field(
+        default=None, description="Angle through which the arc turns, in place of an end point"
+    )
+
+    @model_validator(mode="after")
+    def _determined(self) -> Self:
+        if bool(self.centre) == bool(self.centre_by):
+            raise fault("an arc needs its centre once: 'centre' (positions) or 'centre_by' (from its start)")
+        if [bool(self.to), bool(self.by), self.angle is not None].count(True) != 1:
+            raise fault("an arc needs its end once: 'to' (positions), 'by' (from its start) or 'angle'")
+        for name in ("centre", "centre_by", "to", "by"):
+            point = getattr(self, name)
+            if point and set(point) != set(self.plane):
+                raise fault(f"{name!r} must give {self.plane[0]} and {self.plane[1]}, the axes of the plane")
+        return self
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        return self.plane if self.centre or self.to else ()
+
+    @property
+    def ends(self) -> Mapping[str, float]:
+        return self.to
+
+    @property
+    def description(self) -> str:
+        return f"arc {self.in_plane}, {self.at_feed}"
+
+    def path(self, position: Mapping[str, float]) -> CircularPath:
+        """Path of the arc. An end point equal to the start means a full turn.
+
+        Raises InputError: centre on the start, or end point off the circle about the centre through the start.
+        """
+        first, second = self.plane
+        offset = self.centre_by or {axis: self.centre[axis] - position[axis] for axis in self.plane}
+        centre = (position[first] + offset[first], position[second] + offset[second])
+        radius = math.hypot(offset[first], offset[second])
+        if radius < END_POINT_TOLERANCE:
+            raise InputError(
+                f"the centre of the arc lies {radius * 1e6:.4g} um from its start; "
+                f"allowed: {END_POINT_TOLERANCE * 1e6:g} um or more"
+            )
+        start_angle = math.atan2(-offset[second], -offset[first])
+        if self.angle is not None:
+            return CircularPath(self.plane, centre, radius, start_angle, self.angle, self.sense)
+        end = self.to or {axis: position[axis] + self.by[axis] for axis in self.plane}
+        u, w = end[first] - centre[0], end[second] - centre[1]
+        if abs(math.hypot(u, w) - radius) > END_POINT_TOLERANCE:
+            raise InputError(
+                f"the end point of the arc is {math.hypot(u, w) * 1e3:.7g} mm from the centre, "
+                f"its start {radius * 1e3:.7g} mm; "
+                f"allowed difference: {END_POINT_TOLERANCE * 1e6:g} um"
+            )
+        sweep = (self.sense * (math.atan2(w, u) - start_angle)) % (2 * math.pi)
+        # Where the end is the start to within the tolerance, a full turn is meant, not none.
+        if min(sweep, 2 * math.pi - sweep) * radius <= END_POINT_TOLERANCE:
+            sweep = 2 * math.pi
+        return CircularPath(self.plane, centre, radius, start_angle, sweep, self.sense)
+
+
+class Circle(PlaneMotion):
+    """Full circles that begin and end where the axes are."""
+
+    returns: ClassVar[bool] = True
+    kind: Literal["circle"] = "circle"
+    radius: Annotated[float, Quantity("m", above=0, example="15 mm")] = Field(description="Radius")
+    turns: Annotated[StrictInt, Field(ge=1, le=100_000)] = Field(default=1, description="Number of full turns")
+    start_angle: Annotated[float, Quantity("rad", minimum=-2 * pi, maximum=2 * pi, example="0 deg")] = Field(
+        default=0.0, description="Direction from the centre to the start, from the first axis towards the second"
+    )
+
+    @property
+    def description(self) -> str:
+        turns = f"{self.turns} turn{'s'[: self.turns != 1]}"
+        return f"circle {self.in_plane}, R {self.radius * 1e3:.6g} mm, {turns}, {self.at_feed}"
+
+    def path(self, position: Mapping[str, float]) -> CircularPath:
+        """Path of the circle; its start lies at its start angle."""
+        first, second = self.plane
+        centre = (
+            position[first] - self.radius * math.cos(self.start_angle),
+            position[second] - self.radius * math.sin(self.start_angle),
+        )
+        return CircularPath(self.plane, centre, self.radius, self.start_angle, 2 * math.pi * self.turns, self.sense)
+
+    def target(self, path: Path) -> dict[str, float]:
+        return {}
+
+
+@dataclass(frozen=True)
+class CircularPath:
+    """Circular path about ``centre`` through ``sweep`` [rad] > 0; ``sense`` +1 turns the first axis to the second."""
+
+    axes: tuple[str, str]
+    centre: tuple[float, float]
+    radius: float
+    start_angle: float
+    sweep: float
+    sense: int
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        return self.axes
+
+    @property
+    def length(self) -> float:
+        return self.radius * self.sweep
+
+    def angle(self, s: Array) -> Array:
+        """Angle about the centre [rad] at path lengths ``s`` (N,) [m]."""
+        return self.start_angle + self.sense * s / self.radius
+
+    def position(self, s: Array) -> dict[str, Array]:
+        phi = self.angle(s)
+        return {
+            self.axes[0]: self.centre[0] + self.radius * np.cos(phi),
+            self.axes[1]: self.centre[1] + self.radius * np.sin(phi),
+        }
+
+    def peaks(self, profile: Profile, step: float) -> dict[str, Peaks]:
+        """Peaks of both axes. The path is looked at every ``step`` [s], at 33 instants of every phase of the profile,
+        where the path speed is at an extreme, and where an axis is at an extreme of its motion.
+
+        Acceleration is the axis' share of tangential acceleration and centripetal acceleration v^2/R together.
+        """
+        within_phases = np.linspace(profile.times[:-1], profile.times[1:], POINTS_PER_PHASE).ravel()
+        special = np.concatenate([within_phases, profile.turning_points, self._crossings(profile)])
+        on_grid = math.ceil(profile.duration / step)
+        stretches = (
+            np.arange(first, min(first + INSTANTS, on_grid), dtype=np.float64) * step
+            for first in range(0, on_grid, INSTANTS)
+        )
+        found = dict.fromkeys(self.axes, Peaks(math.inf, -math.inf, 0.0, 0.0))
+        for t in chain([special], stretches):
+            for axis, now in self._peaks_at(profile, t).items():
+                most = found[axis]
+                found[axis] = Peaks(
+                    min(most.low, now.low), max(most.high, now.high),
+                    max(most.speed, now.speed), max(most.acceleration, now.acceleration),
+                )  # fmt: skip
+        return found
+
+    def _peaks_at(self, profile: Profile, t: Array) -> dict[str, Peaks]:
+        """The same at the instants ``t`` [s] alone."""
+        s, v, a = profile.at(t)
+        phi = self.angle(s)
+        tangent = (-self.sense * np.sin(phi), self.sense * np.cos(phi))
+        inward = (-np.cos(phi), -np.sin(phi))
+        found = {}
+        for axis, x, along, towards in zip(self.axes, self.position(s).values(), tangent, inward, strict=True):
+            acceleration = a * along + v**2 / self.radius * towards
+            largest = float(np.abs(v * along).max()), float(np.abs(acceleration).max())
+            found[axis] = Peaks(float(x.min()), float(x.max()), *largest)
+        return found
+
+    def _crossings(self, profile: Profile) -> Array:
+        """Instants [s] at which the path crosses a half axis of its circle."""
+        quarter = math.pi / 2
+        begin = self.sense * self.start_angle / quarter
+        crossed = np.arange(math.ceil(begin), math.floor(begin + self.sweep / quarter) + 1, dtype=np.float64) * quarter
+        return profile.time_at((crossed - self.sense * self.start_angle) * self.radius)
+
+    def geometry(self, profile: Profile, start: float) -> Circular:
+        turns = math.floor(self.sweep / (2 * math.pi) + 1e-9)
+        instants = start + profile.time_at(self.radius * (2 * math.pi * np.arange(turns + 1, dtype=np.float64)))
+        return Circular(
+            axes=self.axes,
+            centre=self.centre,
+            radius=self.radius,
+            sense=self.sense,
+            start_angle=self.start_angle,
+            sweep=self.sweep,
+            turns=tuple(pairwise(instants.tolist())),
+            steady=steady(profile, start),
+        )
+
+
+@dataclass(frozen=True)
+class Circular(Geometry):
+    """Circular path in the plane of two axes."""
+
+    axes: tuple[str, str]
+    """First and second axis of the plane; angles run from the first towards the second."""
+    centre: tuple[float, float]
+    """Programmed centre [m], first and second axis."""
+    radius: float
+    """Programmed radius [m]."""
+    sense: int
+    """+1 counterclockwise (from the first axis towards the second), -1 clockwise."""
+    start_angle: float
+    """Angle of the start as seen from the centre [rad]."""
+    sweep: float
+    """Angle that the path covers, positive [rad]."""
+    turns: tuple[tuple[float, float], ...]
+    """Begin and end of every full turn [s], program time: where the path length is a multiple of 2 pi R."""
+    steady: tuple[float, float] | None
+    """Begin and end of the constant-speed phase [s], program time; None where there is none."""
+
+    @property
+    def text(self) -> str:
+        turns = f" ({len(self.turns)} full turn{'s'[: len(self.turns) != 1]})" if self.turns else ""
+        return f"R {self.radius * 1e3:.6g} mm, {math.degrees(self.sweep):.6g}°{turns}"

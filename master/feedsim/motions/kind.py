@@ -1,0 +1,158 @@
+"""What a kind of motion is: its fields, what the planner asks of it, and what it answers."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.errors import InputError
+from feedsim.fields import Model
+
+Array = NDArray[np.float64]
+
+# An instant within this share of a cycle of the grid lies on it: exact ends carry rounding errors.
+ON_GRID = 1e-6
+
+
+class MotionKind(Model):
+    """Base of the kinds: a subclass has its fields, a field ``kind`` with its name, and answers what follows."""
+
+    returns: ClassVar[bool] = False
+    """Whether it ends where it begins."""
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes that it names, in its order."""
+        return ()
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Axes whose positions at its start decide what it does: without them nothing can be said of it."""
+        return ()
+
+    @property
+    def ends(self) -> Mapping[str, float]:
+        """Axis -> position [m] where its fields alone say that it ends."""
+        return {}
+
+    @property
+    def held(self) -> float:
+        """Time [s] for which all axes are held before one moves."""
+        return 0.0
+
+    @property
+    def files(self) -> Mapping[str, Path]:
+        """Field -> file of data that it names."""
+        return {name: value for name in type(self).model_fields if isinstance(value := getattr(self, name), Path)}
+
+    @property
+    @abstractmethod
+    def description(self) -> str:
+        """It in a line of a report."""
+
+    @abstractmethod
+    def plan(self, start: Start) -> Course:
+        """Its course from ``start``.
+
+        Raises InputError that lists everything for which it cannot be driven. Limits of the axes are the planner's
+        matter, which compares them with the course.
+        """
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where and when a motion begins, and what it is planned with.
+
+    Attributes:
+        position: of all axes [m].
+        time: on the grid of the interpolator [s], program time.
+        T_ipo, T_pos: cycles of the interpolator and of the position controller [s].
+        most: cycles of the interpolator that the program has room for.
+        acceleration, jerk: the machine's limits along a path [m/s2, m/s3].
+        travel: axis -> lowest and highest position [m].
+    """
+
+    position: Mapping[str, float]
+    time: float
+    T_ipo: float
+    T_pos: float
+    most: int
+    acceleration: float
+    jerk: float
+    travel: Mapping[str, tuple[float, float]]
+
+
+class Points(Protocol):
+    """Points that may be computed when they are asked for."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, rows: slice, /) -> Array:
+        """Points of a range of rows; step 1, within the length."""
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """Least and largest position [m], largest speed [m/s] and acceleration [m/s2] (magnitudes) of an axis."""
+
+    low: float
+    high: float
+    speed: float
+    acceleration: float
+
+
+class Geometry:
+    """What figures and reports know of the way of a motion."""
+
+    @property
+    def text(self) -> str:
+        """It in a cell of a table."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A planned motion, from rest to rest. Axes that it says nothing of are held.
+
+    Attributes:
+        duration: exact [s].
+        cycles: of the interpolator, up to its first instant at or after the end.
+        points: axis -> its ``cycles`` positions [m] at the instants T_ipo, 2 T_ipo ... from the start. A spline is laid
+            through them.
+        peaks: of these axes.
+        setpoints: axis -> position [m] and speed [m/s], (N,) each, at the instants 0, T_pos, 2 T_pos ... from the start
+            up to its end: what is not interpolated but taken as it is. A motion has these or ``points``.
+        target: axis -> position [m] at the end; of the axes that are then elsewhere, at least.
+        absolute: the axes end there wherever they began.
+        moving: axes whose setpoint moves.
+        geometry: of its way; None where there is none.
+    """
+
+    duration: float
+    cycles: int
+    points: Mapping[str, Points] = field(default_factory=dict)
+    peaks: Mapping[str, Peaks] = field(default_factory=dict)
+    setpoints: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    target: Mapping[str, float] = field(default_factory=dict)
+    absolute: bool = False
+    moving: tuple[str, ...] = ()
+    geometry: Geometry | None = None
+
+
+def whole_cycles(duration: float, cycle: float) -> int:
+    """Cycles up to the first instant of the grid at or after ``duration`` [s]."""
+    return max(0, math.ceil(duration / cycle - ON_GRID))
+
+
+def check_length(cycles: int, start: Start) -> None:
+    """Raise InputError where the program has no room for ``cycles`` of the interpolator."""
+    if cycles > start.most:
+        raise InputError(
+            f"lasts {cycles * start.T_ipo:.6g} s; allowed in this program: {max(start.most, 0) * start.T_ipo:.6g} s"
+        )

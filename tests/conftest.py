@@ -2,8 +2,12 @@
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from pint_registry import Registry
 
 ROOT = Path(__file__).resolve().parent.parent
 UNITS = ("plant", "controller", "friction", "setpoint")
@@ -55,3 +59,11 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for unit in UNITS:
         build.build(build.load(build.unit_directory(unit), compiler), folder / f"{unit}.fmu", compiler)
     return folder
+
+
+@pytest.fixture(scope="session")
+def registry(tmp_path_factory: pytest.TempPathFactory) -> "Registry":
+    """pint, with the angle as a dimension."""
+    from pint_registry import Registry
+
+    return Registry(tmp_path_factory.mktemp("pint"))

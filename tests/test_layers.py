@@ -33,7 +33,6 @@ SOLE_USERS = {
     "fmpy": {"cosim/unit.py"},
     "ctypes": {"cosim/unit.py", "cosim/friction_law.py", "cosim/exchange.py"},
     "yaml": {"scenario"},
-    "pint": {"units.py", "units"},
     "matplotlib": {"report"},
     "ruckig": {"motions"},
     "tqdm": {"cli"},
@@ -41,7 +40,7 @@ SOLE_USERS = {
     "distributed": {"sweep"},
     "dask": {"sweep"},
     "pyarrow": {"sweep"},
-    "feedsim_packager": {"structure/pack.py", "ssp/pack.py"},
+    "feedsim_packager": {"units.py", "structure/pack.py", "ssp/pack.py"},
 }
 
 

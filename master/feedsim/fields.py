@@ -150,7 +150,7 @@ class Quantity:
 @cache
 def _symbols() -> dict[str, str]:
     """Symbol as a pattern -> its dimension."""
-    return {symbol: units.unit(symbol).dimension for symbol in (*units.DEFINITIONS, *units.ALIASES)}
+    return {symbol: units.unit(symbol).dimension for symbol in (*units.SYMBOLS, *units.ALIASES)}
 
 
 class _AxisName:

@@ -1,9 +1,11 @@
 """Quantities written as text, "5000 mm/min", and their conversion to SI.
 
-The registry is small and built from nothing, so that it knows exactly what a machine-tool engineer writes and nothing
-that looks alike. An angle is a dimension of its own (base unit rad): hertz is one revolution (cycle) per second, so
-1 Hz is 2 pi rad/s and never 1 rad/s, and a controller gain in 1/s is no frequency in Hz. Factors are exact fractions:
-"125 us" is the double nearest to 125e-6, the same as the text 125e-6 itself.
+May use: errors, and the algebra of units that the packager has (sole user of it). Start reading at parse().
+
+The list of symbols is short, so that it holds exactly what a machine-tool engineer writes and nothing that looks alike.
+An angle is a dimension of its own (base unit rad): hertz is one revolution (cycle) per second, so 1 Hz is 2 pi rad/s
+and never 1 rad/s, and a controller gain in 1/s is no frequency in Hz. Factors are exact fractions: "125 us" is the
+double nearest to 125e-6, the same as the text 125e-6 itself.
 """
 
 from __future__ import annotations
@@ -15,61 +17,16 @@ from difflib import get_close_matches
 from fractions import Fraction
 from functools import cache, lru_cache
 from math import inf, isfinite
-from typing import TYPE_CHECKING
 
 from feedsim.errors import InputError
+from feedsim_packager import units as algebra
 
-if TYPE_CHECKING:
-    import pint
-
-# Spelling -> definition in spellings above it. "[...]" makes a base unit.
-DEFINITIONS = {
-    "m": "[length]",
-    "km": "1000 m",
-    "dm": "1/10 m",
-    "cm": "1/100 m",
-    "mm": "1/1000 m",
-    "um": "1/1000 mm",
-    "nm": "1/1000 um",
-    "s": "[time]",
-    "ms": "1/1000 s",
-    "us": "1/1000 ms",
-    "ns": "1/1000 us",
-    "min": "60 s",
-    "h": "60 min",
-    "kg": "[mass]",
-    "g": "1/1000 kg",
-    "t": "1000 kg",
-    "A": "[current]",
-    "mA": "1/1000 A",
-    "rad": "[angle]",
-    "mrad": "1/1000 rad",
-    "urad": "1/1000 mrad",
-    # 2 pi to 40 digits
-    "rev": "6283185307179586476925286766559005768394/1000000000000000000000000000000000000000 rad",
-    "deg": "1/360 rev",
-    "arcsec": "1/3600 deg",
-    "rpm": "rev/min",
-    "Hz": "rev/s",
-    "kHz": "1000 Hz",
-    "N": "kg*m/s^2",
-    "mN": "1/1000 N",
-    "kN": "1000 N",
-    "Pa": "N/m^2",
-    "MPa": "1000000 Pa",
-    "GPa": "1000 MPa",
-    "Nm": "N*m",
-    "V": "kg*m^2/s^3/A",
-    "mV": "1/1000 V",
-    "kV": "1000 V",
-    "Ohm": "V/A",
-    "mOhm": "1/1000 Ohm",
-    "H": "V*s/A",
-    "mH": "1/1000 H",
-    "uH": "1/1000 mH",
-    "Wb": "V*s",
-    "percent": "1/100",
-}
+# What may be written, in the order of messages.
+SYMBOLS = (
+    "m", "km", "dm", "cm", "mm", "um", "nm", "s", "ms", "us", "ns", "min", "h", "kg", "g", "t", "A", "mA",
+    "rad", "mrad", "urad", "rev", "deg", "arcsec", "rpm", "Hz", "kHz", "N", "mN", "kN", "Pa", "MPa", "GPa", "Nm",
+    "V", "mV", "kV", "Ohm", "mOhm", "H", "mH", "uH", "Wb", "percent",
+)  # fmt: skip
 # Other spellings of the same.
 ALIASES = {
     "ohm": "Ohm",
@@ -122,92 +79,12 @@ KINDS = {
     "1/A": ("1/current", "1 1/A"),
 }
 
-# What pint makes of usual expressions, so that files of usual units need not wait for it (a quarter of a second):
-# factor to the base units, times 2 pi to this power, dimension. A test holds every row against pint.
-READY = {
-    "m": ("1", 0, "length"),
-    "1/A": ("1", 0, "1/current"),
-    "Wb": ("1", 0, "length^2*mass/current/time^2"),
-    "H": ("1", 0, "length^2*mass/current^2/time^2"),
-    "V/A": ("1", 0, "length^2*mass/current^2/time^3"),
-    "Ohm": ("1", 0, "length^2*mass/current^2/time^3"),
-    "A": ("1", 0, "current"),
-    "V": ("1", 0, "length^2*mass/current/time^3"),
-    "N*m/A": ("1", 0, "length^2*mass/current/time^2"),
-    "N*m*s/rad": ("1", 0, "length^2*mass/angle/time"),
-    "N*m/rad": ("1", 0, "length^2*mass/angle/time^2"),
-    "N*m": ("1", 0, "length^2*mass/time^2"),
-    "N": ("1", 0, "length*mass/time^2"),
-    "m^4": ("1", 0, "length^4"),
-    "m^2": ("1", 0, "length^2"),
-    "kg*m^2": ("1", 0, "length^2*mass"),
-    "kg/m^3": ("1", 0, "mass/length^3"),
-    "Pa": ("1", 0, "mass/length/time^2"),
-    "N/m": ("1", 0, "mass/time^2"),
-    "m/rad": ("1", 0, "length/angle"),
-    "1/s": ("1", 0, "1/time"),
-    "Hz": ("1", 1, "angle/time"),
-    "rad/s": ("1", 0, "angle/time"),
-    "m/s^3": ("1", 0, "length/time^3"),
-    "m/s^2": ("1", 0, "length/time^2"),
-    "m/s": ("1", 0, "length/time"),
-    "1": ("1", 0, "1"),
-    "rad": ("1", 0, "angle"),
-    "kg": ("1", 0, "mass"),
-    "s": ("1", 0, "time"),
-    "mm": ("1/1000", 0, "length"),
-    "us": ("1/1000000", 0, "time"),
-    "mm/min": ("1/60000", 0, "length/time"),
-    "(m/min)/mm": ("50/3", 0, "1/time"),
-    "mm/rev": ("1/1000", -1, "length/angle"),
-    "N/um": ("1000000", 0, "mass/time^2"),
-    "GPa": ("1000000000", 0, "mass/length/time^2"),
-    "cm^2": ("1/10000", 0, "length^2"),
-    "cm^4": ("1/100000000", 0, "length^4"),
-    "mH": ("1/1000", 0, "length^2*mass/current^2/time^2"),
-    "ms": ("1/1000", 0, "time"),
-    "percent": ("1/100", 0, "1"),
-    "m/min": ("1/60", 0, "length/time"),
-    "um": ("1/1000000", 0, "length"),
-    "cm": ("1/100", 0, "length"),
-    "nm": ("1/1000000000", 0, "length"),
-    "min": ("60", 0, "time"),
-    "kN": ("1000", 0, "length*mass/time^2"),
-    "mrad": ("1/1000", 0, "angle"),
-    "urad": ("1/1000000", 0, "angle"),
-    "rev": ("1", 1, "angle"),
-    "deg": ("1/360", 1, "angle"),
-    "arcsec": ("1/1296000", 1, "angle"),
-    "rpm": ("1/60", 1, "angle/time"),
-    "kHz": ("1000", 1, "angle/time"),
-    "Nm": ("1", 0, "length^2*mass/time^2"),
-    "mm/s": ("1/1000", 0, "length/time"),
-    "deg/s": ("1/360", 1, "angle/time"),
-    "rev/s": ("1", 1, "angle/time"),
-    "rev/min": ("1/60", 1, "angle/time"),
-    "N/mm": ("1000", 0, "mass/time^2"),
-    "kg*cm^2": ("1/10000", 0, "length^2*mass"),
-    "mm/s^2": ("1/1000", 0, "length/time^2"),
-    "MPa": ("1000000", 0, "mass/length/time^2"),
-    "mV": ("1/1000", 0, "length^2*mass/current/time^3"),
-    "mA": ("1/1000", 0, "current"),
-    "uH": ("1/1000000", 0, "length^2*mass/current^2/time^2"),
-    "mOhm": ("1/1000", 0, "length^2*mass/current^2/time^3"),
-    "mm^2": ("1/1000000", 0, "length^2"),
-    "mm^4": ("1/1000000000000", 0, "length^4"),
-    "N*m/(rad/s)": ("1", 0, "length^2*mass/angle/time"),
-    "rad/s^2": ("1", 0, "angle/time^2"),
-    "m/N": ("1", 0, "time^2/mass"),
-    "m/(N*m)": ("1", 0, "time^2/length/mass"),
-    "um/N": ("1/1000000", 0, "time^2/mass"),
-    "g": ("1/1000", 0, "mass"),
-}
-
 DIMENSIONLESS = "1"
 LONGEST_NUMBER = 1100  # characters; every double, written out, has less
 LONGEST = 60  # characters of a unit
 
-_TURN = Fraction(DEFINITIONS["rev"].removesuffix(" rad"))
+# Names of the dimensions of algebra.BASE, as messages have them.
+_DIMENSIONS = ("mass", "length", "time", "current", "temperature", "amount", "luminosity", "angle")
 
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY = re.compile(rf"\s*({NUMBER})(.*)", re.DOTALL)
@@ -309,19 +186,23 @@ def unit(text: str) -> Unit:
         bad = next(c for c in plain if not _LEGAL.fullmatch(c))
         raise InputError(f"unit {text!r} holds {bad!r}")
     for symbol in _SYMBOL.findall(plain):
-        if symbol not in DEFINITIONS and symbol not in ALIASES:
+        if symbol not in SYMBOLS and symbol not in ALIASES:
             raise UnknownSymbol(symbol)
     plain = _SYMBOL.sub(lambda match: ALIASES.get(match[0], match[0]), plain)
     plain = re.sub(r"(?<=[a-zA-Z])([0-9])", r"^\1", plain).replace("**", "^")
     plain = re.sub(r" ?([.*/^()]) ?", r"\1", plain)
     plain = re.sub(r"(?<=[\w)])[ .](?=[\w(])", "*", plain)
-    plain = re.sub(r"(?<=[\w)])\((?!$)", "*(", plain)
+    plain = re.sub(r"(?<=[\w)])\((?!$)|(?<=[0-9])(?=[a-zA-Z])", r"*\g<0>", plain)
     if _product_behind_division(plain):
         raise InputError(f"unit {text!r} is ambiguous; put what stands under the line in brackets, as in N.m/(rad.s)")
     # Beside the units: powers of one digit, 1 as in 1/s, and each bracket closed.
     if not _EXPRESSION.fullmatch(plain) or _unbalanced(plain):
         raise InputError(f"unit {text!r} cannot be read")
-    return Unit(text, *_resolve(plain, text))
+    try:
+        found = algebra.parse(plain.replace("^+", "^") or DIMENSIONLESS)
+    except (algebra.UnitError, RecursionError):
+        raise InputError(f"unit {text!r} cannot be read") from None
+    return Unit(text, found.exact, _dimension(found.exponents))
 
 
 @cache
@@ -352,36 +233,11 @@ def show(value: float, text: str) -> str:
     return f"{value:.9g}" if text in ("1", "") else f"{value:.9g} {text}"
 
 
-def _resolve(plain: str, text: str) -> tuple[Fraction, str]:
-    """Factor and dimension of an expression that is clean already."""
-    if plain in READY:
-        number, turns, dimension = READY[plain]
-        return Fraction(number) * _TURN**turns, dimension
-    return by_pint(plain, text)
-
-
-def by_pint(plain: str, text: str) -> tuple[Fraction, str]:
-    """The same, calculated. InputError: `text`, which it was, cannot be read."""
-    from pint.errors import PintError
-
-    registry = _registry()
-    try:
-        quantity = registry.Quantity(Fraction(1), registry.parse_units(plain)).to_root_units()
-    except (PintError, ValueError, TypeError, SyntaxError, AttributeError, AssertionError, ZeroDivisionError) as error:
-        # pint meets what it cannot read in many ways
-        raise InputError(f"unit {text!r} cannot be read") from error
-    powers = {str(name).strip("[]"): float(str(power)) for name, power in quantity.dimensionality.items()}
-    return Fraction(quantity.magnitude), _dimension(powers)
-
-
-def _dimension(powers: dict[str, float]) -> str:
+def _dimension(exponents: tuple[int, ...]) -> str:
     """Canonical text of a dimension, e.g. "length/time^2"."""
-
-    def term(name: str, power: float) -> str:
-        return name if power == 1 else f"{name}^{power:g}"
-
-    over = [term(name, power) for name, power in sorted(powers.items()) if power > 0]
-    under = [term(name, -power) for name, power in sorted(powers.items()) if power < 0]
+    powers = sorted(zip(_DIMENSIONS, exponents, strict=True))
+    over = [name if power == 1 else f"{name}^{power}" for name, power in powers if power > 0]
+    under = [name if power == -1 else f"{name}^{-power}" for name, power in powers if power < 0]
     return "/".join(["*".join(over) or "1", *under])
 
 
@@ -416,15 +272,15 @@ def _hint(given: Unit, target: Unit) -> str:
 
 
 def _suggest(symbol: str) -> str:
-    known = [*DEFINITIONS, *ALIASES]
+    known = [*SYMBOLS, *ALIASES]
     same = [name for name in known if name.lower() == symbol.lower()]
     close = same or get_close_matches(symbol, known, n=1, cutoff=0.6)
-    return f"; did you mean {close[0]!r}?" if close else f"; known are {', '.join(DEFINITIONS)}"
+    return f"; did you mean {close[0]!r}?" if close else f"; known are {', '.join(SYMBOLS)}"
 
 
 def _suggest_for(symbol: str, text: str, target: Unit) -> str:
     """A symbol close to ``symbol`` with which ``text`` has the dimension of ``target``; else all known ones."""
-    known = [*DEFINITIONS, *ALIASES]
+    known = [*SYMBOLS, *ALIASES]
     close = [name for name in known if name.lower() == symbol.lower()]
     close += get_close_matches(symbol, known, n=10, cutoff=0.5)
     for name in close:
@@ -432,13 +288,4 @@ def _suggest_for(symbol: str, text: str, target: Unit) -> str:
         with suppress(InputError):
             if unit(corrected).dimension == target.dimension:
                 return f"; did you mean {name!r}?"
-    return f"; known are {', '.join(DEFINITIONS)}"
-
-
-@cache
-def _registry() -> pint.UnitRegistry[Fraction]:
-    import pint
-
-    registry: pint.UnitRegistry[Fraction] = pint.UnitRegistry(None, non_int_type=Fraction)
-    registry.load_definitions([f"{name} = {definition.replace('^', '**')}" for name, definition in DEFINITIONS.items()])
-    return registry
+    return f"; known are {', '.join(SYMBOLS)}"

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-HEAVY = {"numpy", "scipy", "matplotlib", "fmpy", "pint", "pydantic", "yaml", "ruckig", "distributed", "dask", "pyarrow"}
+HEAVY = {"numpy", "scipy", "matplotlib", "fmpy", "pydantic", "yaml", "ruckig", "distributed", "dask", "pyarrow"}
 # What neither a run nor a check of a scenario needs, beyond the report's own.
-NOT_FOR_A_RUN = {"pint", "scipy.signal", "scipy.stats", "distributed", "dask", "pyarrow", "matplotlib.pyplot"}
+NOT_FOR_A_RUN = {"scipy.signal", "scipy.stats", "distributed", "dask", "pyarrow", "matplotlib.pyplot"}
 # Nor what reads files of other kinds.
 NOT_FOR_A_RUN |= {"feedsim.scenario.study", "feedsim.scenario.tolerances", "feedsim.ssp"}
 

@@ -59,7 +59,7 @@ def test_unit_is_reduced_to_base_units(name: str) -> None:
         ("1", "%", 100.0),
         ("m/rad", "mm/rad", 1e3),
         ("1/s", "(m/min)/mm", 0.06),  # K_v = 66.67 1/s is 4 (m/min)/mm
-        ("rad/s", "rpm", 9.549296585513721),
+        ("rad/s", "rpm", 9.54929658551372),
         ("rad", "deg", 57.29577951308232),
         ("N.m", "N.m", 1.0),
     ],

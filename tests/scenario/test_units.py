@@ -152,5 +152,5 @@ def test_factor_between_units() -> None:
 def test_every_unit_of_messages_can_be_read() -> None:
     for unit, (_, example) in units.KINDS.items():
         units.parse(example, unit)
-    for spelling in (*units.DEFINITIONS, *units.ALIASES):
+    for spelling in (*units.SYMBOLS, *units.ALIASES):
         assert units.unit(spelling).factor > 0

@@ -1,4 +1,5 @@
-"""Unit expressions -> exponents of the FMI base units and conversion factors.
+"""Unit expressions -> exponents of the FMI base units and conversion factors: for the tables of the units, and for what
+people write in the master's files (feedsim.units).
 
 Grammar (as in Modelica): factors joined by "." (or "*") and "/", parentheses, integer powers ("m/s2", "m/s^2", "s-1").
 "/" takes the one factor behind it: N.m.s/rad, (m/min)/mm. The angle is a dimension of its own, as FMI has it, hence
@@ -7,13 +8,14 @@ rpm and Hz are angular velocities (1 Hz = 2 pi rad/s) and 1/s is not.
 Factors are held as an exact fraction times a power of pi and rounded once, so that mm is 1000 to the last bit.
 """
 
-import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+from operator import add
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # order of FMI 2.0's BaseUnit
+PI = Fraction("3.141592653589793238462643383279502884197")  # 40 digits
 
 
 class UnitError(ValueError):
@@ -29,21 +31,23 @@ class Unit:
     pi_power: int = 0
 
     @property
-    def factor(self) -> float:
+    def exact(self) -> Fraction:
         """Base-unit value of one of this unit."""
-        return _rounded(self.ratio, self.pi_power)
+        return self.ratio * PI**self.pi_power
+
+    @property
+    def factor(self) -> float:
+        """The same, correctly rounded."""
+        return float(self.exact)
 
     def __mul__(self, other: "Unit") -> "Unit":
-        exponents = tuple(a + b for a, b in zip(self.exponents, other.exponents, strict=True))
+        exponents = tuple(map(add, self.exponents, other.exponents))
         return Unit(exponents, self.ratio * other.ratio, self.pi_power + other.pi_power)
 
     def __pow__(self, power: int) -> "Unit":
+        if power == 1:
+            return self
         return Unit(tuple(a * power for a in self.exponents), self.ratio**power, self.pi_power * power)
-
-
-def _rounded(ratio: Fraction, pi_power: int) -> float:
-    # Dividing by pi rather than multiplying by its reciprocal saves one rounding.
-    return float(ratio) * math.pi**pi_power if pi_power >= 0 else float(ratio) / math.pi**-pi_power
 
 
 ONE = Unit((0,) * len(BASE), Fraction(1))
@@ -68,7 +72,11 @@ _PREFIXABLE = {
 _PLAIN = {
     "1": (Fraction(1), 0, ""),
     "%": (Fraction(1, 100), 0, ""),
+    "percent": (Fraction(1, 100), 0, ""),
+    "t": (Fraction(1000), 0, "kg"),
+    "Nm": (Fraction(1), 0, "N.m"),
     "deg": (Fraction(1, 180), 1, "rad"),
+    "arcsec": (Fraction(1, 180 * 3600), 1, "rad"),
     "rev": (Fraction(2), 1, "rad"),
     "rpm": (Fraction(2, 60), 1, "rad/s"),
     "min": (Fraction(60), 0, "s"),
@@ -88,6 +96,7 @@ def _symbol(name: str) -> Unit | None:
     return Unit(ONE.exponents, ratio, pi_power) * (parse(rest) if rest else ONE)
 
 
+@cache
 def _prefixed_symbol(name: str) -> Unit | None:
     unit = _symbol(name)
     if unit is not None:
@@ -114,7 +123,7 @@ def parse(text: str) -> Unit:
         unit, index, sign = ONE, start, 1
         while True:
             factor, index = operand(index)
-            unit = unit * factor**sign
+            unit = unit * factor**sign if unit is not ONE else factor**sign
             mark = tokens[index][0] if index < len(tokens) else ""
             if mark == ")" and nested:
                 return unit, index + 1
@@ -144,7 +153,7 @@ def conversion(unit: str, display_unit: str) -> float:
     a, b = parse(unit), parse(display_unit)
     if a.exponents != b.exponents:
         raise UnitError(f"display unit '{display_unit}' [{dimension(b)}] does not fit unit '{unit}' [{dimension(a)}]")
-    return _rounded(a.ratio / b.ratio, a.pi_power - b.pi_power)
+    return float(a.exact / b.exact)
 
 
 def dimension(unit: Unit) -> str:

@@ -18,6 +18,8 @@ import pose_reference
 from numpy.typing import NDArray
 
 from feedsim import cosim, scenario
+from feedsim.cosim.interpreter import Interpreter
+from feedsim.cosim.operations import When, do_step, get_row, set_real, set_slopes
 from feedsim.cosim.unit import Archive, Log, Port, Unit
 from feedsim.scenario import Machine, Scenario, load_structure
 from feedsim.scenario.structure.geometry import GeometryStructure
@@ -109,14 +111,11 @@ def drive(plant: Path, machine: Machine, recorded: Recorded, modes_file: Path | 
             log = Log(unit, names, count)
             unit.enter_initialisation(0.0, count * h)
             unit.exit_initialisation()
-            log.record(0)
-            slopes = np.diff(recorded.torque, axis=1) / h
-            for k in range(count - 1):
-                port.values[:], port.slopes[:] = recorded.torque[:, k], slopes[:, k]
-                port.set()
-                port.set_slopes()
-                unit.step(k * h, h)
-                log.record(k + 1)
+            torque, slopes = recorded.torque.T, np.diff(recorded.torque, axis=1).T / h
+            rows = get_row(log, When())
+            driven = [set_real(port, torque), set_slopes(port, slopes), do_step(unit, 0.0, h)]
+            Interpreter([*rows, *driven], h).run(0, count - 1)
+            Interpreter(rows, h).run(count - 1, count)
         finally:
             unit.close()
     columns = log.columns()

@@ -1,4 +1,4 @@
-"""The native cycle loop against Python's, its twin: the same bits, the same messages, the same behaviour around it."""
+"""The native cycle loop against the interpreter: the same bits, the same messages, the same behaviour around it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ import pytest
 from feedsim import cosim, nc, scenario
 from feedsim.cosim import Run, exchange
 from feedsim.cosim.excite import measure, usual_rms
-from feedsim.cosim.loop import REPORTED_EVERY, Loop, Progress, Send
+from feedsim.cosim.loop import REPORTED_EVERY, Loop, Progress
+from feedsim.cosim.operations import set_real
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Port
@@ -90,6 +91,27 @@ def test_same_bits(name: str, scheme: str, substeps: int, folder: Path) -> None:
     # The comparison means something: the axis has moved, and friction has worked.
     assert np.ptp(native.trace["Z.x_a"]) > 1e-3
     assert native.coupling["Z.friction_work"] > 1e-3
+
+
+def test_a_scheme_says_who_steps_when_and_who_learns_of_slopes(folder: Path) -> None:
+    friction = ["friction_X", "friction_Y", "friction_Z"]
+    turns = {
+        "extrapolated": (["plant", *friction], {"plant", *friction}),
+        "iterated": (["plant", *friction] * 2, {"plant", *friction}),
+        "gauss_seidel": (["plant", *friction], {"plant"}),
+        "gauss_seidel_friction_first": ([*friction, "plant"], {"plant"}),
+        "jacobi": (["plant", *friction], {"plant"}),
+        "jacobi_extrapolated": (["plant", *friction], {"plant", *friction}),
+        "parallel": (["plant", *friction], set()),
+    }
+    assert turns.keys() == SCHEMES.keys()
+    with System(default_machine(), folder) as system:
+        for name, (steps, sloped) in turns.items():
+            operations = [each for each in Cycle(system, SCHEMES[name], 125e-6, 2).operations() if each.unit]
+            called = [(each.kind, each.unit.name) for each in operations if each.unit]
+            controls = [f"controller_{axis}" for axis in "XYZ"]
+            assert [unit for kind, unit in called if kind == "do_step"] == [*controls, *steps, *steps], name
+            assert {unit for kind, unit in called if kind == "set_slopes"} == sloped, name
 
 
 @pytest.mark.parametrize("name", sorted(SHORT))
@@ -162,7 +184,7 @@ def test_refused_input_is_told_alike_with_the_time(unit: str, variable: str, aft
     def act(native: bool) -> None:
         with System(loaded.machine, folder) as system:
             cycle = Cycle(system, SCHEMES["extrapolated"], 125e-6, 2)
-            send = Send(Port(system.units[unit], [variable]), values, exchange.When())
+            send = set_real(Port(system.units[unit], [variable]), values)
             loop = Loop(cycle, () if after else (send,), (send,) if after else (), exchange.chosen(native, folder))
             system.initialise(program, stop=1.0)
             loop.run(1000)

@@ -11,6 +11,8 @@ import pytest
 
 from feedsim import cosim, nc, scenario
 from feedsim.cosim import Run
+from feedsim.cosim.interpreter import Interpreter
+from feedsim.cosim.operations import do_step
 from feedsim.cosim.system import System
 from feedsim.cosim.unpacked import STORE
 from feedsim.errors import InputError, SimulationError
@@ -166,10 +168,10 @@ def test_units_know_the_end_of_the_run(short: Path, fmus: Path) -> None:
     program = nc.plan(loaded)
     with System(loaded.machine, fmus) as system:
         system.initialise(program, stop=0.001)
-        for k in range(8):
-            system.plant.step(k * 125e-6, 125e-6)
+        steps = Interpreter([do_step(system.plant, 0.0, 125e-6)], 125e-6)
+        steps.run(0, 8)
         with pytest.raises(SimulationError, match=r"unit plant, t = 0\.001 s: step of 0\.000125 s failed: .*stop time"):
-            system.plant.step(0.001, 125e-6)
+            steps.run(8, 9)
 
 
 def test_what_stays_behind_is_used_again_and_goes_when_told(

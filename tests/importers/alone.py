@@ -10,6 +10,8 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 
+from feedsim.cosim.interpreter import Interpreter
+from feedsim.cosim.operations import do_step
 from feedsim.cosim.unit import Archive, Port, Unit
 from importers import z_move
 from importers.system import Component, Experiment, Floats, Result, System, Value
@@ -119,11 +121,12 @@ def by_hand(case: Case, fmus: Path) -> Result:
             unit.set_parameters(case.start)
             unit.enter_initialisation(0.0, do.stop)
             port, out = Port(unit, list(given)), Port(unit, list(case.outputs))
+            steps = Interpreter([do_step(unit, 0.0, STEP)], STEP)
             for k in range(STEPS + 1):
                 if k == 1:
                     unit.exit_initialisation()
                 if k:
-                    unit.step((k - 1) * STEP, STEP)
+                    steps.run(k - 1, k)
                 port.values[:] = [column[k] for column in given.values()]
                 if k == 0:
                     port.set()

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feedsim.cosim.interpreter import Interpreter
+from feedsim.cosim.operations import do_step
 from feedsim.cosim.unit import Archive, Port, Unit
 from importers.system import Experiment, Result, System, boolean
 
@@ -61,8 +63,9 @@ class _Signals:
 
 
 class _Member:
-    def __init__(self, name: str, unit: Unit, system: System) -> None:
+    def __init__(self, name: str, unit: Unit, system: System, step: float) -> None:
         self.unit = unit
+        self.steps = Interpreter([do_step(unit, 0.0, step)], step)
         self.sources = system.sources(name)
         self.inputs = _Signals(unit, list(self.sources))
         wanted = sorted({source[1] for source, _ in system.connections if source[0] == name})
@@ -93,7 +96,7 @@ def run(system: System, experiment: Experiment, master: Master) -> Result:
             unit = Unit(archives[path], name)
             stack.callback(unit.close)
             unit.set_parameters(component.start)
-            members[name] = _Member(name, unit, system)
+            members[name] = _Member(name, unit, system, experiment.step)
         for member in members.values():
             for name in member.inputs.names:
                 instance, variable = member.sources[name]
@@ -135,7 +138,7 @@ def run(system: System, experiment: Experiment, master: Master) -> Result:
             for member in members.values():
                 if master.sequential:
                     member.receive()
-                member.unit.step(k * experiment.step, experiment.step)
+                member.steps.run(k, k + 1)
                 if master.sequential:
                     member.tell()
             for member in members.values():

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from feedsim.cosim.interpreter import Interpreter
+from feedsim.cosim.operations import do_step
 from feedsim.cosim.unit import Archive, Port, Unit
 from importers.system import Experiment, Result, System
 
@@ -41,9 +43,10 @@ def run(system: System, experiment: Experiment, folder: Path, *, sequential: boo
             unit.enter_initialisation(0.0, experiment.stop)
             unit.exit_initialisation()
             port = Port(unit, [OUT + ".".join(key) for key in experiment.record])
+            steps = Interpreter([do_step(unit, 0.0, experiment.step)], experiment.step)
             for k in range(experiment.steps + 1):
                 if k:
-                    unit.step((k - 1) * experiment.step, experiment.step)
+                    steps.run(k - 1, k)
                 port.get()
                 for key, value in zip(experiment.record, port.values, strict=True):
                     result[key][k] = value

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from feedsim.analysis import linear
 from feedsim.analysis.linear import LinearSystem
+from feedsim.cosim.interpreter import Interpreter
+from feedsim.cosim.operations import do_step, get_real, set_real, set_slopes
 from feedsim.cosim.system import controller_parameters
 from feedsim.cosim.unit import Archive, Port, Unit
 from feedsim.scenario import Filter, Machine
@@ -195,6 +197,13 @@ def measured(
             torques = Port(plant, [f"{axis}.M_a" for axis in machine.axes])
             inputs = {axis: Port(units[axis], ["x_a", "n_a", "x_s", "n_add", "M_add"]) for axis in machine.axes}
             shown = {axis: Port(units[axis], ["M_a", "n_s"]) for axis in machine.axes}
+            control = {
+                axis: Interpreter([set_real(inputs[axis]), do_step(units[axis], 0.0, T_C), get_real(shown[axis])], T_C)
+                for axis in machine.axes
+            }
+            told = [torques, force] if name == "tool.F_Z" else [torques]
+            turn = [each for port in told for each in (set_real(port), set_slopes(port))]
+            structure = Interpreter([*turn, do_step(plant, 0.0, T_C)], T_C)
             for k, value in enumerate(wave[:-1]):
                 out.get()
                 record = dict(zip(out.names, out.values.tolist(), strict=True))
@@ -206,19 +215,12 @@ def measured(
                         place = ["x_s", "n_add", "M_add"].index(name.partition(".")[2])
                         # a setpoint moves about the pose; it is taken every T_pos
                         given.values[2 + place] += value
-                    given.set()
-                    units[axis].step(float(t[k]), T_C)
                     torques.values[i] = shown[axis].values[0]
-                    shown[axis].get()
+                    control[axis].run(k, k + 1)
                     torques.slopes[i] = (shown[axis].values[0] - torques.values[i]) / T_C
                     record[f"{axis}.n_s"] = shown[axis].values[1]  # of the instant just worked
-                torques.set()
-                torques.set_slopes()
-                if name == "tool.F_Z":
-                    force.values[0], force.slopes[0] = value, (wave[k + 1] - value) / T_C
-                    force.set()
-                    force.set_slopes()
-                plant.step(float(t[k]), T_C)
+                force.values[0], force.slopes[0] = value, (wave[k + 1] - value) / T_C
+                structure.run(k, k + 1)
                 for output, number in record.items():
                     rows.setdefault(output, []).append(number)
         finally:

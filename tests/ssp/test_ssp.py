@@ -344,6 +344,8 @@ def test_an_experiment_that_starts_late(exported: Path, tmp_path: Path) -> None:
 
 def test_rows_are_those_that_the_unit_plays(exported: Path, tmp_path: Path) -> None:
     """At instants just ahead of rows, for steps of several lengths: with the unit's own slack."""
+    from feedsim.cosim.interpreter import Interpreter
+    from feedsim.cosim.operations import do_step
     from feedsim.cosim.unit import Archive, Unit
     from feedsim.ssp.pack import SETPOINTS_IN_ARCHIVE, read_setpoints
 
@@ -360,8 +362,8 @@ def test_rows_are_those_that_the_unit_plays(exported: Path, tmp_path: Path) -> N
                     unit = Unit(archive, "setpoint")
                     unit.enter_initialisation(0.0, 1.0)
                     unit.exit_initialisation()
-                    unit.step(0.0, float(t) - step)
-                    unit.step(float(t) - step, step)
+                    begin = float(t) - step
+                    Interpreter([do_step(unit, 0.0, begin), do_step(unit, begin, step)], 1.0).run(0, 1)
                     assert unit.value("row") == row, (step, ahead, t)
                     unit.close()
                 both |= set((rows - [3, 57, 200]).tolist())

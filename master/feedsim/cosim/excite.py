@@ -16,8 +16,9 @@ from typing import Literal
 import numpy as np
 
 from feedsim.cosim import wiring
-from feedsim.cosim.exchange import When, chosen
-from feedsim.cosim.loop import Activity, Keep, Loop, Progress, Record, Send, Setpoints
+from feedsim.cosim.exchange import chosen
+from feedsim.cosim.loop import Loop, Progress, Setpoints
+from feedsim.cosim.operations import Operation, When, copy, get_row, set_real, set_slopes
 from feedsim.cosim.run import fmus_directory
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
@@ -127,9 +128,9 @@ def measure(
         cycle = Cycle(system, SCHEMES["extrapolated"], cycles.T_c, 1)
         record = _Record(system, periods * rows, When(first=kept))
         drives = Setpoints(system, program, ratio)
-        before: list[Activity] = [*drives.sends] if offset_speed else []
-        before += [_excite(system, axis, inject, excitation, When(first=first * ratio)), *record.before]
-        loop = Loop(cycle, tuple(before), record.after, library, (drives,) if offset_speed else ())
+        before = [*drives.operations] if offset_speed else []
+        before += [*_excite(system, axis, inject, excitation, When(first=first * ratio)), *record.before]
+        loop = Loop(cycle, before, record.after, library, (drives,) if offset_speed else ())
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
         loop.run(total, progress)
@@ -243,13 +244,14 @@ def _start(axis: str, machine: Machine, distance: float, before: float) -> float
     return min(max(start, low - min(distance, 0.0)), high - max(distance, 0.0))
 
 
-def _excite(system: System, axis: str, inject: str, excitation: Excitation, when: When) -> Send:
+def _excite(system: System, axis: str, inject: str, excitation: Excitation, when: When) -> list[Operation]:
     """What sets the input for the control cycles, a sample each."""
     samples = excitation.samples.reshape(-1, 1)
     if inject in DRIVE_INPUTS:
-        return Send(Port(system.units[wiring.controller(axis)], [inject]), samples, when)
+        return [set_real(Port(system.units[wiring.controller(axis)], [inject]), samples, when)]
+    force = Port(system.plant, [inject])
     slopes = (np.roll(samples, -1) - samples) / excitation.cycle
-    return Send(Port(system.plant, [inject]), samples, when, slopes)
+    return [set_real(force, samples, when), set_slopes(force, slopes, when)]
 
 
 class _Record:
@@ -264,15 +266,13 @@ class _Record:
         self.tool = Log(system.plant, TOOL_SIGNALS, rows)
         self.drives = [Log(control.unit, DRIVE_SIGNALS, rows) for control in system.controllers]
 
-        self.before: tuple[Activity, ...] = (
-            Keep(system.measured, self.measured, when),
-            Keep(system.M_fr, self.M_fr, when),
-            Record(self.tool, when),
-        )
-        self.after: tuple[Activity, ...] = (
-            Keep(system.M_a_start, self.M_a, when),
-            *(Record(log, when) for log in self.drives),
-        )
+        self.before = [
+            copy(self.measured, system.measured, when),
+            copy(self.M_fr, system.M_fr, when),
+            *get_row(self.tool, when),
+        ]
+        self.after = [copy(self.M_a, system.M_a_start, when)]
+        self.after += [operation for log in self.drives for operation in get_row(log, when)]
 
     def columns(self) -> tuple[dict[str, Floats], dict[str, str]]:
         """Values and units by column."""

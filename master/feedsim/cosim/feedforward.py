@@ -35,8 +35,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim.cosim import wiring
-from feedsim.cosim.exchange import When
-from feedsim.cosim.loop import Send
+from feedsim.cosim.operations import Operation, set_real
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats, Port
 from feedsim.errors import InputError
@@ -102,13 +101,13 @@ def friction_feedforward(
     }
 
 
-def feeders(system: System, torques: TorqueFeedforward, instants: int) -> list[Send]:
+def feeders(system: System, torques: TorqueFeedforward, instants: int) -> list[Operation]:
     """What hands over the torques of instant k to the drives.
 
     Raises:
         InputError: an unknown axis, or torques that are not one finite number per instant.
     """
-    sends: list[Send] = []
+    sends: list[Operation] = []
     for axis, torque in torques.items():
         if axis not in system.axes:
             raise InputError(f"torque feedforward: no axis {axis!r}{suggest(axis, system.axes)}")
@@ -118,7 +117,7 @@ def feeders(system: System, torques: TorqueFeedforward, instants: int) -> list[S
                 f"one for the end; there are {torque.shape}, {np.count_nonzero(np.isfinite(torque))} of them finite"
             )
         port = Port(system.units[wiring.controller(axis)], ["M_add"])
-        sends.append(Send(port, torque.reshape(-1, 1), When()))
+        sends.append(set_real(port, torque.reshape(-1, 1)))
     return sends
 
 

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.cosim import wiring
-from feedsim.cosim.exchange import When
-from feedsim.cosim.loop import REPORTED_EVERY, RING, Activity, Keep, Record
+from feedsim.cosim.interpreter import Interpreter
+from feedsim.cosim.loop import REPORTED_EVERY, RING
+from feedsim.cosim.operations import Operation, When, copy, get_row
 from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.signals import held
 from feedsim.cosim.unit import Floats, Log
@@ -138,17 +139,16 @@ class Recording:
         return self._table.filled
 
     @property
-    def activities(self) -> list[Activity]:
-        """What the cycle loop does ahead of each cycle; the end of the last one is left to :meth:`record`."""
+    def operations(self) -> list[Operation]:
+        """What is done ahead of each cycle; the end of the last one is left to :meth:`record`."""
         when = When(every=self.every)
-        kept = [Keep(self._cycle.residual, self._residual, when)] if self._residual_names else []
-        return [*(Record(log, when) for log, _ in self._logs), *kept]
+        kept = [copy(self._residual, self._cycle.bond.residual, when)] if self._residual_names else []
+        return [*(operation for log, _ in self._logs for operation in get_row(log, when)), *kept]
 
     def record(self, k: int) -> None:
         """Record the instant k T_c, where it is one to be recorded; those before are done."""
         self.ahead(k, k + 1)
-        for activity in self.activities:
-            activity(k)
+        Interpreter(self.operations, self._T_c).run(k, k + 1)
 
     def ahead(self, begin: int, end: int) -> None:
         """Make room for the rows of the cycles `begin` to `end` - 1."""

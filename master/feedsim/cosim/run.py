@@ -12,7 +12,7 @@ from feedsim.cosim import trust
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
-from feedsim.cosim.loop import Activity, Loop, Progress, Setpoints
+from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.pose import PoseUse, pose_use
 from feedsim.cosim.recording import Recording, Sink, recorded_columns
 from feedsim.cosim.schedule import SCHEMES, Cycle
@@ -110,9 +110,9 @@ def run(
             at_full_rate = Recording(cycle, program, total, ratio, 1, full_rate_columns(scenario), scratch=scratch)
             recordings.append(at_full_rate)
         drives = Setpoints(system, program, ratio)
-        before: list[Activity] = [*drives.sends, *(activity for each in recordings for activity in each.activities)]
+        before = [*drives.operations, *(operation for each in recordings for operation in each.operations)]
         before += feeders(system, torque_feedforward or {}, total + 1)
-        loop = Loop(cycle, tuple(before), (), library, (drives, *recordings))
+        loop = Loop(cycle, before, (), library, (drives, *recordings))
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
         try:
@@ -147,7 +147,7 @@ def run(
             log=None
             if fine is None or scenario.logging is None
             else log(fine, scenario.logging, ideal_axes(scenario), scratch),
-            native=loop.native is not None,
+            native=library is not None,
         )
 
 

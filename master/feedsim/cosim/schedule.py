@@ -1,17 +1,22 @@
 """One control cycle of the coupled system: who steps when, and what each unit is told of its inputs within the step.
 
+It is written down here, once, as a list of operations, and executed elsewhere (feedsim.cosim.operations).
+
 The controllers sample at t_k and run first; they add no error. The stiff bond is plant <-> friction; a :class:`Scheme`
 says how the two see each other within a step.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from feedsim.cosim import operations as op
+from feedsim.cosim.operations import Bond, Operation
 from feedsim.cosim.system import System
-from feedsim.cosim.unit import Unit
+from feedsim.cosim.unit import Floats
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,11 @@ class Scheme:
     speed: str  # friction: n_fr linear "within" the step, held at its "end" or its "start", or "extrapolated"
     passes: int = 1  # plant and friction go back and take the step again, with the slope of M_fr that they have found
     friction_first: bool = False  # friction steps ahead of the plant, which holds the torque found; else the plant does
+
+    @property
+    def speed_ramp(self) -> bool:
+        """Whether friction is told the slope of its speed."""
+        return self.speed in ("within", "extrapolated")
 
 
 SCHEMES = {
@@ -49,13 +59,10 @@ SCHEMES = {
 
 
 class Cycle:
-    """Executes control cycles on a :class:`System`.
+    """What happens in a control cycle of a :class:`System`, as a list of operations.
 
     Attributes:
-        residual: (axes,) interface energy residual so far [J]: what the plant gives to the bond less what friction
-            takes from it, over the steps' ends (Rodriguez et al., Multibody System Dynamics 55, 2022).
-        residual_peak: (axes,) largest absolute residual met [J].
-        dissipated: (axes,) friction work so far [J].
+        bond: plant and friction: the energies that they exchange.
     """
 
     def __init__(self, system: System, scheme: Scheme, cycle: float, substeps: int) -> None:
@@ -64,91 +71,90 @@ class Cycle:
         self.cycle = cycle
         self.substeps = substeps
         self.step = cycle / substeps
-        count = len(system.axes)
-        self.M_fr_start = np.zeros(count)  # of the exchange step, where it is taken again
-        self.M_a_before = np.zeros(count)  # what an importer without slopes knows of the torque
-        self.assumed_torque = np.zeros(count)  # at the end of the exchange step, by the plant
-        self.residual = np.zeros(count)
-        self.residual_peak = np.zeros(count)
-        self.dissipated = np.zeros(count)
 
-    def run(self, k: int) -> None:
-        """Advance the whole system from k T_c to (k + 1) T_c."""
+        def buffer() -> Floats:
+            return np.zeros(len(system.axes))
+
+        self.M_fr_start = buffer()  # of the exchange step, where it is taken again
+        self.M_a_before = buffer()  # what an importer without slopes knows of the torque
+        self.assumed_torque = buffer()  # at the end of the exchange step, by the plant
+        self.bond = Bond(
+            M_fr=system.M_fr, n=system.n, n_slope=system.n_slope, assumed_torque=self.assumed_torque,
+            n_end=system.n_end, residual=buffer(), residual_peak=buffer(), dissipated=buffer(),
+        )  # fmt: skip
+
+    def operations(self) -> Iterator[Operation]:
+        """The whole system from k T_c to (k + 1) T_c."""
         system = self.system
-        t = k * self.cycle
         for control in system.controllers:
-            control.measured.set()
-            control.unit.step(t, self.cycle)
-            control.torque.get()
-            control.torque.get_slopes()
+            yield op.set_real(control.measured)
+            yield op.do_step(control.unit, 0.0, self.cycle)
+            yield op.get_real(control.torque)
+            if self.scheme.torque_ramp:
+                yield op.get_slopes(control.torque)
         if self.scheme.torque_ramp:
             # From the end backwards: a drive whose torque jumps at t_k then acts as it does, without a cycle's delay.
-            system.M_a_start[:] = system.M_a_end - self.cycle * system.M_a_slope
+            yield op.line(system.M_a_start, system.M_a_end, -self.cycle, system.M_a_slope)
         else:
-            system.M_a_start[:] = self.M_a_before
-            system.M_a_slope[:] = 0.0
-            self.M_a_before[:] = system.M_a_end
+            yield op.copy(system.M_a_start, self.M_a_before)
+            yield op.copy(self.M_a_before, system.M_a_end)
         for j in range(self.substeps):
-            np.multiply(system.M_a_slope, j * self.step, out=system.M_a)
-            system.M_a += system.M_a_start
-            self._exchange(t + j * self.step)
+            yield op.line(system.M_a, system.M_a_start, j * self.step, system.M_a_slope)
+            yield from self._exchange_step(j * self.step)
 
-    def _exchange(self, t: float) -> None:
-        """Plant and friction over one exchange step."""
+    def _exchange_step(self, start: float) -> Iterator[Operation]:
+        """Plant and friction over the step that begins `start` [s] after the cycle; the scheme says who goes first."""
         system, scheme = self.system, self.scheme
-        system.n_start[:] = system.n_end
+        units = [system.plant, *(contact.unit for contact in system.contacts)]
+        yield op.copy(system.n_start, system.n_end)
         if scheme.passes > 1:
-            self.M_fr_start[:] = system.M_fr
-            for unit in self._stepped_again():
-                unit.keep()
-        self._step(t)
-        for _ in range(1, scheme.passes):
-            for unit in self._stepped_again():
-                unit.go_back()
-            system.M_fr[:] = self.M_fr_start
-            self._step(t)
-        taken = system.M_fr * (system.n + self.step * system.n_slope)
-        self.residual += 0.5 * self.step * (self.assumed_torque * system.n_end - taken)
-        np.maximum(self.residual_peak, np.abs(self.residual), out=self.residual_peak)
-        self.dissipated += self.step * taken
+            yield op.copy(self.M_fr_start, system.M_fr)
+            yield from map(op.get_state, units)
+        for again in range(scheme.passes):
+            if again:
+                yield from map(op.set_state, units)
+                yield op.copy(system.M_fr, self.M_fr_start)
+            if scheme.friction_first:
+                yield from self._tell_speed()
+                yield from self._step_friction(start)
+                yield from self._step_plant(start)
+            else:
+                yield from self._step_plant(start)
+                yield from self._tell_speed()
+                yield from self._step_friction(start)
+        yield op.exchange_energy(self.bond, self.step)
 
-    def _stepped_again(self) -> list[Unit]:
-        return [self.system.plant, *(contact.unit for contact in self.system.contacts)]
-
-    def _step(self, t: float) -> None:
-        """A pass: the plant, then friction, or the other way round."""
-        system, h = self.system, self.step
-        if self.scheme.friction_first:
-            system.n[:] = system.n_start
-            self._step_friction(t)
-            self._step_plant(t)
-            return
-        self._step_plant(t)
-        slope = (system.n_end - system.n_start) / h
-        if self.scheme.speed == "within":
-            system.n[:], system.n_slope[:] = system.n_start, slope
-        elif self.scheme.speed == "end":
-            system.n[:] = system.n_end
-        elif self.scheme.speed == "start":
-            system.n[:] = system.n_start
-        else:
-            system.n[:], system.n_slope[:] = system.n_start, system.n_slope_last
-            system.n_slope_last[:] = slope
-        self._step_friction(t)
-
-    def _step_plant(self, t: float) -> None:
+    def _step_plant(self, start: float) -> Iterator[Operation]:
         """With the friction torque that is at hand: that of the last step's end, or what friction has just found."""
         system, scheme, h = self.system, self.scheme, self.step
-        system.plant_inputs.set()
-        (system.plant_inputs if scheme.friction_ramp else system.plant_torque).set_slopes()
-        system.plant.step(t, h)
-        system.plant_outputs.get()
-        self.assumed_torque[:] = system.M_fr + h * system.M_fr_slope if scheme.friction_ramp else system.M_fr
+        yield op.set_real(system.plant_inputs)
+        if scheme.friction_ramp:
+            yield op.set_slopes(system.plant_inputs)
+        elif scheme.torque_ramp:
+            yield op.set_slopes(system.plant_torque)
+        yield op.do_step(system.plant, start, h)
+        yield op.get_real(system.plant_outputs)
+        if scheme.friction_ramp:
+            yield op.line(self.assumed_torque, system.M_fr, h, system.M_fr_slope)
+        else:
+            yield op.copy(self.assumed_torque, system.M_fr)
 
-    def _step_friction(self, t: float) -> None:
+    def _tell_speed(self) -> Iterator[Operation]:
+        """What friction learns of the speed at its contact."""
+        system, speed = self.system, self.scheme.speed
+        yield op.copy(system.n, system.n_end if speed == "end" else system.n_start)
+        if speed == "within":
+            yield op.rate(system.n_slope, system.n_end, system.n_start, self.step)
+        elif speed == "extrapolated":
+            yield op.copy(system.n_slope, system.n_slope_last)
+            yield op.rate(system.n_slope_last, system.n_end, system.n_start, self.step)
+
+    def _step_friction(self, start: float) -> Iterator[Operation]:
         for contact in self.system.contacts:
-            contact.speed.set()
-            contact.speed.set_slopes()
-            contact.unit.step(t, self.step)
-            contact.torque.get()
-            contact.torque.get_slopes()
+            yield op.set_real(contact.speed)
+            if self.scheme.speed_ramp:
+                yield op.set_slopes(contact.speed)
+            yield op.do_step(contact.unit, start, self.step)
+            yield op.get_real(contact.torque)
+            if self.scheme.friction_ramp:
+                yield op.get_slopes(contact.torque)

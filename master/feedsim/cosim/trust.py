@@ -17,12 +17,12 @@ LOAD_TAKEN_UP = 1.0  # s; position and speed controller together settle in some 
 
 
 def energies(system: System, cycle: Cycle) -> dict[str, float]:
-    """Per axis "A.residual", "A.residual_peak" and "A.friction_work" [J]; see :class:`Cycle`."""
+    """Per axis "A.residual", "A.residual_peak" and "A.friction_work" [J]; see feedsim.cosim.operations.Bond."""
     coupling: dict[str, float] = {}
     for i, axis in enumerate(system.axes):
-        coupling[f"{axis}.residual"] = float(cycle.residual[i])
-        coupling[f"{axis}.residual_peak"] = float(cycle.residual_peak[i])
-        coupling[f"{axis}.friction_work"] = float(cycle.dissipated[i])
+        coupling[f"{axis}.residual"] = float(cycle.bond.residual[i])
+        coupling[f"{axis}.residual_peak"] = float(cycle.bond.residual_peak[i])
+        coupling[f"{axis}.friction_work"] = float(cycle.bond.dissipated[i])
     return coupling
 
 
@@ -65,11 +65,12 @@ def _unbalanced_loads(scenario: Scenario) -> list[str]:
 
 
 def _energy(scenario: Scenario, system: System, cycle: Cycle) -> list[str]:
+    bond = cycle.bond
     return [
         f"axis {axis}: the exchange between plant and friction has lost {residual:.3g} J against {work:.3g} J of "
         f"friction work (scheme {cycle.scheme.name}, exchange step {cycle.step * 1e6:.6g} us): it is unstable or too "
         f"coarse, and the result is not to be trusted; try coupling.substeps above {scenario.coupling.substeps}"
-        for axis, residual, work in zip(system.axes, cycle.residual_peak, np.abs(cycle.dissipated), strict=True)
+        for axis, residual, work in zip(system.axes, bond.residual_peak, np.abs(bond.dissipated), strict=True)
         if residual > max(TRUSTED_SHARE * work, TRUSTED_ENERGY)
     ]
 

@@ -12,7 +12,7 @@ import ctypes
 import os
 import re
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import IO, Any, NoReturn, Self
@@ -32,14 +32,25 @@ _DESCRIPTION = "modelDescription.xml"
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 # Compiled ahead: what a signal raises inside a callback is lost, so callbacks are kept short.
 _CALL = re.compile(r"^fmi2[A-Za-z]+: ")
-WARNING = 1  # fmi2Status: 0 OK, 1 warning, 2 discard, 3 error, 4 fatal
+OK, WARNING = 0, 1  # fmi2Status; 2 discard, 3 error, 4 fatal
 
-_EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
-_DERIVATIVE = ctypes.CFUNCTYPE(
-    ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_void_p
-)
-_STATE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
-_STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
+_STATUS, _ADDRESS, _COUNT, _TIME = ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double
+_VALUES = ctypes.CFUNCTYPE(_STATUS, _ADDRESS, _ADDRESS, _COUNT, _ADDRESS)
+_SLOPES = ctypes.CFUNCTYPE(_STATUS, _ADDRESS, _ADDRESS, _COUNT, _ADDRESS, _ADDRESS)
+_STEP = ctypes.CFUNCTYPE(_STATUS, _ADDRESS, _TIME, _TIME, ctypes.c_int)
+_STATE = ctypes.CFUNCTYPE(_STATUS, _ADDRESS, _ADDRESS)
+# What the operations of a cycle call (feedsim.cosim.operations).
+_CALLS = {
+    "set_real": ("fmi2SetReal", _VALUES),
+    "set_slopes": ("fmi2SetRealInputDerivatives", _SLOPES),
+    "do_step": ("fmi2DoStep", _STEP),
+    "get_real": ("fmi2GetReal", _VALUES),
+    "get_slopes": ("fmi2GetRealOutputDerivatives", _SLOPES),
+    "get_boolean": ("fmi2GetBoolean", _VALUES),
+    "get_state": ("fmi2GetFMUstate", _STATE),
+    "set_state": ("fmi2SetFMUstate", _STATE),
+    "free_state": ("fmi2FreeFMUstate", _STATE),
+}
 
 
 class Archive:
@@ -179,7 +190,7 @@ class Unit:
         self.name = name
         self.warnings: list[str] = []
         self._messages: list[str] = []
-        self._time = self._kept_time = 0.0
+        self._time = 0.0
         self._fmu = archive.slave(name)
         callbacks = fmi2CallbackFunctions()
         callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
@@ -191,16 +202,6 @@ class Unit:
         except Exception as error:
             raise InputError(f"unit {name}: cannot be instantiated: {self._said() or error}") from error
         self._component = self._fmu.component
-        library = self._fmu.dll
-        self._set_real = _EXCHANGE(("fmi2SetReal", library))
-        self._get_real = _EXCHANGE(("fmi2GetReal", library))
-        self._get_boolean = _EXCHANGE(("fmi2GetBoolean", library))
-        self._set_slope = _DERIVATIVE(("fmi2SetRealInputDerivatives", library))
-        self._get_slope = _DERIVATIVE(("fmi2GetRealOutputDerivatives", library))
-        self._do_step = _STEP(("fmi2DoStep", library))
-        self._get_state = _STATE(("fmi2GetFMUstate", library))
-        self._set_state = _STATE(("fmi2SetFMUstate", library))
-        self._free_state = _STATE(("fmi2FreeFMUstate", library))
         self.kept_state: NDArray[np.uintp] = np.zeros(1, dtype=np.uintp)  # an fmi2FMUstate; 0: none yet
 
     def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
@@ -241,9 +242,14 @@ class Unit:
         """Address of the instance, the first argument of every FMI function."""
         return int(self._component)
 
-    def address(self, function: str) -> int:
-        """Address of one of the library's functions, for those who call it without Python in between."""
-        return ctypes.cast(getattr(self.library, function), ctypes.c_void_p).value or 0
+    def call(self, operation: str) -> Callable[..., int]:
+        """What an operation calls, on this instance; it returns the fmi2Status."""
+        function, prototype = _CALLS[operation]
+        return partial(prototype((function, self.library)), self.component)
+
+    def address(self, operation: str) -> int:
+        """Address of the function that an operation calls, for those who call it without Python in between."""
+        return ctypes.cast(getattr(self.library, _CALLS[operation][0]), ctypes.c_void_p).value or 0
 
     def set_parameters(self, parameters: Mapping[str, float | int | bool | str]) -> None:
         """Set start values by name, before initialisation.
@@ -290,24 +296,6 @@ class Unit:
         except Exception:
             raise InputError(f"unit {self.name} refuses its parameters: {self._said() or 'no message'}") from None
 
-    def step(self, t: float, h: float) -> None:
-        """Advance from t to t + h [s]."""
-        if self._do_step(self._component, t, h, 1) > WARNING:
-            self.fail(stepping(h), t)
-        self._time = t + h
-
-    def keep(self) -> None:
-        """Keep the state as it is now, in place of the one kept before."""
-        if self._get_state(self._component, self.kept_state.ctypes.data) > WARNING:
-            self.fail(KEEPING)
-        self._kept_time = self._time
-
-    def go_back(self) -> None:
-        """Bring back the state that was kept."""
-        if self._set_state(self._component, int(self.kept_state[0])) > WARNING:
-            self.fail(GOING_BACK)
-        self._time = self._kept_time
-
     def value(self, name: str) -> float:
         """A Real or Integer variable as it is now; for what is read once, ports and logs are faster.
 
@@ -326,7 +314,7 @@ class Unit:
         """Free the instance; never raises, so that it can stand in a `finally`."""
         if self._component is not None:
             if self.kept_state[0]:
-                self._free_state(self._component, self.kept_state.ctypes.data)
+                self.call("free_state")(self.kept_state.ctypes.data)
             self._fmu.fmi2FreeInstance(self._component)  # the library stays loaded, for other instances
             self._component = None
 
@@ -344,20 +332,13 @@ class Unit:
         return np.array([known[name].valueReference for name in names], dtype=np.uint32)
 
 
-def stepping(h: float) -> str:
-    """What a unit was about that failed in a step; likewise :func:`setting` and :func:`reading` on variables."""
-    return f"step of {h:.6g} s"
-
-
 def setting(names: Sequence[str], slopes: bool = False) -> str:
+    """What a unit is at that gets values, for messages; :func:`reading`: that gives them."""
     return f"setting {'slopes of ' if slopes else ''}{', '.join(names)}"
 
 
 def reading(names: Sequence[str], slopes: bool = False) -> str:
     return f"reading {'slopes of ' if slopes else ''}{', '.join(names)}"
-
-
-RECORDING, KEEPING, GOING_BACK = "recording", "keeping the state", "going back to the state kept"
 
 
 class Port:
@@ -382,26 +363,19 @@ class Port:
                 raise ValueError(f"port {self.names}: a buffer of {count} contiguous float64 is needed")
         self.references = unit.references(self.names)
         self.orders = np.ones(count, dtype=np.int32)
-        component = unit._component
-        at = self.references.ctypes.data
-        self._exchange = (component, at, count, self.values.ctypes.data)
-        self._derivative = (component, at, count, self.orders.ctypes.data, self.slopes.ctypes.data)
 
     def set(self) -> None:
-        if self.unit._set_real(*self._exchange) > WARNING:
-            self.unit.fail(setting(self.names))
+        """Send the values now."""
+        self._exchange("set_real", setting(self.names))
 
     def get(self) -> None:
-        if self.unit._get_real(*self._exchange) > WARNING:
-            self.unit.fail(reading(self.names))
+        """Find the values now."""
+        self._exchange("get_real", reading(self.names))
 
-    def set_slopes(self) -> None:
-        if self.unit._set_slope(*self._derivative) > WARNING:
-            self.unit.fail(setting(self.names, slopes=True))
-
-    def get_slopes(self) -> None:
-        if self.unit._get_slope(*self._derivative) > WARNING:
-            self.unit.fail(reading(self.names, slopes=True))
+    def _exchange(self, operation: str, about: str) -> None:
+        at, count = self.references.ctypes.data, self.references.size
+        if self.unit.call(operation)(at, count, self.values.ctypes.data) > WARNING:
+            self.unit.fail(about)
 
 
 class Log:
@@ -425,18 +399,6 @@ class Log:
         self.flags = np.zeros((rows, len(self.flag_names)), dtype=np.int32)
         self.real_references = unit.references(self.real_names)
         self.flag_references = unit.references(self.flag_names)
-
-    def record(self, row: int) -> None:
-        unit = self.unit
-        for call, references, table in (
-            (unit._get_real, self.real_references, self.reals),
-            (unit._get_boolean, self.flag_references, self.flags),
-        ):
-            if not references.size:
-                continue
-            address = table.ctypes.data + row * table.strides[0]
-            if call(unit._component, references.ctypes.data, references.size, address) > WARNING:
-                unit.fail(RECORDING)
 
     def columns(self) -> dict[str, Floats]:
         """Recorded columns by variable name, each (rows,)."""

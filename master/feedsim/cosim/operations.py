@@ -1,0 +1,214 @@
+"""What a control cycle is made of: operations, each one call of a unit or one line of arithmetic.
+
+A list of them says what happens, in which order, on which memory; :mod:`~feedsim.cosim.schedule` writes it. Two
+executors work it, to the same bits: the native loop (:mod:`~feedsim.cosim.exchange`) and the one in Python
+(:mod:`~feedsim.cosim.interpreter`). Names and meanings are those of src/exchange/exchange.h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.cosim.unit import Floats, Log, Port, Unit, reading, setting
+
+
+def _none() -> Floats:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True)
+class When:
+    """Cycles in which an operation is due: `first`, and each `every` cycles from then on."""
+
+    first: int = 0
+    every: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Bond:
+    """The bond between plant and friction over an exchange step, (axes,) each: what it is found from, and its energies.
+
+    Attributes:
+        residual: interface energy residual so far [J]: what the plant gives to the bond less what friction takes from
+            it, over the steps' ends (Rodriguez et al., Multibody System Dynamics 55, 2022).
+        residual_peak: largest absolute residual met [J].
+        dissipated: friction work so far [J].
+    """
+
+    M_fr: Floats
+    n: Floats
+    n_slope: Floats
+    assumed_torque: Floats
+    n_end: Floats
+    residual: Floats
+    residual_peak: Floats
+    dissipated: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Operation:
+    """What is done (`kind`), with which unit and on which memory: arrays, contiguous, that others own and look into.
+
+    Attributes:
+        y: values that are sent or found; with `when` a table, of which one row after the other is used in the cycles
+            that are due, from the top again after the last.
+        a, b: operands of the arithmetic; s: its number, or when in the cycle a step of h begins [s].
+        references, orders: of the variables that a call exchanges.
+        about: what the unit is at, for messages.
+    """
+
+    kind: str
+    y: NDArray[Any] = field(default_factory=_none)
+    a: Floats = field(default_factory=_none)
+    b: Floats = field(default_factory=_none)
+    s: float = 0.0
+    h: float = 0.0
+    bond: Bond | None = None
+    unit: Unit | None = None
+    references: NDArray[Any] = field(default_factory=_none)
+    orders: NDArray[Any] = field(default_factory=_none)
+    about: str = ""
+    when: When | None = None
+
+    def __post_init__(self) -> None:
+        vectors = vars(self.bond) if self.bond else {"y": self.y, "a": self.a, "b": self.b}
+        for name, array in vectors.items():
+            if not array.flags.c_contiguous:
+                raise ValueError(f"{self.kind}: {name} must be contiguous in memory")
+        if self.when and self.y.size != len(self.y) * self.count:
+            raise ValueError(f"{self.about or self.kind}: rows of {self.count} are needed, not {self.y.shape}")
+
+    @property
+    def count(self) -> int:
+        """Variables that are exchanged, or entries of the vectors."""
+        return self.bond.residual.size if self.bond else self.references.size or self.a.size
+
+
+# --- calls of a unit
+
+
+def set_real(port: Port, table: Floats | None = None, when: When | None = None) -> Operation:
+    """Send the port's values; with a table (rows, n) its next row, by default in every cycle."""
+    return _exchange("set_real", port, port.values, setting(port.names), table, when)
+
+
+def set_slopes(port: Port, table: Floats | None = None, when: When | None = None) -> Operation:
+    return _exchange("set_slopes", port, port.slopes, setting(port.names, slopes=True), table, when)
+
+
+def get_real(port: Port) -> Operation:
+    return _exchange("get_real", port, port.values, reading(port.names))
+
+
+def get_slopes(port: Port) -> Operation:
+    return _exchange("get_slopes", port, port.slopes, reading(port.names, slopes=True))
+
+
+def do_step(unit: Unit, start: float, h: float) -> Operation:
+    """From `start` [s] after the beginning of the cycle, over h [s]."""
+    return Operation("do_step", unit=unit, s=start, h=h, about=f"step of {h:.6g} s")
+
+
+def get_state(unit: Unit) -> Operation:
+    """Keep it, for :func:`set_state` to go back to."""
+    return Operation("get_state", unit=unit, y=unit.kept_state, about="keeping the state")
+
+
+def set_state(unit: Unit) -> Operation:
+    return Operation("set_state", unit=unit, y=unit.kept_state, about="going back to the state kept")
+
+
+def get_row(log: Log, when: When) -> list[Operation]:
+    """The variables of a log into its next row."""
+    tables = (("get_real", log.real_references, log.reals), ("get_boolean", log.flag_references, log.flags))
+    return [
+        Operation(kind, unit=log.unit, references=references, y=table, about="recording", when=when)
+        for kind, references, table in tables
+        if references.size
+    ]
+
+
+def _exchange(
+    kind: str, port: Port, buffer: Floats, about: str, table: Floats | None = None, when: When | None = None
+) -> Operation:
+    if table is not None:
+        buffer, when = np.ascontiguousarray(table, dtype=np.float64), when or When()
+    return Operation(
+        kind, unit=port.unit, references=port.references, orders=port.orders, y=buffer, about=about, when=when
+    )
+
+
+# --- arithmetic on vectors with an entry per axis; y may be one of the operands
+
+
+def copy(y: Floats, a: Floats, when: When | None = None) -> Operation:
+    """y = a; with `when`, the next row of y = a."""
+    return Operation("copy", y=y, a=a, when=when)
+
+
+def line(y: Floats, a: Floats, s: float, b: Floats) -> Operation:
+    """y = a + s b"""
+    return Operation("line", y=y, a=a, s=s, b=b)
+
+
+def rate(y: Floats, a: Floats, b: Floats, s: float) -> Operation:
+    """y = (a - b) / s"""
+    return Operation("rate", y=y, a=a, b=b, s=s)
+
+
+def exchange_energy(bond: Bond, h: float) -> Operation:
+    """What a step of h [s] does to the energies of the bond:
+
+    taken = M_fr (n + h n_slope), residual += h/2 (assumed_torque n_end - taken), residual_peak its largest size so far,
+    dissipated += h taken.
+    """
+    return Operation("bond", bond=bond, s=h)
+
+
+# --- how they are worked
+
+
+class Executor:
+    """Works a list of operations in every control cycle.
+
+    Attributes:
+        done: cycles so far; of one that was not worked to its end, not counting it.
+    """
+
+    def __init__(self, operations: Sequence[Operation], T_c: float) -> None:
+        self._operations = tuple(operations)
+        self._T_c = T_c
+        self.done = 0
+
+    def run(self, begin: int, end: int) -> None:
+        """Work the cycles `begin` to `end` - 1; they follow those of the last call.
+
+        Raises:
+            SimulationError: a unit failed; the message names the unit, the time and the unit's reason.
+        """
+        raise NotImplementedError
+
+    def _fail(self, at: int) -> NoReturn:
+        """Raise for the operation `at`, which has failed in the cycle after those done."""
+        failed = self._operations[at]
+        assert failed.unit is not None, f"operation {at}, {failed.kind}, is none that can fail"
+        begin = self.done * self._T_c
+        t = kept = begin
+        if failed.kind == "do_step":
+            t = begin + failed.s
+        else:  # where the unit stands: at the end of its last step, if it has taken one in this cycle
+            for each in self._operations[:at]:
+                if each.unit is not failed.unit:
+                    continue
+                if each.kind == "do_step":
+                    t = begin + each.s + each.h
+                elif each.kind == "get_state":
+                    kept = t
+                elif each.kind == "set_state":
+                    t = kept
+        failed.unit.fail(failed.about, t)

@@ -218,7 +218,7 @@ def test_inputs_are_not_lost(
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("FEEDSIM_FMUS", str(fmus))
-    monkeypatch.setattr("feedsim.cli.identify._options", far_enough)
+    monkeypatch.setattr("feedsim.identify.identify", far_enough)
     machine = [] if "--machine" in words else ["--machine", str(MACHINE)]
     code = main(["identify", *words, *machine, "--axis", "Z", "--out", "out", "--quiet"])
     captured = capfd.readouterr()

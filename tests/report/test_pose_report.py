@@ -204,7 +204,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     ],
 )
 def test_cells_that_are_refused(texts: list[str], message: str) -> None:
-    from feedsim.cli.machine.poses import grid_axes
+    from feedsim.cli.machine.pack import grid_axes
 
     with pytest.raises(InputError) as caught:
         grid_axes(default_machine(), texts)

@@ -15,10 +15,8 @@ import signal
 import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
-from feedsim.cli import compare, compensate, frf, identify, machine, ssp, sweep
-from feedsim.cli.options import add_fmus, add_overrides
+from feedsim.cli import compare, compensate, files, frf, identify, machine, run, sweep
 
 EPILOG = """exit codes:
   0 done    1 internal error    2 bad input or usage    3 a unit failed    4 results cannot be written
@@ -42,6 +40,12 @@ examples:
 """
 
 
+COMMANDS = (
+    run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, compensate.COMMAND, run.SSP, sweep.COMMAND,
+    compare.COMMAND, files.SCHEMA, files.CONVERT,
+)  # fmt: skip
+
+
 def parser() -> argparse.ArgumentParser:
     """The command line's grammar."""
     top = argparse.ArgumentParser(
@@ -52,59 +56,8 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"feedsim {_version()}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
-
-    run = commands.add_parser(
-        "run", help="run a scenario or an SSP; write result.csv, summary.json, report.html and figures"
-    )
-    _add_scenario(run)
-    run.add_argument(
-        "--out",
-        type=_directory,
-        metavar="DIR",
-        help="where the results go (default: results/<name of the scenario file>)",
-    )
-    run.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
-
-    validate = commands.add_parser(
-        "validate", help="check a scenario, an SSP or a study, its machine and its motion without running it"
-    )
-    _add_scenario(validate)
-
-    machine.add_commands(commands)
-    frf.add_command(commands)
-    identify.add_command(commands)
-    compensate.add_command(commands)
-    ssp.add_command(commands)
-    sweep.add_command(commands)
-    compare.add_command(commands)
-
-    schema = commands.add_parser(
-        "schema",
-        help="print the JSON Schema of scenario, machine, structure, mapping, tolerance or study files, for editors",
-    )
-    schema.add_argument(
-        "kind",
-        nargs="?",
-        choices=("scenario", "machine", "structure", "columns", "tolerances", "study"),
-        default="scenario",
-    )
-
-    convert = commands.add_parser(
-        "convert",
-        help="turn variables of a MAT file into a CSV trace",
-        description="Turn variables of a MAT file into a CSV trace with units in its header, e.g. the recorded "
-        "position reference of an axis: feedsim convert record.mat --column t=time:s "
-        "--column qg=Z.x_s:m --out reference.csv",
-    )
-    convert.add_argument("file", type=Path, metavar="FILE.mat")
-    convert.add_argument(
-        "--column",
-        action="append",
-        required=True,
-        metavar="VARIABLE=NAME:UNIT",
-        help="one column; the first must be time",
-    )
-    convert.add_argument("--out", type=Path, required=True, metavar="FILE.csv")
+    for command in COMMANDS:
+        command.add_to(commands)
     return top
 
 
@@ -115,29 +68,19 @@ def _version() -> str:
         return "(run from its sources, not installed)"
 
 
-def _add_scenario(command: argparse.ArgumentParser) -> None:
-    add_fmus(command)
-    command.add_argument(
-        "scenario", type=Path, metavar="SCENARIO", help="scenario file (docs/scenarios.md), or SSP (docs/ssp.md)"
-    )
-    add_overrides(command, "machine.axes.Z.friction.F_C='1.8 N.m'")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     options = parser().parse_args(arguments)
     # Small matrices by the thousand: threads for linear algebra only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-    from feedsim.cli import commands
     from feedsim.errors import FeedsimError
 
     # Where no home folder can be written to, matplotlib tells at length that its cache is a temporary one.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     _end_cleanly_on_signals()
     try:
-        action = getattr(options, "action", None) or getattr(commands, options.command)
-        code = action(options)
+        code = options.action(options)
         if sys.stdout is not None:  # closed by a reader that has gone
             sys.stdout.flush()
     except FeedsimError as error:
@@ -165,12 +108,6 @@ def _end_cleanly_on_signals() -> None:
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):  # Windows has no SIGHUP
             signal.signal(getattr(signal, name), leave)
-
-
-def _directory(text: str) -> Path:
-    if not text:
-        raise argparse.ArgumentTypeError("a directory is needed, not an empty text; '.' is the working directory")
-    return Path(text)
 
 
 def entry() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import traceback
 from argparse import Namespace
@@ -10,8 +9,11 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from feedsim.cli.options import Command, Group, Option, halves
+
 if TYPE_CHECKING:
     from feedsim.compare import Comparison, Options, Tolerances, Variable
+    from feedsim.trace import Array, Series
 
 DESCRIPTION = """Compare results of any simulator, or measured records, with references: every row of the result must
 lie in a tube of tolerance, in value and in time, around the reference. Columns of the reference that the result lacks
@@ -28,92 +30,8 @@ examples:
       --shift estimate --max-shift "2 s" --tol "X.x_a=20 um" --tol "X.M_a=ignore"
 """
 MOST_LINES = 10
-
-
-def add_command(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``compare`` to the commands."""
-    command = subparsers.add_parser(
-        "compare",
-        help="compare results of any simulator with references; exit code 0 same, 1 different, 2 unusable",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    command.add_argument(
-        "files", type=Path, nargs="+", metavar="RESULT REFERENCE", help="CSV files in turn, or two folders"
-    )
-    limits = command.add_argument_group("tolerances")
-    limits.add_argument(
-        "--tol",
-        action="append",
-        default=[],
-        metavar="[PATTERN=]VALUE[,TIME]",
-        help="1e-6 (of the range of the reference), '2 nm', '1 ms' (in time) or both, for all variables or those of a "
-        "pattern: '*.M_a=1e-3 N.m,1 ms'; several times, later ones count more (default: 1e-3)",
-    )
-    limits.add_argument(
-        "--tolerances",
-        type=Path,
-        metavar="FILE.yaml",
-        help="tolerance file (default: the reference's own beside it, docs/comparing.md)",
-    )
-    which = command.add_argument_group("columns")
-    which.add_argument(
-        "--column",
-        action="append",
-        default=[],
-        metavar="RESULT=REFERENCE",
-        help="column of the result that is called otherwise; with * on both sides all such: 'plant.*=*'",
-    )
-    which.add_argument("--only", action="append", default=[], metavar="PATTERN", help="compare these variables only")
-    which.add_argument("--ignore", action="append", default=[], metavar="PATTERN", help="do not compare these")
-    which.add_argument("--common", action="store_true", help="columns that the result lacks are left out, not missing")
-    which.add_argument(
-        "--hold",
-        action="append",
-        default=[],
-        metavar="PATTERN",
-        help="hold their values between rows, without ramps (flags of 0 and 1 do)",
-    )
-    for whose in ("", "reference-"):
-        side = "reference" if whose else "result"
-        which.add_argument(
-            f"--{whose}unit",
-            action="append",
-            default=[],
-            metavar="PATTERN=UNIT",
-            help=f"unit of the {side}'s columns whose header tells none",
-        )
-        which.add_argument(f"--{whose}time", metavar="NAME[:UNIT]", help=f"time column of the {side}")
-        which.add_argument(
-            f"--{whose}columns",
-            type=Path,
-            metavar="MAPPING.yaml",
-            help=f"mapping, where the {side} is a drive's record",
-        )
-    which.add_argument("--axis", metavar="NAME", help="axis of a drive's record")
-    which.add_argument("--machine", type=Path, metavar="MACHINE-or-SCENARIO", help="gives pitch and torque constant")
-    span = command.add_argument_group("time")
-    span.add_argument("--from", dest="start", metavar="TIME", help="compare from this instant on, such as '0.1 s'")
-    span.add_argument("--to", dest="end", metavar="TIME", help="compare up to this instant")
-    span.add_argument(
-        "--shift", metavar="TIME", default="0 s", help="added to the result's time, such as '0.5 ms', or 'estimate'"
-    )
-    span.add_argument("--max-shift", metavar="TIME", default="50 ms", help="largest estimated shift (default: 50 ms)")
-    span.add_argument("--max-gap", metavar="TIME", help="longest step between rows of the result (default: any)")
-    span.add_argument(
-        "--at",
-        choices=("auto", "result", "reference"),
-        default="auto",
-        help="whose instants are looked at (auto: the result's, unless the reference has clearly fewer rows)",
-    )
-    out = command.add_argument_group("output")
-    out.add_argument("--report", type=Path, metavar="FILE.html", help="report with the violated bands")
-    out.add_argument("--junit", type=Path, metavar="FILE.xml", help="JUnit XML for CI servers")
-    out.add_argument("--json", type=Path, metavar="FILE.json", help="all figures")
-    out.add_argument("--all", action="store_true", help="list every variable, not only those outside")
-    out.add_argument("--quiet", action="store_true", help="print nothing but errors")
-    command.set_defaults(action=compare)
+# What a record's signals are called here, and their units.
+RECORD_UNITS = {"x_a": "m", "x_s": "m", "n_a": "rad/s", "M_a": "N.m"}
 
 
 def compare(options: Namespace) -> int:
@@ -198,12 +116,11 @@ def _pair(options: Namespace, choice: Options, result: Path, reference: Path) ->
     from dataclasses import replace
 
     from feedsim import units
-    from feedsim.cli.compare_record import read_side
     from feedsim.compare import compare_series, estimated_shift, tolerances_of
 
     tolerances: Tolerances = tolerances_of(reference, options.tolerances, options.tol)
-    ours = read_side(result, options.time, options.columns, options)
-    theirs = read_side(reference, options.reference_time, options.reference_columns, options)
+    ours = _read_side(result, options.time, options.columns, options)
+    theirs = _read_side(reference, options.reference_time, options.reference_columns, options)
     notes: list[str] = []
     if options.shift == "estimate":
         most = units.parse(options.max_shift, "s")
@@ -219,13 +136,13 @@ def _options(options: Namespace) -> Options:
     from feedsim.compare import Options, Tolerances
 
     Tolerances.parse(options.tol)  # a typing error is told before anything is read
-    columns = [_halves(text, "--column", "RESULT=REFERENCE") for text in options.column]
+    columns = [halves("column", text, "RESULT=REFERENCE is needed") for text in options.column]
 
     def instant(text: str | None) -> float | None:
         return None if text is None else units.parse(text, "s", "0.1 s")
 
     def units_of(texts: list[str], option: str) -> dict[str, str]:
-        pairs = dict(_halves(text, option, "PATTERN=UNIT") for text in texts)
+        pairs = dict(halves(option, text, "PATTERN=UNIT is needed") for text in texts)
         for unit in pairs.values():
             units.unit(unit)
         return pairs
@@ -234,8 +151,8 @@ def _options(options: Namespace) -> Options:
         columns=columns,
         only=options.only,
         ignore=options.ignore,
-        units=units_of(options.unit, "--unit"),
-        reference_units=units_of(options.reference_unit, "--reference-unit"),
+        units=units_of(options.unit, "unit"),
+        reference_units=units_of(options.reference_unit, "reference-unit"),
         hold=options.hold,
         start=instant(options.start),
         end=instant(options.end),
@@ -246,13 +163,58 @@ def _options(options: Namespace) -> Options:
     )
 
 
-def _halves(text: str, option: str, expected: str) -> tuple[str, str]:
+def _read_side(path: Path, time: str | None, mapping: Path | None, options: Namespace) -> Series:
+    """Read a file. time: NAME[:UNIT] of its time column; mapping: for a drive's record. InputError."""
     from feedsim.errors import InputError
+    from feedsim.trace import read_series
 
-    left, equals, right = (part.strip() for part in text.partition("="))
-    if not (left and equals and right):
-        raise InputError(f"{option} {text!r}: {expected} is needed")
-    return left, right
+    if mapping is not None:
+        return _read_record(path, mapping, options.axis, options.machine)
+    if path.suffix.lower() == ".mat":
+        raise InputError(f"{path}: a MAT file needs a mapping of its columns: --columns or --reference-columns")
+    return read_series(path, time=time)
+
+
+def _read_record(path: Path, mapping: Path, axis: str | None, machine: Path | None) -> Series:
+    """The record of an axis A as A.x_a, A.n_a, A.M_a and A.x_s, as far as it holds them.
+
+    Between the pieces of a record with gaps stands a row without numbers, so that nothing is compared there.
+    """
+    import numpy as np
+
+    from feedsim.errors import InputError
+    from feedsim.identify.read import read_records
+    from feedsim.scenario import load_columns, load_subject
+    from feedsim.trace import Series
+
+    subject = load_subject(machine) if machine is not None else None
+    found = read_records(path, load_columns(mapping), axis, subject.machine if subject else None)
+    told = found.provenance
+    named = told.axis or axis
+    if not named:
+        raise InputError(f"{path}: the record does not tell which axis it is of; give --axis, for example --axis Z")
+    lead = None if told.pitch is None else told.pitch / (2 * np.pi)
+    pieces: dict[str, list[Array]] = {"time": []}
+    for i, record in enumerate(found.records):
+        columns = {"time": record.time, "n_a": record.speed, "M_a": record.torque}
+        if lead is not None:
+            columns["x_a"] = None if record.angle is None else record.angle * lead
+            columns["x_s"] = None if record.setpoint is None else record.setpoint * lead
+        for name, values in columns.items():
+            if values is None:
+                continue
+            parts = pieces.setdefault(name, [])
+            if i:
+                gap = 0.5 * (found.records[i - 1].time[-1] + record.time[0])
+                parts.append(np.array([gap if name == "time" else np.nan]))
+            parts.append(values)
+    joined = {name: np.concatenate(parts) for name, parts in pieces.items()}
+    time = joined.pop("time")
+    return Series(
+        time,
+        {f"{named}.{name}": values for name, values in joined.items()},
+        {f"{named}.{name}": RECORD_UNITS[name] for name in joined},
+    )
 
 
 def _lines(comparison: Comparison, everything: bool, notes: bool) -> list[str]:
@@ -308,3 +270,67 @@ def _sum(comparisons: list[Comparison]) -> list[str]:
         return []
     counts = [(sum(each.verdict == kind for each in comparisons), kind) for kind in ("same", "different", "unusable")]
     return [f"{len(comparisons)} comparisons: " + ", ".join(f"{number} {kind}" for number, kind in counts if number)]
+
+
+def _side(side: str, whose: str) -> tuple[Option, ...]:
+    """What can be said of the columns of either side."""
+    return (
+        Option(f"--{whose}unit", "PATTERN=UNIT", f"unit of the {side}'s columns whose header tells none", many=True),
+        Option(f"--{whose}time", "NAME[:UNIT]", f"time column of the {side}"),
+        Option(f"--{whose}columns", "MAPPING.yaml", f"mapping, where the {side} is a drive's record", type=Path),
+    )
+
+
+COMMAND = Command(
+    "compare",
+    "compare results of any simulator with references; exit code 0 same, 1 different, 2 unusable",
+    compare,
+    (
+        Option("files", "RESULT REFERENCE", "CSV files in turn, or two folders", type=Path, nargs="+"),
+        Group(
+            "tolerances",
+            Option("--tol", "[PATTERN=]VALUE[,TIME]",
+                   "1e-6 (of the range of the reference), '2 nm', '1 ms' (in time) or both, for all variables or those "
+                   "of a pattern: '*.M_a=1e-3 N.m,1 ms'; several times, later ones count more (default: 1e-3)",
+                   many=True),
+            Option("--tolerances", "FILE.yaml",
+                   "tolerance file (default: the reference's own beside it, docs/comparing.md)", type=Path),
+        ),
+        Group(
+            "columns",
+            Option("--column", "RESULT=REFERENCE",
+                   "column of the result that is called otherwise; with * on both sides all such: 'plant.*=*'",
+                   many=True),
+            Option("--only", "PATTERN", "compare these variables only", many=True),
+            Option("--ignore", "PATTERN", "do not compare these", many=True),
+            Option("--common", "", "columns that the result lacks are left out, not missing"),
+            Option("--hold", "PATTERN", "hold their values between rows, without ramps (flags of 0 and 1 do)",
+                   many=True),
+            *_side("result", ""),
+            *_side("reference", "reference-"),
+            Option("--axis", "NAME", "axis of a drive's record"),
+            Option("--machine", "MACHINE-or-SCENARIO", "gives pitch and torque constant", type=Path),
+        ),
+        Group(
+            "time",
+            Option("--from", "TIME", "compare from this instant on, such as '0.1 s'", dest="start"),
+            Option("--to", "TIME", "compare up to this instant", dest="end"),
+            Option("--shift", "TIME", "added to the result's time, such as '0.5 ms', or 'estimate'", default="0 s"),
+            Option("--max-shift", "TIME", "largest estimated shift (default: 50 ms)", default="50 ms"),
+            Option("--max-gap", "TIME", "longest step between rows of the result (default: any)"),
+            Option("--at", "",
+                   "whose instants are looked at (auto: the result's, unless the reference has clearly fewer rows)",
+                   choices=("auto", "result", "reference"), default="auto"),
+        ),
+        Group(
+            "output",
+            Option("--report", "FILE.html", "report with the violated bands", type=Path),
+            Option("--junit", "FILE.xml", "JUnit XML for CI servers", type=Path),
+            Option("--json", "FILE.json", "all figures", type=Path),
+            Option("--all", "", "list every variable, not only those outside"),
+            Option("--quiet", "", "print nothing but errors"),
+        ),
+    ),
+    DESCRIPTION,
+    EPILOG,
+)  # fmt: skip

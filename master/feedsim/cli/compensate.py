@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 from argparse import BooleanOptionalAction, Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import add_fmus, add_overrides
-from feedsim.cli.progress import progress_bar
+from feedsim.cli.options import FMUS, QUIET, Command, Option, halves, out, quantity, settings
+from feedsim.cli.terminal import finish, progress_bar
 
 if TYPE_CHECKING:
     from feedsim.nc import Program
@@ -27,49 +25,6 @@ EPILOG = """examples:
 """
 
 
-def add_command(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``compensate`` to the commands."""
-    command = subparsers.add_parser(
-        "compensate",
-        help="friction compensation by torque feedforward: a circle without and with it",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    command.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="scenario with a circle")
-    command.add_argument(
-        "--out", type=Path, metavar="DIR", help="where the results go (default: results/compensate_<name of the file>)"
-    )
-    command.add_argument(
-        "--friction",
-        action="append",
-        default=[],
-        dest="frictions",
-        metavar="AXIS=FILE.yaml",
-        help="friction parameters that the compensation of an axis uses (default: the machine's own, which the machine "
-        "keeps in any case); may be given several times",
-    )
-    command.add_argument(
-        "--delay",
-        action="append",
-        default=[],
-        dest="delays",
-        metavar="[AXIS=]VALUE",
-        help="delay of the feedforward behind the speed setpoint, e.g. '4.2 ms' (default: from the parameters of the "
-        "drive); may be given several times",
-    )
-    command.add_argument(
-        "--table",
-        action=BooleanOptionalAction,
-        default=True,
-        help="with the runs that show what errors of the delay and of the parameters cost (default: yes)",
-    )
-    add_overrides(command, "machine.axes.Z.friction.F_C='1.8 N.m'")
-    add_fmus(command)
-    command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
-    command.set_defaults(action=compensate)
-
-
 def compensate(options: Namespace) -> None:
     """Read, run, write."""
     from feedsim import nc, report, scenario
@@ -83,22 +38,14 @@ def compensate(options: Namespace) -> None:
     delays = _delays(options.delays, program)
     _check_lags(plan, [axis for axis in analysis.moving_axes(program) if axis not in delays])
     report.check_compensation_writable(directory, [*report.input_paths(plan), *files.values()])
-    with progress_bar(options.quiet, "it") as progress:
+    with progress_bar(options.quiet, "it", shortened=True) as progress:
         result = analysis.compensate(
-            plan,
-            program,
-            frictions=frictions,
-            delays=delays,
-            table=options.table,
-            fmus=options.fmus,
+            plan, program, frictions=frictions, delays=delays, table=options.table, fmus=options.fmus,
             progress=progress,
-        )
+        )  # fmt: skip
     report.write_compensation(result, files, directory)
-    for warning in result.warnings:
-        print(f"feedsim: warning: {warning}", file=sys.stderr)
-    if not options.quiet:
-        line = report.compensation_summary_line(result)
-        print(f"{plan.name}: friction compensation -> {directory / 'report.html'}\n  {line}")
+    head = f"{plan.name}: friction compensation -> {directory / 'report.html'}"
+    finish(options.quiet, result.warnings, head, f"  {report.compensation_summary_line(result)}")
 
 
 def _frictions(texts: Sequence[str], program: Program) -> tuple[Mapping[str, Path], Mapping[str, Friction]]:
@@ -109,9 +56,7 @@ def _frictions(texts: Sequence[str], program: Program) -> tuple[Mapping[str, Pat
 
     files: dict[str, Path] = {}
     for text in texts:
-        axis, equals, file = text.partition("=")
-        if not (equals and axis and file):
-            raise InputError(f"--friction {text}: AXIS=FILE.yaml is needed, such as Z=friction_z.yaml")
+        axis, file = halves("friction", text, "AXIS=FILE.yaml is needed, such as Z=friction_z.yaml")
         check_moves(f"--friction {text}", axis, program)
         if axis in files:
             raise InputError(f"--friction {text}: {axis} is given twice")
@@ -121,7 +66,6 @@ def _frictions(texts: Sequence[str], program: Program) -> tuple[Mapping[str, Pat
 
 def _delays(texts: Sequence[str], program: Program) -> Mapping[str, float]:
     """Axis -> delay [s]; one without an axis is that of all, and one with it counts more."""
-    from feedsim import units
     from feedsim.analysis.compensation import check_moves, moving_axes
     from feedsim.errors import InputError
 
@@ -132,10 +76,7 @@ def _delays(texts: Sequence[str], program: Program) -> Mapping[str, float]:
             check_moves(f"--delay {text}", axis, program)
         if axis in given:
             raise InputError(f"--delay {text}: {f'that of {axis}' if equals else 'that of all axes'} is given twice")
-        try:
-            given[axis] = units.parse(value, "s", "4.2 ms")
-        except InputError as error:
-            raise InputError(f"--delay {text}: {error}") from None
+        given[axis] = quantity("delay", value, "s", "4.2 ms", whole=text)
     common = dict.fromkeys(moving_axes(program), given.pop("")) if "" in given else {}
     return common | given
 
@@ -149,3 +90,26 @@ def _check_lags(scenario: Scenario, axes: Sequence[str]) -> None:
         lags_of(scenario, axes)
     except InputError as error:
         raise InputError(f"{error} (--delay AXIS=VALUE)", error.problems) from None
+
+
+COMMAND = Command(
+    "compensate",
+    "friction compensation by torque feedforward: a circle without and with it",
+    compensate,
+    (
+        Option("scenario", "SCENARIO.yaml", "scenario with a circle", type=Path),
+        out("compensate_<name of the file>"),
+        Option("--friction", "AXIS=FILE.yaml",
+               "friction parameters that the compensation of an axis uses (default: the machine's own, which the "
+               "machine keeps in any case); may be given several times", many=True, dest="frictions"),
+        Option("--delay", "[AXIS=]VALUE",
+               "delay of the feedforward behind the speed setpoint, e.g. '4.2 ms' (default: from the parameters of the "
+               "drive); may be given several times", many=True, dest="delays"),
+        Option("--table", "",
+               "with the runs that show what errors of the delay and of the parameters cost (default: yes)",
+               action=BooleanOptionalAction, default=True),
+        settings(), FMUS, QUIET,
+    ),
+    DESCRIPTION,
+    EPILOG,
+)  # fmt: skip

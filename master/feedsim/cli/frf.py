@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import add_fmus, add_overrides
-from feedsim.cli.progress import Progress, progress_bar
+from feedsim.cli.options import FMUS, QUIET, Command, Group, Option, names, out, quantity, settings
+from feedsim.cli.terminal import Progress, finish, progress_bar
 
 if TYPE_CHECKING:
     from feedsim.analysis.campaign import Plan
@@ -32,77 +30,6 @@ EPILOG = """examples:
   feedsim frf scenarios/machines/test_centre --axes Z --friction --offset-speed "5 rad/s" --realisations 4
   feedsim frf scenarios/machines/test_centre --axes Z --overlay measured.csv:Z.n_a/Z.n_s
 """
-
-
-def add_command(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``frf`` to the commands."""
-    command = subparsers.add_parser(
-        "frf",
-        help="frequency responses of the drives, in closed form and measured; Bode plots",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    command.add_argument(
-        "subject", type=Path, metavar="SCENARIO-or-MACHINE", help="scenario file, machine file or machine folder"
-    )
-    command.add_argument(
-        "--out", type=Path, metavar="DIR", help="where the results go (default: results/frf_<name of the file>)"
-    )
-    command.add_argument("--axes", type=_names, metavar="X,Z", help="axes to look at (default: all)")
-    add_overrides(command, "machine.axes.Z.drive.K_p='4 N.m.s/rad'")
-    add_fmus(command)
-    command.add_argument(
-        "--band", default="1Hz..1000Hz", metavar="LOW..HIGH", help="frequencies looked at (default: 1Hz..1000Hz)"
-    )
-    command.add_argument(
-        "--tool", action=BooleanOptionalAction, default=True, help="with the compliance at the tool (default: yes)"
-    )
-    command.add_argument(
-        "--overlay",
-        action="append",
-        default=[],
-        dest="overlays",
-        metavar="FILE[:RESPONSE[=NAME]]",
-        help="lay a curve from a CSV or UFF58 file over, e.g. measured.csv:Z.n_a/Z.M_a; may be given several times",
-    )
-    command.add_argument(
-        "--full-model",
-        action=BooleanOptionalAction,
-        default=True,
-        help="where the machine names its structure: compare with all modes of the finite-element model (default: yes)",
-    )
-    command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
-    measuring = command.add_argument_group("measurement on the units")
-    measuring.add_argument("--no-measure", action="store_true", help="closed form only")
-    measuring.add_argument(
-        "--excitation", choices=("multisine", "prbs"), default="multisine", help="signal (default: multisine)"
-    )
-    measuring.add_argument(
-        "--inject",
-        choices=("n_add", "M_add"),
-        default="n_add",
-        help="where it is added: to the speed setpoint (finds n/M and n_a/n_s) or to the torque setpoint (finds n/M); "
-        "default: n_add",
-    )
-    measuring.add_argument(
-        "--amplitude", metavar="VALUE", help="RMS of the signal, e.g. '0.5 rad/s' (default: 5 %% of the torque limit)"
-    )
-    measuring.add_argument("--periods", type=int, default=2, metavar="N", help="recorded periods (default: 2)")
-    measuring.add_argument("--settle", type=int, default=2, metavar="N", help="periods ahead of those (default: 2)")
-    measuring.add_argument(
-        "--realisations",
-        type=int,
-        metavar="N",
-        help="signals with other phases, averaged (default: 1, with friction 4: only between realisations does the "
-        "coherence see what is not linear)",
-    )
-    measuring.add_argument("--seed", type=int, default=1, metavar="N", help="of the phases (default: 1)")
-    measuring.add_argument("--friction", action="store_true", help="with friction; the closed form knows none")
-    measuring.add_argument(
-        "--offset-speed", metavar="VALUE", help="motor speed at which the excited axis moves, e.g. '5 rad/s'"
-    )
-    command.set_defaults(action=frf)
 
 
 def frf(options: Namespace) -> None:
@@ -128,7 +55,7 @@ def frf(options: Namespace) -> None:
     inputs = [*(file for _, file in subject.files), *(overlay.file for overlay in overlays)]
     report.check_frf_writable(directory, inputs)
 
-    with progress_bar(options.quiet, " cycles") as progress:
+    with progress_bar(options.quiet, " cycles", shortened=True) as progress:
         progress("closed form", 0, 1)
         system = linear.LinearSystem(machine, modes)
         result = linear.evaluate(system, axes)
@@ -166,10 +93,8 @@ def frf(options: Namespace) -> None:
         warnings=tuple(warnings),
     )
     report.write_frf(subject, found, directory)
-    for warning in warnings:
-        print(f"feedsim: warning: {warning}", file=sys.stderr)
-    if not options.quiet:
-        print(f"{subject.name}: frequency responses -> {directory / 'report.html'}\n{report.frf_summary_line(found)}")
+    head = f"{subject.name}: frequency responses -> {directory / 'report.html'}"
+    finish(options.quiet, warnings, head, report.frf_summary_line(found))
 
 
 def _full_model(machine: Machine, progress: Progress, warnings: list[str]) -> Truncation | None:
@@ -194,10 +119,9 @@ def _full_model(machine: Machine, progress: Progress, warnings: list[str]) -> Tr
 
 
 def _names(text: str) -> tuple[str, ...]:
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    if not names:
+    if not (found := names(text)):
         raise ArgumentTypeError("names of axes are needed, such as X,Z")
-    return names
+    return found
 
 
 def _axes(chosen: Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
@@ -212,7 +136,6 @@ def _axes(chosen: Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
 
 def _plan(options: Namespace, machine: Machine) -> Plan:
     """What the options say about the measurement."""
-    from feedsim import units
     from feedsim.analysis.campaign import Plan
     from feedsim.errors import InputError
 
@@ -225,13 +148,6 @@ def _plan(options: Namespace, machine: Machine) -> Plan:
     for name, number in (("periods", options.periods), ("realisations", realisations)):
         if number < 1:
             raise InputError(f"--{name} {number}: at least 1 is needed")
-
-    def quantity(option: str, text: str, unit: str, example: str) -> float:
-        try:
-            return units.parse(text, unit, example)
-        except InputError as error:
-            raise InputError(f"--{option} {text}: {error}") from None
-
     unit, example = ("rad/s", "0.5 rad/s") if options.inject == "n_add" else ("N.m", "4 N.m")
     amplitude, speed = options.amplitude, options.offset_speed
     return Plan(
@@ -266,3 +182,48 @@ def _unstable(poles: int) -> str:
         f"the control loops are unstable: {poles} growing solution(s) of the closed system. The figures of loops "
         "presume stable ones, and nothing was measured"
     )
+
+
+COMMAND = Command(
+    "frf",
+    "frequency responses of the drives, in closed form and measured; Bode plots",
+    frf,
+    (
+        Option("subject", "SCENARIO-or-MACHINE", "scenario file, machine file or machine folder", type=Path),
+        out("frf_<name of the file>"),
+        Option("--axes", "X,Z", "axes to look at (default: all)", type=_names),
+        settings("machine.axes.Z.drive.K_p='4 N.m.s/rad'"),
+        FMUS,
+        Option("--band", "LOW..HIGH", "frequencies looked at (default: 1Hz..1000Hz)", default="1Hz..1000Hz"),
+        Option("--tool", "", "with the compliance at the tool (default: yes)",
+               action=BooleanOptionalAction, default=True),
+        Option("--overlay", "FILE[:RESPONSE[=NAME]]",
+               "lay a curve from a CSV or UFF58 file over, e.g. measured.csv:Z.n_a/Z.M_a; may be given several times",
+               many=True, dest="overlays"),
+        Option("--full-model", "",
+               "where the machine names its structure: compare with all modes of the finite-element model "
+               "(default: yes)", action=BooleanOptionalAction, default=True),
+        QUIET,
+        Group(
+            "measurement on the units",
+            Option("--no-measure", "", "closed form only"),
+            Option("--excitation", "", "signal (default: multisine)",
+                   choices=("multisine", "prbs"), default="multisine"),
+            Option("--inject", "",
+                   "where it is added: to the speed setpoint (finds n/M and n_a/n_s) or to the torque setpoint (finds "
+                   "n/M); default: n_add", choices=("n_add", "M_add"), default="n_add"),
+            Option("--amplitude", "VALUE",
+                   "RMS of the signal, e.g. '0.5 rad/s' (default: 5 %% of the torque limit)"),
+            Option("--periods", "N", "recorded periods (default: 2)", type=int, default=2),
+            Option("--settle", "N", "periods ahead of those (default: 2)", type=int, default=2),
+            Option("--realisations", "N",
+                   "signals with other phases, averaged (default: 1, with friction 4: only between realisations does "
+                   "the coherence see what is not linear)", type=int),
+            Option("--seed", "N", "of the phases (default: 1)", type=int, default=1),
+            Option("--friction", "", "with friction; the closed form knows none"),
+            Option("--offset-speed", "VALUE", "motor speed at which the excited axis moves, e.g. '5 rad/s'"),
+        ),
+    ),
+    DESCRIPTION,
+    EPILOG,
+)  # fmt: skip

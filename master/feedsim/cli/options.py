@@ -1,25 +1,132 @@
-"""Options that several commands have in common."""
+"""The grammar of commands as data: a command, its options, and what the texts of options mean."""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
+import argparse
+from argparse import ArgumentTypeError, Namespace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from feedsim.errors import InputError
 
 
-def add_fmus(command: ArgumentParser) -> None:
-    """--fmus."""
-    command.add_argument(
-        "--fmus", type=Path, metavar="DIR", help="folder of the archives (default: $FEEDSIM_FMUS, else fmus/)"
-    )
+class Option:
+    """An option or argument: what is typed, what its value is called, what it is for.
+
+    many: it may be given several times, and is a list. more: what argparse takes besides. With neither a name for the
+    value nor anything else it is a switch.
+    """
+
+    def __init__(self, typed: str, value: str, help: str, *, many: bool = False, **more: Any) -> None:
+        self.typed = typed
+        self.words: dict[str, Any] = {"help": help, **more}
+        if value:
+            self.words["metavar"] = value
+        elif not more:
+            self.words["action"] = "store_true"
+        if many:
+            self.words |= {"action": "append", "default": []}
+
+    def add_to(self, parser: argparse._ActionsContainer) -> None:
+        """Add it to a parser or a group."""
+        parser.add_argument(self.typed, **self.words)
 
 
-def add_overrides(command: ArgumentParser, example: str) -> None:
+class Group:
+    """Options that the help shows under a title; without one: of which one at most can be given."""
+
+    def __init__(self, title: str, *options: Option | Group) -> None:
+        self.title, self.options = title, options
+
+    def add_to(self, parser: argparse._ActionsContainer) -> None:
+        """Add them to a parser or a group."""
+        group: argparse._ActionsContainer
+        group = parser.add_argument_group(self.title) if self.title else parser.add_mutually_exclusive_group()
+        for option in self.options:
+            option.add_to(group)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of the command line, or a group of commands.
+
+    action: takes the parsed options, returns an exit code or None for 0. epilog: of a description whose lines are kept.
+    """
+
+    name: str
+    help: str
+    action: Callable[[Namespace], int | None] | None = None
+    options: Sequence[Option | Group] = ()
+    description: str | None = None
+    epilog: str | None = None
+    commands: Sequence[Command] = ()
+
+    def add_to(self, commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+        """Add it to a command line."""
+        kept = argparse.RawDescriptionHelpFormatter if self.epilog else argparse.HelpFormatter
+        parser = commands.add_parser(
+            self.name, help=self.help, description=self.description, epilog=self.epilog, formatter_class=kept
+        )
+        for option in self.options:
+            option.add_to(parser)
+        if self.commands:
+            own = parser.add_subparsers(dest=f"{self.name}_command", metavar="COMMAND", required=True)
+            for command in self.commands:
+                command.add_to(own)
+        else:
+            parser.set_defaults(action=self.action)
+
+
+def folder(text: str) -> Path:
+    """Where results go; an empty text is an error of usage."""
+    if not text:
+        raise ArgumentTypeError("a directory is needed, not an empty text; '.' is the working directory")
+    return Path(text)
+
+
+FMUS = Option("--fmus", "DIR", "folder of the archives (default: $FEEDSIM_FMUS, else fmus/)", type=Path)
+QUIET = Option("--quiet", "", "no progress bar and no summary")
+
+
+def out(default: str) -> Option:
+    """--out; default: the folder of results/ otherwise."""
+    return Option("--out", "DIR", f"where the results go (default: results/{default})", type=folder)
+
+
+def settings(example: str = "machine.axes.Z.friction.F_C='1.8 N.m'") -> Option:
     """--set, with an example of KEY=VALUE."""
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="overrides",
-        metavar="KEY=VALUE",
-        help=f"override one entry, e.g. {example}; may be given several times",
-    )
+    told = f"override one entry, e.g. {example}; may be given several times"
+    return Option("--set", "KEY=VALUE", told, dest="overrides", many=True)
+
+
+@contextmanager
+def given(option: str, text: str) -> Iterator[None]:
+    """Have a fault that the block finds tell which option it is of: "--delay 3 kg: ..."."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"--{option} {text}: {error}") from None
+
+
+def quantity(option: str, text: str, unit: str, example: str = "", *, whole: str = "") -> float:
+    """The value of a text in `unit`; whole: what was typed, where the text is a part of it. Raises InputError."""
+    from feedsim import units
+
+    with given(option, whole or text):
+        return units.parse(text, unit, example)
+
+
+def halves(option: str, text: str, needed: str) -> tuple[str, str]:
+    """What stands before and behind the first "=". needed: of the message of InputError, where a half is missing."""
+    left, equals, right = (part.strip() for part in text.partition("="))
+    if not (left and equals and right):
+        raise InputError(f"--{option} {text}: {needed}")
+    return left, right
+
+
+def names(text: str) -> tuple[str, ...]:
+    """What stands between the commas."""
+    return tuple(part.strip() for part in text.split(",") if part.strip())

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 import shlex
 import sys
 from argparse import Namespace
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import add_fmus, add_overrides
+from feedsim.cli.options import FMUS, QUIET, Command, Option, out, settings
+from feedsim.cli.terminal import finish, progress_bar, warn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,40 +36,6 @@ examples:
 """
 
 
-def add_command(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``sweep`` to the commands."""
-    command = subparsers.add_parser(
-        "sweep",
-        help="make the many runs of a study; write a table, a report and sensitivities",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    command.add_argument("study", type=Path, metavar="STUDY.yaml", help="study file (docs/sweeps.md)")
-    command.add_argument(
-        "--out", type=_directory, metavar="DIR", help="where the results go (default: results/<name of the study file>)"
-    )
-    command.add_argument("--workers", type=int, metavar="N", help="processes (default: the cores; 0: this one alone)")
-    command.add_argument(
-        "--scheduler", metavar="ADDRESS", help="make the runs on the Dask cluster with this scheduler, tcp://host:8786"
-    )
-    command.add_argument("--runs", type=int, metavar="N", help="in place of the study's sampling.runs")
-    command.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the table (default: csv)")
-    command.add_argument("--restart", action="store_true", help="begin anew; discards the runs that DIR has")
-    command.add_argument("--dry-run", action="store_true", help="tell what would be done and how long it takes")
-    command.add_argument("--row", type=int, metavar="RUN", help="print the command that makes this one run by itself")
-    command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
-    add_fmus(command)
-    add_overrides(command, "machine.axes.Z.friction.F_C='1.8 N.m'")
-    command.set_defaults(action=sweep)
-
-
-def _directory(text: str) -> Path:
-    if not text:
-        raise argparse.ArgumentTypeError("a directory is needed, not an empty text; '.' is the working directory")
-    return Path(text)
-
-
 def sweep(options: Namespace) -> int:
     """feedsim sweep."""
     from feedsim import report
@@ -80,8 +44,7 @@ def sweep(options: Namespace) -> int:
     from feedsim.sweep.study import AllFailed, run
 
     study = load_study(options.study, options.overrides, runs=options.runs)
-    for warning in study.warnings:
-        print(f"feedsim: warning: {warning}", file=sys.stderr)
+    warn(study.warnings)
     planned = design(study)
     if options.row is not None:
         print(_command(study, planned, options.row, options.fmus))
@@ -93,11 +56,11 @@ def sweep(options: Namespace) -> int:
     begun = perf_counter()
     last: list[Progress] = []
     try:
-        with _bar(study.name, options.quiet) as tell:
+        with progress_bar(options.quiet, " runs") as bar:
 
             def progress(now: Progress) -> None:
                 last[:] = [now]
-                tell(now)
+                bar(study.name, now.done, now.total, now.resumed, f"{now.failed} failed" if now.failed else "")
 
             table = run(
                 study,
@@ -120,8 +83,7 @@ def sweep(options: Namespace) -> int:
         print(f"feedsim: interrupted; {done} {directory}; the same command continues", file=sys.stderr)
         return 130
     report.write_sweep(table, study, planned, directory)
-    if not options.quiet:
-        print(_summary(study, last[0], perf_counter() - begun, directory))
+    finish(options.quiet, (), _summary(study, last[0], perf_counter() - begun, directory))
     return 0
 
 
@@ -129,25 +91,6 @@ def _summary(study: Study, last: Progress, seconds: float, directory: Path) -> s
     failed = f", {last.failed} of them failed (their messages are in the table)" if last.failed else ""
     resumed = f", {last.resumed} of them before" if last.resumed else ""
     return f"{study.name}: {last.total} runs{resumed}{failed}; {seconds:.3g} s -> {directory}"
-
-
-@contextmanager
-def _bar(name: str, quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """A progress bar with rate and time left; what was done before does not count for the rate."""
-    from tqdm import tqdm
-
-    with tqdm(desc=name, unit=" runs", leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
-
-        def tell(now: Progress) -> None:
-            if bar.total is None:
-                bar.reset(now.total)
-                bar.initial = bar.n = now.resumed
-                bar.refresh()
-            if now.failed:
-                bar.set_postfix_str(f"{now.failed} failed", refresh=False)
-            bar.update(now.done - bar.n)
-
-        yield tell
 
 
 def _command(study: Study, planned: Design, row: int, fmus: Path | None) -> str:
@@ -178,8 +121,7 @@ def _dry_run(study: Study, planned: Design, options: Namespace) -> int:
         times = "factor " if parameter.factor else ""
         print(f"  {parameter.name}: {times}{told} ({', '.join(parameter.keys)})")
     found = trial(study, planned, options.fmus)
-    for run, why in found.failed.items():
-        print(f"feedsim: warning: run {run} fails: {why}", file=sys.stderr)
+    warn(f"run {run} fails: {why}" for run, why in found.failed.items())
     names = ", ".join(chosen(found.figures, study.figures))
     print(f"  figures: {names}")
     if found.failed:
@@ -207,9 +149,8 @@ def validate(options: Namespace) -> None:
     study = load_study(options.scenario, options.overrides)
     planned = design(study)
     run, warnings, failed = check(study, planned, options.fmus)
-    told = [f"run {other} is refused, run {run} is not: {why}" for other, why in failed.items()]
-    for warning in (*study.warnings, *told, *warnings):
-        print(f"feedsim: warning: {warning}", file=sys.stderr)
+    refused = [f"run {other} is refused, run {run} is not: {why}" for other, why in failed.items()]
+    warn([*study.warnings, *refused, *warnings])
     print(f"{options.scenario}: valid; {planned.runs} runs of {study.scenario}")
 
 
@@ -218,3 +159,25 @@ def _duration(seconds: float) -> str:
         if seconds >= 2 * size:
             return f"{seconds / size:.2g} {unit}"
     return f"{seconds:.2g} s"
+
+
+COMMAND = Command(
+    "sweep",
+    "make the many runs of a study; write a table, a report and sensitivities",
+    sweep,
+    (
+        Option("study", "STUDY.yaml", "study file (docs/sweeps.md)", type=Path),
+        out("<name of the study file>"),
+        Option("--workers", "N", "processes (default: the cores; 0: this one alone)", type=int),
+        Option("--scheduler", "ADDRESS",
+               "make the runs on the Dask cluster with this scheduler, tcp://host:8786"),
+        Option("--runs", "N", "in place of the study's sampling.runs", type=int),
+        Option("--format", "", "of the table (default: csv)", choices=("csv", "parquet"), default="csv"),
+        Option("--restart", "", "begin anew; discards the runs that DIR has"),
+        Option("--dry-run", "", "tell what would be done and how long it takes"),
+        Option("--row", "RUN", "print the command that makes this one run by itself", type=int),
+        QUIET, FMUS, settings(),
+    ),
+    DESCRIPTION,
+    EPILOG,
+)  # fmt: skip

@@ -2,13 +2,14 @@
 
 from feedsim.identify.friction_file import Identified
 from feedsim.identify.identify import Progress, identify
-from feedsim.identify.options import STAGES, Options
-from feedsim.identify.read import Provenance, Recorded, read_records
+from feedsim.identify.options import STAGES, Asked, Options
+from feedsim.identify.read import Provenance, Recorded, named_apart, read_records, read_traces
 from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate, Identification
 
 __all__ = [
     "STAGES",
+    "Asked",
     "Estimate",
     "Identification",
     "Identified",
@@ -18,5 +19,7 @@ __all__ = [
     "Record",
     "Recorded",
     "identify",
+    "named_apart",
     "read_records",
+    "read_traces",
 ]

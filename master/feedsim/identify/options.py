@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import nan, pi
+from pathlib import Path
 
 from feedsim.errors import InputError
 from feedsim.identify.parameters import FRICTION, KINDS, Kind, check_held
+from feedsim.identify.read import Provenance
 from feedsim.identify.result import Estimate
+from feedsim.scenario import Machine
 from feedsim.structure import Modes
+from feedsim.structure.modes import checked_modes
 
 STAGES = (1, 2)
 LEAD = Kind("m/rad", "lead", above=0.0)
@@ -56,3 +61,86 @@ class Options:
         if self.delay is not None:
             KINDS["delay"].check("the delay of the torque is given as", self.delay)
         check_held(self.hold)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What someone says of an axis, ahead of its traces.
+
+    Attributes:
+        axis: its name; None: the only one that the traces tell.
+        inertia: seen at the motor [kg.m2]; mass: the same at the slide [kg], and in words; None: not said.
+        delay: of the torque channel [s]; None: not said.
+        estimated: "inertia", "delay", or both: to be estimated, whatever mapping and machine say.
+        hold, free, stages: as in :class:`Options`.
+    """
+
+    axis: str | None = None
+    inertia: float | None = None
+    mass: float | None = None
+    mass_reason: str = ""
+    delay: float | None = None
+    estimated: tuple[str, ...] = ()
+    hold: Mapping[str, float] = field(default_factory=dict)
+    free: tuple[str, ...] = ()
+    stages: tuple[int, ...] = STAGES
+
+    def with_traces(self, sources: Sequence[Provenance], machine: Machine | None = None) -> Options:
+        """What is known when the traces are read: this, else what their mapping says, else the machine.
+
+        Raises InputError: the traces are of several axes or pitches, or tell none; else as :class:`Options`.
+        """
+        axis = self._axis(sources)
+        pitches = {source.pitch: source.file for source in sources if source.pitch is not None}
+        if len(pitches) > 1:
+            which = ", ".join(f"{1e3 * pitch:.9g} mm ({file})" for pitch, file in pitches.items())
+            raise InputError(f"the traces have different pitches: {which}")
+        if not pitches:
+            raise InputError(
+                "the pitch of the axis is needed, for values at the slide: give --machine, or pitch: 20 mm in --columns"
+            )
+        I_P = next(iter(pitches)) / (2 * pi)
+        own = machine.axes.get(axis) if machine is not None else None
+        J, modes = self._inertia(I_P, sources), None
+        if J is None and "inertia" not in self.estimated and machine is not None and own is not None:
+            modes = checked_modes(machine)
+            reason = f"J_tot of the modes of {machine.name}, whose flexibility is taken off the torque"
+            J = _inertia(modes.J_tot(axis), reason)
+        delays = {source.torque_delay for source in sources}
+        of_mapping = delays.pop() if len(delays) == 1 and "delay" not in self.estimated else None
+        return Options(
+            axis=axis,
+            I_P=I_P,
+            J=J,
+            modes=modes,
+            delay=of_mapping if self.delay is None else self.delay,
+            hold=self.hold,
+            free=self.free,
+            # The friction that the machine file has: for parameters that the traces do not tell.
+            fallback={name: float(value) for name, value in own.friction.parameters().items()} if own else {},
+            stages=self.stages,
+        )
+
+    def _axis(self, sources: Sequence[Provenance]) -> str:
+        named = {source.axis: source.file for source in sources if source.axis}
+        if self.axis:
+            named.setdefault(self.axis, Path("--axis"))
+        if len(named) > 1:
+            which = ", ".join(f"{axis} ({file})" for axis, file in named.items())
+            raise InputError(f"the traces are of several axes: {which}; --axis names one, and its traces are needed")
+        if not named:
+            raise InputError("the traces do not tell which axis they are of; give --axis, for example --axis Z")
+        return next(iter(named))
+
+    def _inertia(self, I_P: float, sources: Sequence[Provenance]) -> Estimate | None:
+        """What is said, else what the mapping says; None: neither, or it is to be estimated."""
+        if self.mass is not None:
+            return _inertia(self.mass * I_P**2, self.mass_reason)
+        if self.inertia is not None:
+            return _inertia(self.inertia, "as given")
+        of_mapping = [source.inertia for source in sources if source.inertia is not None]
+        return _inertia(of_mapping[0], "of the mapping") if of_mapping and "inertia" not in self.estimated else None
+
+
+def _inertia(value: float, reason: str) -> Estimate:
+    return Estimate("J", value, KINDS["J"].unit, KINDS["J"].meaning, nan, "given", reason)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
@@ -122,6 +122,22 @@ def read_records(
     unread = _unread_load(recording, chosen)
     warnings = (*chosen.notes, *unread, *drive.warnings, *gaps, *checked(path, records))
     return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings))
+
+
+def read_traces(
+    paths: Sequence[Path],
+    mapping: Columns | None = None,
+    axis: str | None = None,
+    machine: Machine | None = None,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> list[Recorded]:
+    """Read several files, each as :func:`read_records` does. progress: what is being done, how much of it, of what."""
+    recorded = []
+    for k, path in enumerate(paths):
+        progress("reading", k, len(paths))
+        recorded.append(read_records(path, mapping, axis, machine))
+    progress("reading", len(paths), len(paths))
+    return recorded
 
 
 def _axis(mapping: Columns | None, axis: str | None, machine: Machine | None) -> str:

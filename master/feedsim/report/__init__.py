@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from feedsim.report.identify.summary import headline as identification_headline
     from feedsim.report.identify.summary import rigid_line
     from feedsim.report.identify.summary import table_lines as identification_table
+    from feedsim.report.identify.summary import terminal_lines as identification_lines
     from feedsim.report.identify.summary import terminal_warnings as identification_warnings
     from feedsim.report.identify.write import check_identification_writable, write_identification
     from feedsim.report.machine.write import check_machine_writable, write_machine
@@ -37,6 +38,7 @@ __all__ = [
     "frf_summary_line",
     "growing",
     "identification_headline",
+    "identification_lines",
     "identification_table",
     "identification_warnings",
     "input_paths",
@@ -63,6 +65,7 @@ _HOMES = {
     "discard_sweep": ("sweep.write", "discard_sweep"),
     "frf_summary_line": ("frf.summary", "summary_line"),
     "identification_headline": ("identify.summary", "headline"),
+    "identification_lines": ("identify.summary", "terminal_lines"),
     "identification_table": ("identify.summary", "table_lines"),
     "identification_warnings": ("identify.summary", "terminal_warnings"),
     "rigid_line": ("identify.summary", "rigid_line"),

@@ -1,5 +1,8 @@
-"""``feedsim machine``: build, info, show, pack."""
+"""``feedsim machine``: build, info, show, pack: what is done with a machine rather than with a scenario."""
 
-from feedsim.cli.machine.commands import add_commands
+from feedsim.cli.machine.figures import BUILD, INFO
+from feedsim.cli.machine.pack import PACK
+from feedsim.cli.machine.show import SHOW
+from feedsim.cli.options import Command
 
-__all__ = ["add_commands"]
+COMMAND = Command("machine", "build, look at and pack a machine", commands=(BUILD, INFO, SHOW, PACK))

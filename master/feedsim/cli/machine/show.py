@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import math
+from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.machine.source import Commands, add_source, add_step, info
+from feedsim.cli.machine.figures import QUIET, SOURCE, STEP, figures
+from feedsim.cli.options import Command, Option
+from feedsim.cli.terminal import finish
 from feedsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,37 +19,8 @@ if TYPE_CHECKING:
 NEAR = 0.1
 
 
-def add_show(own: Commands[argparse.ArgumentParser]) -> None:
-    """Add `show` to the commands of `machine`."""
-    show = own.add_parser(
-        "show",
-        help="draw the machine's structure and its modes; write pictures and report.html",
-        description="Draw the structure of a machine and its first modes, or chosen ones: PNG and SVG in DIR/figures, "
-        "with report.html around them. MACHINE may be a scenario too.",
-    )
-    add_source(show)
-    add_step(show)
-    show.add_argument(
-        "--mode",
-        action="append",
-        default=[],
-        metavar="MODE",
-        help="mode to draw: its number, or a frequency such as 21Hz for the nearest one; may be given several times",
-    )
-    show.add_argument("--animate", action="store_true", help="write an animated GIF of every --mode, too")
-    show.add_argument(
-        "--scale",
-        default="auto",
-        metavar="FACTOR",
-        help="deflections are drawn this many times as large as usual, e.g. 2 (default: auto, a tenth of the machine)",
-    )
-    show.add_argument("--out", type=Path, required=True, metavar="DIR", help="where the pictures go")
-    show.add_argument("--quiet", action="store_true", help="no progress and no summary")
-    show.set_defaults(action=show_machine)
-
-
-def show_machine(options: argparse.Namespace) -> None:
-    """Build, draw, write."""
+def show(options: Namespace) -> None:
+    """feedsim machine show: compute, draw, write."""
     from feedsim import report
     from feedsim.scenario import load_described
 
@@ -61,15 +34,13 @@ def show_machine(options: argparse.Namespace) -> None:
             "structure file (key structure, docs/structure.md)"
         )
     report.check_machine_writable(options.out)
-    found = info(options, described, quiet=options.quiet)
+    found = figures(options, described, quiet=options.quiet)
     chosen = list(dict.fromkeys(_mode(text, found.modes) for text in options.mode))
     report.write_machine(
         described.structure, found, described.files, options.out, modes=chosen, scale=scale, animate=options.animate
     )
-    if not options.quiet:
-        print(f"{found.title} -> {options.out / 'report.html'}")
-        for k in chosen:
-            print(f"mode {k}: {found.modes.frequency[k]:.2f} Hz, {found.moving[k]}")
+    shown = [f"mode {k}: {found.modes.frequency[k]:.2f} Hz, {found.moving[k]}" for k in chosen]
+    finish(options.quiet, (), f"{found.title} -> {options.out / 'report.html'}", *shown)
 
 
 def _mode(text: str, modes: Modes) -> int:
@@ -112,3 +83,25 @@ def _scale(text: str) -> float:
     if not (math.isfinite(scale) and 0 < scale <= 100):
         raise InputError(f"--scale {text}: auto, or a factor above 0 and up to 100, is needed")
     return scale
+
+
+SHOW = Command(
+    "show",
+    "draw the machine's structure and its modes; write pictures and report.html",
+    show,
+    (
+        *SOURCE,
+        STEP,
+        Option("--mode", "MODE",
+               "mode to draw: its number, or a frequency such as 21Hz for the nearest one; may be given several times",
+               many=True),
+        Option("--animate", "", "write an animated GIF of every --mode, too"),
+        Option("--scale", "FACTOR",
+               "deflections are drawn this many times as large as usual, e.g. 2 (default: auto, a tenth of the "
+               "machine)", default="auto"),
+        Option("--out", "DIR", "where the pictures go", type=Path, required=True),
+        QUIET,
+    ),
+    "Draw the structure of a machine and its first modes, or chosen ones: PNG and SVG in DIR/figures, with "
+    "report.html around them. MACHINE may be a scenario too.",
+)  # fmt: skip

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
+import shlex
 import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from feedsim.identify import Identified
-from feedsim.identify.friction_file import interval_text, relative_text, remark_text, value_text
+from feedsim.identify.friction_file import (
+    FRICTION,
+    constant_load_hint,
+    interval_text,
+    open_loop_line,
+    relative_text,
+    remark_text,
+    value_text,
+)
 from feedsim.identify.result import Estimate, Identification
 from feedsim.report.identify.open_loop import open_loop_part
 from feedsim.report.identify.quantities import (
@@ -67,6 +77,21 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
         "performance": {f"{step}": {"value": taken, "unit": "s"} for step, taken in found.seconds.items()},
         "files": list(files),
     }
+
+
+def terminal_lines(identified: Identified, directory: Path) -> list[str]:
+    """What the terminal shows: headline, table, what was done besides, advice, and how to use friction.yaml."""
+    found = identified.found
+    lines = [f"axis {found.axis}: {headline(identified)} -> {directory / 'report.html'}", *table_lines(identified)]
+    if line := open_loop_line(found):
+        lines.append(f"  open loop: {line}")
+    if line := rigid_line(identified):
+        lines.append(f"  {line}")
+    lines += [f"  advice: {advice}" for advice in found.advice]
+    if hint := constant_load_hint(found):
+        lines.append(f"  {hint}")
+    setting = shlex.quote(f"machine.axes.{found.axis}.friction={directory / FRICTION}")
+    return [*lines, f"  use: feedsim run SCENARIO.yaml --set {setting}"]
 
 
 def table_lines(identified: Identified) -> list[str]:

@@ -1,0 +1,151 @@
+"""feedsim run, validate and ssp: one scenario, or an SSP file, made, checked, or written for other simulators."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from feedsim.cli.options import FMUS, QUIET, Command, Option, out, settings
+from feedsim.cli.terminal import finish, progress_bar, warn
+from feedsim.errors import InputError, OutputError
+
+if TYPE_CHECKING:
+    from feedsim.nc import Program
+    from feedsim.report.partial import Partial
+    from feedsim.scenario import Scenario
+
+    # Warnings of a run -> all that is to be said: what the archives' own are called in an SSP file, and what it lacks.
+    Wording = Callable[[Iterable[str]], tuple[str, ...]]
+
+SSP_TEXT = """Write a scenario as one SSP file (System Structure and Parameterization 1.0): the plant packed with the
+machine, a controller and a friction unit per axis with their parameters, the setpoints of the motion in a unit that
+plays them, and the wiring. Other simulators run it without anything of feedsim (docs/ssp.md); feedsim run FILE.ssp runs
+it here."""
+SSP_EXAMPLES = """examples:
+  feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
+  feedsim ssp scenarios/z_positioning.yaml --set "machine.axes.Z.friction.W=0 rad" --out lugre.ssp
+"""
+
+
+def run(options: Namespace) -> None:
+    """feedsim run."""
+    from feedsim import analysis, cosim, report
+
+    directory: Path = options.out or Path("results") / options.scenario.stem
+    with _subject(options) as (plan, program, fmus, worded):
+        analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
+        report.check_writable(directory, report.input_paths(plan))
+        with _rows_kept(report.growing(directory)) as recorded:
+            with progress_bar(options.quiet, " cycles", shortened=True) as progress:
+                result = cosim.run(
+                    plan, program=program, fmus=fmus, progress=progress.of(plan.name), scratch=recorded.scratch,
+                    sink=recorded,
+                )  # fmt: skip
+            result = replace(result, warnings=worded(result.warnings))
+            figures = analysis.evaluate(result)
+            report.write(result, figures, directory, recorded)
+    finish(options.quiet, result.warnings, f"{plan.name}: {report.summary_line(result, figures)} -> {directory}")
+
+
+@contextmanager
+def _rows_kept(recorded: Partial) -> Iterator[Partial]:
+    """Say where the rows are of a run that does not come to its end."""
+    try:
+        with recorded:
+            yield recorded
+    except BaseException:
+        if recorded.left:
+            print(f"feedsim: the rows up to {recorded.time:.9g} s are kept in {recorded.path}", file=sys.stderr)
+        raise
+
+
+def validate(options: Namespace) -> None:
+    """feedsim validate."""
+    from feedsim import analysis, cosim
+    from feedsim.cli import sweep
+    from feedsim.scenario import is_study
+
+    if is_study(options.scenario):
+        sweep.validate(options)
+        return
+    with _subject(options) as (plan, program, fmus, worded):
+        analysis.check(plan, program)
+        warn(worded(cosim.check(plan, program, fmus=fmus)))
+    motions = f"{len(plan.motions)} motion{'s'[: len(plan.motions) != 1]}"
+    print(f"{options.scenario}: valid; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}")
+
+
+def write_ssp(options: Namespace) -> None:
+    """feedsim ssp."""
+    from feedsim import scenario, ssp
+
+    if not scenario.is_ssp(options.out):
+        raise InputError(f"--out {options.out}: an SSP file ends in .ssp; simulators tell it by that")
+    if scenario.is_ssp(options.scenario):
+        raise InputError(f"{options.scenario}: is an SSP file already; a scenario is expected")
+    if not options.out.absolute().parent.is_dir():
+        raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
+    plan = scenario.load(options.scenario, options.overrides)
+    done = ssp.export(plan, options.out, fmus=options.fmus)
+    warn(done.warnings)
+    print(
+        f"{done.path}: {done.size / 1024:.0f} KiB, {len(done.instances)} instances, {done.duration:.4g} s at "
+        f"{plan.machine.cycles.T_c * 1e6:.6g} us; parameters in resources/*.ssv; "
+        f"runs on {', '.join(done.platforms) or 'no platform'}"
+    )
+
+
+@contextmanager
+def _subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | None, Wording]]:
+    """What ``run`` and ``validate`` are to look at: a scenario file, or an SSP, whose archives are its own.
+
+    Scenario, program, folder of archives, and what makes a run's warnings all that is to be said.
+    """
+    from feedsim import nc, scenario
+
+    if not scenario.is_ssp(options.scenario):
+        if scenario.is_study(options.scenario):
+            raise InputError(f"{options.scenario}: is a study of many runs: feedsim sweep {options.scenario}")
+        loaded = scenario.load(options.scenario, options.overrides)
+        yield loaded, nc.plan(loaded), options.fmus, tuple
+        return
+    if options.fmus is not None:
+        raise InputError(f"--fmus {options.fmus}: {options.scenario} has its own archives; leave the option out")
+    from feedsim import ssp  # not for runs of scenario files
+
+    with ssp.opened(options.scenario, options.overrides) as found:
+        yield found.scenario, found.program, found.fmus, found.told
+
+
+SUBJECT = (
+    FMUS,
+    Option("scenario", "SCENARIO", "scenario file (docs/scenarios.md), or SSP (docs/ssp.md)", type=Path),
+    settings(),
+)
+RUN = Command(
+    "run",
+    "run a scenario or an SSP; write result.csv, summary.json, report.html and figures",
+    run,
+    (*SUBJECT, out("<name of the scenario file>"), QUIET),
+)
+VALIDATE = Command(
+    "validate", "check a scenario, an SSP or a study, its machine and its motion without running it", validate, SUBJECT
+)
+SSP = Command(
+    "ssp",
+    "write a scenario as an SSP file, which other simulators run",
+    write_ssp,
+    (
+        Option("scenario", "SCENARIO.yaml", "scenario file (docs/scenarios.md)", type=Path),
+        Option("--out", "FILE.ssp", "the SSP file to write", type=Path, required=True),
+        FMUS,
+        settings(),
+    ),
+    description=SSP_TEXT,
+    epilog=SSP_EXAMPLES,
+)

@@ -1,0 +1,55 @@
+"""What commands say while they work and in the end: a progress bar, warnings, what has been made."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+class Progress:
+    """A progress bar that names what is being done."""
+
+    def __init__(self, bar: Any) -> None:
+        self._bar = bar
+        self._what: str | None = None
+
+    def __call__(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
+        """How many of its steps are done, of how many. before: done earlier, which do not count for the rate."""
+        if what != self._what:
+            self._what = what
+            self._bar.reset(total)
+            self._bar.set_description(what, refresh=not before)
+            if before:
+                self._bar.initial = self._bar.n = before
+                self._bar.refresh()
+        if note:
+            self._bar.set_postfix_str(note, refresh=False)
+        self._bar.update(done - self._bar.n)
+
+    def of(self, what: str) -> Any:
+        """The same for those who tell how much is done, and not of what."""
+        return lambda done, total: self(what, done, total)
+
+
+@contextmanager
+def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterator[Progress]:
+    """A progress bar; none if ``quiet`` or where nobody watches. shortened: large numbers of the `unit` (12.3k)."""
+    from tqdm import tqdm
+
+    with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
+        yield Progress(bar)
+
+
+def warn(warnings: Iterable[str]) -> None:
+    """Say on standard error what the user should know before believing the results."""
+    for warning in warnings:
+        print(f"feedsim: warning: {warning}", file=sys.stderr)
+
+
+def finish(quiet: bool, warnings: Iterable[str], *lines: str) -> None:
+    """How a command ends: with its warnings, and with what it has made unless it is to be quiet."""
+    warn(warnings)
+    if not quiet:
+        print("\n".join(lines))

@@ -11,9 +11,8 @@ import pyuff
 
 from feedsim.errors import InputError, OutputError
 from feedsim.trace import uff
-from feedsim.trace.overlay import read_overlay, read_response
 from feedsim.trace.response import FrequencyResponse, quotient_unit
-from feedsim.trace.response_csv import Columns, read_response_csv, write_response
+from feedsim.trace.response_files import read_overlay, read_response, read_response_csv, write_response
 
 F = np.array([1.0, 2.5, 10.0, 1000 / 3])
 H = 1 / (0.0164 * 2j * np.pi * F) * np.exp(-1j * F / 100)
@@ -53,46 +52,24 @@ def test_refused(changes: dict[str, Any], message: str) -> None:
 
 def test_selection() -> None:
     whole = response()
-    band = whole.between(2.5, 10)
-    np.testing.assert_array_equal(band.frequency, [2.5, 10])
-    np.testing.assert_array_equal(band[NAME], H[1:3])
-    np.testing.assert_array_equal(band.coherence[NAME], [0.5, 1.0])
-    np.testing.assert_array_equal(whole.where(whole.coherence[NAME] > 0.4).frequency, [2.5, 10])
     assert whole.select(["tool.*"]).names == ("tool.x_Z/tool.F_Z",)
     assert not whole.select(["tool.*"]).coherence
     with pytest.raises(InputError, match=r"did you mean 'Z.n_a/Z.M_a'"):
         whole["Z.n_a/Z.M"]
 
 
-def test_decibels_and_phase() -> None:
+def test_phase() -> None:
     whole = FrequencyResponse(F, {"a": np.array([1, 10j, -0.1, -1j])})
-    np.testing.assert_allclose(whole.dB("a"), [0, 20, -20, 0], atol=1e-12)
     np.testing.assert_allclose(whole.phase("a"), [0, 90, 180, -90])
-    np.testing.assert_allclose(whole.phase("a", unwrapped=True), [0, 90, 180, 270])
 
 
-def test_interpolation_is_exact_for_powers_of_frequency() -> None:
-    """Magnitude in dB and phase over lg f: 1/(j omega)^2 is a straight line in both."""
-    whole = FrequencyResponse(F, {"a": (2j * np.pi * F) ** -2 * 7})
-    wanted = np.array([1.0, 1.7, 9.0, 200.0])
-    np.testing.assert_allclose(whole.at(wanted)["a"], (2j * np.pi * wanted) ** -2 * 7, rtol=1e-12)
-    with pytest.raises(InputError, match=r"400 Hz is outside the frequency response, which has 1 to 333\.333 Hz"):
-        whole.at([2.0, 400.0])
-
-
-def test_conversion_and_joining() -> None:
+def test_conversion() -> None:
     whole = response()
     turned = whole.converted({NAME: "rpm/(N.m)"})
     np.testing.assert_allclose(turned[NAME], H * 30 / np.pi, rtol=1e-15)
     assert turned.unit(NAME) == "rpm/(N.m)"
     with pytest.raises(InputError, match=r"Z\.n_a/Z\.M_a'"):
         whole.converted({NAME: "m/N"})
-    named = whole.select([NAME]).renamed({NAME: "measured"})
-    assert named.joined(whole).names == ("measured", NAME, "tool.x_Z/tool.F_Z")
-    with pytest.raises(InputError, match="in both"):
-        whole.joined(whole)
-    with pytest.raises(InputError, match="different frequencies"):
-        whole.joined(named.between(2, 5))
 
 
 def test_units_of_quotients() -> None:
@@ -159,11 +136,11 @@ def test_real_and_imaginary_parts_and_named_decibels(tmp_path: Path) -> None:
 
 
 def test_columns_of_ones_own_choice(tmp_path: Path) -> None:
-    file = written(tmp_path, "Hz,|G| [dB],arg G [deg],gamma2\n5,40,180,0.5\n")
-    chosen = {NAME: Columns("|G|", "arg G", "gamma2", UNIT)}
-    found = read_response_csv(file, columns=chosen, frequency="Hz")
+    file = written(tmp_path, "x [kHz],|G| [dB re m/N],arg G [deg],gamma2\n5,40,180,0.5\n")
+    found = read_overlay(f"{file}:{NAME}=|G|,arg G,gamma2")
+    np.testing.assert_allclose(found.frequency, [5000])
     np.testing.assert_allclose(found[NAME], [-100], rtol=1e-12)
-    assert found.unit(NAME) == UNIT
+    assert found.unit(NAME) == "m/N"
     assert found.coherence[NAME] == [0.5]
 
 

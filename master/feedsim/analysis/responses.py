@@ -21,8 +21,8 @@ from feedsim.analysis.truncation import Truncation
 from feedsim.errors import InputError
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
-from feedsim.trace.overlay import read_overlay
 from feedsim.trace.response import FrequencyResponse
+from feedsim.trace.response_files import read_overlay
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -143,7 +143,8 @@ def one(system: linear.LinearSystem, name: str, frequency: Floats) -> Complexes:
 def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[str]]:
     """Curves of a file that are to be laid over, and warnings.
 
-    text: as trace.overlay.read_overlay takes it. known: responses that are shown; a file read as a whole may hold more.
+    text: as feedsim.trace.response_files.read_overlay takes it. known: responses that are shown; a file read as a whole
+    may hold more.
 
     Raises:
         InputError: what the reader refuses, a file without any of the known responses, a unit of another dimension.

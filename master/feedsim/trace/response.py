@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -12,16 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedsim import units as quantities
 from feedsim.errors import InputError
-from feedsim.trace.trace import check_name, check_unit, matching, suggest
+from feedsim.trace.trace import Array, Columns, check_name, check_unit, matching
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 ROUNDING = 1e-9  # of a frequency: quotients of times carry it
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class FrequencyResponse(Columns[Complexes]):
     """Functions over a common frequency axis.
 
     Attributes:
@@ -38,10 +37,11 @@ class FrequencyResponse:
             unit or coherence without its column.
     """
 
-    frequency: Floats
+    frequency: Array
     columns: Mapping[str, Complexes]
     units: Mapping[str, str] = field(default_factory=dict)
-    coherence: Mapping[str, Floats] = field(default_factory=dict)
+    coherence: Mapping[str, Array] = field(default_factory=dict)
+    kind = "frequency response"
 
     def __post_init__(self) -> None:
         frequency = _frozen(self.frequency, np.float64, "frequency", None)
@@ -71,50 +71,13 @@ class FrequencyResponse:
         object.__setattr__(self, "units", MappingProxyType(units))
         object.__setattr__(self, "coherence", MappingProxyType(coherence))
 
-    def __getitem__(self, name: str) -> Complexes:
-        """Values of a column; InputError with a suggestion if there is none of that name."""
-        try:
-            return self.columns[name]
-        except KeyError:
-            raise InputError(f"no frequency response {name!r}{suggest(name, self.columns)}") from None
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.columns
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.columns)
-
     def __len__(self) -> int:
         """Number of frequencies."""
         return int(self.frequency.size)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.columns)
-
-    def unit(self, name: str) -> str:
-        """Unit of a column; "" where none is known."""
-        self[name]
-        return self.units[name]
-
-    def dB(self, name: str) -> Floats:
-        """Magnitude in decibels, 20 lg of the value in its unit."""
-        with np.errstate(divide="ignore"):
-            return np.asarray(20 * np.log10(np.abs(self[name])))
-
-    def phase(self, name: str, *, unwrapped: bool = False) -> Floats:
-        """Phase [deg], from -180 to 180, or continuous over the frequencies from there."""
-        angle = np.angle(self[name])
-        return np.degrees(np.unwrap(angle) if unwrapped else angle)
-
-    def between(self, low: float, high: float) -> FrequencyResponse:
-        """Rows with low <= frequency <= high [Hz], up to rounding."""
-        first = int(np.searchsorted(self.frequency, low * (1 - ROUNDING), side="left"))
-        return self._rows(np.arange(first, int(np.searchsorted(self.frequency, high * (1 + ROUNDING), side="right"))))
-
-    def where(self, rows: NDArray[np.bool_]) -> FrequencyResponse:
-        """Rows for which `rows` (N,) is true, such as those of high coherence."""
-        return self._rows(np.flatnonzero(rows))
+    def phase(self, name: str) -> Array:
+        """Phase [deg], from -180 to 180."""
+        return np.degrees(np.angle(self[name]))
 
     def select(self, patterns: Iterable[str]) -> FrequencyResponse:
         """Columns whose name matches any of the glob patterns. InputError for a pattern that matches nothing."""
@@ -125,32 +88,6 @@ class FrequencyResponse:
             {name: self.units[name] for name in kept},
             {name: self.coherence[name] for name in kept if name in self.coherence},
         )
-
-    def at(self, frequency: ArrayLike) -> FrequencyResponse:
-        """On other frequencies [Hz] within the range: magnitude in dB and unwrapped phase linear over lg f.
-
-        Raises:
-            InputError: a frequency beyond the range, or a magnitude of 0, which has no decibels.
-        """
-        wanted = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-        if not len(self):
-            raise InputError("a frequency response without frequencies cannot be interpolated")
-        low, high = self.frequency[0], self.frequency[-1]
-        outside = ~((wanted >= low * (1 - ROUNDING)) & (wanted <= high * (1 + ROUNDING)))
-        if outside.any():
-            raise InputError(
-                f"{wanted[outside][0]:.6g} Hz is outside the frequency response, which has {low:.6g} to {high:.6g} Hz"
-            )
-        x, known = np.log(wanted), np.log(self.frequency)
-        columns = {}
-        for name, values in self.columns.items():
-            if not np.all(values):
-                at = self.frequency[np.flatnonzero(values == 0)[0]]
-                raise InputError(f"frequency response {name!r} is 0 at {at:.6g} Hz and cannot be interpolated")
-            logarithm = np.log(np.abs(values)) + 1j * np.unwrap(np.angle(values))
-            columns[name] = np.exp(np.interp(x, known, logarithm))
-        coherence = {name: np.interp(x, known, values) for name, values in self.coherence.items()}
-        return FrequencyResponse(wanted, columns, self.units, coherence)
 
     def converted(self, units: Mapping[str, str]) -> FrequencyResponse:
         """With the columns named in `units` in that unit.
@@ -167,42 +104,6 @@ class FrequencyResponse:
             except InputError as error:
                 raise InputError(f"frequency response {name!r}: {error}") from None
         return FrequencyResponse(self.frequency, columns, {**self.units, **units}, self.coherence)
-
-    def renamed(self, names: Mapping[str, str]) -> FrequencyResponse:
-        """With the columns named in `names` (old name -> new name) called anew. InputError: no such column."""
-        for name in names:
-            self[name]
-        if double := sorted({new for new in names.values() if (set(self.columns) - set(names)) & {new}}):
-            raise InputError(f"there is a frequency response {double[0]!r} already")
-        return FrequencyResponse(
-            self.frequency,
-            {names.get(name, name): values for name, values in self.columns.items()},
-            {names.get(name, name): unit for name, unit in self.units.items()},
-            {names.get(name, name): values for name, values in self.coherence.items()},
-        )
-
-    def joined(self, other: FrequencyResponse) -> FrequencyResponse:
-        """With the columns of `other`, whose frequencies must be the same. InputError: they are not, a name twice."""
-        if self.frequency.shape != other.frequency.shape or not np.allclose(
-            self.frequency, other.frequency, rtol=ROUNDING, atol=0
-        ):
-            raise InputError("frequency responses over different frequencies cannot be joined")
-        if double := sorted(set(self.columns) & set(other.columns)):
-            raise InputError(f"frequency response {double[0]!r} is in both of those to be joined")
-        return FrequencyResponse(
-            self.frequency,
-            {**self.columns, **other.columns},
-            {**self.units, **other.units},
-            {**self.coherence, **other.coherence},
-        )
-
-    def _rows(self, rows: NDArray[np.intp]) -> FrequencyResponse:
-        return FrequencyResponse(
-            self.frequency[rows],
-            {name: values[rows] for name, values in self.columns.items()},
-            self.units,
-            {name: values[rows] for name, values in self.coherence.items()},
-        )
 
 
 def quotient_unit(output: str, input: str) -> str:

@@ -15,8 +15,8 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.trace.csv import Table, read_table, seconds_of, time_index
-from feedsim.trace.numbers import Decimal, decimal_mark
+from feedsim.trace.cells import Decimal, Table, decimal_mark, fits, read_table
+from feedsim.trace.csv import TIME_NAMES
 from feedsim.trace.trace import Array, TimeColumns, Trace
 
 # "x [m]", "Z.x_a[REAL]"; an index as in "x[3]" or "A[1,2]" belongs to the name.
@@ -84,13 +84,11 @@ def read_series(path: str | Path, *, time: str | None = None, time_unit: str | N
     table = read_table(path, _heads, as_numbers=True)
     if time is not None and time not in table.names and time_unit is None:
         name, colon, unit = time.rpartition(":")
-        if colon and (name in table.names or _is_time(unit)):
+        if colon and (name in table.names or fits(unit, "s")):
             time, time_unit = name, unit
-    at = time_index(table, time)
+    at = table.axis(time, TIME_NAMES, "s")
     if time_unit is not None and units.factor(time_unit, "s") != units.factor(table.units[at] or time_unit, "s"):
-        raise InputError(
-            f"{path}:{table.header_line}: the time column {table.names[at]!r} is in {table.units[at]}, not {time_unit}"
-        )
+        raise InputError(f"{table.head}: the time column {table.names[at]!r} is in {table.units[at]}, not {time_unit}")
     mark: Decimal = "."
     if table.decimal_comma and any("," in cell for column in table.columns for cell in column):
         plain = [column for column in table.columns if not _is_text(column)]
@@ -106,7 +104,7 @@ def read_series(path: str | Path, *, time: str | None = None, time_unit: str | N
             f"{path}:{table.lines[row]}: {found} in the time column {table.names[at]!r}; "
             "every instant must be a finite number"
         )
-    seconds = seconds_of(table, at, instants, time_unit)
+    seconds = instants * table.factor(at, "s", "time column", time_unit or "s")
     if (wrong := np.flatnonzero(np.diff(seconds) < 0)).size:
         row = int(wrong[0]) + 1
         raise InputError(
@@ -174,14 +172,6 @@ def _fault(table: Table, index: int, mark: Decimal) -> str:
     more = f" (and {len(wrong) - 1} more such cells)" if len(wrong) > 1 else ""
     where, name = f"{table.where}:{table.lines[row]}", table.names[index]
     return f"{where}: {table.columns[index][row]!r} in column {name!r} is no number{more}"
-
-
-def _is_time(unit: str) -> bool:
-    try:
-        units.factor(unit, "s")
-    except InputError:
-        return False
-    return True
 
 
 def _is_text(cells: Sequence[str]) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from types import MappingProxyType
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,14 +14,43 @@ from feedsim.errors import InputError
 from feedsim.trace.table import STRETCH, release, stretches, unchangeable
 
 Array = NDArray[np.float64]
+Values = TypeVar("Values", bound=NDArray[Any])
 
 
-class TimeColumns:
-    """What columns over a common time have in common: time, columns, units, and how they are reached."""
+class Columns(Generic[Values]):
+    """Columns by name, with their units."""
+
+    columns: Mapping[str, Values]
+    units: Mapping[str, str]
+    kind: ClassVar[str] = "column"
+
+    def __getitem__(self, name: str) -> Values:
+        """Values of a column; InputError with a suggestion if there is none of that name."""
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise InputError(f"no {self.kind} {name!r}{suggest(name, self.columns)}") from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.columns)
+
+    def unit(self, name: str) -> str:
+        """Unit of a column as in the CSV header; "" where none is known."""
+        self[name]
+        return self.units[name]
+
+
+class TimeColumns(Columns[Array]):
+    """Columns over a common time."""
 
     time: Array
-    columns: Mapping[str, Array]
-    units: Mapping[str, str]
 
     def _settle(self) -> None:
         """Make the arrays read-only. InputError: not one-dimensional, lengths that differ, time that is not finite,
@@ -38,26 +68,9 @@ class TimeColumns:
         object.__setattr__(self, "columns", MappingProxyType(columns))
         object.__setattr__(self, "units", MappingProxyType({name: self.units.get(name, "") for name in columns}))
 
-    def __getitem__(self, name: str) -> Array:
-        """Values of a column; InputError with a suggestion if there is none of that name."""
-        try:
-            return self.columns[name]
-        except KeyError:
-            raise InputError(f"no column {name!r}{suggest(name, self.columns)}") from None
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.columns
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.columns)
-
     def __len__(self) -> int:
         """Number of rows."""
         return int(self.time.size)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,11 +101,6 @@ class Trace(TimeColumns):
             )
         for unit in self.units.values():
             check_unit(unit)
-
-    def unit(self, name: str) -> str:
-        """Unit of a column as in the CSV header; "" where none is known."""
-        self[name]
-        return self.units[name]
 
     def between(self, t0: float, t1: float) -> "Trace":
         """Rows with t0 <= time <= t1 [s], give or take a millionth of the mean step (k h is rounded)."""

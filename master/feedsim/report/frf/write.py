@@ -16,7 +16,7 @@ from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, 
 from feedsim.report.style import Picture, remarked
 from feedsim.report.truncation_plots import truncation_pictures
 from feedsim.scenario import Subject
-from feedsim.trace.response_csv import write_response
+from feedsim.trace.response_files import write_response
 
 CURVES, MEASURED = "frf.csv", "frf_measured.csv"
 

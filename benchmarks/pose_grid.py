@@ -25,8 +25,8 @@ from feedsim.scenario import Machine, Scenario, load_structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.modes import TOOL_PORTS, Modes, read_modes
 from feedsim.structure.pack import pack
-from feedsim.structure.poses import PoseGrid, grid_axis, pose_grid
-from feedsim.structure.poses_file import write_poses
+from feedsim.structure.poses import grid_axis, pose_grid
+from feedsim.structure.poses_file import PoseGrid, write_poses
 from feedsim.structure.solve import solve
 
 Floats = NDArray[np.float64]
@@ -164,7 +164,7 @@ def response(modes: Modes, force: str, output: str, frequency: Floats) -> Floats
 
 def full_modes(structure: GeometryStructure, pose: Mapping[str, float]) -> Modes:
     """All modes at a pose."""
-    from feedsim.structure.geometry import assemble
+    from feedsim.structure.geometry.assemble import assemble
 
     return solve(assemble(structure, pose), cutoff=np.inf, damping=structure.damping).modes
 

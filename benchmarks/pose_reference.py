@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, eigh, solve_triangular
 
 from feedsim.scenario.structure.geometry import GeometryStructure
-from feedsim.structure.geometry import Assembler
+from feedsim.structure.geometry.assemble import Assembler
 
 Floats = NDArray[np.float64]
 DIRECTIONS = ("X", "Y", "Z")

@@ -15,7 +15,7 @@ import yaml
 from feedsim import cli, cosim, scenario
 from feedsim.analysis import evaluate
 from feedsim.structure import read_modes
-from feedsim.structure.doubt import table_doubt
+from feedsim.structure.table_check import table_mismatch
 
 ROOT = Path(__file__).resolve().parents[2]
 TEST_CENTRE, ONE_AXIS = (ROOT / "scenarios" / "machines" / name for name in ("test_centre", "one_axis"))
@@ -309,10 +309,10 @@ def test_a_table_of_another_pose_is_not_packed_and_warned_of(tmp_path: Path, cap
     said = capsys.readouterr().err
     assert "is not that of the pose X 0.8 m, Y 0.327 m, Z 0.4 m" in said
     assert "--at X=800mm Y=327mm Z=400mm" in said
-    assert table_doubt(scenario.load_machine(folder)) is not None
-    assert table_doubt(scenario.load_machine(TEST_CENTRE)) is None
+    assert table_mismatch(scenario.load_machine(folder)) is not None
+    assert table_mismatch(scenario.load_machine(TEST_CENTRE)) is None
     # A table with static correction, of that pose, is as good.
     out = tmp_path / "corrected"
     assert run("build", folder, "--at", "Z=400mm", "--static-correction", "--out", out) == 0
     shutil.copy(out / "modes.csv", folder / "modes.csv")
-    assert table_doubt(scenario.load_machine(folder)) is None
+    assert table_mismatch(scenario.load_machine(folder)) is None

@@ -23,7 +23,7 @@ from feedsim.report.machine.pictures import telling_view
 from feedsim.report.view import FRONT, OBLIQUE, SIDE, TOP, view
 from feedsim.scenario import Structure, load_structure
 from feedsim.structure.build import Built, build
-from feedsim.structure.deflection import node_motion
+from feedsim.structure.geometry.outline import node_motion
 
 ROOT = Path(__file__).resolve().parents[2]
 TEST_CENTRE, ONE_AXIS = (ROOT / "scenarios" / "machines" / name for name in ("test_centre", "one_axis"))

@@ -17,7 +17,7 @@ from feedsim.motions import Dwell, Move
 from feedsim.report.page import page
 from feedsim.report.summary import summary
 from feedsim.scenario import Machine, load_structure
-from feedsim.structure.geometry import assemble
+from feedsim.structure.geometry.assemble import assemble
 from feedsim.structure.pose_change import LARGE, LOOKED_AT, PoseChange, pose_change, warnings
 from report_helpers import positioning_run
 from scenario_helpers import MACHINE, default_machine, scenario

@@ -11,8 +11,7 @@ from scipy.integrate import dblquad
 from scipy.linalg import eigh
 
 from feedsim.scenario.structure.sections import Box, Material, Properties, Rectangle, Rod, Tube
-from feedsim.structure.geometry.beam import beam_axes, beam_matrices
-from feedsim.structure.geometry.sections import BeamProperties, area_moments, beam_properties, rod
+from feedsim.structure.geometry.beam import BeamProperties, area_moments, beam_axes, beam_matrices, beam_properties, rod
 
 Floats = NDArray[np.float64]
 

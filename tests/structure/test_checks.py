@@ -11,8 +11,7 @@ from scipy import sparse
 
 from feedsim.errors import InputError
 from feedsim.structure.assembly import Assembly
-from feedsim.structure.checks import check
-from feedsim.structure.checks.units import frequency_warnings
+from feedsim.structure.checks.model import check, frequency_warnings
 
 MASS, STIFFNESS = chain([100.0, 200.0, 300.0], [4e6, 9e6])
 ZEROS = np.zeros(3)

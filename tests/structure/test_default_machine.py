@@ -14,7 +14,7 @@ from scipy.io import mmread
 
 from feedsim.structure import read_modes
 from feedsim.structure.assembly import Assembly
-from feedsim.structure.geometry import Assembler, assemble
+from feedsim.structure.geometry.assemble import assemble
 from structure_helpers import GIVEN_POSE, MACHINES, default_structure, dense_modes
 
 Floats = NDArray[np.float64]
@@ -92,12 +92,6 @@ def test_products_of_mode_shapes() -> None:
     # The basis of the rigid modes is arbitrary, their sum is not.
     products, expected = found[:3].T @ found[:3], given[:3].T @ given[:3]
     assert np.abs(products - expected).max() <= 1e-6 * np.abs(expected).max()
-
-
-def test_masses() -> None:
-    assembler = Assembler(default_structure())
-    assert assembler.total_mass == pytest.approx(9061.64, abs=0.005)  # two decimals are given
-    assert [assembler.moving_mass(axis) for axis in AXES] == pytest.approx([2799, 907, 435], abs=0.5)
 
 
 def test_who_is_where() -> None:

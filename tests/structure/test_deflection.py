@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from feedsim.structure.assembly import Geometry
-from feedsim.structure.deflection import deflection, node_motion
+from feedsim.structure.geometry.outline import deflection, node_motion
 
 Floats = NDArray[np.float64]
 L = 1.7

@@ -11,11 +11,9 @@ import yaml
 from fe_models import ROOT, STRUCTURES, dense_modes
 
 from feedsim.scenario.load import load_structure
-from feedsim.structure.matrices import assemble
-from feedsim.structure.matrices.nodes import NODE_COLUMNS
-from feedsim.structure.matrices.ports import BY_NODE
+from feedsim.structure.matrices.build import import_model
 from feedsim.structure.matrices.raw import DIRECTIONS
-from feedsim.structure.matrices.tables import read_table
+from feedsim.structure.matrices.tables import BY_NODE, NODE_COLUMNS, read_table
 
 TEXT = (ROOT / "docs" / "fe-import.md").read_text(encoding="utf-8")
 BLOCKS = {kind: re.findall(rf"^```{kind}\n(.*?)^```", TEXT, re.M | re.S) for kind in ("yaml", "csv")}
@@ -52,10 +50,10 @@ def test_tables_are_read(tmp_path: Path) -> None:
 
 
 def test_the_figures_it_quotes() -> None:
-    frequency, _ = dense_modes(assemble(load_structure(STRUCTURES / "matrix_market")))
+    frequency, _ = dense_modes(import_model(load_structure(STRUCTURES / "matrix_market")).assembly)
     kept = frequency[frequency <= 1000.0]
     assert (len(kept), f"{kept[3]:.2f}") == (93, "21.09")
     assert "3 rigid modes and 90 up to 1000 Hz, the first at 21.09 Hz" in TEXT
-    frequency, _ = dense_modes(assemble(load_structure(STRUCTURES / "calculix")))
+    frequency, _ = dense_modes(import_model(load_structure(STRUCTURES / "calculix")).assembly)
     quoted = ", ".join(f"{f:.2f}" for f in frequency[1:3]) + f" and {frequency[3]:.2f} Hz after the rigid mode"
     assert quoted in TEXT

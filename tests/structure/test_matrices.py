@@ -15,8 +15,8 @@ from fe_models import STRUCTURES, chain, dense_modes, write_market
 from feedsim.errors import InputError
 from feedsim.scenario.load import load_structure
 from feedsim.structure.assembly import Assembly
-from feedsim.structure.checks import check
-from feedsim.structure.matrices import Imported, assemble, import_model
+from feedsim.structure.checks.model import check
+from feedsim.structure.matrices.build import Imported, import_model
 
 REFERENCE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre" / "modes.csv"
 SHIPPED = STRUCTURES / "matrix_market"
@@ -108,7 +108,7 @@ def nodes_of_the_test_centre() -> list[tuple[str, str, list[int]]]:
 
 def test_millimetres_and_tonnes_by_nodes_give_the_same_modes(tmp_path: Path) -> None:
     """The shipped model as a program in mm, t, s would write it, ports by node and direction."""
-    source = assemble(load_structure(SHIPPED))
+    source = import_model(load_structure(SHIPPED)).assembly
     nodes = nodes_of_the_test_centre()
     direction = np.empty(615, dtype=int)
     owner = [""] * 615

@@ -13,10 +13,11 @@ from scipy import sparse
 
 from feedsim.errors import InputError, OutputError
 from feedsim.scenario import load_structure
-from feedsim.structure.geometry import Assembler
+from feedsim.structure.geometry.assemble import Assembler
 from feedsim.structure.modes import read_modes
-from feedsim.structure.poses import GridAxis, check_common, check_same_machine, grid_axis, pose_grid
-from feedsim.structure.poses_file import read_grid, write_poses
+from feedsim.structure.poses import check_common, grid_axis, pose_grid
+from feedsim.structure.poses_file import GridAxis, read_grid, write_poses
+from feedsim.structure.table_check import check_same_machine
 from structure_helpers import GIVEN_POSE, MACHINES, default_structure, dense_modes
 
 STRUCTURE = default_structure()

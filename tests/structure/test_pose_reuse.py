@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from feedsim.scenario import Machine
-from feedsim.structure import at_hand, doubt, pose_change
+from feedsim.structure import pose_change, solve, table_check
+from feedsim.structure.geometry import assemble
 from feedsim.structure.pose_change import NEAR, PoseChange
 from scenario_helpers import MACHINE, default_machine
 
@@ -23,9 +24,9 @@ def forget() -> None:
         pose_change._between,
         pose_change._end,
         pose_change._middle,
-        doubt._modes,
-        at_hand.structure_of,
-        at_hand.assembler_of,
+        table_check._modes,
+        assemble.structure_of,
+        assemble.assembler_of,
     ):
         cached.cache_clear()
 
@@ -34,15 +35,14 @@ def forget() -> None:
 def poses(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, float]]]:
     """Poses that modes are calculated of, as they come."""
     solved: list[dict[str, float]] = []
-    real = pose_change.solve
+    real = solve.solve
 
     def spy(assembly: Any, **options: Any) -> Any:
         solved.append(dict(assembly.pose))
         return real(assembly, **options)
 
     forget()
-    monkeypatch.setattr(pose_change, "solve", spy)
-    monkeypatch.setattr(doubt, "solve", spy)
+    monkeypatch.setattr(solve, "solve", spy)
     yield solved
     forget()
 
@@ -121,17 +121,17 @@ def test_another_pose_and_another_structure_are_noticed(poses: list[dict[str, fl
 
 
 def test_many_runs_keep_little(poses: list[dict[str, float]]) -> None:
-    for cached in (pose_change._between, pose_change._end, pose_change._middle, doubt._modes):
+    for cached in (pose_change._between, pose_change._end, pose_change._middle, table_check._modes):
         assert cached.cache_parameters()["maxsize"] in range(1, 257)
 
 
 def test_the_table_of_modes_is_doubted_once(poses: list[dict[str, float]]) -> None:
     machine = default_machine()
-    assert doubt.table_doubt(machine) is None
-    assert doubt.table_doubt(machine) is None
+    assert table_check.table_mismatch(machine) is None
+    assert table_check.table_mismatch(machine) is None
     assert poses == [dict(machine.pose)]
     wrong = machine.model_copy(update={"pose": {**machine.pose, "Z": 0.4}})
-    said = doubt.table_doubt(wrong)
+    said = table_check.table_mismatch(wrong)
     assert said is not None
     assert "Z 0.4 m" in said
     assert len(poses) == 2

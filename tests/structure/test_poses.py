@@ -9,7 +9,7 @@ import pytest
 
 from feedsim.errors import InputError
 from feedsim.structure.assembly import Assembly
-from feedsim.structure.geometry import Assembler, assemble
+from feedsim.structure.geometry.assemble import Assembler, assemble
 from structure_helpers import GIVEN_POSE, Floats, default_structure
 
 STRUCTURE = default_structure()

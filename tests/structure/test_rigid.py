@@ -14,7 +14,7 @@ from eigen_models import DEFAULT_DAMPING, LEAD, TWO_PERCENT, Floats, chain, driv
 from feedsim.errors import InputError
 from feedsim.structure.assembly import Assembly
 from feedsim.structure.eigenpairs import dense
-from feedsim.structure.geometry import assemble
+from feedsim.structure.geometry.assemble import assemble
 from feedsim.structure.rigid import cleaned, definite_basis, definite_signs
 from feedsim.structure.solve import Solution, solve
 from structure_helpers import GIVEN_POSE, default_structure

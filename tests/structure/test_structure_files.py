@@ -12,7 +12,7 @@ import yaml
 
 from feedsim.errors import InputError
 from feedsim.scenario import json_schema, load_structure
-from feedsim.structure.geometry import Assembler
+from feedsim.structure.geometry.assemble import Assembler
 from structure_helpers import MACHINES, default_structure, geometry, one_axis_data, one_axis_text
 
 ROOT = Path(__file__).resolve().parents[2]

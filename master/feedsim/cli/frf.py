@@ -39,7 +39,7 @@ def frf(options: Namespace) -> None:
     from feedsim.analysis.campaign import run_campaign
     from feedsim.cosim.plant_modes import plant_modes
     from feedsim.scenario import load_subject
-    from feedsim.structure.doubt import table_doubt
+    from feedsim.structure.table_check import table_mismatch
 
     subject = load_subject(options.subject, options.overrides)
     machine = subject.machine
@@ -61,7 +61,7 @@ def frf(options: Namespace) -> None:
         result = linear.evaluate(system, axes)
         closed = responses.closed_form(system, wanted, frequency)
         progress("closed form", 1, 1)
-        if not doubts and (doubt := table_doubt(machine)) is not None:
+        if not doubts and (doubt := table_mismatch(machine)) is not None:
             warnings.append(doubt)
         if result.unstable_poles:
             warnings.append(_unstable(result.unstable_poles))

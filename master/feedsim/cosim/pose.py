@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from feedsim.cosim.system import System
 from feedsim.nc import Program
 from feedsim.scenario import Machine
-from feedsim.structure.doubt import table_doubt
 from feedsim.structure.pack import POSES_IN_ARCHIVE
 from feedsim.structure.pose_change import NEAR, PoseChange, pose_change, warnings
-from feedsim.structure.poses import GridAxis
-from feedsim.structure.poses_file import read_grid
+from feedsim.structure.poses_file import GridAxis, read_grid
+from feedsim.structure.table_check import table_mismatch
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def pose_use(machine: Machine, program: Program, system: System) -> PoseUse:
     left = tuple(
         sentence for axis in grid if axis.axis in ranges for sentence in _left(axis, ranges[axis.axis], machine)
     )
-    doubt = None if grid else table_doubt(machine)  # a plant that follows has modes of its own
+    doubt = None if grid else table_mismatch(machine)  # a plant that follows has modes of its own
     doubts = () if doubt is None else (doubt,)
     return PoseUse(change, grid, _crossings(system) if grid else None, (*doubts, *left, *warnings(change)))
 

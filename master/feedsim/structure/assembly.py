@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+SHOWN = 5  # labels in a message
+DEGREES = ("degree of freedom", "degrees of freedom")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,3 +63,32 @@ class Assembly:
     labels: tuple[str, ...]
     geometry: Geometry | None
     pose: Mapping[str, float]
+
+
+def translating_mass(assembly: Assembly) -> Floats:
+    """Mass that translates in X, Y and Z (3,) [kg]; 0 where the model does not say which way it moves.
+
+    Degrees of freedom that are constrained have left the model and count no more. A rotor that stands as a mass on a
+    displacement (docs/fe-import.md) counts as the mass that it is in the model.
+    """
+    masses = np.zeros(3)
+    for d, direction in enumerate(("ux", "uy", "uz")):
+        if assembly.geometry is not None:
+            columns = assembly.geometry.dofs[:, d]
+            unit = np.zeros(len(assembly.labels))
+            unit[columns[columns >= 0]] = 1
+        else:
+            unit = np.array([label.endswith(f" {direction}") for label in assembly.labels], dtype=np.float64)
+        masses[d] = unit @ (assembly.mass @ unit)
+    return masses
+
+
+def few(labels: Sequence[str], indices: Integers) -> str:
+    """The first labels, and how many there are beyond."""
+    text = ", ".join(labels[int(i)] for i in indices[:SHOWN])
+    return text + (f" and {len(indices) - SHOWN} more" if len(indices) > SHOWN else "")
+
+
+def counted(count: int, one: str, several: str) -> str:
+    """ "1 degree of freedom has", "3 degrees of freedom have"."""
+    return f"{count} {one if count == 1 else several}"

@@ -11,11 +11,10 @@ from feedsim.errors import InputError
 from feedsim.scenario import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.scenario.structure.matrices import FiniteElements
-from feedsim.structure import matrices
 from feedsim.structure.assembly import Assembly
-from feedsim.structure.checks import check
-from feedsim.structure.checks.units import frequency_warnings
-from feedsim.structure.geometry import assemble as assemble_geometry
+from feedsim.structure.checks.model import check, frequency_warnings
+from feedsim.structure.geometry.assemble import assemble as assemble_geometry
+from feedsim.structure.matrices.build import import_model
 from feedsim.structure.solve import Solution, solve
 
 # Positions that are typed twice are the same where they differ by less [m].
@@ -43,7 +42,7 @@ def assemble(structure: Structure, pose: Mapping[str, float]) -> tuple[Assembly,
         return assemble_geometry(structure, pose), ()
     if not isinstance(structure, FiniteElements):
         raise TypeError(f"no kind of structure: {type(structure).__name__}")
-    model = matrices.import_model(structure)
+    model = import_model(structure)
     own = model.assembly.pose
     for axis, position in pose.items():
         if axis not in structure.axes:

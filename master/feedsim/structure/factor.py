@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from feedsim.errors import InputError
-from feedsim.structure.assembly import Assembly
+from feedsim.structure.assembly import Assembly, Floats
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-Floats = NDArray[np.float64]
 
 # A factorisation without pivoting is trusted where it solves a random system to this backward error: an eigenvalue
 # that near to the shift, relative to the largest one, may be counted on the wrong side of it, and no other.

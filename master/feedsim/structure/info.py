@@ -7,18 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.scenario import Friction
-from feedsim.structure.assembly import Assembly
+from feedsim.structure.assembly import Assembly, Floats, translating_mass
 from feedsim.structure.build import Built
 from feedsim.structure.modes import Modes
 from feedsim.structure.solve import Solution
-
-Floats = NDArray[np.float64]
-
-# A table and a structure that belong together agree to the eigensolver's error (1e-8); a changed structure is far off.
-SAME = 1e-5
 
 
 @dataclass(frozen=True)
@@ -78,19 +72,6 @@ def axis_infos(
             )
         )
     return tuple(infos)
-
-
-def total_mass(assembly: Assembly) -> float:
-    """Mass of everything [kg], as a translation along X meets it; NaN without geometry.
-
-    A rotor that stands as a mass on a displacement (docs/fe-import.md) counts as the mass that it is in the model.
-    """
-    if assembly.geometry is None:
-        return math.nan
-    dofs = assembly.geometry.dofs[:, 0]
-    u = np.zeros(assembly.mass.shape[0])
-    u[dofs[dofs >= 0]] = 1.0
-    return float(u @ (assembly.mass @ u))
 
 
 def moving_mass(assembly: Assembly, shapes: Floats, modes: Modes, axis: str, axes: Sequence[str]) -> float:
@@ -161,7 +142,7 @@ def info_of_model(
         pose=assembly.pose,
         axes=axis_infos(solution.modes, assembly.axes, step, friction, (assembly, solution.shapes)),
         step=step,
-        total_mass=total_mass(assembly),
+        total_mass=math.nan if assembly.geometry is None else float(translating_mass(assembly)[0]),
         modes=solution.modes,
         moving=tuple(str(motion) for motion in solution.moving),
         built=built,
@@ -191,31 +172,3 @@ def info_of_table(
         built=None,
         warnings=(),
     )
-
-
-def stale(table: Modes, built: Modes, tolerance: float = SAME) -> str:
-    """In words where a table of modes is not what the structure gives at the pose that it belongs to; "" where it is.
-
-    Compared are what the drives see of it: frequencies of modes and inertias of axes. A table may have been cut off
-    elsewhere, and may end in pseudo-modes of a static correction: then the modes that both have count.
-
-    built: modes without pseudo-modes. tolerance: relative [1].
-    """
-    count = min(len(table.frequency), len(built.frequency))
-    whole = len(table.frequency) == len(built.frequency)
-    here, there = table.frequency[:count], built.frequency[:count]
-    off = np.flatnonzero(np.abs(here - there) > tolerance * there)
-    if len(off):
-        k = int(off[0])
-        # At most one pseudo-mode per port, after the modes; one elastic mode at least has to agree for that.
-        corrected = len(table.frequency) - k <= len(table.ports) and bool(np.any(there[:k] > 0))
-        if whole or not corrected:
-            return f"mode {k} has {here[k]:.6g} Hz; the structure gives {there[k]:.6g} Hz"
-    for axis in (port.removeprefix("n_") for port in built.ports if port.startswith("n_")):
-        inertias = [("J_tot", table.J_tot(axis), built.J_tot(axis))]
-        if whole:  # it is a sum over all modes
-            inertias.append(("J_inf", table.J_inf(axis), built.J_inf(axis)))
-        for what, own, other in inertias:
-            if abs(own - other) > tolerance * other:
-                return f"{what} of {axis} is {own:.6g} kg.m2 by it; the structure gives {other:.6g} kg.m2"
-    return ""

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.scenario import Machine
+from feedsim.structure.assembly import Floats
 from feedsim.trace.files import written_whole
-
-Floats = NDArray[np.float64]
 
 MODE, FREQUENCY, DAMPING = "mode", "frequency [Hz]", "damping ratio [1]"
 TOOL_PORTS = ("tcp_X", "tcp_Y", "tcp_Z")

@@ -6,12 +6,8 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feedsim.structure.assembly import Assembly
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from feedsim.structure.assembly import Assembly, Floats, Integers
 
 DIRECTIONS = "XYZ"
 # Bodies are named up to this number and down to this share.

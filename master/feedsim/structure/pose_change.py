@@ -12,20 +12,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from feedsim.errors import FeedsimError
 from feedsim.scenario import Machine
-from feedsim.structure.assembly import Assembly
-from feedsim.structure.at_hand import State, assembler_of, state_of, structure_of
-from feedsim.structure.factor import SparseFactor
+from feedsim.structure.assembly import Assembly, Floats
+from feedsim.structure.geometry.assemble import State, assembler_of, state_of, structure_of
 from feedsim.structure.modes import TOOL_PORTS
-from feedsim.structure.solve import Solution, solve
 
-Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    from feedsim.structure.solve import Solution
 
 # Closer to the pose nothing is calculated [m]: modes change by 0.1 % and less per millimetre.
 NEAR = 1e-3
@@ -218,6 +217,8 @@ def _middle(pose: _Pose) -> tuple[Assembly, Solution]:
 
 
 def _model(pose: _Pose, moved: Mapping[str, float], described: bool) -> tuple[Assembly, Solution]:
+    from feedsim.structure.solve import solve  # loaded where there is something to solve
+
     assembler = assembler_of(pose.structure, pose.state)
     here = {axis: position for axis, position in pose.axes if axis in assembler.structure.axes}
     assembly = assembler.at({**here, **moved})
@@ -248,6 +249,8 @@ def _modes(pose: _Pose, ends: Sequence[_End]) -> tuple[ModeChange, ...]:
 
 def _matched(assembly: Assembly, one: Solution, other: Solution) -> tuple[Floats, Floats]:
     """Per mode of `one`, frequency [Hz] and MAC of the mode of `other` that it becomes; each is taken once."""
+    from scipy.optimize import linear_sum_assignment
+
     if other is one:
         return one.modes.frequency, np.ones_like(one.modes.frequency)
     mac = (one.shapes.T @ (assembly.mass @ other.shapes)) ** 2
@@ -278,6 +281,8 @@ def _compliances(axis: str, ends: tuple[_End, _End, _End]) -> tuple[Compliance, 
 
 def _static(axis: str, assembly: Assembly, solution: Solution) -> list[float]:
     """Displacements under unit loads, less the rigid motion that they accelerate."""
+    from feedsim.structure.factor import SparseFactor
+
     rigid = solution.shapes[:, solution.modes.rigid]
     moved = assembly.mass @ rigid
     n, x = assembly.ports[f"n_{axis}"], assembly.ports[f"x_{axis}"]

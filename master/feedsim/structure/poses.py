@@ -15,97 +15,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.scenario import Structure
-from feedsim.scenario.structure.geometry import GeometryStructure
-from feedsim.structure.assembly import Assembly
-from feedsim.structure.geometry import Assembler
-from feedsim.structure.modes import Modes
+from feedsim.structure.assembly import Assembly, Floats
+from feedsim.structure.geometry.assemble import movable
+from feedsim.structure.poses_file import Cell, GridAxis, PoseGrid
 from feedsim.structure.solve import solve
-
-Floats = NDArray[np.float64]
 
 # An axis that rests on a boundary swings about it by micrometres (following error, ring-down) and must not change
 # cells with every swing; a hundredth of a cell is 0.2 mm for cells of 20 mm. The modes hardly change over that.
 HYSTERESIS = 0.01
 # What a grid may hold at most: the plant has all of it in memory.
 MOST_CELLS = 20000
-# A mode table belongs to a structure where its frequencies are the structure's, to the digits that tables are given in.
-SAME_FREQUENCY = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class GridAxis:
-    """Cells along an axis.
-
-    Attributes:
-        axis: its name.
-        centres: (n,) positions that the modes belong to, ascending [m].
-        boundaries: (n - 1,) where the cells meet [m]. The outermost cells have no end.
-        hysteresis: how far beyond a boundary the axis must be for the cell to change [m].
-    """
-
-    axis: str
-    centres: Floats
-    boundaries: Floats
-    hysteresis: float
-
-    @property
-    def width(self) -> float:
-        """Largest distance between neighbouring centres; of a single cell none, which is unlimited [m]."""
-        return float(np.max(np.diff(self.centres), initial=0.0)) if len(self.centres) > 1 else math.inf
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """First and last centre [m]."""
-        return float(self.centres[0]), float(self.centres[-1])
-
-    @property
-    def reach(self) -> tuple[float, float]:
-        """Where the first and the last cell end, were they as wide as asked for; of a single cell unlimited [m]."""
-        if len(self.centres) == 1:
-            return -math.inf, math.inf
-        first, last = self.limits
-        return 2 * first - float(self.boundaries[0]), 2 * last - float(self.boundaries[-1])
-
-
-@dataclass(frozen=True, eq=False)
-class Cell:
-    """A pose of the grid (axis -> position [m]) and its modes."""
-
-    pose: Mapping[str, float]
-    modes: Modes
-
-
-@dataclass(frozen=True, eq=False)
-class PoseGrid:
-    """Modes of all cells of a grid of poses.
-
-    Attributes:
-        axes: of the machine, in the plant's order.
-        grid: the axes that the grid extends along.
-        cells: row-major, the last grid axis fastest.
-        transfers: per grid axis, cell -> T (modes of its upper neighbour, own modes) for all cells that have one.
-    """
-
-    axes: tuple[str, ...]
-    grid: tuple[GridAxis, ...]
-    cells: tuple[Cell, ...]
-    transfers: tuple[Mapping[int, Floats], ...]
-
-    @property
-    def size(self) -> int:
-        """Numbers that poses.bin holds, 8 bytes each; the plant has as much in memory, and some more."""
-        heads = 3 + sum(3 + 2 * len(axis.centres) - 1 for axis in self.grid)
-        rows = sum(1 + len(cell.modes.frequency) * (2 + len(cell.modes.ports)) for cell in self.cells)
-        return heads + rows + sum(t.size for along in self.transfers for t in along.values())
 
 
 def grid_axis(axis: str, low: float, high: float, cell: float, hysteresis: float | None = None) -> GridAxis:
@@ -187,46 +113,6 @@ def pose_grid(
         if progress is not None:
             progress(index + 1, count)
     return PoseGrid(names, tuple(grid), tuple(cells), transfers)
-
-
-def movable(structure: Structure) -> Assembler:
-    """The structure, to be assembled in any pose.
-
-    Raises:
-        InputError: its kind is known at one pose only.
-    """
-    if not isinstance(structure, GeometryStructure):
-        raise InputError(
-            f"{structure.name or 'the structure'}: finite-element matrices belong to one pose; modes that follow the "
-            "axes need a structure of kind geometry, which can be assembled at any pose (docs/structure.md)"
-        )
-    return Assembler(structure)
-
-
-def check_same_machine(modes: Modes, structure: Structure, pose: Mapping[str, float]) -> None:
-    """A mode table is that of the structure at `pose` (axis -> position [m]): a grid of poses goes on from it.
-
-    Raises:
-        InputError: it has other frequencies.
-    """
-    own = modes.frequency[~modes.rigid]
-    assembly = movable(structure).at({axis: pose[axis] for axis in structure_axes(structure)})
-    found = solve(assembly, cutoff=structure.cutoff, damping=structure.damping).modes.frequency
-    found = found[found > 0]
-    count = min(len(own), len(found))
-    wrong = np.flatnonzero(np.abs(own[:count] - found[:count]) > SAME_FREQUENCY * found[:count])
-    if len(wrong):
-        i = int(wrong[0])
-        where = ", ".join(f"{axis} {units.show(position, 'm')}" for axis, position in assembly.pose.items())
-        raise InputError(
-            f"{modes.file}: elastic mode {i} has {own[i]:.6g} Hz; the structure's has {found[i]:.6g} Hz at {where}. A "
-            "grid of poses would be another machine: compute the table anew (feedsim machine build)"
-        )
-
-
-def structure_axes(structure: Structure) -> tuple[str, ...]:
-    """Axes of a structure of kind geometry; none of others."""
-    return tuple(structure.axes) if isinstance(structure, GeometryStructure) else ()
 
 
 def check_common(first: Assembly, other: Assembly) -> None:

@@ -1,21 +1,87 @@
-"""poses.bin, the grid of poses as the plant reads it: src/plant_fmu/README.md, Tables."""
+"""Modes of a grid of poses, and poses.bin, their file as the plant reads it: src/plant_fmu/README.md, Tables."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.errors import InputError
+from feedsim.structure.assembly import Floats
 from feedsim.structure.modes import TOOL_PORTS, Modes
-from feedsim.structure.poses import Cell, GridAxis, PoseGrid
 from feedsim.trace.files import written_whole
 
 MARK = b"FSPOSES1"
 
-Floats = NDArray[np.float64]
+
+@dataclass(frozen=True, eq=False)
+class GridAxis:
+    """Cells along an axis.
+
+    Attributes:
+        axis: its name.
+        centres: (n,) positions that the modes belong to, ascending [m].
+        boundaries: (n - 1,) where the cells meet [m]. The outermost cells have no end.
+        hysteresis: how far beyond a boundary the axis must be for the cell to change [m].
+    """
+
+    axis: str
+    centres: Floats
+    boundaries: Floats
+    hysteresis: float
+
+    @property
+    def width(self) -> float:
+        """Largest distance between neighbouring centres; of a single cell none, which is unlimited [m]."""
+        return float(np.max(np.diff(self.centres), initial=0.0)) if len(self.centres) > 1 else math.inf
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """First and last centre [m]."""
+        return float(self.centres[0]), float(self.centres[-1])
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Where the first and the last cell end, were they as wide as asked for; of a single cell unlimited [m]."""
+        if len(self.centres) == 1:
+            return -math.inf, math.inf
+        first, last = self.limits
+        return 2 * first - float(self.boundaries[0]), 2 * last - float(self.boundaries[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A pose of the grid (axis -> position [m]) and its modes."""
+
+    pose: Mapping[str, float]
+    modes: Modes
+
+
+@dataclass(frozen=True, eq=False)
+class PoseGrid:
+    """Modes of all cells of a grid of poses.
+
+    Attributes:
+        axes: of the machine, in the plant's order.
+        grid: the axes that the grid extends along.
+        cells: row-major, the last grid axis fastest.
+        transfers: per grid axis, cell -> T (modes of its upper neighbour, own modes) for all cells that have one.
+    """
+
+    axes: tuple[str, ...]
+    grid: tuple[GridAxis, ...]
+    cells: tuple[Cell, ...]
+    transfers: tuple[Mapping[int, Floats], ...]
+
+    @property
+    def size(self) -> int:
+        """Numbers that poses.bin holds, 8 bytes each; the plant has as much in memory, and some more."""
+        heads = 3 + sum(3 + 2 * len(axis.centres) - 1 for axis in self.grid)
+        rows = sum(1 + len(cell.modes.frequency) * (2 + len(cell.modes.ports)) for cell in self.cells)
+        return heads + rows + sum(t.size for along in self.transfers for t in along.values())
 
 
 def write_poses(path: Path, poses: PoseGrid) -> int:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
-from feedsim.structure.assembly import Assembly
+from feedsim.structure.assembly import Assembly, Floats
 from feedsim.structure.eigenpairs import MASSLESS, Eigenpairs
-
-Floats = NDArray[np.float64]
 
 # The iteration below shrinks its error by shift/(lambda + shift) < 1/101 a step for every dropped mode.
 STEPS = 8

@@ -6,16 +6,13 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
 from feedsim.errors import InputError
-from feedsim.structure.assembly import Assembly
+from feedsim.structure.assembly import Assembly, Floats
 from feedsim.structure.eigenpairs import Eigenpairs
 from feedsim.structure.factor import not_definite
 from feedsim.structure.moving import what_moves
-
-Floats = NDArray[np.float64]
 
 # A mode is rigid where the strain energies of its degrees of freedom cancel to this part of their sum. In exact
 # matrices rounding leaves 1e-16, in matrices written as text with 13 digits 1e-13; a mode at 20 Hz of a machine of

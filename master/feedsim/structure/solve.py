@@ -10,13 +10,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from feedsim.errors import InputError
 from feedsim.scenario.structure import Damping
-from feedsim.structure.assembly import Assembly
+from feedsim.structure.assembly import Assembly, Floats
 from feedsim.structure.eigenpairs import Eigenpairs, dense, error_bounds, lanczos
 from feedsim.structure.modes import TOOL_PORTS, Modes
 from feedsim.structure.moving import Motion, what_moves
@@ -29,8 +28,6 @@ from feedsim.structure.rigid import (
     rigid_count,
     rotor_rows,
 )
-
-Floats = NDArray[np.float64]
 
 # Full matrices up to here: 800 degrees of freedom take a second. Beyond, the sparse way is faster by far.
 DENSE = 800

@@ -118,8 +118,9 @@ def figures(options: Namespace, described: Described, *, quiet: bool = False) ->
 
 def _info_of_structure(options: Namespace, described: Described, h: float, quiet: bool) -> MachineInfo:
     from feedsim.structure.build import build
-    from feedsim.structure.info import info_of_model, stale
+    from feedsim.structure.info import info_of_model
     from feedsim.structure.modes import read_modes
+    from feedsim.structure.table_check import stale
 
     assert described.structure is not None
     cutoff = _positive("cutoff", options.cutoff, "rad/s", "1500 Hz") if options.cutoff is not None else None

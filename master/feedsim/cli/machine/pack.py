@@ -17,7 +17,7 @@ from feedsim.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from feedsim.scenario import Machine
-    from feedsim.structure.poses import GridAxis
+    from feedsim.structure.poses_file import GridAxis
 
 # A cell takes a tenth of a second and, with two axes and a hundred modes, 0.2 MB in the archive and in the plant.
 MOST_CELLS = 3000
@@ -31,7 +31,7 @@ def pack(options: Namespace) -> None:
     from feedsim import cosim, scenario
     from feedsim.structure import checked_modes
     from feedsim.structure import pack as archive
-    from feedsim.structure.doubt import table_doubt
+    from feedsim.structure.table_check import table_mismatch
 
     if options.out.is_dir():
         raise OutputError(f"cannot write {options.out}: Is a directory; name the archive, e.g. --out machine.fmu")
@@ -41,7 +41,7 @@ def pack(options: Namespace) -> None:
     with tempfile.TemporaryDirectory(prefix="feedsim-") as folder:
         modes = _modes_at(machine, pose, Path(folder) / "modes.csv") if options.at else machine.modes
         checked_modes(machine.model_copy(update={"modes": modes}))  # what a run would refuse should not be packed
-        if not options.at and (doubt := table_doubt(machine)) is not None:
+        if not options.at and (doubt := table_mismatch(machine)) is not None:
             raise InputError(f"{doubt}, or let the modes be computed: --at")
         poses, follows = None, ""
         if options.poses:
@@ -111,9 +111,11 @@ def _write_grid(machine: Machine, pose: Mapping[str, float], modes: Path, option
         InputError: no such axis, no such cells, or a machine whose structure is known at one pose only.
     """
     from feedsim.scenario import load_structure
+    from feedsim.structure.geometry.assemble import movable
     from feedsim.structure.modes import read_modes
-    from feedsim.structure.poses import check_same_machine, movable, pose_grid
+    from feedsim.structure.poses import pose_grid
     from feedsim.structure.poses_file import write_poses
+    from feedsim.structure.table_check import check_same_machine
 
     if machine.structure is None:
         raise InputError(

@@ -14,8 +14,7 @@ from feedsim.scenario import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.assembly import Assembly, Geometry
 from feedsim.structure.build import Built
-from feedsim.structure.deflection import deflection, node_motion
-from feedsim.structure.geometry.outline import Outline, outline
+from feedsim.structure.geometry.outline import Outline, deflection, node_motion, outline
 
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 METAL = "#7b8794"  # screws, rotors, and bodies beyond the colours

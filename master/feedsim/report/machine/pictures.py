@@ -13,7 +13,7 @@ from feedsim.report.style import INK, MUTED, PAPER, PNG_DPI, VERMILLION, Picture
 from feedsim.report.view import FRONT, OBLIQUE, SIDE, TOP, Faces, View, draw_faces, draw_lines, frame_limits
 from feedsim.report.words import minus
 from feedsim.structure.build import Built
-from feedsim.structure.deflection import deflection, node_motion
+from feedsim.structure.geometry.outline import deflection, node_motion
 from feedsim.structure.info import MachineInfo
 
 if TYPE_CHECKING:

@@ -1,5 +1,5 @@
-"""Checks of a finite-element model before it is solved."""
+"""Checks of a finite-element model before it is solved, each fault with its own message.
 
-from feedsim.structure.checks.model import check
-
-__all__ = ["check"]
+May use assembly alone, beside numpy and scipy.
+Start with model.py: ``check``.
+"""

@@ -14,8 +14,7 @@ from scipy import sparse
 from scipy.linalg import eigh_tridiagonal
 from scipy.sparse.linalg import splu
 
-from feedsim.structure.assembly import Assembly, Floats
-from feedsim.structure.checks.words import few, listing
+from feedsim.structure.assembly import Assembly, Floats, counted, few
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,7 +43,7 @@ def mass_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
             "them a mass, hold them, or leave them out"
         ], []
     return [], [
-        f"{listing(len(massless), 'degree of freedom follows', 'degrees of freedom follow')} statically, without mass: "
+        f"{counted(len(massless), 'degree of freedom follows', 'degrees of freedom follow')} statically, without mass: "
         f"{few(assembly.labels, massless)}"
     ]
 
@@ -60,7 +59,7 @@ def _indefinite(assembly: Assembly, matrix: sparse.csc_array, what: str, quantit
     if len(negative):
         worst = negative[np.argsort(diagonal[negative])]
         return [
-            f"{listing(len(worst), 'degree of freedom has', 'degrees of freedom have')} negative {quantity} on the "
+            f"{counted(len(worst), 'degree of freedom has', 'degrees of freedom have')} negative {quantity} on the "
             f"diagonal, down to {diagonal[worst[0]]:.6g} at {few(assembly.labels, worst)}"
         ]
     pair = _worst_pair(matrix, diagonal)

@@ -6,16 +6,15 @@ only the solution can tell stays with it: how many rigid modes there are, and ne
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
 
 from feedsim.errors import InputError
-from feedsim.structure.assembly import Assembly, Floats
+from feedsim.structure.assembly import Assembly, Floats, counted, few, translating_mass
 from feedsim.structure.checks.definite import mass_faults, stiffness_faults
 from feedsim.structure.checks.parts import part_faults
-from feedsim.structure.checks.units import unit_warnings
-from feedsim.structure.checks.words import few, listing
 
 # Round-off of an element's assembly is 1e-12 of an entry's scale and less; a matrix that is wrong is off by more.
 ASYMMETRY = 1e-9
@@ -76,7 +75,7 @@ def _finite(assembly: Assembly) -> list[str]:
             row = int(matrix.indices[bad[0]])
             column = int(np.searchsorted(matrix.indptr, bad[0], side="right")) - 1
             faults.append(
-                f"{listing(len(bad), 'entry', 'entries')} of the {what} matrix not finite, the first "
+                f"{counted(len(bad), 'entry', 'entries')} of the {what} matrix not finite, the first "
                 f"{matrix.data[bad[0]]} at ({assembly.labels[row]}, {assembly.labels[column]})"
             )
     for port, vector in assembly.ports.items():
@@ -126,7 +125,7 @@ def _empty(assembly: Assembly) -> list[str]:
     if not len(empty):
         return []
     return [
-        f"{listing(len(empty), 'degree of freedom has', 'degrees of freedom have')} neither mass nor stiffness: "
+        f"{counted(len(empty), 'degree of freedom has', 'degrees of freedom have')} neither mass nor stiffness: "
         f"{few(assembly.labels, empty)}; constrain them or leave them out"
     ]
 
@@ -150,3 +149,50 @@ def _ports(assembly: Assembly) -> tuple[list[str], list[str]]:
     if idle:
         warnings.append(f"ports {', '.join(idle)} excite nothing: forces there move nothing, displacements stay 0")
     return faults, warnings
+
+
+LEAST_MASS, MOST_MASS = 20.0, 1e6  # [kg] a test bench, a portal machine
+LEAST_SIZE, MOST_SIZE = 0.05, 100.0  # [m]
+LEAST_FREQUENCY, MOST_FREQUENCY = 1.0, 2000.0  # [Hz] of the lowest elastic mode
+MASS_UNITS = {"tonnes": ("t", 1000.0), "grams": ("g", 1e-3)}
+
+
+def unit_warnings(assembly: Assembly) -> list[str]:
+    """What looks like another unit than the one that is stated."""
+    warnings = []
+    masses = translating_mass(assembly)
+    if np.any(masses) and not LEAST_MASS <= np.max(masses) <= MOST_MASS:
+        mass = float(np.max(masses))
+        text = f"the model's mass is {mass:.4g} kg; a machine has {LEAST_MASS:g} kg to {MOST_MASS:g} kg"
+        fitting = [
+            f"{mass:.4g} looks like {name}, units: {{mass: {unit}}}"
+            for name, (unit, factor) in MASS_UNITS.items()
+            if LEAST_MASS <= mass * factor <= MOST_MASS
+        ]
+        warnings.append("; ".join([text, *fitting]))
+    geometry = assembly.geometry
+    if geometry is not None and len(geometry.nodes) > 1:
+        size = float(np.max(np.ptp(geometry.nodes, axis=0)))
+        if not LEAST_SIZE <= size <= MOST_SIZE:
+            text = f"the model measures {size:.4g} m; a machine measures {LEAST_SIZE:g} m to {MOST_SIZE:g} m"
+            if LEAST_SIZE <= size / 1000 <= MOST_SIZE:
+                text += f"; {size:.4g} looks like millimetres, units: {{length: mm}}"
+            elif LEAST_SIZE <= size * 1000 <= MOST_SIZE:
+                text += "; was it converted from millimetres twice?"
+            warnings.append(text)
+    return warnings
+
+
+def frequency_warnings(omega: float) -> list[str]:
+    """About the lowest elastic mode's angular frequency [rad/s], once it is known."""
+    frequency = omega / (2 * math.pi)
+    if LEAST_FREQUENCY <= frequency <= MOST_FREQUENCY:
+        return []
+    text = (
+        f"the lowest elastic mode is at {frequency:.4g} Hz; a machine's is from {LEAST_FREQUENCY:g} Hz to "
+        f"{MOST_FREQUENCY:g} Hz"
+    )
+    # Mass in kg beside stiffness in N/mm: too low by the root of 1000; mass in t beside N/m: too high by it.
+    if frequency < LEAST_FREQUENCY:
+        return [f"{text}; is the stiffness in N/mm beside a mass in kg, or something held by nearly nothing?"]
+    return [f"{text}; is the mass in tonnes beside a stiffness in N/m?"]

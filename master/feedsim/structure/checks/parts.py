@@ -9,8 +9,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from feedsim.structure.assembly import Assembly, Integers
-from feedsim.structure.checks.words import DEGREES, SHOWN, few, listing
+from feedsim.structure.assembly import DEGREES, SHOWN, Assembly, Integers, counted, few
 
 # Round-off makes rigid modes of large stiff models mHz; a machine's or a mount's lowest mode is above 1 Hz.
 RIGID = (2 * math.pi * 0.1) ** 2
@@ -59,7 +58,7 @@ def _flying(
     faults = []
     for p, members, axes in parts[:SHOWN]:
         allowed = f" ({len(axes)} for the axes {', '.join(axes)} that act on it)" if axes else ""
-        size = listing(len(members), *DEGREES)
+        size = counted(len(members), *DEGREES)
         faults.append(
             f"a part flies freely: {size} ({few(assembly.labels, members)}) that nothing connects to the "
             f"{sizes[main]} of the largest part, with {_modes(free[p])}{allowed}; connect it, hold it or leave it out"
@@ -71,13 +70,13 @@ def _flying(
 
 def _modes(count: int) -> str:
     return (
-        f"{MOST_RIGID - 1} rigid modes or more" if count >= MOST_RIGID else listing(count, "rigid mode", "rigid modes")
+        f"{MOST_RIGID - 1} rigid modes or more" if count >= MOST_RIGID else counted(count, "rigid mode", "rigid modes")
     )
 
 
 def _held(assembly: Assembly, parts: list[Integers], largest: int) -> list[str]:
     warnings = [
-        f"a part of {listing(len(members), *DEGREES)} "
+        f"a part of {counted(len(members), *DEGREES)} "
         f"({few(assembly.labels, members)}) is connected to the ground alone, not to the {largest} of the largest part"
         for members in parts[:SHOWN]
     ]

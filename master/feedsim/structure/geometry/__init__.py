@@ -1,5 +1,5 @@
-"""A machine written as geometry: beams, masses, guides and drives, assembled at any pose of its axes."""
+"""A machine written as geometry: beams, masses, guides and drives, assembled at any pose of its axes.
 
-from feedsim.structure.geometry.assemble import Assembler, assemble
-
-__all__ = ["Assembler", "assemble"]
+May use the scenario's models of a structure, and assembly. Sole place of finite elements of our own.
+Start with assemble.py; mesh.py has nodes and beams, springs.py what joins the bodies.
+"""

@@ -1,21 +1,27 @@
-"""A machine written as geometry -> mass, stiffness and ports at a pose."""
+"""A machine written as geometry -> mass, stiffness and ports at a pose.
+
+A structure file is read and meshed once for all who look at other poses of its machine.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
+from feedsim.scenario import Structure, load_structure
 from feedsim.scenario.structure.checks import contradictions, pose_faults
+from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.assembly import Assembly, Geometry
 from feedsim.structure.geometry.mesh import Mesh, symmetric, weighted
 from feedsim.structure.geometry.springs import body_springs, drive_springs, ports
 
-if TYPE_CHECKING:
-    from feedsim.scenario.structure.geometry import GeometryStructure
+# What tells a file from a later one of the same name.
+State = tuple[int, int, int]
 
 
 class Assembler:
@@ -31,23 +37,6 @@ class Assembler:
             raise InputError.of(structure.name or "structure", faults)
         self.structure = structure
         self.mesh = Mesh(structure)
-
-    @property
-    def total_mass(self) -> float:
-        """Mass of everything [kg]."""
-        return self._mass_of(np.ones(len(self.mesh.names), dtype=np.bool_))
-
-    def moving_mass(self, axis: str) -> float:
-        """Mass of all that moves with an axis [kg]: its bodies with their screws and motors."""
-        bodies = self.structure.bodies
-        return self._mass_of(np.array([axis in bodies[carrier].moves_with for carrier in self.mesh.carriers]))
-
-    def _mass_of(self, nodes: NDArray[np.bool_]) -> float:
-        """Mass that nodes carry [kg]: what a translation of them moves."""
-        translation = np.zeros(self.mesh.size)
-        six = np.diff(self.mesh.first_dof, append=self.mesh.size) == 6
-        translation[self.mesh.first_dof[nodes & six]] = 1.0
-        return float(translation @ (self.mesh.mass @ translation))
 
     def at(self, pose: Mapping[str, float]) -> Assembly:
         """The machine with its axes at `pose` [m].
@@ -83,6 +72,43 @@ def assemble(structure: GeometryStructure, pose: Mapping[str, float]) -> Assembl
         InputError: the structure contradicts itself; the pose lacks an axis, names another one, or is out of travel.
     """
     return Assembler(structure).at(pose)
+
+
+def movable(structure: Structure) -> Assembler:
+    """The structure, to be assembled in any pose.
+
+    Raises:
+        InputError: its kind is known at one pose only.
+    """
+    if not isinstance(structure, GeometryStructure):
+        raise InputError(
+            f"{structure.name or 'the structure'}: finite-element matrices belong to one pose; modes that follow the "
+            "axes need a structure of kind geometry, which can be assembled at any pose (docs/structure.md)"
+        )
+    return Assembler(structure)
+
+
+def structure_axes(structure: Structure) -> tuple[str, ...]:
+    """Axes of a structure of kind geometry; none of others."""
+    return tuple(structure.axes) if isinstance(structure, GeometryStructure) else ()
+
+
+def state_of(file: Path) -> State:
+    """Time of the last change [ns], length [byte] and number of a file. Raises OSError."""
+    found = file.stat()
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+@lru_cache(maxsize=8)
+def structure_of(file: Path, state: State) -> Structure:
+    """As load_structure; `state` is that of the file, so that a changed one is read anew."""
+    return load_structure(file)
+
+
+@lru_cache(maxsize=8)
+def assembler_of(file: Path, state: State) -> Assembler:
+    """As movable, of :func:`structure_of`."""
+    return movable(structure_of(file, state))
 
 
 def _geometry(mesh: Mesh, positions: NDArray[np.float64]) -> Geometry:

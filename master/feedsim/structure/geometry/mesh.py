@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from feedsim.scenario.structure.geometry import GeometryStructure, NodeGroup
 from feedsim.scenario.structure.names import Held, Line, Node, nodes
-from feedsim.structure.geometry.beam import beam_matrices
+from feedsim.structure.geometry.beam import BeamProperties, beam_matrices, beam_properties, rod
 from feedsim.structure.geometry.points import Grip, Row, riding, rigid
-from feedsim.structure.geometry.sections import BeamProperties, beam_properties, rod
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.scenario.structure.drive import Drive
 from feedsim.scenario.structure.names import held, node, nodes, rail
+from feedsim.structure.assembly import Floats
 from feedsim.structure.geometry.mesh import FRAME, Mesh
 from feedsim.structure.geometry.points import Row, rigid
 
-Floats = NDArray[np.float64]
 Springs = Iterator[tuple[float, Row]]
 
 

@@ -14,10 +14,9 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.scenario.structure.matrices import AnsysStructure
-from feedsim.structure.checks.words import DEGREES, listing
-from feedsim.structure.matrices.nodes import read_points
-from feedsim.structure.matrices.raw import DIRECTIONS, Raw
-from feedsim.structure.matrices.sparse import from_triangle
+from feedsim.structure.assembly import DEGREES, counted
+from feedsim.structure.matrices.raw import DIRECTIONS, Raw, from_triangle
+from feedsim.structure.matrices.tables import read_points
 
 READER = "ansys.mapdl.reader"
 INSTALL = "make ansys (outside a checkout: pip install --no-deps ansys-mapdl-reader)"
@@ -65,7 +64,7 @@ def read(structure: AnsysStructure) -> Raw:
         entries = matrix.tocoo()
         rows, columns = entries.row.astype(np.int64), entries.col.astype(np.int64)
         matrices.append(from_triangle(rows, columns, entries.data.astype(np.float64), len(nodes), file))
-    notes = (f"{listing(int(fixed.sum()), *DEGREES)} constrained: removed",) if np.any(fixed) else ()
+    notes = (f"{counted(int(fixed.sum()), *DEGREES)} constrained: removed",) if np.any(fixed) else ()
     return Raw(
         matrices[0],
         matrices[1],

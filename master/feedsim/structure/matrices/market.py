@@ -9,10 +9,9 @@ from scipy import io, sparse
 
 from feedsim.errors import InputError
 from feedsim.scenario.structure.matrices import MatrixMarketStructure
-from feedsim.structure.checks.words import DEGREES, listing
-from feedsim.structure.matrices.nodes import NodeTable, read_nodes
-from feedsim.structure.matrices.raw import Raw
-from feedsim.structure.matrices.sparse import from_both, from_triangle
+from feedsim.structure.assembly import DEGREES, counted
+from feedsim.structure.matrices.raw import Raw, from_both, from_triangle
+from feedsim.structure.matrices.tables import NodeTable, read_nodes
 
 
 def read(structure: MatrixMarketStructure) -> Raw:
@@ -32,7 +31,7 @@ def read(structure: MatrixMarketStructure) -> Raw:
     fixed = (np.diff(mass.indptr) == 0) & (np.diff(stiffness.indptr) == 0)
     notes = []
     if np.any(fixed):
-        notes.append(f"{listing(int(fixed.sum()), *DEGREES)} without mass and stiffness: removed as constrained")
+        notes.append(f"{counted(int(fixed.sum()), *DEGREES)} without mass and stiffness: removed as constrained")
     absent = f"no column of {structure.nodes} gives it a degree of freedom" if structure.nodes else ""
     return Raw(mass, stiffness, table.nodes, table.directions, fixed, absent, table.points, tuple(notes))
 

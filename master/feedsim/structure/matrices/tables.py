@@ -1,4 +1,7 @@
-"""CSV tables of a finite-element model: a header, then rows; every fault with its line."""
+"""CSV tables of a finite-element model: nodes and lines between them, ports; every fault with its line.
+
+A table of ports says which degrees of freedom a motor, a scale and the tool act on and see, with which weights.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,12 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
+import numpy as np
+
 from feedsim.errors import InputError
+from feedsim.structure.assembly import Floats, Integers, few
+from feedsim.structure.matrices.raw import DIRECTIONS, Points, Raw
+from feedsim.structure.modes import TOOL_PORTS
 
 MOST_PROBLEMS = 20
 
@@ -86,3 +94,164 @@ def suggestion(word: str, known: set[str]) -> str:
     """'; did you mean ...?', else '; allowed: ...'."""
     close = get_close_matches(word, sorted(known), n=1, cutoff=0.6)
     return f"; did you mean {close[0]!r}?" if close else f"; allowed: {', '.join(sorted(known))}"
+
+
+NODE_COLUMNS = ("node", "x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class NodeTable:
+    """What a table of nodes says of the degrees of freedom. See Raw."""
+
+    nodes: tuple[str, ...] | None
+    directions: Integers
+    points: Points | None
+
+    @classmethod
+    def unknown(cls, size: int) -> NodeTable:
+        """Nothing is known."""
+        return cls(None, np.full(size, -1, dtype=np.int64), None)
+
+
+def read_nodes(file: Path, lines: Path | None, size: int) -> NodeTable:
+    """Nodes with the degrees of freedom of a model of `size`: columns ux ... rz number them from 0, empty for none.
+
+    Raises:
+        InputError: with file and line; a degree of freedom that is not there or is given twice.
+    """
+    rows = read_table(file, "a table of nodes", [NODE_COLUMNS], ("name", "body", *DIRECTIONS))
+    if not any(row[direction] for row in rows for direction in DIRECTIONS):
+        raise InputError(
+            f"{file}:1: a table of nodes for Matrix Market files needs columns {', '.join(DIRECTIONS)} (those that "
+            "there are) with the numbers of the degrees of freedom, from 0"
+        )
+    nodes, directions = [""] * size, np.full(size, -1, dtype=np.int64)
+    for row in rows:
+        for d, direction in enumerate(DIRECTIONS):
+            if row[direction] in ("", "-1"):
+                continue
+            i = index(file, row, direction, size)
+            if nodes[i]:
+                raise InputError(
+                    f"{file}:{row.line}: degree of freedom {i} belongs to node {nodes[i]} {DIRECTIONS[directions[i]]} "
+                    f"already"
+                )
+            nodes[i], directions[i] = row["node"], d
+    return NodeTable(tuple(nodes), directions, _points(file, rows, lines))
+
+
+def read_points(file: Path, lines: Path | None) -> Points:
+    """Nodes alone, where the matrices bring their own numbering by nodes. InputError with file and line."""
+    rows = read_table(file, "a table of nodes", [NODE_COLUMNS], ("name", "body"))
+    return _points(file, rows, lines)
+
+
+def _points(file: Path, rows: list[Row], lines: Path | None) -> Points:
+    seen: dict[str, int] = {}
+    for i, row in enumerate(rows):
+        if not row["node"]:
+            raise InputError(f"{file}:{row.line}: a node without a number or name")
+        if row["node"] in seen:
+            raise InputError(f"{file}:{row.line}: node {row['node']} is in line {rows[seen[row['node']]].line} already")
+        seen[row["node"]] = i
+    positions = [[number(file, row, column) for column in ("x", "y", "z")] for row in rows]
+    joined = []
+    for row in read_table(lines, "a table of lines", [("from", "to")]) if lines else []:
+        for end in ("from", "to"):
+            if row[end] not in seen:
+                raise InputError(f"{lines}:{row.line}: there is no node {row[end]} in {file}")
+        joined.append([seen[row["from"]], seen[row["to"]]])
+    return Points(
+        tuple(seen),
+        np.array(positions, dtype=np.float64).reshape(-1, 3),
+        tuple(row["name"] or f"node {row['node']}" for row in rows),
+        tuple(row["body"] for row in rows),
+        np.array(joined, dtype=np.int64).reshape(-1, 2),
+    )
+
+
+BY_DOF = ("port", "dof", "coefficient")
+BY_NODE = ("port", "node", "direction", "coefficient")
+# Spellings of the programs that tables come from.
+SPELLINGS = {
+    **{word: d for d, direction in enumerate(DIRECTIONS) for word in (direction, str(d + 1))},
+    **{"x": 0, "y": 1, "z": 2, "rotx": 3, "roty": 4, "rotz": 5},
+}
+
+
+def read_ports(file: Path, raw: Raw, axes: Sequence[str]) -> dict[str, Floats]:
+    """Vectors (N,) of the ports, in the file's units, constrained degrees of freedom included.
+
+    Ports of the tool that the table does not name are zero: nothing acts there and nothing is seen.
+
+    Raises:
+        InputError: lists every fault with its line: unknown ports, nodes, directions or degrees of freedom, a port
+            that names one twice, an axis without its ports, a port that acts on nothing but constraints.
+    """
+    rows = read_table(file, "a table of ports", [BY_NODE, BY_DOF])
+    wanted = [f"{quantity}_{axis}" for axis in axes for quantity in ("n", "x")]
+    vectors = {port: np.zeros(raw.size) for port in (*wanted, *TOOL_PORTS)}
+    problems = [
+        f"{file}: no row of port {port!r} ({_meaning(port)})"
+        for port in wanted
+        if all(row["port"] != port for row in rows)
+    ]
+    find, given = _Finder(file, raw), set[tuple[str, int]]()
+    for row in rows:
+        try:
+            port = row["port"]
+            if port not in vectors:
+                raise InputError(f"{file}:{row.line}: unknown port {port!r}{suggestion(port, set(vectors))}")
+            dof, weight = find(row), number(file, row, "coefficient")
+            if (port, dof) in given:
+                raise InputError(f"{file}:{row.line}: port {port!r} names {find.labels[dof]} twice")
+            given.add((port, dof))
+            vectors[port][dof] = weight
+        except InputError as error:
+            problems += error.problems
+    named = {row["port"] for row in rows}
+    for port, vector in vectors.items() if not problems else ():
+        if port in named and np.any(vector) and not np.any(vector[~raw.fixed]):
+            on = few(find.labels, np.flatnonzero(vector))
+            problems.append(f"{file}: port {port!r} acts on constrained degrees of freedom alone ({on}): nothing moves")
+    if problems:
+        raise InputError.of(f"{file}: not a usable table of ports", problems[:MOST_PROBLEMS])
+    return vectors
+
+
+class _Finder:
+    """The degree of freedom that a row of the table names."""
+
+    def __init__(self, file: Path, raw: Raw) -> None:
+        self.file, self.raw = file, raw
+        self.labels = raw.labels()
+        pairs = zip(raw.nodes, raw.directions.tolist(), strict=True) if raw.nodes else ()
+        self.index = {pair: i for i, pair in enumerate(pairs) if pair[0]}
+        self.nodes = {node for node, _ in self.index}
+
+    def __call__(self, row: Row) -> int:
+        where = f"{self.file}:{row.line}"
+        if "dof" in row.cells:
+            return index(self.file, row, "dof", self.raw.size)
+        if not self.index:
+            raise InputError(f"{where}: the table names nodes; without a table of nodes (nodes: ...) only dof counts")
+        node, word = row["node"], row["direction"].lower()
+        if word not in SPELLINGS:
+            raise InputError(f"{where}: column 'direction': {row['direction']!r} is none of {', '.join(DIRECTIONS)}")
+        direction = SPELLINGS[word]
+        found = self.index.get((node, direction))
+        if found is not None:
+            return found
+        known = [DIRECTIONS[d] for d in range(len(DIRECTIONS)) if (node, d) in self.index]
+        has = f"it has {', '.join(known)}; " if known else ""
+        in_mesh = self.raw.points is not None and node in self.raw.points.ids
+        if node not in self.nodes and not in_mesh:
+            raise InputError(f"{where}: there is no node {node!r} with degrees of freedom")
+        raise InputError(
+            f"{where}: node {node} has no degree of freedom {DIRECTIONS[direction]}; {has}{self.raw.absent}"
+        )
+
+
+def _meaning(port: str) -> str:
+    kind = "rotor against stator: torque in, angle out" if port.startswith("n_") else "linear scale: travel out"
+    return f"{kind}; axes: names {port[2:]}"

@@ -1,0 +1,112 @@
+"""Does a machine's table of modes belong to its structure, at its pose? Asked before the table is trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from feedsim import units
+from feedsim.errors import FeedsimError, InputError
+from feedsim.scenario import Machine, Structure
+from feedsim.structure.geometry.assemble import State, assembler_of, movable, state_of, structure_axes, structure_of
+from feedsim.structure.modes import Modes, read_modes
+
+# A table and a structure that belong together agree to the eigensolver's error (1e-8); a changed structure is far off.
+SAME = 1e-5
+# A mode table belongs to a structure where its frequencies are the structure's, to the digits that tables are given in.
+SAME_FREQUENCY = 1e-3
+
+
+def table_mismatch(machine: Machine) -> str | None:
+    """A sentence where the table of modes is not that of the machine's pose by its structure; None where it is.
+
+    None as well where it cannot be told: no structure, matrices (of one pose, and costly to solve), or a structure that
+    is faulty, which who needs it will say.
+    """
+    if machine.structure is None:
+        return None
+    try:
+        built = _modes(machine.structure, state_of(machine.structure), tuple(machine.pose.items()))
+        how = stale(read_modes(machine.modes, list(machine.axes)), built, SAME_FREQUENCY) if built else ""
+    except (OSError, FeedsimError):
+        return None
+    if not how:
+        return None
+    return (
+        f"the table of modes {machine.modes} is not that of the pose {_shown(machine.pose, ' ')}: {how}; build it "
+        f"anew: feedsim machine build {machine.structure} --at {_shown(machine.pose, '=')} --out DIR"
+    )
+
+
+def _shown(pose: Mapping[str, float], between: str) -> str:
+    if between == "=":
+        return " ".join(f"{axis}={1e3 * position:.9g}mm" for axis, position in pose.items())
+    return ", ".join(f"{axis}{between}{units.show(position, 'm')}" for axis, position in pose.items())
+
+
+@lru_cache(maxsize=32)
+def _modes(structure: Path, state: State, pose: tuple[tuple[str, float], ...]) -> Modes | None:
+    """Modes at the pose; `state` is that of the file, so that a changed one is read anew."""
+    description = structure_of(structure, state)
+    axes = structure_axes(description)
+    if not axes:
+        return None
+    assembly = assembler_of(structure, state).at({axis: position for axis, position in pose if axis in axes})
+    from feedsim.structure.solve import solve  # loaded where there is something to solve
+
+    # The sparse way: of a model of some hundred degrees of freedom, in less than half the time of full matrices.
+    return solve(assembly, cutoff=description.cutoff, damping=description.damping, dense_limit=0, described=False).modes
+
+
+def stale(table: Modes, built: Modes, tolerance: float = SAME) -> str:
+    """In words where a table of modes is not what the structure gives at the pose that it belongs to; "" where it is.
+
+    Compared are what the drives see of it: frequencies of modes and inertias of axes. A table may have been cut off
+    elsewhere, and may end in pseudo-modes of a static correction: then the modes that both have count.
+
+    built: modes without pseudo-modes. tolerance: relative [1].
+    """
+    count = min(len(table.frequency), len(built.frequency))
+    whole = len(table.frequency) == len(built.frequency)
+    here, there = table.frequency[:count], built.frequency[:count]
+    off = np.flatnonzero(np.abs(here - there) > tolerance * there)
+    if len(off):
+        k = int(off[0])
+        # At most one pseudo-mode per port, after the modes; one elastic mode at least has to agree for that.
+        corrected = len(table.frequency) - k <= len(table.ports) and bool(np.any(there[:k] > 0))
+        if whole or not corrected:
+            return f"mode {k} has {here[k]:.6g} Hz; the structure gives {there[k]:.6g} Hz"
+    for axis in (port.removeprefix("n_") for port in built.ports if port.startswith("n_")):
+        inertias = [("J_tot", table.J_tot(axis), built.J_tot(axis))]
+        if whole:  # it is a sum over all modes
+            inertias.append(("J_inf", table.J_inf(axis), built.J_inf(axis)))
+        for what, own, other in inertias:
+            if abs(own - other) > tolerance * other:
+                return f"{what} of {axis} is {own:.6g} kg.m2 by it; the structure gives {other:.6g} kg.m2"
+    return ""
+
+
+def check_same_machine(modes: Modes, structure: Structure, pose: Mapping[str, float]) -> None:
+    """A mode table is that of the structure at `pose` (axis -> position [m]): a grid of poses goes on from it.
+
+    Raises:
+        InputError: it has other frequencies.
+    """
+    from feedsim.structure.solve import solve
+
+    own = modes.frequency[~modes.rigid]
+    assembly = movable(structure).at({axis: pose[axis] for axis in structure_axes(structure)})
+    found = solve(assembly, cutoff=structure.cutoff, damping=structure.damping).modes.frequency
+    found = found[found > 0]
+    count = min(len(own), len(found))
+    wrong = np.flatnonzero(np.abs(own[:count] - found[:count]) > SAME_FREQUENCY * found[:count])
+    if len(wrong):
+        i = int(wrong[0])
+        where = ", ".join(f"{axis} {units.show(position, 'm')}" for axis, position in assembly.pose.items())
+        raise InputError(
+            f"{modes.file}: elastic mode {i} has {own[i]:.6g} Hz; the structure's has {found[i]:.6g} Hz at {where}. A "
+            "grid of poses would be another machine: compute the table anew (feedsim machine build)"
+        )

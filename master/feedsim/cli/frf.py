@@ -37,7 +37,7 @@ def frf(options: Namespace) -> None:
     from feedsim import report
     from feedsim.analysis import linear, responses, truncation
     from feedsim.analysis.campaign import run_campaign
-    from feedsim.cosim.plant_modes import plant_modes
+    from feedsim.cosim.plant import plant_modes
     from feedsim.scenario import load_subject
     from feedsim.structure.table_check import table_mismatch
 

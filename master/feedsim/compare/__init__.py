@@ -1,4 +1,7 @@
-"""Results against references: a tube of tolerance in value and in time around every variable."""
+"""Results against references: a tube of tolerance in value and in time around every variable.
+
+May use: scenario (tolerance files, spellings of units), trace. Start reading at `compare`; `tube` is the method.
+"""
 
 from feedsim.compare.compare import compare
 from feedsim.compare.files import Clock, compare_files, compare_series, pairs_of, tolerances_of, unusable
@@ -9,24 +12,7 @@ from feedsim.compare.tube import along, bounds
 from feedsim.compare.verdict import EXIT_CODES, Comparison, Curves, Variable, seconds
 
 __all__ = [
-    "DEFAULT",
-    "EXIT_CODES",
-    "Clock",
-    "Comparison",
-    "Curves",
-    "Options",
-    "Shift",
-    "Tolerance",
-    "Tolerances",
-    "Variable",
-    "along",
-    "bounds",
-    "compare",
-    "compare_files",
-    "compare_series",
-    "estimated_shift",
-    "pairs_of",
-    "seconds",
-    "tolerances_of",
-    "unusable",
-]
+    "DEFAULT", "EXIT_CODES", "Clock", "Comparison", "Curves", "Options", "Shift", "Tolerance", "Tolerances", "Variable",
+    "along", "bounds", "compare", "compare_files", "compare_series", "estimated_shift", "pairs_of", "seconds",
+    "tolerances_of", "unusable",
+]  # fmt: skip

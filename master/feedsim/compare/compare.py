@@ -8,10 +8,20 @@ from math import inf
 
 import numpy as np
 
-from feedsim.compare.options import Options, chosen, listed, missing, no_match, sources, unit_of, units_told, unmatched
+from feedsim.compare.options import (
+    Options,
+    chosen,
+    factor,
+    listed,
+    missing,
+    no_match,
+    sources,
+    units_told,
+    unmatched,
+    with_units,
+)
 from feedsim.compare.overlap import Overlap
-from feedsim.compare.quantity import allowed, factor
-from feedsim.compare.tolerance import Tolerances
+from feedsim.compare.tolerance import Tolerances, allowed
 from feedsim.compare.tube import along, bounds
 from feedsim.compare.verdict import Comparison, Curves, Variable, Verdict
 from feedsim.errors import InputError
@@ -44,6 +54,7 @@ def compare(
     notes = _unused(result, reference, tolerances, options)
     notes += units_told(reference.units, asked, options.reference_units, "reference")
     notes += units_told(result.units, found.values(), options.units, "result")
+    result, reference = with_units(result, options.units), with_units(reference, options.reference_units)
     unused = tuple(tolerances.unused(reference.all_names))
     blank = Comparison(*names, "unusable", notes=tuple(notes), shift=options.shift, unused=unused)
     if not found:
@@ -52,7 +63,7 @@ def compare(
     if not len(result) or not len(reference):
         return replace(blank, problem=f"the {'result' if len(reference) else 'reference'} has no rows")
     over = Overlap(result, reference, options, min(tolerances.of(name).time or 0.0 for name in found))
-    peers = _magnitudes(reference, asked, options)
+    peers = _magnitudes(reference, asked)
     blank = replace(blank, start=over.start, end=over.end)
     if over.problem:
         return replace(blank, problem=over.problem)
@@ -85,8 +96,7 @@ def _variable(
 ) -> tuple[Variable, list[str]]:
     """A variable and what there is to say about it."""
     options, tolerance = over.options, tolerances.of(name)
-    unit = over.reference.units[name] or unit_of(name, options.reference_units)
-    theirs = over.result.units[source] or unit_of(source, options.units)
+    unit, theirs = over.reference.units[name], over.result.units[source]
     remarks = []
     try:
         scale, remark = factor(theirs, unit)
@@ -149,22 +159,12 @@ def _variable(
     if bad.any():
         reason = f"the result holds no number ({y[np.argmax(bad)]}) in {np.sum(bad)} of {len(y)} rows"
     return Variable(
-        name,
-        "different" if beyond.any() else "same",
-        source,
-        unit,
-        time=float(at[worst]),
-        value=float(y[worst]),
-        expected=expected,
-        deviation=float(off[worst]),
-        allowed=limit,
-        reach=reach,
-        rows=len(at),
-        outside=int(np.sum(beyond)),
-        first=float(at[np.argmax(beyond)]) if beyond.any() else None,
-        reason=reason,
+        name, "different" if beyond.any() else "same", source, unit,
+        time=float(at[worst]), value=float(y[worst]), expected=expected, deviation=float(off[worst]),
+        allowed=limit, reach=reach, rows=len(at), outside=int(np.sum(beyond)),
+        first=float(at[np.argmax(beyond)]) if beyond.any() else None, reason=reason,
         curves=Curves(at, y, low - limit, high + limit, time, values, bool(hold)),
-    ), remarks
+    ), remarks  # fmt: skip
 
 
 def _light(variables: Sequence[Variable]) -> tuple[Variable, ...]:
@@ -193,15 +193,12 @@ def _unused(result: Series, reference: Series, tolerances: Tolerances, options: 
     return notes
 
 
-def _magnitudes(reference: Series, names: Sequence[str], options: Options) -> dict[str, float]:
+def _magnitudes(reference: Series, names: Sequence[str]) -> dict[str, float]:
     """Unit -> largest magnitude of the reference's columns in it; of plain numbers none."""
     found: dict[str, float] = {}
     for name in names:
-        if name not in reference:
-            continue
-        unit = reference.units[name] or unit_of(name, options.reference_units)
-        values = np.abs(reference[name])
-        if unit not in ("", "1"):
+        if name in reference and (unit := reference.units[name]) not in ("", "1"):
+            values = np.abs(reference[name])
             found[unit] = max(found.get(unit, 0.0), float(values[np.isfinite(values)].max(initial=0.0)))
     return found
 

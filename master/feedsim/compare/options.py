@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from feedsim.compare.quantity import factor
+from feedsim import units
 from feedsim.errors import InputError
-from feedsim.trace import matches
+from feedsim.scenario.columns import spelled
+from feedsim.trace import Series, matches
 from feedsim.trace.trace import suggest
 
 
@@ -45,9 +46,8 @@ class Options:
 
 def chosen(names: Sequence[str], options: Options) -> list[str]:
     """Reference's names that are asked for. InputError: a pattern that matches nothing."""
-    for pattern in (*options.only, *options.ignore):
-        if not any(matches(name, pattern) for name in names):
-            raise InputError(f"the reference has no column {pattern!r}{suggest(pattern, names)}")
+    for pattern in unmatched((*options.only, *options.ignore), names):
+        raise InputError(f"the reference has no column {pattern!r}{suggest(pattern, names)}")
     return [name for name in names if (not options.only or _any(name, options.only)) and not _any(name, options.ignore)]
 
 
@@ -82,9 +82,16 @@ def missing(name: str, result: Sequence[str]) -> str:
     return f"the result has no column {name!r}{suggest(name, result)}"
 
 
-def unit_of(name: str, units: Mapping[str, str]) -> str:
+def with_units(series: Series, given: Mapping[str, str]) -> Series:
+    """With the units that are given for columns whose header tells none. given: pattern -> unit."""
+    if not given:
+        return series
+    return replace(series, units={name: unit or _given(name, given) for name, unit in series.units.items()})
+
+
+def _given(name: str, given: Mapping[str, str]) -> str:
     """Unit that is given for a column; "" without."""
-    return next((unit for pattern, unit in reversed(list(units.items())) if matches(name, pattern)), "")
+    return next((unit for pattern, unit in reversed(list(given.items())) if matches(name, pattern)), "")
 
 
 def units_told(headers: Mapping[str, str], names: Iterable[str], given: Mapping[str, str], whose: str) -> list[str]:
@@ -94,7 +101,7 @@ def units_told(headers: Mapping[str, str], names: Iterable[str], given: Mapping[
     """
     twice: dict[str, list[str]] = {}
     for name in names:
-        header, unit = headers.get(name, ""), unit_of(name, given)
+        header, unit = headers.get(name, ""), _given(name, given)
         if not header or not unit:
             continue
         try:
@@ -108,6 +115,31 @@ def units_told(headers: Mapping[str, str], names: Iterable[str], given: Mapping[
             )
         twice.setdefault(unit, []).append(name)
     return [f"{listed(those)}: the {whose}'s header tells {unit} already" for unit, those in twice.items()]
+
+
+def factor(result: str, reference: str) -> tuple[float, str]:
+    """What result's values are multiplied with to be in the reference's unit, and what was taken for granted.
+
+    A column without a unit is in SI where the other one has a unit: so are the variables of FMUs that tools write
+    without. InputError: unknown unit, dimensions differ.
+    """
+    if result == reference or {result, reference} <= {"", "1"}:  # a plain number is written with and without "1"
+        return 1.0, ""
+    if result and reference:
+        return conversion(result, reference), ""
+    if not result:
+        scale = 1 / units.unit(spelled(reference)).factor
+        return float(scale), f"the result tells no unit; taken as SI (the reference's is {reference})"
+    to_si = float(units.unit(spelled(result)).factor)
+    return to_si, f"the reference tells no unit; taken as SI (the result's is {result})"
+
+
+def conversion(given: str, wanted: str) -> float:
+    """Factor between two units, in the spelling of drives where feedsim does not know them. InputError."""
+    try:
+        return float(units.factor(given, wanted))
+    except InputError:
+        return float(units.factor(spelled(given), spelled(wanted)))
 
 
 def unmatched(patterns: Iterable[str], names: Sequence[str]) -> list[str]:

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from feedsim.compare.options import Options, chosen, listed, sources, unit_of
-from feedsim.compare.quantity import factor
+from feedsim.compare.options import Options, chosen, factor, listed, sources, with_units
 from feedsim.compare.tolerance import Tolerances
 from feedsim.compare.tube import Rows, usual_step
 from feedsim.errors import InputError
@@ -67,15 +66,15 @@ def estimated_shift(
     end = float(reference.time[-1] if options.end is None else min(reference.time[-1], options.end))
     compared = (reference.time >= begin) & (reference.time <= end)
     near = (result.time >= begin - most) & (result.time <= end + most)
+    result, reference = with_units(result, options.units), with_units(reference, options.reference_units)
     asked = [n for n in chosen(reference.all_names, options) if n in reference and not tolerances.of(n).ignore]
     found: dict[str, tuple[Array, Array]] = {}
     left_out: dict[str, str] = {}
     for name, source in sources(result.all_names, asked, options).items():
         if source not in result:
             continue
-        unit = reference.units[name] or unit_of(name, options.reference_units)
         try:
-            scale, _ = factor(result.units[source] or unit_of(source, options.units), unit)
+            scale, _ = factor(result.units[source], reference.units[name])
         except InputError:
             left_out[name] = "units differ"
             continue

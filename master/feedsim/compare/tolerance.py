@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite
 
 from feedsim import units
+from feedsim.compare.options import conversion
 from feedsim.errors import InputError
 from feedsim.scenario.tolerances import ToleranceFile
 from feedsim.trace import matches
@@ -150,3 +152,26 @@ def _part(text: str) -> Tolerance:
     if units.unit(unit).dimension == units.unit("s").dimension:
         return Tolerance(time=units.convert(value, unit, "s"))
     return Tolerance(value=value, unit=unit)
+
+
+def allowed(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> float:
+    """Tolerance in value in `unit`; without a unit the values are taken to be in SI.
+
+    span, magnitude: range of the reference, and largest magnitude of its kind. InputError: a unit of another kind, or
+    what comes of it is too large for a number.
+    """
+    found = _allowed(tolerance, unit, span, magnitude)
+    if not isfinite(found):
+        raise InputError(f"{tolerance.text} of a range of {span:.6g} is no finite number")
+    return found
+
+
+def _allowed(tolerance: Tolerance, unit: str, span: float, magnitude: float) -> float:
+    value, given = tolerance.value or 0.0, tolerance.unit or ""
+    if tolerance.relative:
+        return value * max(span, OF_MAGNITUDE * magnitude, OF_UNIT) if value else 0.0
+    if not given or given == unit:
+        return value
+    if not unit:
+        return value * float(units.unit(given).factor)
+    return value * conversion(given, unit)

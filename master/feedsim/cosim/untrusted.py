@@ -20,17 +20,9 @@ FREE = 64 << 20  # bytes up to which the ratio does not count
 LARGEST_DOCUMENT = 64 << 20  # bytes of what is read into memory at once: XML, JSON, YAML
 LONGEST_PART = 240  # bytes of a file's or folder's name; systems know 255
 LONGEST_NAME = 1024  # bytes of a name with its folders
-_DEVICES = frozenset(
-    (
-        "CON",
-        "PRN",
-        "AUX",
-        "NUL",
-        "CONIN$",
-        "CONOUT$",
-        *(f"{port}{n}" for port in ("COM", "LPT") for n in "0123456789¹²³"),
-    )
-)  # on Windows, with any ending
+# On Windows, with any ending.
+_PORTS = (f"{port}{n}" for port in ("COM", "LPT") for n in "0123456789¹²³")
+_DEVICES = frozenset(("CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$", *_PORTS))
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of the standards FMI and SSP
 
 

@@ -57,7 +57,7 @@ def test_events_missing_values_words_and_arrays(tmp_path: Path) -> None:
 
 def test_time_of_another_name(tmp_path: Path) -> None:
     path = file(tmp_path, "k,clock,x\n0,0,1\n1,1000,2\n")
-    np.testing.assert_array_equal(read_series(path, time="clock", time_unit="us").time, [0, 1e-3])
+    np.testing.assert_array_equal(read_series(path, time="clock:us").time, [0, 1e-3])
     with pytest.raises(InputError, match="no time column"):
         read_series(path)
 

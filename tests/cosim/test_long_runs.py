@@ -42,9 +42,10 @@ def everything_is_long(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("in_memory", [0, 10**6])
-def test_table(in_memory: int, tmp_path: Path) -> None:
+def test_table(in_memory: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table, "IN_MEMORY", in_memory)
     values = np.random.default_rng(1).normal(size=(3, 50_000))
-    filled = Table(3, 60_000, tmp_path, in_memory=in_memory)
+    filled = Table(3, 60_000, tmp_path)
     for first in range(0, 50_000, 7001):
         filled.append(values[:, first : first + 7001])
     columns = filled.columns()
@@ -61,13 +62,15 @@ def test_table(in_memory: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="tells mappings on Linux only")
-def test_file_goes_with_the_last_array(tmp_path: Path) -> None:
+def test_file_goes_with_the_last_array(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table, "IN_MEMORY", 0)
+
     def open_files() -> int:
         return Path("/proc/self/maps").read_text().count(str(tmp_path)) + sum(
             os.path.realpath(link).startswith(str(tmp_path)) for link in Path("/proc/self/fd").iterdir()
         )
 
-    filled = Table(2, 1000, tmp_path, in_memory=0)
+    filled = Table(2, 1000, tmp_path)
     filled.append(np.arange(2000.0).reshape(2, -1))
     time, values = filled.columns()
     part = Trace(time, {"y": values}).between(10.0, 20.0)
@@ -80,9 +83,10 @@ def test_file_goes_with_the_last_array(tmp_path: Path) -> None:
     assert open_files() == 0
 
 
-def test_full_disk_is_an_error_that_tells_the_size(tmp_path: Path) -> None:
+def test_full_disk_is_an_error_that_tells_the_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table, "IN_MEMORY", 0)
     with pytest.raises(OutputError, match=r"gone: a temporary file of 8 MB .* cannot be written: No such file"):
-        Table(10, 100_000, tmp_path / "gone", in_memory=0)
+        Table(10, 100_000, tmp_path / "gone")
 
 
 def test_trace_takes_what_nobody_can_change_as_it_is() -> None:

@@ -4,7 +4,7 @@ May use: scenario (tolerance files, spellings of units), trace. Start reading at
 """
 
 from feedsim.compare.compare import compare
-from feedsim.compare.files import Clock, compare_files, compare_series, pairs_of, tolerances_of, unusable
+from feedsim.compare.files import compare_files, compare_series, pairs_of, tolerances_of, unusable
 from feedsim.compare.options import Options
 from feedsim.compare.shift import Shift, estimated_shift
 from feedsim.compare.tolerance import DEFAULT, Tolerance, Tolerances
@@ -12,7 +12,7 @@ from feedsim.compare.tube import along, bounds
 from feedsim.compare.verdict import EXIT_CODES, Comparison, Curves, Variable, seconds
 
 __all__ = [
-    "DEFAULT", "EXIT_CODES", "Clock", "Comparison", "Curves", "Options", "Shift", "Tolerance", "Tolerances", "Variable",
+    "DEFAULT", "EXIT_CODES", "Comparison", "Curves", "Options", "Shift", "Tolerance", "Tolerances", "Variable",
     "along", "bounds", "compare", "compare_files", "compare_series", "estimated_shift", "pairs_of", "seconds",
     "tolerances_of", "unusable",
 ]  # fmt: skip

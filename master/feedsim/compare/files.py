@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from feedsim.compare.compare import compare
@@ -17,14 +16,6 @@ from feedsim.trace import Series, read_series
 TOLERANCES = "tolerances.yaml"
 # reference data in the layout of the FMI cross-check
 REFERENCE_ENDING = "_ref.csv"
-
-
-@dataclass(frozen=True)
-class Clock:
-    """Where the time of a file is: name of its column and its unit; None: as the header tells."""
-
-    column: str | None = None
-    unit: str | None = None
 
 
 def pairs_of(paths: Sequence[Path]) -> list[tuple[Path, Path]]:
@@ -55,18 +46,13 @@ def pairs_of(paths: Sequence[Path]) -> list[tuple[Path, Path]]:
 
 
 def compare_files(
-    result: Path,
-    reference: Path,
-    tolerances: Tolerances | None = None,
-    options: Options | None = None,
-    *,
-    clocks: tuple[Clock, Clock] = (Clock(), Clock()),
+    result: Path, reference: Path, tolerances: Tolerances | None = None, options: Options | None = None
 ) -> Comparison:
     """Read and compare two files; what cannot be read or compared is told in what is returned."""
     read: list[Series] = []
-    for path, clock, what in zip((result, reference), clocks, ("result", "reference"), strict=True):
+    for path, what in ((result, "result"), (reference, "reference")):
         try:
-            read.append(read_series(path, time=clock.column, time_unit=clock.unit))
+            read.append(read_series(path))
         except InputError as error:
             return unusable(result, reference, f"the {what} cannot be read: {error}")
     return compare_series(read[0], read[1], tolerances, options, names=(str(result), str(reference)))

@@ -4,11 +4,10 @@ May use: units, errors. Start reading at `trace` (the Trace), then `cells` and `
 responses are in `response` and `response_files`.
 """
 
-from feedsim.trace.csv import read_csv, write_csv
+from feedsim.trace.csv import read_csv, read_setpoints, write_csv
 from feedsim.trace.files import written_whole
 from feedsim.trace.recording import Recording, convert_mat, read_recording
 from feedsim.trace.series import Series, as_series, read_series
-from feedsim.trace.setpoints import read_setpoints
 from feedsim.trace.table import Table, least_and_largest, release, stretches
 from feedsim.trace.trace import Array, Trace, matches, matching
 

@@ -70,19 +70,19 @@ def as_series(trace: Trace | Series) -> Series:
     return trace if isinstance(trace, Series) else Series(trace.time, trace.columns, trace.units)
 
 
-def read_series(path: str | Path, *, time: str | None = None, time_unit: str | None = None) -> Series:
+def read_series(path: str | Path, *, time: str | None = None) -> Series:
     """Read the CSV file of any simulator; layout, separators and decimal marks as `read_csv`.
 
-    time       name of the time column, or NAME:UNIT where there is no column of that whole name; default "time" or "t"
-               in any case, else a first column whose unit is a time
-    time_unit  unit of the time where the header does not tell it; default s
+    time   name of the time column, or NAME:UNIT where there is no column of that whole name and the header does not
+           tell the unit (default s); default "time" or "t" in any case, else a first column whose unit is a time
 
     True and false are 1 and 0. Raises InputError with file and line: layout, time that runs back or is missing, a unit
     of the time that is not the header's.
     """
     path = Path(path)
     table = read_table(path, _heads, as_numbers=True)
-    if time is not None and time not in table.names and time_unit is None:
+    time_unit = None
+    if time is not None and time not in table.names:
         name, colon, unit = time.rpartition(":")
         if colon and (name in table.names or fits(unit, "s")):
             time, time_unit = name, unit

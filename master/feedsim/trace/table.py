@@ -32,17 +32,17 @@ class Table:
     filled: rows so far.
     """
 
-    def __init__(self, columns: int, rows: int, folder: Path | None = None, in_memory: int | None = None) -> None:
+    def __init__(self, columns: int, rows: int, folder: Path | None = None) -> None:
         """folder: where the file goes if there is to be one; default: the system's folder for temporary files.
 
-        in_memory: size [bytes] above which there is one. OutputError: the file cannot be made.
+        OutputError: the file cannot be made.
         """
         self.rows, self.filled = rows, 0
         self._values: Array | None = None
         self._file: IO[bytes] | None = None
         self._folder = folder or Path(tempfile.gettempdir())
         self._count = columns
-        if 8 * columns * rows <= (IN_MEMORY if in_memory is None else in_memory):
+        if 8 * columns * rows <= IN_MEMORY:
             self._values = np.zeros((columns, rows))
             return
         try:

@@ -18,7 +18,6 @@ from feedsim.errors import InputError
 from feedsim.fields import AxisName, File, Model, Quantity, fault
 from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Start, whole_cycles
 from feedsim.motions.profile import SpeedChange, speed_change
-from feedsim.trace import read_setpoints
 
 
 class Column(Model):
@@ -82,7 +81,10 @@ class MeasuredSetpoints(MotionKind):
 
         Raises InputError where the file cannot be read, lacks a column or a unit, or has too few rows.
         """
-        from scipy.interpolate import CubicSpline  # takes longer to load than all of the fields
+        # Loaded where a recording is read: splines take longer to load than all of the fields.
+        from scipy.interpolate import CubicSpline
+
+        from feedsim.trace import read_setpoints
 
         rows = read_setpoints(
             self.file,

@@ -29,12 +29,31 @@ from feedsim.trace import Table
 LONGEST = 40_000_000
 
 
+# Position [m] and speed [m/s] of an axis at position cycles, counted from the first one of its piece.
+Sampled = Callable[[NDArray[np.int64]], tuple[Array, Array]]
+
+
 @dataclass
 class _Stretch:
     """Points of all axes on the T_ipo grid from ``first`` on, between two recordings."""
 
     first: int
     points: dict[str, list[Points]]
+
+    def sampled(self, axis: str, held: float, ratio: int, T_ipo: float) -> Sampled:
+        """An axis on the spline through its points; ``ratio`` position cycles per ``T_ipo`` [s]."""
+        # Knots 1 apart: a position cycle is then 1/ratio, exact for the usual ratios, however long the program.
+        spline = LongSpline(Joined(self.points[axis]))
+
+        def at(instants: NDArray[np.int64]) -> tuple[Array, Array]:
+            x, v = spline(instants, ratio)
+            return x, v / T_ipo
+
+        return at
+
+    def end(self, axis: str, held: float) -> float:
+        """Where it leaves an axis [m]."""
+        return float(self.points[axis][-1][-1:][0])
 
 
 @dataclass
@@ -43,6 +62,20 @@ class _Inset:
 
     first: int
     setpoints: Mapping[str, tuple[Array, Array]]
+
+    def sampled(self, axis: str, held: float, ratio: int, T_ipo: float) -> Sampled:
+        """An axis as recorded, or where it is ``held`` [m]; at rest behind the recording."""
+        x_s, v_s = self.setpoints.get(axis, (np.array([held]), np.zeros(1)))
+
+        def at(instants: NDArray[np.int64]) -> tuple[Array, Array]:
+            row = np.minimum(instants, len(x_s) - 1)
+            return x_s[row], np.where(instants < len(x_s), v_s[row], 0.0)
+
+        return at
+
+    def end(self, axis: str, held: float) -> float:
+        """Where it leaves an axis [m]."""
+        return float(self.setpoints[axis][0][-1]) if axis in self.setpoints else held
 
 
 @dataclass
@@ -180,8 +213,8 @@ def _sample(state: _Plan, scenario: Scenario, scratch: Path | None) -> Program:
     for piece, first, last in zip(state.pieces, starts, [*starts[1:], total], strict=True):
         sampled = {}
         for axis in axes:
-            sampled[axis] = _sampled(piece, axis, held[axis], ratio, cycles.T_ipo)
-            held[axis] = _end(piece, axis, held[axis])
+            sampled[axis] = piece.sampled(axis, held[axis], ratio, cycles.T_ipo)
+            held[axis] = piece.end(axis, held[axis])
         for begin in range(first, last, BLOCK * ratio):
             instants = np.arange(begin, min(begin + BLOCK * ratio, last))
             block = np.empty((1 + 2 * len(axes), len(instants)))
@@ -193,35 +226,6 @@ def _sample(state: _Plan, scenario: Scenario, scratch: Path | None) -> Program:
     time, *columns = table.columns()
     x_s, n_ffw = columns[: len(axes)], columns[len(axes) :]
     return Program(time, dict(zip(axes, x_s, strict=True)), dict(zip(axes, n_ffw, strict=True)), tuple(state.segments))
-
-
-def _sampled(
-    piece: _Stretch | _Inset, axis: str, held: float, ratio: int, T_ipo: float
-) -> Callable[[NDArray[np.int64]], tuple[Array, Array]]:
-    """Position [m] and speed [m/s] of an axis at the position cycles of a piece, counted from its first one."""
-    if isinstance(piece, _Stretch):
-        # Knots 1 apart: a position cycle is then 1/ratio, exact for the usual ratios, however long the program.
-        spline = LongSpline(Joined(piece.points[axis]))
-
-        def stretch(instants: NDArray[np.int64]) -> tuple[Array, Array]:
-            x, v = spline(instants, ratio)
-            return x, v / T_ipo
-
-        return stretch
-    x_s, v_s = piece.setpoints.get(axis, (np.array([held]), np.zeros(1)))
-
-    def inset(instants: NDArray[np.int64]) -> tuple[Array, Array]:
-        at = np.minimum(instants, len(x_s) - 1)
-        return x_s[at], np.where(instants < len(x_s), v_s[at], 0.0)
-
-    return inset
-
-
-def _end(piece: _Stretch | _Inset, axis: str, held: float) -> float:
-    """Where a piece leaves an axis [m]."""
-    if isinstance(piece, _Stretch):
-        return float(piece.points[axis][-1][-1:][0])
-    return float(piece.setpoints[axis][0][-1]) if axis in piece.setpoints else held
 
 
 def _stretch(state: _Plan) -> _Stretch:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from feedsim.errors import InputError
 from feedsim.structure.assembly import Assembly, Floats
@@ -77,12 +77,7 @@ class SparseFactor:
     def __init__(self, assembly: Assembly, sigma: float) -> None:
         """RuntimeError: the matrix is singular to rounding (sigma is an eigenvalue)."""
         self._matrix, self._scale = shifted(assembly, sigma)
-        self._lu = splu(
-            self._matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True, "Equil": False},
-        )
+        self._lu = symmetric_factors(self._matrix, Equil=False)
 
     @property
     def entries(self) -> int:
@@ -109,6 +104,12 @@ class SparseFactor:
             return np.inf
         magnitude = abs(self._matrix) @ abs(solution) + abs(right)
         return float(np.max(abs(self._matrix @ solution - right)) / np.max(magnitude))
+
+
+def symmetric_factors(matrix: csc_array, **options: bool) -> SuperLU:
+    """L and U of a symmetric matrix, symmetric ordering, pivots on the diagonal. RuntimeError: exactly singular."""
+    options = {"SymmetricMode": True, **options}
+    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
 def not_definite(assembly: Assembly) -> InputError:

@@ -159,12 +159,11 @@ def info_of_table(
     friction: Mapping[str, Friction] | None = None,
 ) -> MachineInfo:
     """The figures that a table of modes gives by itself."""
-    axes = tuple(port.removeprefix("n_") for port in modes.ports if port.startswith("n_"))
     return MachineInfo(
         name=name,
         note=note,
         pose=pose,
-        axes=axis_infos(modes, axes, step, friction),
+        axes=axis_infos(modes, modes.axes, step, friction),
         step=step,
         total_mass=math.nan,
         modes=modes,

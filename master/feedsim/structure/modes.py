@@ -49,6 +49,11 @@ class Modes:
         """(N,) which modes are rigid."""
         return np.asarray(self.frequency == 0)
 
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes that it has ports of."""
+        return tuple(port.removeprefix("n_") for port in self.ports if port.startswith("n_"))
+
     def J_tot(self, axis: str) -> float:
         """Inertia that a slow torque of `axis` accelerates [kg.m2]: 1 / sum of n^2 over the rigid modes."""
         return float(1 / np.sum(self.ports[f"n_{axis}"][self.rigid] ** 2))

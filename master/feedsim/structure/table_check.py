@@ -79,7 +79,7 @@ def stale(table: Modes, built: Modes, tolerance: float = SAME) -> str:
         corrected = len(table.frequency) - k <= len(table.ports) and bool(np.any(there[:k] > 0))
         if whole or not corrected:
             return f"mode {k} has {here[k]:.6g} Hz; the structure gives {there[k]:.6g} Hz"
-    for axis in (port.removeprefix("n_") for port in built.ports if port.startswith("n_")):
+    for axis in built.axes:
         inertias = [("J_tot", table.J_tot(axis), built.J_tot(axis))]
         if whole:  # it is a sum over all modes
             inertias.append(("J_inf", table.J_inf(axis), built.J_inf(axis)))

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 from scipy.linalg import eigh_tridiagonal
-from scipy.sparse.linalg import splu
 
 from feedsim.structure.assembly import Assembly, Floats, counted, few
+from feedsim.structure.factor import symmetric_factors
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -136,12 +136,10 @@ def _loose(stiffness: sparse.csc_array, massless: NDArray[np.int64]) -> NDArray[
     root = sparse.diags_array(1 / np.sqrt(diagonal))
     scaled = (root @ block @ root).tocsc()
     try:
-        factors = splu(scaled, diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        factors = symmetric_factors(scaled)
     except RuntimeError:  # exactly singular
         shifted = scaled + 1e-12 * sparse.eye_array(len(massless))
-        factors = splu(
-            shifted.tocsc(), diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
-        )
+        factors = symmetric_factors(shifted.tocsc())
     pivots = factors.U.diagonal()
     if np.min(np.abs(pivots)) > 1e-10:
         return None

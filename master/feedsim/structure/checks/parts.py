@@ -7,9 +7,9 @@ import math
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 from feedsim.structure.assembly import DEGREES, SHOWN, Assembly, Integers, counted, few
+from feedsim.structure.factor import symmetric_factors
 
 # Round-off makes rigid modes of large stiff models mHz; a machine's or a mount's lowest mode is above 1 Hz.
 RIGID = (2 * math.pi * 0.1) ** 2
@@ -110,7 +110,7 @@ def _rigid_modes(assembly: Assembly, members: Integers) -> int:
     root = sparse.diags_array(1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)))
     scaled = sparse.csc_array(root @ shifted @ root)
     try:
-        factors = splu(scaled, diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        factors = symmetric_factors(scaled)
     except RuntimeError:  # exactly singular: a direction with neither mass nor stiffness
         return MOST_RIGID
     return min(int(np.sum(factors.U.diagonal() < 0)), MOST_RIGID)

@@ -9,12 +9,12 @@ import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.fields import did_you_mean
 from feedsim.structure.assembly import Floats, Integers, few
 from feedsim.structure.matrices.raw import DIRECTIONS, Points, Raw
 from feedsim.structure.modes import TOOL_PORTS
@@ -52,8 +52,10 @@ def read_table(file: Path, what: str, headers: Sequence[Sequence[str]], optional
     if not any(set(header) <= set(columns) for header in headers):
         there = f"; there is {', '.join(columns)}" if columns else "; the file is empty"
         raise InputError(f"{file}:1: {what} begins with a header: {forms}{there}")
-    known = {*optional, *(name for header in headers for name in header)}
-    problems = [f"{file}:1: unknown column {name!r}{suggestion(name, known)}" for name in columns if name not in known]
+    known = sorted({*optional, *(name for header in headers for name in header)})
+    problems = [
+        f"{file}:1: unknown column {name!r}{did_you_mean(name, known)}" for name in columns if name not in known
+    ]
     twice = [name for name in dict.fromkeys(columns) if columns.count(name) > 1]
     problems += [f"{file}:1: column {name!r} occurs twice" for name in twice]
     problems += [
@@ -88,12 +90,6 @@ def index(file: Path, row: Row, column: str, below: int) -> int:
             f"{below - 1} (in the Matrix Market files from 1 to {below})"
         )
     return int(text)
-
-
-def suggestion(word: str, known: set[str]) -> str:
-    """'; did you mean ...?', else '; allowed: ...'."""
-    close = get_close_matches(word, sorted(known), n=1, cutoff=0.6)
-    return f"; did you mean {close[0]!r}?" if close else f"; allowed: {', '.join(sorted(known))}"
 
 
 NODE_COLUMNS = ("node", "x", "y", "z")
@@ -201,7 +197,7 @@ def read_ports(file: Path, raw: Raw, axes: Sequence[str]) -> dict[str, Floats]:
         try:
             port = row["port"]
             if port not in vectors:
-                raise InputError(f"{file}:{row.line}: unknown port {port!r}{suggestion(port, set(vectors))}")
+                raise InputError(f"{file}:{row.line}: unknown port {port!r}{did_you_mean(port, sorted(vectors))}")
             dof, weight = find(row), number(file, row, "coefficient")
             if (port, dof) in given:
                 raise InputError(f"{file}:{row.line}: port {port!r} names {find.labels[dof]} twice")

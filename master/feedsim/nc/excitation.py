@@ -76,11 +76,6 @@ class Excitation:
         """Largest magnitude."""
         return float(np.max(np.abs(self.samples)))
 
-    @property
-    def crest_factor(self) -> float:
-        """Peak over RMS."""
-        return self.peak / self.rms
-
 
 def multisine(
     cycles: Cycles,

@@ -34,11 +34,6 @@ class GridAxis:
     hysteresis: float
 
     @property
-    def width(self) -> float:
-        """Largest distance between neighbouring centres; of a single cell none, which is unlimited [m]."""
-        return float(np.max(np.diff(self.centres), initial=0.0)) if len(self.centres) > 1 else math.inf
-
-    @property
     def limits(self) -> tuple[float, float]:
         """First and last centre [m]."""
         return float(self.centres[0]), float(self.centres[-1])

@@ -85,6 +85,12 @@ SHELL_SOURCES := $(wildcard src/fmi2/*.[ch] src/fmi2/standard/*.h)
 fmus/%.fmu: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) pyproject.toml LICENSE
 	$(PY) -m feedsim_packager build $* --out $@ --build-dir $(BUILD)/fmus
 
+# What the master knows of the units' variables.
+VARIABLES := master/feedsim/variables.json
+fmus: $(VARIABLES)
+$(VARIABLES): $(VENV)/.run $(COMPILER) $(PACKAGER) src/fmi2/table.h $(foreach unit,$(UNITS),$(wildcard src/$(unit)_fmu/*.def src/$(unit)_fmu/identity.h))
+	$(PY) -m feedsim_packager variables --out $@
+
 # The native cycle loop lies beside the archives.
 EXCHANGE := exchange$(if $(filter Windows_NT,$(OS)),.dll,$(if $(filter Darwin,$(shell uname -s)),.dylib,.so))
 EXCHANGE_SOURCES := $(wildcard src/exchange/*.[ch] src/exchange/*.py) $(addprefix src/packager/feedsim_packager/,checkout.py compile.py toolchain.py)
@@ -159,7 +165,7 @@ test-importers: fmus $(VENV)/.importers ## the units in other simulators, three 
 	$(PY) tests/importers/install.py $(BUILD)/importers
 	FEEDSIM_IMPORTERS=$(BUILD)/importers $(PY) -m pytest tests/importers
 
-reference: $(VENV)/.dev ## make the pinned reference CSVs anew, from scipy and the monolithic implementation
+reference: $(VENV)/.dev $(VARIABLES) ## make the pinned reference CSVs anew, from scipy and the monolithic implementation
 	$(PY) tests/reference/make_reference.py
 
 check-reference: fmus $(VENV)/.run ## compare all units and both scenarios with the pinned reference CSVs
@@ -203,4 +209,4 @@ lock: ## resolve the dependencies of pyproject.toml anew
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --no-deps pyproject.toml --extra ansys -c requirements.lock -o requirements-ansys.lock
 
 clean: ## remove what was built, keep the environment
-	rm -rf $(BUILD) $(FMUS) fmus/exchange.* $(RESULTS)
+	rm -rf $(BUILD) $(FMUS) fmus/exchange.* $(VARIABLES) $(RESULTS)

@@ -26,6 +26,7 @@ ORDER = [
     "motions",
     "trace",
     "fields",
+    "variables",
     "units",
     "errors",
 ]

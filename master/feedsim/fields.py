@@ -1,6 +1,6 @@
 """Field types of the files that people write: quantities with units, axis names, files; the base of their models.
 
-May use: units, errors. Start reading at Quantity.
+May use: variables, units, errors. Start reading at Quantity.
 """
 
 from __future__ import annotations
@@ -12,13 +12,16 @@ from difflib import get_close_matches
 from functools import cache, lru_cache
 from math import inf, isfinite
 from pathlib import Path
-from typing import Annotated, Any
+from types import NoneType
+from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.variables import Variable
 
 # Studies check a scenario for every run, most of whose texts are those of the run before.
 _parsed = lru_cache(maxsize=4096)(units.parse)
@@ -77,6 +80,11 @@ class Quantity:
     maximum: float = inf
     above: float = -inf
     example: str = ""
+
+    @classmethod
+    def of(cls, info: FieldInfo) -> Quantity | None:
+        """What a field of a model holds, where it is a quantity."""
+        return next((note for note in info.metadata if isinstance(note, cls)), None)
 
     def read(self, value: Any, *, text: bool = True) -> float:
         """`value` as SI number; PydanticCustomError with a message that a person can act on."""
@@ -137,14 +145,35 @@ class Quantity:
         def validate(value: Any, info: ValidationInfo) -> float:
             return self.read(value, text=isinstance(info.context, Reading))
 
-        return core_schema.with_info_plain_validator_function(
+        schema: core_schema.CoreSchema = core_schema.with_info_plain_validator_function(
             validate, serialization=core_schema.plain_serializer_function_ser_schema(lambda value: value)
         )
+        return core_schema.nullable_schema(schema) if NoneType in get_args(source) else schema
 
     def __get_pydantic_json_schema__(
         self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return self.json_schema()
+        inner: Any = core  # within what checks the field further
+        while inner["type"] != "nullable" and "schema" in inner:
+            inner = inner["schema"]
+        own = self.json_schema()
+        return {"anyOf": [own, {"type": "null"}]} if inner["type"] == "nullable" else own
+
+
+def parameter(variable: Variable, default: Any = ..., *, example: str = "", text: str = "") -> Any:
+    """A field for a parameter of a unit: unit, range and description are those of the unit's table.
+
+    default: `...` for a key that must be given. example: shown in messages, the start value by default. text: another
+    description, for what the table says of one of several groups.
+    """
+    checked = default is None  # by what depends on other keys; a number has no unit, being no text
+    low, high = (bound if isfinite(bound) else None for bound in (variable.minimum, variable.maximum))
+    bounds: dict[str, Any] = {"ge": low, "le": high} if variable.kind == "INTEGER" else {}
+    field: Any = Field(default, description=text or variable.text, validate_default=checked, **bounds)
+    if variable.kind == "REAL":
+        shown = example or variable.example
+        field.metadata.append(Quantity(variable.unit, variable.minimum, variable.maximum, example=shown))
+    return field
 
 
 @cache

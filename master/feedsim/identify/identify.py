@@ -17,7 +17,7 @@ from feedsim.identify.inertia import Inertia, inertia
 from feedsim.identify.motion import motion
 from feedsim.identify.options import Options
 from feedsim.identify.output_error import dynamic
-from feedsim.identify.parameters import CONSTANT_SPEED, FRICTION, KINDS, PRE_SLIDING, USUAL
+from feedsim.identify.parameters import CONSTANT_SPEED, FRICTION, KINDS, NO_EFFECT, PRE_SLIDING, USUAL
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
 from feedsim.identify.result import (
@@ -34,6 +34,7 @@ from feedsim.identify.result import (
 from feedsim.identify.stretches import Part, parts
 from feedsim.identify.stribeck import stationary
 from feedsim.identify.torque import Law
+from feedsim.variables import table
 
 Progress = Callable[[str, int, int], None]  # what is being done, how many of its steps are done, of how many
 
@@ -42,8 +43,6 @@ ORDER = (*FRICTION, "M_0", "J", "delay")
 USUAL_DEFLECTION, USUAL_RELAXATION = 5e-3, 2.5e-3
 INERTIA_OFF, CERTAIN = 0.1, 4.0  # relative, standard deviations: a given inertia that is off by both is worth a warning
 SLIDING = 1.0  # [rad], some 20 times a usual pre-sliding: amplitude above which a sine is mostly sliding
-# What a parameter is held at where no stage tells it and no machine was named: no effect.
-NO_EFFECT = {"F_log": 0.0, "sigma_2": 0.0, "asymmetry": 0.0, "W": 0.0, "gamma": 1.0, "v_s": 0.6}
 
 
 def identify(
@@ -293,7 +292,8 @@ class _Run:
         if name == "sigma_1":
             value = found["sigma_0"].value * USUAL_RELAXATION
             return _held(name, value, "held", f"{reason}; usual relaxation time".lstrip("; "))
-        return _held(name, NO_EFFECT.get(name, USUAL.get(name, 0.0)), "held", f"{reason}; no effect".lstrip("; "))
+        value = NO_EFFECT[name] if name in NO_EFFECT else float(table("friction")[name].start)
+        return _held(name, value, "held", f"{reason}; no effect".lstrip("; "))
 
     def _timed(self, step: str) -> AbstractContextManager[None]:
         return _Timed(self.seconds, step)

@@ -15,7 +15,7 @@ from feedsim.identify.determined import GOES_WITH, Verdict, verdict
 from feedsim.identify.fit import Prior, correlation
 from feedsim.identify.motion import noise_of
 from feedsim.identify.motion_noise import motion_covariance
-from feedsim.identify.parameters import KINDS, PRE_SLIDING, STATIONARY, USUAL
+from feedsim.identify.parameters import KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
 from feedsim.identify.search import Search, Solution, joined, spread
@@ -140,7 +140,7 @@ def _known(
     hold: Mapping[str, float],
     free: Collection[str],
 ) -> _Known:
-    values = {**USUAL, "asymmetry": 0.0, "F_log": 0.0, "M_0": 0.0, "sigma_2": 0.0, "J": 0.0, "W": 0.0, "gamma": 1.0}
+    values = {**NO_EFFECT, "M_0": 0.0, "J": 0.0}
     values |= {"delay": delay if delay is not None else 0.0, "sigma_1": 0.0}
     held: dict[str, tuple[Status, str]] = {
         name: ("held", "usual value, records of friction hardly tell it") for name in USUAL if name not in free

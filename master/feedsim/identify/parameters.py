@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite
 
-from feedsim import units
+from feedsim import units, variables
 from feedsim.errors import InputError
-from feedsim.fields import Quantity
 from feedsim.scenario import Friction
 
 
@@ -42,39 +41,38 @@ class Kind:
             raise InputError(f"{what} {units.show(value, self.unit)}; allowed: {self.range}")
 
 
-def _friction(name: str, meaning: str) -> Kind:
-    """Unit and range are those of the key in machine files: what is estimated can be written into one."""
-    annotation = next(note for note in Friction.model_fields[name].metadata if isinstance(note, Quantity))
-    return Kind(annotation.unit, meaning, annotation.minimum, annotation.maximum, annotation.above)
-
-
-KINDS = {
-    "sigma_0": _friction("sigma_0", "bristle stiffness"),
-    "sigma_1": _friction("sigma_1", "bristle damping"),
-    "W": _friction("W", "width of the engaging zone"),
-    "gamma": _friction("gamma", "share of the bristle stiffness engaged at once after a reversal"),
-    "F_C": _friction("F_C", "Coulomb friction"),
-    "F_S": _friction("F_S", "static friction"),
-    "v_s": _friction("v_s", "Stribeck speed"),
-    "beta": _friction("beta", "Stribeck exponent"),
-    "F_log": _friction("F_log", "logarithmic rise of the friction"),
-    "v_log": _friction("v_log", "reference speed of the logarithmic rise"),
-    "sigma_2": _friction("sigma_2", "viscous friction"),
-    "asymmetry": _friction("asymmetry", "direction dependence of the friction"),
-    "M_0": Kind("N.m", "constant load against the motor torque"),
-    "J": Kind("kg.m2", "inertia", above=0.0),
-    # Wide against the offsets between the channels of one log; what is beyond is a wrong unit, or two logs.
-    "delay": Kind("s", "delay of the torque channel against the motion", -20e-3, 20e-3),
-}
-
-FRICTION = ("sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "v_s", "beta", "F_log", "v_log", "asymmetry", "W", "gamma")
 PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma")
 # What plateaus tell, in the order in which it is shown; and all of it that stage 2 takes over.
 CONSTANT_SPEED = ("F_C", "F_S", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
 STATIONARY = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0")
 RIGID = ("J", "sigma_2", "F_C", "M_0")  # of a rigid axis with Coulomb and viscous friction
-# Held unless they are freed: no record of friction alone tells them well.
-USUAL: Mapping[str, float] = {"beta": 1.0, "v_log": 3.0}
+
+_TABLE = variables.parameters("friction")
+FRICTION = tuple(_TABLE)
+# Held at the unit's start values unless they are freed: no record of friction alone tells them well.
+USUAL: Mapping[str, float] = {
+    name: float(each.start) for name, each in _TABLE.items() if name not in (*PRE_SLIDING, *STATIONARY)
+}
+# What leaves no trace in the friction: what machine files mean that do not give it.
+NO_EFFECT: Mapping[str, float] = {"sigma_2": 0.0} | {
+    name: field.default for name in FRICTION if not (field := Friction.model_fields[name]).is_required()
+}
+
+
+def _kind(name: str) -> Kind:
+    """Of a parameter of the unit: what is estimated can be written into a machine file."""
+    row = _TABLE[name]
+    return Kind(row.unit, row.short, row.minimum, row.maximum)
+
+
+KINDS = {
+    **{name: _kind(name) for name in (*PRE_SLIDING, *CONSTANT_SPEED[:-1])},
+    "M_0": Kind("N.m", "constant load against the motor torque"),
+    **{name: _kind(name) for name in USUAL if name not in CONSTANT_SPEED},
+    "J": Kind("kg.m2", "inertia", above=0.0),
+    # Wide against the offsets between the channels of one log; what is beyond is a wrong unit, or two logs.
+    "delay": Kind("s", "delay of the torque channel against the motion", -20e-3, 20e-3),
+}
 
 
 def check_held(hold: Mapping[str, float]) -> None:

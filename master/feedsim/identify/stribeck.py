@@ -14,10 +14,13 @@ from feedsim.identify import doubts
 from feedsim.identify.doubts import Points
 from feedsim.identify.fit import Fit, Parameter, correlation, fit
 from feedsim.identify.level import curve, torque
-from feedsim.identify.parameters import CONSTANT_SPEED, KINDS, USUAL, check_held
+from feedsim.identify.parameters import CONSTANT_SPEED, KINDS, check_held
+from feedsim.identify.parameters import USUAL as USUAL_OF_ALL
 from feedsim.identify.result import Correlation, Estimate, Plateau, Stationary, Status
 
 Array = NDArray[np.float64]
+
+USUAL = {name: value for name, value in USUAL_OF_ALL.items() if name in CONSTANT_SPEED}
 
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6

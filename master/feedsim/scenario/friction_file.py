@@ -92,11 +92,8 @@ _Dumper.add_representer(list, _list)
 
 def _units() -> dict[str, str]:
     """Name -> SI unit of every friction parameter, in the order of the file."""
-    found = {
-        name: next((note.unit for note in field.metadata if isinstance(note, Quantity)), None)
-        for name, field in Friction.model_fields.items()
-    }
-    return {name: unit for name, unit in found.items() if unit is not None}
+    found = {name: Quantity.of(info) for name, info in Friction.model_fields.items()}
+    return {name: quantity.unit for name, quantity in found.items() if quantity is not None}
 
 
 def _number(value: float) -> str:

@@ -274,9 +274,9 @@ def reading(data: dict[str, Any]) -> Reading:
 
 def _cycle(cycles: dict[str, Any], name: str) -> float | None:
     """A cycle [s]; None where it cannot be read, which is reported where it stands."""
-    quantity = next(note for note in Cycles.model_fields[name].metadata if isinstance(note, Quantity))
+    quantity = Quantity.of(Cycles.model_fields[name])
     with suppress(PydanticCustomError):
-        return quantity.read(cycles.get(name))
+        return quantity.read(cycles.get(name)) if quantity else None
     return None
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from math import pi
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, PrivateAttr, StrictBool, StrictInt, StrictStr, ValidationInfo, field_validator
+from pydantic import Field, PrivateAttr, StrictBool, StrictInt, StrictStr, ValidationInfo, create_model, field_validator
 
-from feedsim.fields import AxisName, File, Model, Quantity, Reading, fault, is_multiple
+from feedsim import variables
+from feedsim.fields import AxisName, File, Model, Quantity, Reading, fault, is_multiple, parameter
 
 Parameter = float | int | bool | str
 FilterType = Literal["off", "second_order", "band_stop", "low_pass"]
@@ -31,48 +32,25 @@ class ParameterGroup(Model):
         return values
 
 
-class Friction(ParameterGroup):
+# What a friction file must give; and what the friction is without, where it does not give it: no effect. Any other
+# parameter of the unit is held at its start value then.
+_FRICTION_NEEDED = ("sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "v_s")
+_FRICTION_WITHOUT = {"F_log": 0.0, "W": 0.0, "gamma": 1.0}
+_IDENTIFIED = (
+    "Where the parameters come from, as feedsim identify writes it: kept and shown, never calculated with. Its keys "
+    "are free, but names of parameters are refused: they would have no effect here"
+)
+
+
+class _Friction(ParameterGroup):
     """Friction of an axis on the motor side: LuGre with the transmission engaging model (Eqs. 1-7)."""
 
-    sigma_0: Annotated[float, Quantity("N.m/rad", minimum=1e-6)] = Field(description="Bristle stiffness")
-    sigma_1: Annotated[float, Quantity("N.m.s/rad", minimum=0, example="0.8 N.m.s/rad")] = Field(
-        description="Bristle damping"
-    )
-    sigma_2: Annotated[float, Quantity("N.m.s/rad", minimum=0, example="0.006 N.m.s/rad")] = Field(
-        description="Viscous friction coefficient"
-    )
-    F_C: Annotated[float, Quantity("N.m", minimum=1e-9, example="1.6 N.m")] = Field(
-        description="Coulomb friction torque"
-    )
-    F_S: Annotated[float, Quantity("N.m", minimum=1e-9)] = Field(
-        description="Static (break-away) friction torque; at least F_C"
-    )
-    v_s: Annotated[float, Quantity("rad/s", minimum=1e-9, example="0.6 rad/s")] = Field(description="Stribeck speed")
-    beta: Annotated[float, Quantity("1", minimum=0.1, maximum=10, example="1")] = Field(
-        default=1.0, description="Stribeck exponent"
-    )
-    F_log: Annotated[float, Quantity("N.m", minimum=0, example="0.4 N.m")] = Field(
-        default=0.0, description="Factor of the logarithmic rise with speed"
-    )
-    v_log: Annotated[float, Quantity("rad/s", minimum=1e-9, example="3 rad/s")] = Field(
-        default=3.0, description="Reference speed of the logarithmic rise"
-    )
-    asymmetry: Annotated[float, Quantity("1", minimum=-0.9, maximum=0.9, example="5 %")] = Field(
-        default=0.0, description="Direction dependence: the static level is multiplied by 1 + asymmetry sgn(n)"
-    )
-    W: Annotated[float, Quantity("rad", minimum=0)] = Field(
-        default=0.0, description="Width of the engaging zone; 0 rad switches the engaging model off (pure LuGre)"
-    )
-    gamma: Annotated[float, Quantity("1", minimum=0, maximum=1)] = Field(
-        default=1.0, description="Share of the bristle stiffness that is engaged at once after a reversal"
-    )
-    identified: dict[str, Any] = Field(
-        default={},
-        description="Where the parameters come from, as feedsim identify writes it: kept and shown, never calculated "
-        "with. Its keys are free, but names of parameters are refused: they would have no effect here",
-    )
+    if TYPE_CHECKING:
+        identified: dict[str, Any]
 
-    @field_validator("identified")
+        def __getattr__(self, parameter: str) -> float: ...
+
+    @field_validator("identified", check_fields=False)
     @classmethod
     def _no_parameters(cls, identified: dict[str, Any]) -> dict[str, Any]:
         if misplaced := [name for name in identified if name != "identified" and name in cls.model_fields]:
@@ -87,7 +65,7 @@ class Friction(ParameterGroup):
         del values["identified"]
         return values
 
-    @field_validator("F_S")
+    @field_validator("F_S", check_fields=False)
     @classmethod
     def _static_at_least_coulomb(cls, F_S: float, info: ValidationInfo) -> float:
         F_C = info.data.get("F_C")
@@ -98,19 +76,44 @@ class Friction(ParameterGroup):
         return F_S
 
 
+def _friction_fields() -> dict[str, Any]:
+    """The parameters of the unit `friction`, each with how it is checked, and where they come from."""
+    known = variables.parameters("friction")
+    defaults = dict.fromkeys(_FRICTION_NEEDED, ...) | _FRICTION_WITHOUT
+    fields = {name: (float, parameter(each, defaults.get(name, float(each.start)))) for name, each in known.items()}
+    return {**fields, "identified": (dict[str, Any], Field(default={}, description=_IDENTIFIED))}
+
+
+if TYPE_CHECKING:
+    Friction = _Friction
+else:
+    Friction = create_model(
+        "Friction", __base__=_Friction, __module__=__name__, __doc__=_Friction.__doc__, **_friction_fields()
+    )
+
+
+_CONTROLLER = variables.parameters("controller")
+
+
+def _drive(name: str, default: Any = ...) -> Any:
+    """The field of a parameter of the unit `controller`."""
+    return parameter(_CONTROLLER[name], default)
+
+
+def _filter(name: str) -> Any:
+    """The field of a parameter that each of the four filters has."""
+    variable = _CONTROLLER[f"filter_1.{name}"]
+    text = variable.text.removeprefix("Filter 1: ")
+    return parameter(variable, None, text=text[:1].upper() + text[1:])
+
+
 class Filter(ParameterGroup):
     """A current setpoint filter."""
 
     type: FilterType = Field(default="off", description="off, second_order (band_stop is the same) or low_pass")
-    f: Annotated[float, Quantity("Hz", minimum=1e-3)] | None = Field(
-        default=None, description="Characteristic frequency, below half the sampling rate"
-    )
-    D_num: Annotated[float, Quantity("1", minimum=0, example="0.1")] | None = Field(
-        default=None, description="Numerator damping ratio (second_order, band_stop)"
-    )
-    D_den: Annotated[float, Quantity("1", minimum=1e-6, example="1.0")] | None = Field(
-        default=None, description="Denominator damping ratio"
-    )
+    f: float | None = _filter("f")
+    D_num: float | None = _filter("D_num")
+    D_den: float | None = _filter("D_den")
 
     @field_validator("f", "D_num", "D_den")
     @classmethod
@@ -125,8 +128,6 @@ class Filter(ParameterGroup):
             )
         return value
 
-    model_config = ConfigDict(validate_default=True)
-
     def parameters(self) -> dict[str, Parameter]:
         return super().parameters() | {"type": FILTER_TYPES[self.type]}
 
@@ -134,64 +135,31 @@ class Filter(ParameterGroup):
 class CurrentController(ParameterGroup):
     """PI current controller, the same on both axes of the rotor frame."""
 
-    K_p: Annotated[float, Quantity("V/A", minimum=0)] = Field(description="Gain")
-    T_n: Annotated[float, Quantity("s", minimum=1e-6, example="11.1 ms")] = Field(description="Integral-action time")
+    K_p: float = _drive("current.K_p")
+    T_n: float = _drive("current.T_n")
 
 
 class Drive(ParameterGroup):
     """Position, speed and current control of an axis with its synchronous motor."""
 
     # position loop
-    K_v: Annotated[float, Quantity("1/s", minimum=0)] = Field(description="Position controller gain")
-    k_ffw: Annotated[float, Quantity("1", minimum=0, maximum=2, example="100 %")] = Field(
-        default=1.0, description="Weight of the speed feedforward"
-    )
-    T_dyn: Annotated[float, Quantity("s", minimum=0, maximum=1, example="1.326 ms")] = Field(
-        default=0.0,
-        validate_default=False,  # it has no unit, being no text
-        description="Dynamic matching: delay of position setpoint and feedforward alike",
-    )
-    T_sym: Annotated[float, Quantity("s", minimum=0, maximum=1, example="3.528 ms")] = Field(
-        description="Symmetry filter: delay of the position setpoint against the feedforward"
-    )
-    symmetry_lag: StrictBool = Field(
-        default=False, description="Symmetry filter as a first-order lag instead of a dead time"
-    )
-    ramp_speed_setpoint: StrictBool = Field(
-        default=True,
-        description="Speed setpoint runs linearly to its new value within the position cycle; false: steps and is held",
-    )
+    K_v: float = _drive("K_v")
+    k_ffw: float = _drive("k_ffw", 1.0)
+    T_dyn: float = _drive("T_dyn", 0.0)
+    T_sym: float = _drive("T_sym")
+    symmetry_lag: StrictBool = _drive("symmetry_lag", False)
+    ramp_speed_setpoint: StrictBool = _drive("ramp_speed_setpoint", True)
 
     # speed loop
-    K_p: Annotated[float, Quantity("N.m.s/rad", minimum=0)] = Field(description="Speed controller gain")
-    speed_integrator: StrictBool = Field(
-        default=True, description="Integral part of the speed controller; false: P controller"
-    )
-    T_n: Annotated[float, Quantity("s", minimum=1e-6, example="12 ms")] | None = Field(
-        default=None, description="Speed controller integral-action time"
-    )
-    speed_window: Annotated[StrictInt, Field(ge=0, le=1000)] = Field(
-        default=0,
-        validate_default=False,
-        description="Speed from the measured position, over this many control cycles; 0: the motor speed n_a",
-    )
-    reference_model: StrictBool = Field(
-        default=True, description="Reference model; false: the integrator sees the speed setpoint"
-    )
-    omega_0: Annotated[float, Quantity("rad/s", minimum=1e-3)] | None = Field(
-        default=None, description="Reference model: natural frequency"
-    )
-    D: Annotated[float, Quantity("1", minimum=0, example="1.214")] | None = Field(
-        default=None, description="Reference model: damping ratio"
-    )
-    T_ref: Annotated[float, Quantity("s", minimum=0, maximum=1, example="0 ms")] = Field(
-        default=0.0,
-        validate_default=False,  # it has no unit, being no text
-        description="Reference model: dead time",
-    )
-    M_max: Annotated[float, Quantity("N.m", minimum=0, example="80 N.m")] = Field(
-        description="Limit of the torque setpoint, both directions"
-    )
+    K_p: float = _drive("K_p")
+    speed_integrator: StrictBool = _drive("speed_integrator", True)
+    T_n: float | None = _drive("T_n", None)
+    speed_window: StrictInt = _drive("speed_window", 0)
+    reference_model: StrictBool = _drive("reference_model", True)
+    omega_0: float | None = _drive("omega_0", None)
+    D: float | None = _drive("D", None)
+    T_ref: float = _drive("T_ref", 0.0)
+    M_max: float = _drive("M_max")
 
     # current setpoint filters, in series
     filter_1: Filter = Field(default=Filter(), description="Current setpoint filter 1")
@@ -200,25 +168,14 @@ class Drive(ParameterGroup):
     filter_4: Filter = Field(default=Filter(), description="Current setpoint filter 4")
 
     # current loop and motor
-    ideal_current_loop: StrictBool = Field(
-        default=False,
-        description="The torque takes its setpoint at every sample instant and holds it; no motor equations",
-    )
-    current: CurrentController | None = Field(default=None, description="Current controller")
-    u_max: Annotated[float, Quantity("V", minimum=0)] | None = Field(
-        default=None, description="Limit of the voltage amplitude"
-    )
-    R: Annotated[float, Quantity("Ohm", minimum=0)] | None = Field(default=None, description="Stator resistance")
-    L_d: Annotated[float, Quantity("H", minimum=1e-9)] | None = Field(
-        default=None, description="Inductance on the d axis"
-    )
-    L_q: Annotated[float, Quantity("H", minimum=1e-9)] | None = Field(
-        default=None, description="Inductance on the q axis"
-    )
-    p: Annotated[StrictInt, Field(ge=1, le=1000)] | None = Field(default=None, description="Pole pairs")
-    K_t: Annotated[float, Quantity("N.m/A", minimum=1e-9)] = Field(description="Torque constant 3/2 p psi")
-
-    model_config = ConfigDict(validate_default=True)
+    ideal_current_loop: StrictBool = _drive("ideal_current_loop", False)
+    current: CurrentController | None = Field(default=None, validate_default=True, description="Current controller")
+    u_max: float | None = _drive("u_max", None)
+    R: float | None = _drive("R", None)
+    L_d: float | None = _drive("L_d", None)
+    L_q: float | None = _drive("L_q", None)
+    p: StrictInt | None = _drive("p", None)
+    K_t: float = _drive("K_t")
 
     @field_validator("T_n", "omega_0", "D", "current", "u_max", "R", "L_d", "L_q", "p")
     @classmethod
@@ -271,11 +228,9 @@ class Axis(Model):
 class Cycles(Model):
     """Cycle times, each a whole multiple of the one before."""
 
-    control: Annotated[float, Quantity("s", minimum=1e-6, maximum=1)] = Field(
-        description="Cycle of the current and speed controllers, T_c"
-    )
-    position: Annotated[float, Quantity("s", minimum=1e-6, maximum=1, example="1 ms")] = Field(
-        description="Cycle of the position controller, T_pos; a whole multiple of the control cycle"
+    control: float = parameter(_CONTROLLER["T_c"], text="Cycle of the current and speed controllers, T_c")
+    position: float = parameter(
+        _CONTROLLER["T_pos"], text="Cycle of the position controller, T_pos; a whole multiple of the control cycle"
     )
     interpolation: Annotated[float, Quantity("s", minimum=1e-6, maximum=1, example="2 ms")] = Field(
         description="Cycle of the interpolator, T_ipo; a whole multiple of the position cycle"

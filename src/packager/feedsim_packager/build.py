@@ -23,7 +23,7 @@ from . import (
     trial,
     variables,
 )
-from .checkout import PROJECT, REFERENCES, SHELL, SOURCES, STANDARD
+from .checkout import PROJECT, REFERENCES, SHELL, SOURCES, STANDARD, unit_folders
 from .errors import CompilerError, InputError
 from .machine import Machine, named
 from .resources import Experiment, Resources
@@ -87,7 +87,7 @@ def unit_directory(name: str) -> Path:
         return directory
     if Path(name).is_dir():
         return Path(name)
-    known = ", ".join(sorted(path.name.removesuffix("_fmu") for path in SOURCES.glob("*_fmu")))
+    known = ", ".join(path.name.removesuffix("_fmu") for path in unit_folders())
     raise InputError(f"no unit '{name}' (units: {known}; or the path of a unit's folder)")
 
 

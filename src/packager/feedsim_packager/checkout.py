@@ -8,3 +8,8 @@ SHELL = SOURCES / "fmi2"
 STANDARD = SHELL / "standard"  # the headers of FMI 2.0
 REFERENCES = PROJECT / "tests" / "reference"
 DEFAULT_MODES = PROJECT / "scenarios" / "machines" / "test_centre" / "modes.csv"
+
+
+def unit_folders() -> list[Path]:
+    """Folders of the units, by their names."""
+    return sorted(SOURCES.glob("*_fmu"))

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import build, checkout, kinds, repack, targets
+from . import archive, build, checkout, declared, kinds, repack, table, targets
 from .compile import EXTRA_FLAGS
 from .errors import InputError, PackagerError
 from .machine import named
@@ -48,6 +48,9 @@ def _parser() -> argparse.ArgumentParser:
     packing.add_argument("--build-dir", type=Path, help="keep staged sources and library in this folder")
     describing = commands.add_parser("describe", parents=[common], help="print modelDescription.xml")
     describing.add_argument("unit", metavar="UNIT", help="plant, controller, friction, setpoint, or a unit's folder")
+    declaring = commands.add_parser("variables", help="write the tables of all units as one JSON file")
+    declaring.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
+    declaring.add_argument("--out", type=Path, required=True, help="file to write")
     repacking = commands.add_parser("repack", help="pack another machine or motion into an archive; needs no compiler")
     repacking.add_argument("base", type=Path, metavar="BASE.fmu", help="archive whose binaries and sources are taken")
     _add_resources(repacking)
@@ -69,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit code."""
     options = _parser().parse_args(arguments)
     try:
-        {"describe": _describe, "build": _build, "repack": _repack}[options.command](options)
+        {"describe": _describe, "build": _build, "variables": _variables, "repack": _repack}[options.command](options)
     except PackagerError as error:
         print(f"error: {error}", file=sys.stderr)
         return error.exit_code
@@ -96,6 +99,13 @@ def _describe(options: argparse.Namespace) -> None:
     unit = _load(options.unit, find_compiler(options.cc), options)
     _warn(unit.warnings)
     sys.stdout.buffer.write(unit.description())
+
+
+def _variables(options: argparse.Namespace) -> None:
+    compiler = find_compiler(options.cc)
+    found = [table.read(path, (checkout.SHELL, checkout.STANDARD), compiler) for path in checkout.unit_folders()]
+    archive.write(options.out, declared.dump(found))
+    print(f"{options.out}: tables of {', '.join(each.unit for each in found)}")
 
 
 def _build(options: argparse.Namespace) -> None:

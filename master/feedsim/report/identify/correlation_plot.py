@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from feedsim.identify.result import Correlation
-from feedsim.report.identify.quantities import SYMBOLS
+from feedsim.report.identify.quantities import symbol
 from feedsim.report.style import BLUE, GRID, MUTED, VERMILLION, Picture, drawing, finish
 
 STRONG = 0.9  # printed bold
@@ -39,7 +39,7 @@ def correlation_picture(axis: str, correlation: Correlation) -> Picture | None:
             room.axhline(k, color=GRID, linewidth=0.6)
             room.axvline(k, color=GRID, linewidth=0.6)
         ticks = [k + 0.5 for k in range(size)]
-        labels = [SYMBOLS.get(name, name) for name in names]
+        labels = [symbol(name) for name in names]
         room.set_xticks(ticks, labels)
         room.set_yticks(ticks, labels)
         room.tick_params(length=0)

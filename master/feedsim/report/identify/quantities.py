@@ -11,26 +11,36 @@ from feedsim.identify.result import NORMAL_95, Estimate, Stationary
 from feedsim.report.provenance import InputFile, hashed
 from feedsim.report.words import display_unit, typeset
 
-SYMBOLS = {
-    "sigma_0": r"$\sigma_0$",
-    "sigma_1": r"$\sigma_1$",
-    "sigma_2": r"$\sigma_2$",
-    "F_C": "$F_C$",
-    "F_S": "$F_S$",
-    "v_s": "$v_s$",
-    "beta": r"$\beta$",
-    "F_log": "$F_{log}$",
-    "v_log": "$v_{log}$",
-    "asymmetry": "asym.",
-    "W": "$W$",
-    "gamma": r"$\gamma$",
-    "M_0": "$M_0$",
-    "J": "$J$",
-    "delay": "delay",
-}
 MM_PER_MIN = 60e3  # per m/s
 LEAST_SPEEDS = 3  # that make a curve
+LONGEST_WORD = 6  # that stands beside a symbol
+_GREEK = (
+    "alpha",
+    "beta",
+    "gamma",
+    "delta",
+    "zeta",
+    "eta",
+    "kappa",
+    "lambda",
+    "mu",
+    "rho",
+    "sigma",
+    "tau",
+    "psi",
+    "omega",
+)
 SAME_SPEED = 1.05  # ratio up to which two speeds are one: that of a direction and of the other, or of a repetition
+
+
+def symbol(name: str) -> str:
+    """A parameter's name in the letters of mathematics, for pictures: sigma_0, F_log; words are cut."""
+    base, _, index = name.partition("_")
+    if base in _GREEK:
+        base = rf"\{base}"
+    elif len(base) > 1:
+        return name if len(name) <= LONGEST_WORD else f"{name[:4]}."
+    return f"${base}_{{{index}}}$" if index else f"${base}$"
 
 
 def remark(identified: Identified) -> str:

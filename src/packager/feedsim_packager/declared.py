@@ -1,0 +1,28 @@
+"""Tables of variables -> one JSON file for those who know the units by name and have no C preprocessor: the master."""
+
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from .table import Row, Table
+
+
+def dump(tables: Iterable[Table]) -> bytes:
+    """Unit -> name -> what its row says, without rows per axis; a bound that is not there is left out."""
+    content = {table.unit: {row.name: _entry(row) for row in table.scalars} for table in tables}
+    return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def _entry(row: Row) -> dict[str, Any]:
+    start = row.start if row.kind == "STRING" else _number(row.start)
+    entry: dict[str, Any] = {"kind": row.kind, "causality": row.causality, "start": start}
+    if row.kind == "REAL":
+        entry |= {"unit": row.unit, "display_unit": row.display_unit}
+    bounds = {"minimum": row.min, "maximum": row.max}
+    known = {name: _number(bound) for name, bound in bounds.items() if bound not in ("NO_MIN", "NO_MAX")}
+    return entry | known | {"text": row.description}
+
+
+def _number(text: str) -> float:
+    """As it is spelled: 1 is no 1.0."""
+    return int(text) if text.lstrip("+-").isdigit() else float(text)

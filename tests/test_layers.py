@@ -41,7 +41,7 @@ SOLE_USERS = {
     "distributed": {"sweep"},
     "dask": {"sweep"},
     "pyarrow": {"sweep"},
-    "feedsim_packager": {"units.py", "structure/pack.py", "ssp/pack.py"},
+    "feedsim_packager": {"units.py", "structure/pack.py", "ssp/setpoints.py"},
 }
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from feedsim import cosim, nc, scenario
-from feedsim.cosim.system import controller_parameters, plant_parameters
+from feedsim.cosim.roles import controller_parameters
+from feedsim.cosim.system import plant_parameters
 from feedsim.trace import Trace
 from feedsim_packager import repack, setpoints
 from feedsim_packager.machine import named
@@ -61,7 +62,7 @@ def hand_wired(move: Move, fmus: Path, folder: Path) -> System:
     connections = []
     for axis in axes:
         control, contact = f"controller_{axis}", f"friction_{axis}"
-        components[control] = Component(fmus / "controller.fmu", controller_parameters(machine, machine.axes[axis]))
+        components[control] = Component(fmus / "controller.fmu", controller_parameters(machine, axis))
         connections += [
             (("setpoint", f"{axis}.x_s"), (control, "x_s")),
             (("setpoint", f"{axis}.n_ffw"), (control, "n_ffw")),

@@ -13,7 +13,7 @@ from feedsim.analysis import linear
 from feedsim.analysis.linear import LinearSystem
 from feedsim.cosim.interpreter import Interpreter
 from feedsim.cosim.operations import do_step, get_real, set_real, set_slopes
-from feedsim.cosim.system import controller_parameters
+from feedsim.cosim.roles import controller_parameters
 from feedsim.cosim.unit import Archive, Port, Unit
 from feedsim.scenario import Filter, Machine
 from feedsim.structure import Modes, checked_modes
@@ -187,8 +187,8 @@ def measured(
             plant.set_parameters(
                 {"modes_file": str(table)} | {f"{axis}.x_0": machine.pose[axis] for axis in machine.axes}
             )
-            for axis, described in machine.axes.items():
-                units[axis].set_parameters(controller_parameters(machine, described))
+            for axis in machine.axes:
+                units[axis].set_parameters(controller_parameters(machine, axis))
             for unit in units.values():
                 unit.enter_initialisation(0.0, float(t[-1] + T_C))
                 unit.exit_initialisation()

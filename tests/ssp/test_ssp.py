@@ -328,9 +328,9 @@ def test_every_stop_time_can_be_run(exported: Path, tmp_path: Path) -> None:
 
 def test_the_rest_that_an_evaluation_needs() -> None:
     from feedsim.analysis.positioning import LEAST_REST
-    from feedsim.ssp import stop_time
+    from feedsim.ssp import setpoints
 
-    assert stop_time.LEAST_REST == LEAST_REST
+    assert setpoints.LEAST_REST == LEAST_REST
 
 
 def test_an_experiment_that_starts_late(exported: Path, tmp_path: Path) -> None:
@@ -347,7 +347,7 @@ def test_rows_are_those_that_the_unit_plays(exported: Path, tmp_path: Path) -> N
     from feedsim.cosim.interpreter import Interpreter
     from feedsim.cosim.operations import do_step
     from feedsim.cosim.unit import Archive, Unit
-    from feedsim.ssp.pack import SETPOINTS_IN_ARCHIVE, read_setpoints
+    from feedsim.ssp.setpoints import SETPOINTS_IN_ARCHIVE, read_setpoints
 
     file = tmp_path / "setpoint.fmu"
     file.write_bytes(ssp_helpers.contents(exported)["resources/setpoint.fmu"])

@@ -239,17 +239,6 @@ def test_files_that_are_missing(exported: Path, tmp_path: Path) -> None:
     assert "resources/friction.fmu: not a usable FMI 2.0 archive" in str(refusal(write(tmp_path / "bad.ssp", bad)))
 
 
-def test_a_component_of_somebody_else(exported: Path, tmp_path: Path) -> None:
-    """A unit with our variables, but another model name."""
-    files = contents(exported)
-    inner = tmp_path / "friction.fmu"
-    inner.write_bytes(files["resources/friction.fmu"])
-    altered(inner, inner, "modelDescription.xml", lambda t: t.replace('modelName="friction"', 'modelName="Coulomb"', 1))
-    files["resources/friction.fmu"] = inner.read_bytes()
-    problems = refusal(write(tmp_path / "foreign.ssp", files)).problems
-    assert [f"friction_{axis} is a 'Coulomb'" in problem for axis, problem in zip("XYZ", problems, strict=False)]
-
-
 def test_no_setpoint_unit(exported: Path, tmp_path: Path) -> None:
     def drop(text: str) -> str:
         start = text.index('<ssd:Component name="setpoint"')

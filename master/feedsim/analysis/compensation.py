@@ -154,7 +154,10 @@ def compensate(
         for axis in named or ():
             check_moves(f"{what} of axis {axis}", axis, program)
     machine = scenario.machine
-    used = {axis: (frictions or {}).get(axis, machine.axes[axis].friction) for axis in axes}
+    used = {
+        axis: (frictions or {}).get(axis) or machine.shipped_friction(axis, "compensation without friction of its own")
+        for axis in axes
+    }
     lags = lags_of(scenario, [axis for axis in axes if axis not in (delays or {})])
     applied = {axis: (delays or {})[axis] if axis not in lags else lags[axis].delay for axis in axes}
     plain = _fully_recorded(scenario, turn)
@@ -216,9 +219,11 @@ def lags_of(scenario: Scenario, axes: Sequence[str]) -> dict[str, Lag]:
     problems = []
     for axis in axes:
         try:
-            lags[axis] = lag_of(scenario.machine.axes[axis], scenario.machine.cycles)
+            lags[axis] = lag_of(scenario.machine.shipped_drive(axis, "its lag"), scenario.machine.cycles)
         except InputError as error:
-            problems.append(f"axis {axis}: {error}; give the delay of its compensation")
+            problems.append(
+                f"axis {axis}: {str(error).removeprefix(f'axis {axis}: ')}; give the delay of its compensation"
+            )
     if problems:
         raise InputError.of(f"{scenario.file}: the delay of the compensation is not known", problems)
     return lags

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, QUIET, Command, Option, halves, out, quantity, settings
-from feedsim.cli.terminal import finish, progress_bar
+from feedsim.cli.terminal import announce, finish, progress_bar
 
 if TYPE_CHECKING:
     from feedsim.nc import Program
@@ -31,6 +31,7 @@ def compensate(options: Namespace) -> None:
     from feedsim.analysis import compensation as analysis
 
     plan = scenario.load(options.scenario, options.overrides)
+    announce(plan.machine)
     directory: Path = options.out or Path("results") / f"compensate_{options.scenario.stem}"
     program = nc.plan(plan)
     analysis.circle_task(plan, program)

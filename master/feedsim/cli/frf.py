@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, QUIET, Command, Group, Option, names, out, quantity, settings
-from feedsim.cli.terminal import Progress, finish, progress_bar
+from feedsim.cli.terminal import Progress, announce, finish, progress_bar
 
 if TYPE_CHECKING:
     from feedsim.analysis.campaign import Plan
@@ -43,6 +43,7 @@ def frf(options: Namespace) -> None:
 
     subject = load_subject(options.subject, options.overrides)
     machine = subject.machine
+    announce(machine)
     axes = _axes(options.axes, machine)
     plan = _plan(options, machine)
     named = options.subject.stem if options.subject.is_file() else options.subject.resolve().name

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, QUIET, Command, Option, out, settings
-from feedsim.cli.terminal import finish, progress_bar, warn
+from feedsim.cli.terminal import announce, finish, progress_bar, warn
 from feedsim.errors import InputError, OutputError
 
 if TYPE_CHECKING:
@@ -91,6 +91,7 @@ def write_ssp(options: Namespace) -> None:
     if not options.out.absolute().parent.is_dir():
         raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
     plan = scenario.load(options.scenario, options.overrides)
+    announce(plan.machine)
     done = ssp.export(plan, options.out, fmus=options.fmus)
     warn(done.warnings)
     print(
@@ -112,6 +113,7 @@ def _subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | Non
         if scenario.is_study(options.scenario):
             raise InputError(f"{options.scenario}: is a study of many runs: feedsim sweep {options.scenario}")
         loaded = scenario.load(options.scenario, options.overrides)
+        announce(loaded.machine)
         yield loaded, nc.plan(loaded), options.fmus, tuple
         return
     if options.fmus is not None:
@@ -119,6 +121,7 @@ def _subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | Non
     from feedsim import ssp  # not for runs of scenario files
 
     with ssp.opened(options.scenario, options.overrides) as found:
+        announce(found.scenario.machine)
         yield found.scenario, found.program, found.fmus, found.told
 
 

@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, QUIET, Command, Option, out, settings
-from feedsim.cli.terminal import finish, progress_bar, warn
+from feedsim.cli.terminal import announce, finish, progress_bar, warn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,6 +44,7 @@ def sweep(options: Namespace) -> int:
     from feedsim.sweep.study import AllFailed, run
 
     study = load_study(options.study, options.overrides, runs=options.runs)
+    announce(study.base.scenario.machine)
     warn(study.warnings)
     planned = design(study)
     if options.row is not None:
@@ -147,6 +148,7 @@ def validate(options: Namespace) -> None:
     from feedsim.sweep.trial import check
 
     study = load_study(options.scenario, options.overrides)
+    announce(study.base.scenario.machine)
     planned = design(study)
     run, warnings, failed = check(study, planned, options.fmus)
     refused = [f"run {other} is refused, run {run} is not: {why}" for other, why in failed.items()]

@@ -5,7 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from feedsim.scenario import Machine
 
 
 class Progress:
@@ -46,6 +49,12 @@ def warn(warnings: Iterable[str]) -> None:
     """Say on standard error what the user should know before believing the results."""
     for warning in warnings:
         print(f"feedsim: warning: {warning}", file=sys.stderr)
+
+
+def announce(machine: Machine) -> None:
+    """Say on standard error, ahead of a run, whose programs are executed besides the shipped units."""
+    for axis, unit in machine.foreign_units:
+        print(f"feedsim: axis {axis}: executes {unit.fmu} of another maker as {unit.role.name}", file=sys.stderr)
 
 
 def finish(quiet: bool, warnings: Iterable[str], *lines: str) -> None:

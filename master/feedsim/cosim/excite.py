@@ -150,10 +150,7 @@ def measure(
             periods=periods,
             unsettled=unsettled,
             wall_time=wall_time,
-            units={
-                name: {"guid": unit.archive.guid, "version": unit.archive.version}
-                for name, unit in system.units.items()
-            },
+            units=system.archives,
             warnings=(*system.warnings, *_doubts(trace, axis, friction, offset_speed, unsettled)),
         )
 
@@ -163,12 +160,12 @@ def usual_rms(machine: Machine, axis: str, inject: str) -> float:
 
     As a speed it is that torque over the speed controller's gain, as a force what balances it.
     """
-    described = machine.axes[axis]
-    torque = 0.05 * described.drive.M_max
+    described, drive = machine.axes[axis], machine.shipped_drive(axis, "the usual amplitude")
+    torque = 0.05 * drive.M_max
     if inject == "M_add":
         return torque
     if inject == "n_add":
-        return torque / max(described.drive.K_p, 1e-9)
+        return torque / max(drive.K_p, 1e-9)
     return torque / described.I_P / 10  # a tenth: the force meets compliances that the torque does not
 
 
@@ -180,6 +177,8 @@ def _check(
     inputs = (*DRIVE_INPUTS, *wiring.TOOL_FORCES)
     if inject not in inputs:
         raise InputError(f"no input {inject!r} to excite{suggest(inject, inputs)}; there is {', '.join(inputs)}")
+    for name in machine.axes:
+        machine.shipped_drive(name, "a measured frequency response")
     T_c, T_pos = machine.cycles.T_c, machine.cycles.T_pos
     if not math.isclose(excitation.cycle, T_c, rel_tol=1e-9):
         raise InputError(
@@ -248,10 +247,10 @@ def _excite(system: System, axis: str, inject: str, excitation: Excitation, when
     """What sets the input for the control cycles, a sample each."""
     samples = excitation.samples.reshape(-1, 1)
     if inject in DRIVE_INPUTS:
-        return [set_real(Port(system.units[wiring.controller(axis)], [inject]), samples, when)]
+        return set_real(Port(system.units[wiring.controller(axis)], [inject]), samples, when)
     force = Port(system.plant, [inject])
     slopes = (np.roll(samples, -1) - samples) / excitation.cycle
-    return [set_real(force, samples, when), set_slopes(force, slopes, when)]
+    return [*set_real(force, samples, when), *set_slopes(force, slopes, when)]
 
 
 class _Record:

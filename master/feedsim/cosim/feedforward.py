@@ -40,7 +40,7 @@ from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats, Port
 from feedsim.errors import InputError
 from feedsim.nc import Program
-from feedsim.scenario import Axis, Cycles, Drive, Friction, Machine
+from feedsim.scenario import Cycles, Drive, Friction, Machine
 from feedsim.scenario.machine import FILTER_TYPES, Filter
 from feedsim.trace.trace import suggest
 
@@ -65,13 +65,12 @@ class Lag:
         return self.axis - self.torque
 
 
-def lag_of(axis: Axis, cycles: Cycles) -> Lag:
+def lag_of(drive: Drive, cycles: Cycles) -> Lag:
     """Lags of an axis from its drive's parameters.
 
     Raises:
         InputError: the drive has no position or no current control, so that it has none.
     """
-    drive = axis.drive
     if drive.K_v <= 0:
         raise InputError("K_v is 0: without position control the lag of the axis is not that of its setpoint filters")
     return Lag(axis=drive.T_dyn + drive.T_sym + (1 - drive.k_ffw) / drive.K_v, torque=_torque_lag(drive, cycles.T_c))
@@ -116,8 +115,14 @@ def feeders(system: System, torques: TorqueFeedforward, instants: int) -> list[O
                 f"torque feedforward of axis {axis}: {instants} finite values are needed, one per control cycle and "
                 f"one for the end; there are {torque.shape}, {np.count_nonzero(np.isfinite(torque))} of them finite"
             )
+        role = system.roles[wiring.controller(axis)]
+        if "M_add" not in role.signals:
+            raise InputError(
+                f"{role}: no input of it stands for M_add, to which a torque feedforward is added; name one under "
+                f"axes.{axis}.drive.inputs"
+            )
         port = Port(system.units[wiring.controller(axis)], ["M_add"])
-        sends.append(set_real(port, torque.reshape(-1, 1)))
+        sends += set_real(port, port.to_own(torque.reshape(-1, 1)))
     return sends
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from feedsim.cosim.unit import Floats
 from feedsim.errors import InputError
-from feedsim.scenario import Level, Logging, Scenario
+from feedsim.scenario import Drive, Level, Logging, Scenario
 from feedsim.trace import Table, Trace, least_and_largest, release, stretches
 
 LINEAR = ("i_d", "i_q", "M_a", "M_fr", "z", "c")
@@ -154,8 +154,9 @@ def logged_axes(scenario: Scenario) -> tuple[str, ...]:
 
 
 def ideal_axes(scenario: Scenario) -> tuple[str, ...]:
-    """Axes with an ideal current loop."""
-    return tuple(name for name, axis in scenario.machine.axes.items() if axis.drive.ideal_current_loop)
+    """Axes with an ideal current loop. Of another maker's drive that is not known; its torque counts as linear."""
+    drives = {name: axis.drive for name, axis in scenario.machine.axes.items()}
+    return tuple(name for name, drive in drives.items() if isinstance(drive, Drive) and drive.ideal_current_loop)
 
 
 def full_rate_columns(scenario: Scenario) -> tuple[str, ...]:

@@ -85,25 +85,31 @@ class Setpoints:
     """
 
     def __init__(self, system: System, program: Program, ratio: int) -> None:
-        self._columns = [(program.x_s[axis], program.n_ffw[axis]) for axis in system.axes]
-        self._ratio = ratio
+        ports = [control.setpoint for control in system.controllers]
+        self._columns = [
+            [(alias, columns[axis]) for alias, name in zip(port.aliases, port.names, strict=True)
+             for columns in [{"x_s": program.x_s, "n_ffw": program.n_ffw}[name]]]
+            for axis, port in zip(system.axes, ports, strict=True)
+        ]  # fmt: skip
+        self._ratio, self._length = ratio, len(program.time)
         self._rows = min(len(program.time), max(RING, 2 * (REPORTED_EVERY // ratio + 1)))
         self._filled = 0
         when = When(every=ratio)
-        self._tables = [np.zeros((self._rows, 2)) for _ in system.controllers]
+        self._tables = [np.zeros((self._rows, len(port.names))) for port in ports]
         self.operations = [
-            set_real(control.setpoint, table, when)
-            for control, table in zip(system.controllers, self._tables, strict=True)
+            operation
+            for port, table in zip(ports, self._tables, strict=True)
+            for operation in set_real(port, table, when)
         ]
 
     def ahead(self, begin: int, end: int) -> None:
         done, needed = -(-begin // self._ratio), -(-end // self._ratio)
         if needed <= self._filled:
             return
-        last = min(done + self._rows, len(self._columns[0][0]))
+        last = min(done + self._rows, self._length)
         at = np.arange(self._filled, last) % self._rows
         for table, columns in zip(self._tables, self._columns, strict=True):
-            for i, column in enumerate(columns):
-                table[at, i] = column[self._filled : last]
-        release(*(column for columns in self._columns for column in columns))
+            for i, (alias, column) in enumerate(columns):
+                table[at, i] = alias.to_own(column[self._filled : last])
+        release(*(column for columns in self._columns for _, column in columns))
         self._filled = last

@@ -92,21 +92,41 @@ class Operation:
 # --- calls of a unit
 
 
-def set_real(port: Port, table: Floats | None = None, when: When | None = None) -> Operation:
-    """Send the port's values; with a table (rows, n) its next row, by default in every cycle."""
-    return _exchange("set_real", port, port.values, setting(port.names), table, when)
+def set_real(port: Port, table: Floats | None = None, when: When | None = None) -> list[Operation]:
+    """Send the port's values; with a table (rows, n), which is as the unit takes it, its next row, by default in every
+    cycle."""
+    converted = [] if table is not None else _converted(port, port.own_values, port.values, inwards=True)
+    return [*converted, _exchange("set_real", port, port.own_values, setting(port.names), table, when)]
 
 
-def set_slopes(port: Port, table: Floats | None = None, when: When | None = None) -> Operation:
-    return _exchange("set_slopes", port, port.slopes, setting(port.names, slopes=True), table, when)
+def set_slopes(port: Port, table: Floats | None = None, when: When | None = None) -> list[Operation]:
+    converted = [] if table is not None else _converted(port, port.own_slopes, port.slopes, inwards=True, slopes=True)
+    return [*converted, _exchange("set_slopes", port, port.own_slopes, setting(port.names, slopes=True), table, when)]
 
 
-def get_real(port: Port) -> Operation:
-    return _exchange("get_real", port, port.values, reading(port.names))
+def get_real(port: Port) -> list[Operation]:
+    converted = _converted(port, port.own_values, port.values)
+    return [_exchange("get_real", port, port.own_values, reading(port.names)), *converted]
 
 
-def get_slopes(port: Port) -> Operation:
-    return _exchange("get_slopes", port, port.slopes, reading(port.names, slopes=True))
+def get_slopes(port: Port) -> list[Operation]:
+    converted = _converted(port, port.own_slopes, port.slopes, slopes=True)
+    return [_exchange("get_slopes", port, port.own_slopes, reading(port.names, slopes=True)), *converted]
+
+
+def _converted(
+    port: Port, own: Floats, signals: Floats, *, inwards: bool = False, slopes: bool = False
+) -> list[Operation]:
+    """Units of measurement on the way into the unit or out of it; nothing where none is to be converted."""
+    operations = []
+    for i, alias in enumerate(port.aliases) if port.converts else ():
+        at = slice(i, i + 1)
+        offset = 0.0 if slopes else alias.offset
+        if inwards:
+            operations.append(line(own[at], np.array([-offset / alias.factor]), 1 / alias.factor, signals[at]))
+        else:
+            operations.append(line(signals[at], np.array([offset]), alias.factor, own[at]))
+    return operations
 
 
 def do_step(unit: Unit, start: float, h: float) -> Operation:

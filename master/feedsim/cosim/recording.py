@@ -23,13 +23,10 @@ from feedsim.cosim.signals import held
 from feedsim.cosim.unit import Floats, Log
 from feedsim.errors import InputError
 from feedsim.nc import Program
-from feedsim.scenario import Scenario
+from feedsim.scenario import Machine, Scenario
+from feedsim.scenario.roles import DRIVE, FRICTION
 from feedsim.trace import Table, Trace, matching
 
-CONTROLLER_SIGNALS = (
-    "M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q", "torque_limited", "voltage_limited",
-)  # fmt: skip
-FRICTION_SIGNALS = ("M_fr", "z", "c", "k", "lambda")
 PLANT_SIGNALS = ("x_a", "n_a")
 TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
 # Of the coupling, not of a unit: recorded where it is asked for.
@@ -46,21 +43,22 @@ def recorded_columns(scenario: Scenario) -> list[str]:
     Raises:
         InputError: an entry of recording.variables matches none.
     """
-    axes = tuple(scenario.machine.axes)
     wanted = scenario.recording.variables
     if wanted is None:
-        return columns_of(axes)
+        return columns_of(scenario.machine)
     try:
-        return matching(columns_of(axes, residual=True), wanted)
+        return matching(columns_of(scenario.machine, residual=True), wanted)
     except InputError as error:
         raise InputError(f"{scenario.file}: recording.variables: {error}") from None
 
 
-def columns_of(axes: Collection[str], *, residual: bool = False) -> list[str]:
+def columns_of(machine: Machine, *, residual: bool = False) -> list[str]:
     """All columns that can be recorded, in the order of a trace."""
-    signals = (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *CONTROLLER_SIGNALS, *FRICTION_SIGNALS)
-    signals += (RESIDUAL,) if residual else ()
-    return [*(f"{axis}.{signal}" for axis in axes for signal in signals), *TOOL_SIGNALS]
+    found: list[str] = []
+    for name, axis in machine.axes.items():
+        shown = (*DRIVE.shown(axis.drive), *FRICTION.shown(axis.friction), *([RESIDUAL] if residual else []))
+        found += (f"{name}.{signal}" for signal in (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *shown))
+    return [*found, *TOOL_SIGNALS]
 
 
 class Recording:
@@ -97,7 +95,7 @@ class Recording:
         system = cycle.system
         self._axes = system.axes
         self.every, self._ratio, self._T_c = every, ratio, cycle.cycle
-        self._columns = matching(columns_of(system.axes, residual=True), columns)
+        self._columns = matching(columns_of(system.machine, residual=True), columns)
         total = cycles // every + 1
         self._ring = min(total, max(RING, 2 * (REPORTED_EVERY // every + 1)))
         self._table = Table(1 + len(self._columns), total, scratch)
@@ -112,15 +110,17 @@ class Recording:
                     self._units[name] = wiring.SETPOINT_UNITS[setpoint]
         plant = [f"{axis}.{signal}" for axis in system.axes for signal in PLANT_SIGNALS]
         self._log(wiring.PLANT, {name: name for name in (*plant, *TOOL_SIGNALS)}, cycle)
-        for axis in system.axes:
-            self._log(wiring.controller(axis), {signal: f"{axis}.{signal}" for signal in CONTROLLER_SIGNALS}, cycle)
-            self._log(wiring.friction(axis), {signal: f"{axis}.{signal}" for signal in FRICTION_SIGNALS}, cycle)
+        self.limited: dict[str, int] = {}
+        for axis, described in system.machine.axes.items():
+            drive, friction = DRIVE.shown(described.drive), FRICTION.shown(described.friction)
+            self.limited |= {f"{axis}.{limit}": 0 for limit in LIMITS if limit in drive}
+            self._log(wiring.controller(axis), {signal: f"{axis}.{signal}" for signal in drive}, cycle)
+            self._log(wiring.friction(axis), {signal: f"{axis}.{signal}" for signal in friction}, cycle)
         residuals = [f"{axis}.{RESIDUAL}" for axis in system.axes]
         self._residual = np.zeros((self._ring, len(system.axes)))
         self._residual_names = residuals if any(name in self._columns for name in residuals) else []
         self._units |= {name: RESIDUAL_UNIT for name in residuals if name in self._columns}
         self._cycle = cycle
-        self.limited = {f"{axis}.{limit}": 0 for axis in system.axes for limit in LIMITS}
 
     def _log(self, instance: str, names: dict[str, str], cycle: Cycle) -> None:
         """Record the signals of a unit that are among the columns; `names`: signal -> column."""
@@ -131,7 +131,7 @@ class Recording:
         self._logs.append((log, asked))
         for signal, name in asked.items():
             if name in self._columns:
-                self._units[name] = log.unit.archive.unit_of(signal)
+                self._units[name] = log.unit.unit_of(signal)
 
     @property
     def rows(self) -> int:
@@ -177,9 +177,8 @@ class Recording:
         cycle = rows * self.every
         found: dict[str, Floats] = {}
         for log, names in self._logs:
-            reals, flags = self._of_rows(log.reals, rows).T, self._of_rows(log.flags, rows).T
-            found.update({names[signal]: values for signal, values in zip(log.real_names, reals, strict=True)})
-            found.update({names[signal]: values for signal, values in zip(log.flag_names, flags, strict=True)})
+            columns = log.columns(self._of_rows(log.reals, rows), self._of_rows(log.flags, rows))
+            found |= {names[signal]: values for signal, values in columns.items()}
         for name in self.limited:
             self.limited[name] += int(np.count_nonzero(found[name]))
         position_cycle = cycle // self._ratio

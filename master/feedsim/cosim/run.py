@@ -132,13 +132,11 @@ def run(
             trace=recording.trace(),
             coupling=trust.energies(system, cycle),
             wall_time=wall_time,
-            units={
-                name: {"guid": unit.archive.guid, "version": unit.archive.version}
-                for name, unit in system.units.items()
-            },
+            units=system.archives,
             pose=pose,
             warnings=(
                 *system.warnings,
+                *cycle.warnings,
                 *trust.foreseen(scenario, modes),
                 *pose.warnings,
                 *trust.found(scenario, cycle, recording),
@@ -162,4 +160,6 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
     with System(scenario.machine, fmus or fmus_directory()) as system:
         system.initialise(program, stop=float(program.time[-1]))
         pose = pose_use(scenario.machine, program, system)
-        return (*system.warnings, *trust.foreseen(scenario, modes), *pose.warnings)
+        cycles, coupling = scenario.machine.cycles, scenario.coupling
+        cycle = Cycle(system, SCHEMES[coupling.scheme], cycles.T_c, coupling.substeps)
+        return (*system.warnings, *cycle.warnings, *trust.foreseen(scenario, modes), *pose.warnings)

@@ -15,8 +15,10 @@ import numpy as np
 
 from feedsim.cosim import operations as op
 from feedsim.cosim.operations import Bond, Operation
+from feedsim.cosim.roles import RoleUnit, check_step
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats
+from feedsim.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -58,10 +60,21 @@ SCHEMES = {
 }
 
 
+def lacking(role: RoleUnit, scheme: Scheme) -> str:
+    """What the friction in a role would need for a scheme and has not, in words; empty where it serves."""
+    needed = {
+        "no slope of its input": (role.takes_slopes, scheme.passes > 1 or scheme.speed == "extrapolated"),
+        "no slope of its output": (role.gives_slopes, scheme.passes > 1 or scheme.speed == "extrapolated"),
+        "no state to go back to": (role.keeps_state, scheme.passes > 1),
+    }
+    return ", ".join(what for what, (there, wanted) in needed.items() if wanted and not there)
+
+
 class Cycle:
     """What happens in a control cycle of a :class:`System`, as a list of operations.
 
     Attributes:
+        warnings: what a user should know of it, a sentence each.
         bond: plant and friction: the energies that they exchange.
     """
 
@@ -83,15 +96,46 @@ class Cycle:
             n_end=system.n_end, residual=buffer(), residual_peak=buffer(), dissipated=buffer(),
         )  # fmt: skip
 
+        self.warnings = self._check()
+
+    def _check(self) -> tuple[str, ...]:
+        """What a user should know of how other makers' units are exchanged, a sentence each.
+
+        Raises:
+            InputError: lists the units that the scheme or the step does not suit.
+        """
+        scheme, problems, warnings = self.scheme, [], []
+        contacts = [contact.role for contact in self.system.contacts]
+        for role in contacts:
+            if missing := lacking(role, scheme):
+                serving = [each.name for each in SCHEMES.values() if not lacking(role, each)]
+                problems.append(
+                    f"{role}: coupling scheme {scheme.name} does not work with it, which has {missing}; those that do: "
+                    f"{', '.join(serving)}"
+                )
+            elif scheme.speed_ramp and not (role.takes_slopes and role.gives_slopes):
+                known = {"speed": role.takes_slopes, "torque": role.gives_slopes}
+                held = " nor of its ".join(name for name, there in known.items() if not there)
+                warnings.append(
+                    f"{role}: knows no slope of its {held}: on this axis the exchange holds what has none, as "
+                    f"gauss_seidel does, and is of first order; coupling.substeps above {self.substeps} make it finer"
+                )
+        steps = [(control.role, self.cycle, "cycles.control") for control in self.system.controllers]
+        steps += [(role, self.step, "cycles.control over coupling.substeps") for role in contacts]
+        problems += filter(None, (check_step(*each) for each in steps))
+        if problems:
+            raise InputError.of("the units cannot be exchanged so", problems)
+        return tuple(warnings)
+
     def operations(self) -> Iterator[Operation]:
         """The whole system from k T_c to (k + 1) T_c."""
         system = self.system
         for control in system.controllers:
-            yield op.set_real(control.measured)
+            yield from op.set_real(control.measured)
             yield op.do_step(control.unit, 0.0, self.cycle)
-            yield op.get_real(control.torque)
-            if self.scheme.torque_ramp:
-                yield op.get_slopes(control.torque)
+            yield from op.get_real(control.torque)
+            if self.scheme.torque_ramp and control.role.gives_slopes:  # of another drive, M_a is held as it is found
+                yield from op.get_slopes(control.torque)
         if self.scheme.torque_ramp:
             # From the end backwards: a drive whose torque jumps at t_k then acts as it does, without a cycle's delay.
             yield op.line(system.M_a_start, system.M_a_end, -self.cycle, system.M_a_slope)
@@ -127,13 +171,13 @@ class Cycle:
     def _step_plant(self, start: float) -> Iterator[Operation]:
         """With the friction torque that is at hand: that of the last step's end, or what friction has just found."""
         system, scheme, h = self.system, self.scheme, self.step
-        yield op.set_real(system.plant_inputs)
+        yield from op.set_real(system.plant_inputs)
         if scheme.friction_ramp:
-            yield op.set_slopes(system.plant_inputs)
+            yield from op.set_slopes(system.plant_inputs)
         elif scheme.torque_ramp:
-            yield op.set_slopes(system.plant_torque)
+            yield from op.set_slopes(system.plant_torque)
         yield op.do_step(system.plant, start, h)
-        yield op.get_real(system.plant_outputs)
+        yield from op.get_real(system.plant_outputs)
         if scheme.friction_ramp:
             yield op.line(self.assumed_torque, system.M_fr, h, system.M_fr_slope)
         else:
@@ -150,11 +194,14 @@ class Cycle:
             yield op.rate(system.n_slope_last, system.n_end, system.n_start, self.step)
 
     def _step_friction(self, start: float) -> Iterator[Operation]:
+        """A unit that takes no slope gets the speed of the step's end; of one that gives none the torque is held."""
+        scheme = self.scheme
         for contact in self.system.contacts:
-            yield op.set_real(contact.speed)
-            if self.scheme.speed_ramp:
-                yield op.set_slopes(contact.speed)
+            takes, gives = contact.role.takes_slopes, contact.role.gives_slopes
+            yield from op.set_real(contact.speed if takes or scheme.speed != "within" else contact.speed_end)
+            if scheme.speed_ramp and takes:
+                yield from op.set_slopes(contact.speed)
             yield op.do_step(contact.unit, start, self.step)
-            yield op.get_real(contact.torque)
-            if self.scheme.friction_ramp:
-                yield op.get_slopes(contact.torque)
+            yield from op.get_real(contact.torque)
+            if scheme.friction_ramp and gives:
+                yield from op.get_slopes(contact.torque)

@@ -10,15 +10,21 @@ import numpy as np
 
 from feedsim.cosim import wiring
 from feedsim.cosim.plant import axes_of, open_plant
+from feedsim.cosim.roles import RoleUnit, archive_path, check_instances, filled
 from feedsim.cosim.unit import Archive, Floats, Port, Unit
+from feedsim.errors import InputError
 from feedsim.nc import Program
-from feedsim.scenario import Axis, Machine
+from feedsim.scenario import Machine
+from feedsim.scenario.roles import DRIVE, FRICTION, Role
+
+SETPOINT, MEASURED = ("x_s", "n_ffw"), ("x_a", "n_a")
 
 
 @dataclass(frozen=True)
 class Control:
-    """A drive controller with its ports."""
+    """The drive of an axis with its ports, which hold those signals that it has."""
 
+    role: RoleUnit
     unit: Unit
     setpoint: Port  # x_s, n_ffw
     measured: Port  # x_a, n_a
@@ -27,10 +33,15 @@ class Control:
 
 @dataclass(frozen=True)
 class Contact:
-    """A friction unit with its ports."""
+    """The friction of an axis with its ports.
 
+    speed_end: n_fr at the end of the exchange step, for a unit that cannot be told how fast it changes within.
+    """
+
+    role: RoleUnit
     unit: Unit
     speed: Port  # n_fr
+    speed_end: Port
     torque: Port  # M_fr
 
 
@@ -52,7 +63,7 @@ class System:
     """
 
     def __init__(self, machine: Machine, fmus: Path, *, friction: bool = True) -> None:
-        self.axes = tuple(machine.axes)
+        self.machine, self.axes = machine, tuple(machine.axes)
         self.friction = friction
         self._open: list[Archive | Unit] = []
         try:
@@ -63,32 +74,52 @@ class System:
 
     def _build(self, machine: Machine, fmus: Path) -> None:
         plant = open_plant(machine, fmus)
-        archives = {"plant": plant.archive}
         self._open.append(plant.archive)
-        for name in ("controller", "friction") if self.friction else ("controller",):
-            archives[name] = Archive(fmus / f"{name}.fmu")
-            self._open.append(archives[name])
-        self.archives = archives
-        instances = {wiring.PLANT: archives["plant"]}
-        for axis in self.axes:
-            instances[wiring.controller(axis)] = archives["controller"]
-            if self.friction:
-                instances[wiring.friction(axis)] = archives["friction"]
-        wiring.check(wiring.figure_2(self.axes, with_friction=self.friction), instances)
+        self.roles = self._fill(machine, fmus)
+        instances = {wiring.PLANT: plant.archive} | {name: role.archive for name, role in self.roles.items()}
+        given = {name: role.signals for name, role in self.roles.items()}
+        connections = wiring.figure_2(self.axes, with_friction=self.friction, given=given)
+        wiring.check(connections, instances, [name for name, role in self.roles.items() if role.foreign])
         self.units = {name: self._instantiate(archive, name) for name, archive in instances.items()}
         self.plant = self.units[wiring.PLANT]
         self.plant_axes, self.plant_modes_file = axes_of(plant.archive), plant.modes_file
 
         self.plant.set_parameters(plant_parameters(machine, plant.modes_file))
-        for axis, described in machine.axes.items():
-            self.units[wiring.controller(axis)].set_parameters(controller_parameters(machine, described))
-            self.units[wiring.controller(axis)].set_parameters({wiring.RELEASE: True})
-            if self.friction:
-                self.units[wiring.friction(axis)].set_parameters(described.friction.parameters())
+        for name, role in self.roles.items():
+            self.units[name].set_parameters(role.parameters)
+            if wiring.RELEASE in role.signals:
+                self.units[name].set_parameters({role.signals[wiring.RELEASE].name: True})
         self._share_buffers()
 
+    def _fill(self, machine: Machine, fmus: Path) -> dict[str, RoleUnit]:
+        """Instance -> what fills its role; nothing of it is executed yet."""
+        wanted: list[tuple[str, str, Role]] = [
+            (instance(axis), axis, role)
+            for axis in self.axes
+            for instance, role in ((wiring.controller, DRIVE), (wiring.friction, FRICTION))
+            if role is DRIVE or self.friction
+        ]
+        archives: dict[Path, Archive] = {}
+        found: dict[str, RoleUnit] = {}
+        problems: list[str] = []
+        for name, axis, role in wanted:
+            path = archive_path(machine, axis, role, fmus)
+            try:
+                if path not in archives:
+                    archives[path] = Archive(path)
+                    self._open.append(archives[path])
+                found[name] = filled(machine, axis, role, archives[path])
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            problems = list(dict.fromkeys(problems))
+            raise InputError.of("the units cannot be used", problems)
+        check_instances(found.values())
+        return found
+
     def _instantiate(self, archive: Archive, name: str) -> Unit:
-        unit = Unit(archive, name)
+        role = self.roles.get(name)
+        unit = Unit(archive, name, role.signals if role is not None and role.foreign else None)
         self._open.append(unit)
         return unit
 
@@ -117,22 +148,28 @@ class System:
         self.contacts: list[Contact] = []
         for i, axis in enumerate(axes):
             own = slice(i, i + 1)
-            control = self.units[wiring.controller(axis)]
+            name = wiring.controller(axis)
+            role, control = self.roles[name], self.units[name]
+            setpoint, both = ([name for name in group if name in role.signals] for group in (SETPOINT, MEASURED))
             self.controllers.append(
                 Control(
+                    role=role,
                     unit=control,
-                    setpoint=Port(control, ["x_s", "n_ffw"]),
-                    measured=Port(control, ["x_a", "n_a"], self.measured[2 * i : 2 * i + 2]),
+                    setpoint=Port(control, setpoint),
+                    measured=Port(control, both, self.measured[2 * i : 2 * i + len(both)]),
                     torque=Port(control, ["M_a"], self.M_a_end[own], self.M_a_slope[own]),
                 )
             )
             if not self.friction:
                 continue
-            contact = self.units[wiring.friction(axis)]
+            name = wiring.friction(axis)
+            role, contact = self.roles[name], self.units[name]
             self.contacts.append(
                 Contact(
+                    role=role,
                     unit=contact,
                     speed=Port(contact, ["n_fr"], self.n[own], self.n_slope[own]),
+                    speed_end=Port(contact, ["n_fr"], self.n_end[own]),
                     torque=Port(contact, ["M_fr"], self.M_fr[own], self.M_fr_slope[own]),
                 )
             )
@@ -159,13 +196,23 @@ class System:
     def set_setpoints(self, program: Program, i: int) -> None:
         """Hand over the setpoints of position cycle i."""
         for axis, control in zip(self.axes, self.controllers, strict=True):
-            control.setpoint.values[0] = program.x_s[axis][i]
-            control.setpoint.values[1] = program.n_ffw[axis][i]
+            columns = {"x_s": program.x_s[axis], "n_ffw": program.n_ffw[axis]}
+            control.setpoint.values[:] = [columns[name][i] for name in control.setpoint.names]
             control.setpoint.set()
 
     @property
+    def archives(self) -> dict[str, dict[str, str]]:
+        """Instance -> GUID and version of its archive, and the name of one that is another maker's."""
+        return {
+            name: {"guid": unit.archive.guid, "version": unit.archive.version}
+            | ({"name": unit.archive.path.stem} if name in self.roles and self.roles[name].foreign else {})
+            for name, unit in self.units.items()
+        }
+
+    @property
     def warnings(self) -> list[str]:
-        return [warning for unit in self.units.values() for warning in unit.warnings]
+        ahead = [warning for role in self.roles.values() for warning in role.warnings]
+        return [*ahead, *(warning for unit in self.units.values() for warning in unit.warnings)]
 
     def close(self) -> None:
         for part in reversed(self._open):
@@ -188,9 +235,3 @@ def plant_parameters(machine: Machine, modes_file: Path | None) -> dict[str, flo
         parameters[f"{name}.x_0"] = machine.pose[name]
         parameters[f"{name}.M_0"] = axis.M_0
     return parameters
-
-
-def controller_parameters(machine: Machine, axis: Axis) -> dict[str, float | int | bool | str]:
-    """Parameters of an axis's controller by FMU name."""
-    cycles = {"T_c": machine.cycles.T_c, "T_pos": machine.cycles.T_pos, "I_P": axis.I_P}
-    return {**axis.drive.parameters(), **cycles}

@@ -7,7 +7,7 @@ import numpy as np
 from feedsim.cosim.recording import Recording
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
-from feedsim.scenario import Scenario
+from feedsim.scenario import ForeignUnit, Scenario
 from feedsim.structure import Modes
 
 # Of the friction work, and J (an axis at rest has no work to speak of). On the default machine the first-order schemes
@@ -40,9 +40,18 @@ def _stability(scenario: Scenario, modes: Modes) -> list[str]:
     """Explicit exchange needs a friction slope well below 2 J_inf/h."""
     scheme = SCHEMES[scenario.coupling.scheme]
     step = scenario.machine.cycles.T_c / scenario.coupling.substeps
-    warnings = []
+    warnings: list[str] = []
+    unknown = [name for name, axis in scenario.machine.axes.items() if isinstance(axis.friction, ForeignUnit)]
+    if unknown:
+        warnings.append(
+            f"axis {', '.join(unknown)}: how steeply another maker's friction rises with the speed is not known: "
+            f"nothing tells ahead whether scheme {scheme.name} is stable with it, the energy residual of the run does"
+        )
     for name, axis in scenario.machine.axes.items():
-        slope, bound = axis.friction.sigma_1 + axis.friction.sigma_2, 2 * modes.J_inf(name) / step
+        friction = axis.friction
+        if isinstance(friction, ForeignUnit):
+            continue
+        slope, bound = friction.sigma_1 + friction.sigma_2, 2 * modes.J_inf(name) / step
         if slope > scheme.stable_share * bound:
             warnings.append(
                 f"axis {name}: sigma_1 + sigma_2 = {slope:.4g} N.m.s/rad is above "

@@ -13,6 +13,7 @@ import os
 import re
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import IO, Any, NoReturn, Self
@@ -51,6 +52,29 @@ _CALLS = {
     "set_state": ("fmi2SetFMUstate", _STATE),
     "free_state": ("fmi2FreeFMUstate", _STATE),
 }
+
+
+@dataclass(frozen=True)
+class Alias:
+    """A variable that stands for a signal of the system: signal = factor * variable + offset, in the SI unit `unit`;
+    None where it is that which the archive declares."""
+
+    name: str
+    unit: str | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def converts(self) -> bool:
+        return (self.factor, self.offset) != (1.0, 0.0)
+
+    def to_own(self, signal: Any) -> Any:
+        """Values of the variable for those of the signal."""
+        return signal * (1 / self.factor) - self.offset / self.factor if self.converts else signal
+
+    def to_signal(self, variable: Any) -> Any:
+        """Values of the signal for those of the variable."""
+        return variable * self.factor + self.offset if self.converts else variable
 
 
 class Archive:
@@ -99,11 +123,15 @@ class Archive:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def unit_of(self, name: str) -> str:
-        """Unit of variable `name` as the archive declares it; "1" where it declares none."""
+    def declared_unit(self, name: str) -> str | None:
+        """Unit of variable `name` as the archive declares it; None where it declares none."""
         variable = self.variables[name]
         declared = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
-        return str(declared or "1")
+        return str(declared) if declared else None
+
+    def unit_of(self, name: str) -> str:
+        """The same, "1" where it declares none."""
+        return self.declared_unit(name) or "1"
 
     def slave(self, name: str) -> FMU2Slave:
         """FMPy's wrapper for an instance `name`, around a library that is loaded once.
@@ -185,8 +213,10 @@ def _read_description(path: Path, directory: Path) -> Any:
 class Unit:
     """An instance of an archive. Every failed call raises :class:`SimulationError` with the unit's own message."""
 
-    def __init__(self, archive: Archive, name: str) -> None:
+    def __init__(self, archive: Archive, name: str, signals: Mapping[str, Alias] | None = None) -> None:
+        """signals: what the system calls the variables that it exchanges and records; None: as the archive does."""
         self.archive = archive
+        self.signals = signals
         self.name = name
         self.warnings: list[str] = []
         self._messages: list[str] = []
@@ -198,7 +228,9 @@ class Unit:
         callbacks.freeMemory = defaultCallbacks.freeMemory
         try:
             self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
-            self._fmu.setDebugLogging(True, ["logStatusWarning", "logStatusError"])
+            known = {category.name for category in archive.description.logCategories or ()}
+            if wanted := [name for name in ("logStatusWarning", "logStatusError") if name in known]:
+                self._fmu.setDebugLogging(True, wanted)
         except Exception as error:
             raise InputError(f"unit {name}: cannot be instantiated: {self._said() or error}") from error
         self._component = self._fmu.component
@@ -265,7 +297,7 @@ class Unit:
             try:
                 if variable.type == "Real":
                     self._fmu.setReal(reference, [float(value)])
-                elif variable.type == "Integer":
+                elif variable.type in ("Integer", "Enumeration"):
                     self._fmu.setInteger(reference, [int(value)])
                 elif variable.type == "Boolean":
                     self._fmu.setBoolean(reference, [bool(value)])
@@ -318,6 +350,14 @@ class Unit:
             self._fmu.fmi2FreeInstance(self._component)  # the library stays loaded, for other instances
             self._component = None
 
+    def alias(self, name: str) -> Alias:
+        """The variable that stands for a signal; where the unit has no signals, the one of that name."""
+        return Alias(name) if self.signals is None or name not in self.signals else self.signals[name]
+
+    def unit_of(self, name: str) -> str:
+        """Unit of a signal, or of the variable of that name; "1" where there is none."""
+        return self.alias(name).unit or self.archive.unit_of(name)
+
     def references(self, names: Iterable[str]) -> NDArray[np.uint32]:
         """Value references of the named variables.
 
@@ -325,7 +365,7 @@ class Unit:
             InputError: the unit has no such variable.
         """
         known = self.archive.variables
-        names = list(names)
+        names = [self.alias(name).name for name in names]
         for name in names:
             if name not in known:
                 raise InputError(f"{self.archive.path.name}: no variable '{name}'")
@@ -346,8 +386,10 @@ class Port:
 
     Attributes:
         references, orders: (n,) value references, and the order of the derivatives (1), as the FMI functions take them.
-        values: (n,) in the unit's own units; what `set` sends and `get` fills.
-        slopes: (n,) first time derivatives; what `set_slopes` sends and `get_slopes` fills.
+        aliases: of the variables.
+        values, slopes: (n,) signals and their first time derivatives, shared with other units.
+        own_values, own_slopes: (n,) the same as the unit has them: the same memory, unless there is a unit of
+            measurement to be converted.
     """
 
     def __init__(
@@ -363,18 +405,34 @@ class Port:
                 raise ValueError(f"port {self.names}: a buffer of {count} contiguous float64 is needed")
         self.references = unit.references(self.names)
         self.orders = np.ones(count, dtype=np.int32)
+        self.aliases = tuple(map(unit.alias, self.names))
+        self.converts = any(alias.converts for alias in self.aliases)
+        self.own_values, self.own_slopes = (
+            (np.zeros(count), np.zeros(count)) if self.converts else (self.values, self.slopes)
+        )
+
+    def to_own(self, values: Floats) -> Floats:
+        """Signals (..., n) as the unit is to get them."""
+        if not self.converts:
+            return values
+        columns = [alias.to_own(values[..., i]) for i, alias in enumerate(self.aliases)]
+        return np.ascontiguousarray(np.stack(columns, axis=-1))
 
     def set(self) -> None:
         """Send the values now."""
+        if self.converts:
+            self.own_values[:] = self.to_own(self.values)
         self._exchange("set_real", setting(self.names))
 
     def get(self) -> None:
         """Find the values now."""
         self._exchange("get_real", reading(self.names))
+        if self.converts:
+            self.values[:] = [alias.to_signal(each) for alias, each in zip(self.aliases, self.own_values, strict=True)]
 
     def _exchange(self, operation: str, about: str) -> None:
         at, count = self.references.ctypes.data, self.references.size
-        if self.unit.call(operation)(at, count, self.values.ctypes.data) > WARNING:
+        if self.unit.call(operation)(at, count, self.own_values.ctypes.data) > WARNING:
             self.unit.fail(about)
 
 
@@ -390,7 +448,7 @@ class Log:
     def __init__(self, unit: Unit, names: Sequence[str], rows: int) -> None:
         self.unit = unit
         unit.references(names)  # names must exist before their types are asked
-        kinds = {name: unit.archive.variables[name].type for name in names}
+        kinds = {name: unit.archive.variables[unit.alias(name).name].type for name in names}
         self.real_names = tuple(name for name in names if kinds[name] == "Real")
         self.flag_names = tuple(name for name in names if kinds[name] == "Boolean")
         if len(self.real_names) + len(self.flag_names) != len(names):
@@ -400,8 +458,9 @@ class Log:
         self.real_references = unit.references(self.real_names)
         self.flag_references = unit.references(self.flag_names)
 
-    def columns(self) -> dict[str, Floats]:
-        """Recorded columns by variable name, each (rows,)."""
-        columns = {name: self.reals[:, i] for i, name in enumerate(self.real_names)}
-        columns.update({name: self.flags[:, i].astype(np.float64) for i, name in enumerate(self.flag_names)})
+    def columns(self, reals: Floats | None = None, flags: NDArray[Any] | None = None) -> dict[str, Floats]:
+        """Columns by the signals' names, each (rows,): of these rows, or of all."""
+        reals, flags = self.reals if reals is None else reals, self.flags if flags is None else flags
+        columns = {name: self.unit.alias(name).to_signal(reals[:, i]) for i, name in enumerate(self.real_names)}
+        columns.update({name: flags[:, i].astype(np.float64) for i, name in enumerate(self.flag_names)})
         return columns

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from feedsim.cosim.unit import Archive
@@ -48,8 +48,14 @@ def friction(axis: str) -> str:
 PLANT = "plant"
 
 
-def figure_2(axes: Sequence[str], *, with_friction: bool = True) -> list[Connection]:
-    """Connections of the paper's Fig. 2: NC -> control -> structure <-> friction, structure -> control."""
+def figure_2(
+    axes: Sequence[str], *, with_friction: bool = True, given: Mapping[str, Container[str]] | None = None
+) -> list[Connection]:
+    """Connections of the paper's Fig. 2: NC -> control -> structure <-> friction, structure -> control.
+
+    given: instance -> the signals that it has, where those are not all of its role.
+    """
+    given = given or {}
     connections = [Connection(Variable(PLANT, name), Variable(ZERO, name)) for name in TOOL_FORCES]
     for axis in axes:
         control, contact = controller(axis), friction(axis)
@@ -68,12 +74,18 @@ def figure_2(axes: Sequence[str], *, with_friction: bool = True) -> list[Connect
             drives[Variable(contact, "n_fr")] = Variable(PLANT, f"{axis}.n_fr")
         else:
             drives[Variable(PLANT, f"{axis}.M_fr")] = Variable(ZERO, "M_fr")
-        connections += [Connection(target, source) for target, source in drives.items()]
+        connections += [
+            Connection(target, source)
+            for target, source in drives.items()
+            if all(end.instance not in given or end.name in given[end.instance] for end in (target, source))
+        ]
     return connections
 
 
-def check(connections: Iterable[Connection], instances: Mapping[str, Archive]) -> None:
+def check(connections: Iterable[Connection], instances: Mapping[str, Archive], foreign: Container[str] = ()) -> None:
     """Every input of every instance is driven exactly once, by something that exists and has the same unit.
+
+    foreign: instances of other makers' archives, whose signals are checked where they are mapped.
 
     Raises:
         InputError: lists every fault found.
@@ -85,11 +97,14 @@ def check(connections: Iterable[Connection], instances: Mapping[str, Archive]) -
             problems.append(f"{target} is connected {count} times; once is allowed")
     driven = {connection.target for connection in connections}
     for instance, archive in instances.items():
+        if instance in foreign:
+            continue
         for variable in archive.variables.values():
             if variable.causality == "input" and Variable(instance, variable.name) not in driven:
                 problems.append(f"{instance}/{variable.name} is an input without a connection")
     for connection in connections:
-        problems += _faults(connection, instances)
+        if not any(end.instance in foreign for end in (connection.target, connection.source)):
+            problems += _faults(connection, instances)
     if problems:
         raise InputError("the units cannot be wired:\n  " + "\n  ".join(problems))
 

@@ -106,6 +106,7 @@ class Asked:
             modes = checked_modes(machine)
             reason = f"J_tot of the modes of {machine.name}, whose flexibility is taken off the torque"
             J = _inertia(modes.J_tot(axis), reason)
+        friction = machine.shipped_frictions.get(axis) if machine is not None else None
         delays = {source.torque_delay for source in sources}
         of_mapping = delays.pop() if len(delays) == 1 and "delay" not in self.estimated else None
         return Options(
@@ -117,7 +118,7 @@ class Asked:
             hold=self.hold,
             free=self.free,
             # The friction that the machine file has: for parameters that the traces do not tell.
-            fallback={name: float(value) for name, value in own.friction.parameters().items()} if own else {},
+            fallback={name: float(value) for name, value in friction.parameters().items()} if friction else {},
             stages=self.stages,
         )
 

@@ -17,7 +17,7 @@ from feedsim.identify.even_time import stretches
 from feedsim.identify.record import Array, Record
 from feedsim.identify.signals import Channel, Chosen, choose
 from feedsim.identify.signs import checked
-from feedsim.scenario import Columns, Machine
+from feedsim.scenario import Columns, Drive, Machine
 from feedsim.trace import Recording, read_recording
 
 # Values given twice are the same up to the rounding of what people write.
@@ -165,8 +165,8 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
                 f"{mapping.where('pitch')}: {1e3 * pitch:.9g} mm; axis {chosen.axis} of machine {machine.name} "
                 f"({machine.directory}) has {1e3 * own.pitch:.9g} mm"
             )
-        K_t = own.drive.K_t
-        if mapping is not None and constant is not None and abs(constant - K_t) > SAME * K_t:
+        K_t = own.drive.K_t if isinstance(own.drive, Drive) else None
+        if mapping is not None and constant is not None and K_t is not None and abs(constant - K_t) > SAME * K_t:
             warnings.append(
                 f"{mapping.where('torque_constant')}: {constant:.9g} N.m/A counts, not the {K_t:.9g} N.m/A of axis "
                 f"{chosen.axis} of machine {machine.name}"

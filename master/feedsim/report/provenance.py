@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from feedsim.fields import Quantity
-from feedsim.scenario import Axis, Drive, Friction, Machine, Scenario
+from feedsim.scenario import Axis, Drive, ForeignUnit, Friction, Machine, Scenario
 
 Parameter = float | int | bool | str
 
@@ -51,6 +51,7 @@ def _inputs(scenario: Scenario) -> list[tuple[str, Path]]:
     named.append(("modes", scenario.machine.modes))
     if scenario.machine.plant is not None:
         named.append(("plant archive", scenario.machine.plant))
+    named += [(f"{unit.role.name} of {axis}", unit.fmu) for axis, unit in scenario.machine.foreign_units]
     named += [("recorded setpoints", path) for motion in scenario.motions for path in motion.files.values()]
     return named
 
@@ -84,7 +85,7 @@ def friction_origins(machine: Machine) -> dict[str, str]:
     """
     origins: dict[str, str] = {}
     for name, axis in machine.axes.items():
-        told = axis.friction.identified
+        told = axis.friction.identified if isinstance(axis.friction, Friction) else None
         if not told:
             continue
         traces = told.get("traces")
@@ -95,7 +96,9 @@ def friction_origins(machine: Machine) -> dict[str, str]:
     return origins
 
 
-def _with_units(group: Drive | Friction) -> dict[str, tuple[Parameter, str]]:
+def _with_units(group: Drive | Friction | ForeignUnit) -> dict[str, tuple[Parameter, str]]:
+    if isinstance(group, ForeignUnit):  # what it declares, and has not been given here, only its archive knows
+        return {"fmu": (group.fmu.name, ""), **{name: (value, "") for name, value in group.parameters.items()}}
     units = dict(_units(type(group)))
     return {name: (value, units.get(name, "")) for name, value in group.parameters().items()}
 

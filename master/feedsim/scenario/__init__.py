@@ -12,6 +12,7 @@ from feedsim.scenario.load import load, load_machine, load_structure
 from feedsim.scenario.logging import Delay, Level, Logging, Noise, Quantisation
 from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine, PathLimits
 from feedsim.scenario.model import CircleTest, Coupling, Evaluation, Positioning, Recording, Scenario
+from feedsim.scenario.roles import ForeignUnit
 from feedsim.scenario.structure import Damping, DampingStep, Structure
 from feedsim.scenario.subject import Subject, load_subject
 
@@ -39,6 +40,7 @@ __all__ = [
     "Drive",
     "Evaluation",
     "Filter",
+    "ForeignUnit",
     "Friction",
     "Level",
     "Logging",

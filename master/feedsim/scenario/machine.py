@@ -7,10 +7,23 @@ from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, StrictBool, StrictInt, StrictStr, ValidationInfo, create_model, field_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    PrivateAttr,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    Tag,
+    ValidationInfo,
+    create_model,
+    field_validator,
+)  # fmt: skip
 
 from feedsim import variables
+from feedsim.errors import InputError
 from feedsim.fields import AxisName, File, Model, Quantity, Reading, fault, is_multiple, parameter
+from feedsim.scenario.roles import DRIVE, FOREIGN, FRICTION, SHIPPED, ForeignUnit, filled, mapping
 
 Parameter = float | int | bool | str
 FilterType = Literal["off", "second_order", "band_stop", "low_pass"]
@@ -190,6 +203,24 @@ class Drive(ParameterGroup):
 _SWITCHES = {"T_n": ("speed_integrator", True), "omega_0": ("reference_model", True), "D": ("reference_model", True)}
 
 
+class ForeignDrive(ForeignUnit):
+    """Another maker's unit as drive of an axis."""
+
+    role = DRIVE
+    shipped = Drive
+    inputs: mapping("DriveInputs", DRIVE.inputs)  # type: ignore[valid-type]
+    outputs: mapping("DriveOutputs", DRIVE.outputs)  # type: ignore[valid-type]
+
+
+class ForeignFriction(ForeignUnit):
+    """Another maker's unit as friction of an axis."""
+
+    role = FRICTION
+    shipped = Friction
+    inputs: mapping("FrictionInputs", FRICTION.inputs)  # type: ignore[valid-type]
+    outputs: mapping("FrictionOutputs", FRICTION.outputs)  # type: ignore[valid-type]
+
+
 class Axis(Model):
     """A feed axis: rotor, ball screw and slide as the control sees them."""
 
@@ -204,8 +235,12 @@ class Axis(Model):
         description="Constant load torque M_0, counted against the motor torque (weight on a vertical axis)",
     )
     display_sign: Literal[1, -1] = Field(default=1, description="Sign of torque and current in figures, nowhere else")
-    drive: Drive
-    friction: Friction
+    drive: Annotated[Annotated[Drive, Tag(SHIPPED)] | Annotated[ForeignDrive, Tag(FOREIGN)], Discriminator(filled)] = (
+        Field(description="Parameters of the shipped drive, or another unit (fmu) with its variables")
+    )
+    friction: Annotated[
+        Annotated[Friction, Tag(SHIPPED)] | Annotated[ForeignFriction, Tag(FOREIGN)], Discriminator(filled)
+    ] = Field(description="Parameters of the shipped friction, or another unit (fmu) with its variables")
 
     @field_validator("travel")
     @classmethod
@@ -305,6 +340,33 @@ class Machine(Model):
         it was read as part of a scenario, which has them."""
         return self._files
 
+    def shipped_drive(self, axis: str, who: str) -> Drive:
+        """The parameters of an axis's drive, which `who` needs. InputError: it is another maker's unit."""
+        drive = self.axes[axis].drive
+        if isinstance(drive, ForeignUnit):
+            raise InputError(_foreign(axis, drive, who))
+        return drive
+
+    @property
+    def foreign_units(self) -> list[tuple[str, ForeignUnit]]:
+        """Axis and unit of every role that another maker's unit fills."""
+        return [
+            (name, unit) for name, axis in self.axes.items() for unit in (axis.drive, axis.friction)
+            if isinstance(unit, ForeignUnit)
+        ]  # fmt: skip
+
+    @property
+    def shipped_frictions(self) -> dict[str, Friction]:
+        """Axis -> parameters of its friction, where that is the shipped unit."""
+        return {name: axis.friction for name, axis in self.axes.items() if isinstance(axis.friction, Friction)}
+
+    def shipped_friction(self, axis: str, who: str) -> Friction:
+        """The parameters of an axis's friction. InputError: as :meth:`shipped_drive`."""
+        friction = self.axes[axis].friction
+        if isinstance(friction, ForeignUnit):
+            raise InputError(_foreign(axis, friction, who))
+        return friction
+
     @field_validator("axes")
     @classmethod
     def _pose_within_travel(cls, axes: dict[str, Axis], info: ValidationInfo) -> dict[str, Axis]:
@@ -322,3 +384,10 @@ class Machine(Model):
                 message = f"the pose of {name}, {pose[name]:.9g} m, is outside its travel, {low:.9g} to {high:.9g} m"
                 raise fault(message, beside=("pose", name))
         return axes
+
+
+def _foreign(axis: str, unit: ForeignUnit, who: str) -> str:
+    return (
+        f"axis {axis}: its {unit.role.name} is {unit.fmu.name}, a unit of another maker; {who} needs the law of the "
+        f"shipped {unit.role.shipped}.fmu with its parameters"
+    )

@@ -79,12 +79,14 @@ def _open_to_files(group: dict[str, Any], definitions: dict[str, Any]) -> None:
     for name, part in group.get("properties", {}).items():
         file = {"type": "string", "pattern": "." if name == "machine" else r"\.ya?ml$"}
         inner = part.get("additionalProperties", part)
-        options = inner.get("anyOf", [inner]) if isinstance(inner, dict) else []
+        options: Any = inner.get("anyOf", inner.get("oneOf", [inner])) if isinstance(inner, dict) else []
         references = [option["$ref"] for option in options if "$ref" in option]
         if references and definitions[references[0].rpartition("/")[2]].get("type") == "object":
-            others = [option for option in options if "$ref" not in option]
-            inner.pop("$ref", None)
-            inner["anyOf"] = [{"$ref": references[0]}, file, *others]
+            groups, others = ([o for o in options if ("$ref" in o) is group] for group in (True, False))
+            alternatives = [{"$ref": group["$ref"]} for group in groups]
+            for word in ("$ref", "oneOf"):
+                inner.pop(word, None)
+            inner["anyOf"] = [*alternatives, file, *others]
 
 
 def _without_titles(schema: Any) -> Any:

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from feedsim.fields import ExistingFile
+from feedsim.scenario.roles import told_by
 from feedsim.scenario.source import Place
 
 
@@ -53,6 +54,9 @@ def resolve(annotation: Any, data: Any) -> Any:
                 if all(map(kind_of, options)):
                     kind = data.get("kind") if isinstance(data, dict) else None
                     options = [option for option in options if kind_of(option) == kind]
+                elif all(is_group(resolve(part, None)) for part in options):  # a key tells them apart
+                    given = data if isinstance(data, dict) else {}
+                    options = [part for part in options if told_by(resolve(part, None)) in given] or options
                 else:  # a group or something else, as the data is
                     options = [part for part in options if is_group(resolve(part, None)) == isinstance(data, dict)]
                 if not options:

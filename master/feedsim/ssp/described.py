@@ -15,7 +15,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from feedsim.fields import Quantity
-from feedsim.scenario import Scenario, load_structure
+from feedsim.scenario import Drive, Scenario, load_structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 
 RECORDINGS = "resources/recordings"
@@ -33,12 +33,16 @@ def text(scenario: Scenario) -> str:
     axes = {}
     for name, axis in machine["axes"].items():
         axes[name] = {key: axis[key] for key in own}
-        if identified := axis["friction"].get("identified"):
-            axes[name]["friction"] = {"identified": identified}
+        for role in ("drive", "friction"):  # of another maker's unit what is recorded, which no connection tells
+            kept = {key: axis[role][key] for key in ("identified", "outputs") if axis[role].get(key)}
+            axes[name] |= {role: kept} if kept else {}
+    # The parameters of a shipped drive tell the others.
+    shipped = any(isinstance(axis.drive, Drive) for axis in scenario.machine.axes.values())
+    told = ("interpolation",) if shipped else ("control", "position", "interpolation")
     whole["machine"] = {
         "name": machine["name"],
         "note": machine["note"],
-        "cycles": {"interpolation": machine["cycles"]["interpolation"]},
+        "cycles": {key: machine["cycles"][key] for key in told},
         "path": machine["path"],
         "axes": axes,
     }

@@ -9,16 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from feedsim.cosim import check, fmus_directory, wiring
-from feedsim.cosim.system import controller_parameters, plant_parameters
+from feedsim.cosim.roles import RoleUnit, archive_path, filled
+from feedsim.cosim.system import plant_parameters
 from feedsim.cosim.unit import Archive
+from feedsim.cosim.unit_definition import UnitDefinition, unit_definitions
 from feedsim.errors import InputError
 from feedsim.nc import Program, plan
-from feedsim.scenario import Scenario
+from feedsim.scenario import Machine, Scenario
+from feedsim.scenario.roles import DRIVE, FRICTION, Role
 from feedsim.ssp import archive, described, parameter_set, system_structure
-from feedsim.ssp.pack import pack_setpoints
 from feedsim.ssp.parameter_set import ParameterSet, Value
+from feedsim.ssp.setpoints import pack_setpoints
 from feedsim.ssp.system_structure import Binding, Component, Connector, Link, Structure
-from feedsim.ssp.unit_definition import UnitDefinition, unit_definitions
 from feedsim.structure.pack import pack
 
 SETPOINT = "setpoint"  # the instance that plays the setpoints
@@ -53,27 +55,42 @@ def export(scenario: Scenario, out: Path, *, program: Program | None = None, fmu
     program = program or plan(scenario)
     fmus = fmus or fmus_directory()
     warnings = check(scenario, program, fmus=fmus)
+    sources = _sources(scenario.machine, fmus)
     with tempfile.TemporaryDirectory(prefix="feedsim-") as folder, ExitStack() as stack:
-        content = _archives(scenario, program, fmus, Path(folder))
-        archives = {kind: stack.enter_context(Archive(Path(folder) / f"{kind}.fmu")) for kind in content}
-        files = _files(scenario, program, archives)
+        content = _archives(scenario, program, fmus, sources, Path(folder))
+        archives = {name: stack.enter_context(Archive(Path(folder) / f"{name}.fmu")) for name in content}
+        instances = _instances(scenario.machine, fmus, sources)
+        files = _files(scenario, program, archives, instances)
         platforms = sorted(set.intersection(*(set(each.platforms) for each in archives.values())))
-    files |= {f"{RESOURCES}/{kind}.fmu": data for kind, data in content.items()}
+    files |= {f"{RESOURCES}/{name}.fmu": data for name, data in content.items()}
     files |= {name: path.read_bytes() for name, path in described.recordings(scenario).items()}
     if (structure := described.structure(scenario)) is not None:
         files[described.STRUCTURE] = structure
     size = archive.write(out, files)
-    instances = tuple(name for name, _ in _instances(tuple(scenario.machine.axes)))
-    return Exported(out, size, instances, program.duration, tuple(platforms), warnings)
+    return Exported(out, size, tuple(instances), program.duration, tuple(platforms), warnings)
 
 
-def _archives(scenario: Scenario, program: Program, fmus: Path, folder: Path) -> dict[str, bytes]:
-    """Bytes of the four archives, which are left in `folder` too."""
+def _sources(machine: Machine, fmus: Path) -> dict[Path, str]:
+    """Archives of drives and frictions -> their names inside the SSP, each archive once."""
+    names: dict[Path, str] = {}
+    for role in (DRIVE, FRICTION):
+        for axis in machine.axes:
+            path = archive_path(machine, axis, role, fmus)
+            stem = role.shipped if path == fmus / f"{role.shipped}.fmu" else path.stem
+            taken = {SETPOINT, "plant", *(other for at, other in names.items() if at != path)}
+            taken |= {"controller", "friction"} if path.parent != fmus else set()
+            free = (name for name in (stem, *(f"{stem}_{i}" for i in range(2, 100))) if name not in taken)
+            names.setdefault(path, next(free))
+    return names
+
+
+def _archives(
+    scenario: Scenario, program: Program, fmus: Path, sources: Mapping[Path, str], folder: Path
+) -> dict[str, bytes]:
+    """Bytes of the archives by name, in the order of the signal flow; they are left in `folder` too."""
     machine = scenario.machine
-    missing = [fmus / f"{kind}.fmu" for kind in ("plant", "controller", "friction", "setpoint")]
-    if machine.plant is not None:
-        missing[0] = machine.plant
-    if missing := [path for path in missing if not path.is_file()]:
+    plant, setpoint = machine.plant or fmus / "plant.fmu", fmus / f"{SETPOINT}.fmu"
+    if missing := [path for path in (plant, *sources, setpoint) if not path.is_file()]:
         raise InputError(
             f"{missing[0]}: no such file; `make fmus` builds the archives, FEEDSIM_FMUS names their folder"
         )
@@ -82,49 +99,66 @@ def _archives(scenario: Scenario, program: Program, fmus: Path, folder: Path) ->
     else:
         pose = {axis: machine.pose[axis] for axis in machine.axes}
         pack(
-            fmus / "plant.fmu", folder / "plant.fmu", modes=machine.modes, pose=pose, name=machine.name,
-            note=machine.note, trial=False,
+            plant, folder / "plant.fmu", modes=machine.modes, pose=pose, name=machine.name, note=machine.note,
+            trial=False,
         )  # fmt: skip
-    pack_setpoints(fmus / "setpoint.fmu", folder / "setpoint.fmu", program, name=scenario.name, note=scenario.note)
-    for kind in ("controller", "friction"):
-        (folder / f"{kind}.fmu").write_bytes((fmus / f"{kind}.fmu").read_bytes())
-    return {kind: (folder / f"{kind}.fmu").read_bytes() for kind in ("setpoint", "controller", "plant", "friction")}
+    pack_setpoints(setpoint, folder / "setpoint.fmu", program, name=scenario.name, note=scenario.note)
+    for path, name in sources.items():
+        (folder / f"{name}.fmu").write_bytes(path.read_bytes())
+    drives = dict.fromkeys(sources[archive_path(machine, axis, DRIVE, fmus)] for axis in machine.axes)
+    others = [name for name in sources.values() if name not in drives]
+    return {name: (folder / f"{name}.fmu").read_bytes() for name in (SETPOINT, *drives, "plant", *others)}
 
 
-def _instances(axes: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Instance and kind of its archive, in the order of the signal flow."""
-    return [
-        (SETPOINT, "setpoint"),
-        *((wiring.controller(axis), "controller") for axis in axes),
-        (wiring.PLANT, "plant"),
-        *((wiring.friction(axis), "friction") for axis in axes),
-    ]
+def _instances(machine: Machine, fmus: Path, sources: Mapping[Path, str]) -> dict[str, str]:
+    """Instance -> name of its archive, in the order of the signal flow."""
+
+    def name(axis: str, role: Role) -> str:
+        return sources[archive_path(machine, axis, role, fmus)]
+
+    return {
+        SETPOINT: SETPOINT,
+        **{wiring.controller(axis): name(axis, DRIVE) for axis in machine.axes},
+        wiring.PLANT: "plant",
+        **{wiring.friction(axis): name(axis, FRICTION) for axis in machine.axes},
+    }
 
 
-def _files(scenario: Scenario, program: Program, archives: Mapping[str, Archive]) -> dict[str, bytes]:
+def _files(
+    scenario: Scenario, program: Program, archives: Mapping[str, Archive], instances: Mapping[str, str]
+) -> dict[str, bytes]:
     """The system structure and the parameter sets."""
     machine = scenario.machine
     axes = tuple(machine.axes)
-    parameters = {wiring.PLANT: plant_parameters(machine, None)}
-    for name, axis in machine.axes.items():
-        parameters[wiring.controller(name)] = controller_parameters(machine, axis)
-        parameters[wiring.friction(name)] = axis.friction.parameters()
+    units: dict[str, RoleUnit] = {}
+    for axis in axes:
+        for role, instance in ((DRIVE, wiring.controller(axis)), (FRICTION, wiring.friction(axis))):
+            units[instance] = filled(machine, axis, role, archives[instances[instance]])
+    parameters: dict[str, Mapping[str, Value]] = {wiring.PLANT: plant_parameters(machine, None)}
+    parameters |= {instance: unit.parameters for instance, unit in units.items()}
+
+    def end(variable: wiring.Variable) -> tuple[str, str]:
+        if variable.instance == wiring.NC:
+            return SETPOINT, variable.name
+        unit = units.get(variable.instance)
+        return variable.instance, variable.name if unit is None else unit.signals[variable.name].name
+
     links = tuple(
-        Link(_end(connection.source), _end(connection.target))
-        for connection in wiring.figure_2(axes)
+        Link(end(connection.source), end(connection.target))
+        for connection in wiring.figure_2(axes, given={name: unit.signals for name, unit in units.items()})
         if connection.source.instance != wiring.ZERO  # an input that nothing drives keeps its start value, 0
     )
     components, files = [], {}
-    for instance, kind in _instances(axes):
+    for instance, name in instances.items():
         bindings: tuple[Binding, ...] = ()
         if instance in parameters:
             source = f"{RESOURCES}/{instance}.ssv"
-            files[source] = _parameters(archives[kind], parameters[instance], machine.note)
+            files[source] = _parameters(archives[name], parameters[instance], machine.note)
             bindings = (Binding(source=source),)
         connected = {end[1] for link in links for end in (link.start, link.end) if end[0] == instance}
-        connectors = _connectors(archives[kind], connected)
-        box = _box(instance, kind, axes)
-        components.append(Component(instance, f"{RESOURCES}/{kind}.fmu", connectors, bindings, box))
+        connectors = _connectors(archives[name], connected)
+        box = _box(instance, axes)
+        components.append(Component(instance, f"{RESOURCES}/{name}.fmu", connectors, bindings, box))
     structure = Structure(
         name=scenario.name,
         components=tuple(components),
@@ -141,16 +175,13 @@ def _files(scenario: Scenario, program: Program, archives: Mapping[str, Archive]
     return {archive.STRUCTURE: system_structure.to_bytes(structure), **files}
 
 
-def _box(instance: str, kind: str, axes: tuple[str, ...]) -> tuple[float, float, float, float]:
+def _box(instance: str, axes: tuple[str, ...]) -> tuple[float, float, float, float]:
     """Place in a picture: the signal flow from the left to the right, the axes from the top to the bottom."""
-    left = (WIDTH + GAP) * ("setpoint", "controller", "plant", "friction").index(kind)
-    row = {name(axis): i for i, axis in enumerate(axes) for name in (wiring.controller, wiring.friction)}.get(instance)
-    first, last = (0, len(axes) - 1) if row is None else (row, row)
+    rows = {name(axis): i for i, axis in enumerate(axes) for name in (wiring.controller, wiring.friction)}
+    kind = instance if instance not in rows else "friction" if instance.startswith("friction") else "controller"
+    left = (WIDTH + GAP) * (SETPOINT, "controller", wiring.PLANT, "friction").index(kind)
+    first, last = (rows[instance],) * 2 if instance in rows else (0, len(axes) - 1)
     return left, -(HEIGHT + GAP) * last - HEIGHT, left + WIDTH, -(HEIGHT + GAP) * first
-
-
-def _end(variable: wiring.Variable) -> tuple[str, str]:
-    return (SETPOINT if variable.instance == wiring.NC else variable.instance, variable.name)
 
 
 def _connectors(unit: Archive, connected: set[str]) -> tuple[Connector, ...]:

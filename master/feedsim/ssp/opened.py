@@ -22,11 +22,11 @@ from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment, plan
 from feedsim.nc.program import LONGEST
 from feedsim.scenario import Scenario, load
-from feedsim.ssp import archive, rebuilt, stop_time, system_structure
+from feedsim.ssp import archive, rebuilt, setpoints, system_structure
 from feedsim.ssp.described import STRUCTURE
-from feedsim.ssp.pack import SETPOINTS_IN_ARCHIVE, Table, read_setpoints
 from feedsim.ssp.rebuilt import Parts
 from feedsim.ssp.roles import roles
+from feedsim.ssp.setpoints import SETPOINTS_IN_ARCHIVE, Table, read_setpoints
 from feedsim.ssp.system_structure import Structure
 from feedsim.ssp.values import values
 from feedsim.structure.build import SAME_POSITION
@@ -76,15 +76,20 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
         archives = _archives(structure, files, folder, path, stack)
         found = roles(structure, archives, str(path))
         table = _table(archives[found.setpoint], f"{path}: {found.setpoint}")
-        parts = Parts(found, archives, values(structure, files, archives, str(path)), table)
+        given = values(structure, files, archives, found.foreign, str(path))
+        own = rebuilt.annotation(structure.scenario, files, str(path))
+        T_c, T_pos, guessed = rebuilt.cycles(found, archives, given, table, own, structure.step)
+        parts = Parts(found, archives, given, table, T_c, T_pos)
         if problems := rebuilt.faults(parts, str(path)):
             raise InputError.of(str(path), problems)
-        own = rebuilt.annotation(structure.scenario, files, str(path))
         _lay_out(folder, files, parts, own, path)
         program = _sampled(parts, structure, path)
         with _own_names(path, folder):
             scenario, program, warnings = _with_motions(parts, own, program, path, folder, overrides)
             told = (*_late(structure, path), *_jumps(scenario, program, path), *warnings)
+            if guessed:
+                cycle = units.show(T_c, "s")
+                told += (f"{path.name}: no drive tells its control cycle; it is {cycle}, {guessed}",)
             yield Opened(scenario, program, path, folder, told)
 
 
@@ -125,13 +130,10 @@ def _table(setpoint: Archive, where: str) -> Table:
 def _lay_out(folder: Path, files: archive.Files, parts: Parts, own: Mapping[str, Any] | None, path: Path) -> None:
     """Put archives, modes, setpoints and what the annotation names where the scenario's data look for them."""
     roles = parts.roles
-    first = {
-        "plant": roles.plant,
-        "controller": next(iter(roles.controllers.values())),
-        "friction": next(iter(roles.frictions.values())),
-    }
-    for kind, component in first.items():
-        parts.archives[component].path.replace(folder / f"{kind}.fmu")
+    shipped = {"plant": [roles.plant], "controller": roles.shipped_drives, "friction": roles.shipped_frictions}
+    for kind, components in shipped.items():
+        if components:
+            parts.archives[components[0]].path.replace(folder / f"{kind}.fmu")
     inside = {rebuilt.MODES: (roles.plant, MODES_IN_ARCHIVE), rebuilt.SETPOINTS: (roles.setpoint, SETPOINTS_IN_ARCHIVE)}
     for name, (component, place) in inside.items():
         source = parts.archives[component].directory / place
@@ -169,10 +171,11 @@ def _with_motions(
     """The scenario, and the program with the annotation's motions as its segments, if they are those of the table."""
     warnings: list[str] = []
     if own is not None and "motions" in own:
-        before = _load(rebuilt.scenario_data(parts, own, path.stem, motions=True), folder, path)
+        data = rebuilt.scenario_data(parts, own, path.stem, folder, motions=True)
+        before = _load(data, folder, path)
         planned = _planned(before, program)
-        if planned is not None and stop_time.agree(planned.x_s, program.x_s):
-            scenario = _load(rebuilt.scenario_data(parts, own, path.stem, motions=True), folder, path, overrides)
+        if planned is not None and setpoints.agree(planned.x_s, program.x_s):
+            scenario = _load(data, folder, path, overrides)
             changed = _planned(scenario, program) if overrides else planned
             if changed is None or not (_same(changed.x_s, planned.x_s) and _same(changed.n_ffw, planned.n_ffw)):
                 raise InputError(
@@ -180,18 +183,18 @@ def _with_motions(
                     "the file has as a table; change the scenario and export it anew (feedsim ssp)"
                 )
             _check_cycles(scenario, parts, path)
-            scenario, lost = stop_time.evaluation(scenario, planned, program)
+            scenario, lost = setpoints.evaluation(scenario, planned, program)
             if lost:
                 warnings.append(
                     f"{path.name}: ends at {program.duration:.6g} s, too early for {', '.join(lost)}: left out"
                 )
-            kept = stop_time.segments(planned, program)
+            kept = setpoints.segments(planned, program)
             return scenario, Program(program.time, program.x_s, program.n_ffw, kept), tuple(warnings)
         warnings.append(
             f"{path.name}: its setpoints are not those of the motions that it tells: they run as recorded ones, and "
             "what was to be evaluated is not"
         )
-    scenario = _load(rebuilt.scenario_data(parts, own, path.stem, motions=False), folder, path, overrides)
+    scenario = _load(rebuilt.scenario_data(parts, own, path.stem, folder, motions=False), folder, path, overrides)
     _check_cycles(scenario, parts, path)
     axes = parts.roles.axes
     segment = Segment(

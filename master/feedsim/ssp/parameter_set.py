@@ -9,9 +9,10 @@ from fractions import Fraction
 from math import inf, isfinite
 
 from feedsim import units
+from feedsim.cosim.unit_definition import UnitDefinition
 from feedsim.errors import InputError
 from feedsim.ssp import xml
-from feedsim.ssp.unit_definition import UnitDefinition, append_units, read_units
+from feedsim.ssp.xml import append_units, read_units
 
 # The same name in every set of a file: ecos asks for the sets of one name, in whichever component they are.
 NAME = "parameters"

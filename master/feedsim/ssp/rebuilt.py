@@ -7,17 +7,20 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, nextafter, pi
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from feedsim import units
 from feedsim.cosim.unit import Archive
 from feedsim.errors import InputError
 from feedsim.scenario.machine import FILTER_TYPES
+from feedsim.scenario.roles import DRIVE, FRICTION, Role
 from feedsim.ssp.described import RECORDINGS, STRUCTURE
-from feedsim.ssp.pack import Table
 from feedsim.ssp.parameter_set import Value, number
 from feedsim.ssp.roles import Roles
+from feedsim.ssp.setpoints import Table
 from feedsim.ssp.values import start_value
 
 FILTER_NAMES = {number: name for name, number in reversed(FILTER_TYPES.items())}
@@ -30,23 +33,44 @@ MARGIN = 1e-3  # m, that an axis may travel beyond its setpoints where nobody te
 
 @dataclass(frozen=True)
 class Parts:
-    """The components' archives and parameters, by role."""
+    """The components' archives and parameters, by role, and the cycles of the control [s]."""
 
     roles: Roles
     archives: Mapping[str, Archive]
     values: Mapping[str, Mapping[str, Value]]
     table: Table
+    T_c: float
+    T_pos: float
 
-    @property
-    def T_c(self) -> float:
-        return float(self._control("T_c"))
 
-    @property
-    def T_pos(self) -> float:
-        return float(self._control("T_pos"))
+def cycles(
+    roles: Roles,
+    archives: Mapping[str, Archive],
+    values: Mapping[str, Mapping[str, Value]],
+    table: Table,
+    own: Mapping[str, Any] | None,
+    step: float | None,
+) -> tuple[float, float, str]:
+    """T_c and T_pos [s], and where T_c comes from if no shipped drive tells it, else nothing.
 
-    def _control(self, name: str) -> Value:
-        return self.values[next(iter(self.roles.controllers.values()))][name]
+    Other drives have parameters of their own. The annotation knows then, or else the table is played once in a position
+    cycle, and T_c is the step that the file advises, or a drive's archive.
+    """
+    if roles.shipped_drives:
+        known = values[roles.shipped_drives[0]]
+        return float(known["T_c"]), float(known["T_pos"]), ""
+    told = ((own or {}).get("machine") or {}).get("cycles", {})
+    try:
+        return units.parse(str(told["control"]), "s"), units.parse(str(told["position"]), "s"), ""
+    except KeyError:
+        pass
+    if step is not None:
+        return step, table.cycle, "the step size that the file advises"
+    for name in roles.drives.values():
+        experiment = archives[name].description.defaultExperiment
+        if experiment is not None and experiment.stepSize is not None:
+            return float(experiment.stepSize), table.cycle, f"the default step of {name}"
+    return table.cycle, table.cycle, "the interval of the setpoints"
 
 
 def faults(parts: Parts, where: str) -> list[str]:
@@ -54,7 +78,7 @@ def faults(parts: Parts, where: str) -> list[str]:
     roles, values = parts.roles, parts.values
     found = []
     for name in ("T_c", "T_pos"):
-        given = {control: values[control][name] for control in roles.controllers.values()}
+        given = {control: values[control][name] for control in roles.shipped_drives}
         if len(set(given.values())) > 1:
             said = ", ".join(f"{control} {value!r} s" for control, value in given.items())
             found.append(f"{where}: the controllers differ in {name}: {said}; all axes have one cycle here")
@@ -64,10 +88,10 @@ def faults(parts: Parts, where: str) -> list[str]:
     for axis, name in roles.setpoints.items():
         if name not in parts.table.x_s:
             found.append(f"{where}: axis {axis}: {roles.setpoint} has no setpoints of an axis {name!r}")
-    for kind in (roles.controllers, roles.frictions):
-        guids = {parts.archives[name].guid for name in kind.values()}
+    for shipped in (roles.shipped_drives, roles.shipped_frictions):
+        guids = {parts.archives[name].guid for name in shipped}
         if len(guids) > 1:
-            found.append(f"{where}: {', '.join(kind.values())} are made from different archives ({', '.join(guids)})")
+            found.append(f"{where}: {', '.join(shipped)} are made from different archives ({', '.join(guids)})")
     return found
 
 
@@ -124,8 +148,9 @@ def _check_types(data: Any, what: str) -> None:
         raise InputError(f"{what}: its motions are no list of groups")
     if not all(isinstance(motion.get("file", ""), str) for motion in motions):
         raise InputError(f"{what}: a motion's file is no text")
-    if not all(isinstance(axis.get("friction", {}), dict) for axis in axes.values()):
-        raise InputError(f"{what}: an axis's friction is no group")
+    groups = [axis.get(role.name, {}) for axis in axes.values() for role in (DRIVE, FRICTION)]
+    if not all(isinstance(group, dict) and isinstance(group.get("outputs", {}), dict) for group in groups):
+        raise InputError(f"{what}: an axis's drive or friction is no group")
     if not all(isinstance(place.get("name", ""), str) for place in (data, machine)):
         raise InputError(f"{what}: a name is no text")
 
@@ -139,9 +164,11 @@ def _depth(data: Any) -> int:
     return depth
 
 
-def scenario_data(parts: Parts, own: Mapping[str, Any] | None, name: str, *, motions: bool) -> dict[str, Any]:
-    """Data of a scenario file. `own`: of the annotation. `motions`: whether its motions and evaluation are taken over,
-    or else the setpoints stand as recorded ones."""
+def scenario_data(
+    parts: Parts, own: Mapping[str, Any] | None, name: str, folder: Path, *, motions: bool
+) -> dict[str, Any]:
+    """Data of a scenario file in `folder`. `own`: of the annotation. `motions`: whether its motions and evaluation are
+    taken over, or else the setpoints stand as recorded ones."""
     roles = parts.roles
     own = dict(own or {})
     told = own.get("machine", {})
@@ -152,15 +179,16 @@ def scenario_data(parts: Parts, own: Mapping[str, Any] | None, name: str, *, mot
     plant = parts.values[roles.plant]
     axes = {}
     for axis in roles.axes:
-        axes[axis] = _axis(parts, axis, told.get("axes", {}).get(axis, {}))
+        axes[axis] = _axis(parts, axis, told.get("axes", {}).get(axis, {}), folder)
     machine = {
         "name": told.get("name", name),
         "note": told.get("note", ""),
         "modes": MODES,
         "plant": "plant.fmu",
         "pose": {axis: f"{plant[f'{axis}.x_0']!r} m" for axis in roles.axes},
-        "cycles": {"control": f"{parts.T_c!r} s", "position": f"{parts.T_pos!r} s"}
-        | told.get("cycles", {"interpolation": f"{parts.T_pos!r} s"}),
+        "cycles": {"interpolation": f"{parts.T_pos!r} s"}
+        | told.get("cycles", {})
+        | {"control": f"{parts.T_c!r} s", "position": f"{parts.T_pos!r} s"},
         "path": told.get("path", {"jerk": "1000 m/s^3", "acceleration": "100 m/s^2"}),
         "axes": axes,
     }
@@ -169,10 +197,32 @@ def scenario_data(parts: Parts, own: Mapping[str, Any] | None, name: str, *, mot
     return {**own, "name": own.get("name", name), "machine": machine}
 
 
-def _axis(parts: Parts, axis: str, told: Mapping[str, Any]) -> dict[str, Any]:
+def _axis(parts: Parts, axis: str, told: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     roles = parts.roles
-    control, contact = roles.controllers[axis], roles.frictions[axis]
     plant = parts.values[roles.plant]
+    control, contact = roles.drives[axis], roles.frictions[axis]
+    limits = _limits(parts.table, roles.setpoints[axis], float(plant[f"{axis}.x_0"]))
+    if control in roles.foreign:
+        drive = _foreign(parts, control, DRIVE, told, folder)
+        pitch = told.get("pitch") or f"{_seen_pitch(parts.table, roles.setpoints[axis])!r} m"
+    else:
+        drive, pitch = _shipped_drive(parts, control), _pitch(float(parts.values[control]["I_P"]), told.get("pitch"))
+    if contact in roles.foreign:
+        friction = _foreign(parts, contact, FRICTION, told, folder)
+    else:
+        identified = {key: value for key, value in told.get("friction", {}).items() if key == "identified"}
+        friction = {**_group(parts, contact), **identified}
+    return {
+        **limits,
+        **{key: value for key, value in told.items() if key in (*limits, "display_sign")},
+        "pitch": pitch,
+        "constant_load": f"{plant[f'{axis}.M_0']!r} N.m",
+        "drive": drive,
+        "friction": friction,
+    }
+
+
+def _shipped_drive(parts: Parts, control: str) -> dict[str, Any]:
     drive = _group(parts, control, leave=("T_c", "T_pos", "I_P"))
     for key, inner in drive.items():
         if key.startswith("filter_") and isinstance(inner, dict):
@@ -184,15 +234,22 @@ def _axis(parts: Parts, axis: str, told: Mapping[str, Any]) -> dict[str, Any]:
                 for name, value in started.items():
                     if parts.values[control][f"{key}.{name}"] == value:
                         del inner[name]
-    limits = _limits(parts.table, roles.setpoints[axis], float(plant[f"{axis}.x_0"]))
-    identified = {key: value for key, value in told.get("friction", {}).items() if key == "identified"}
+    return drive
+
+
+def _foreign(parts: Parts, component: str, role: Role, told: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A component that is no shipped unit. The wiring tells what is exchanged, the annotation what else is recorded."""
+    archive, signals = parts.archives[component], parts.roles.foreign[component]
+    recorded = {
+        signal: name
+        for signal, name in told.get(role.name, {}).get("outputs", {}).items()
+        if signal not in signals and name in archive.variables
+    }
     return {
-        **limits,
-        **{key: value for key, value in told.items() if key in (*limits, "display_sign")},
-        "pitch": _pitch(float(parts.values[control]["I_P"]), told.get("pitch")),
-        "constant_load": f"{plant[f'{axis}.M_0']!r} N.m",
-        "drive": drive,
-        "friction": {**_group(parts, contact), **identified},
+        "fmu": str(archive.path.relative_to(folder)),
+        "inputs": {signal.name: signals[signal.name] for signal in role.inputs if signal.name in signals},
+        "outputs": {signal.name: signals[signal.name] for signal in role.outputs if signal.name in signals} | recorded,
+        "parameters": dict(parts.values[component]),
     }
 
 
@@ -220,6 +277,13 @@ def _pitch(I_P: float, told: Any) -> str:
             candidates.insert(0, number(told.removesuffix(" m")))
     best = min(candidates, key=lambda pitch: abs(pitch / (2 * pi) - I_P))
     return f"{best!r} m"
+
+
+def _seen_pitch(table: Table, setpoint: str) -> float:
+    """Travel per turn [m] as the setpoints have it: the steps of position over those that the speeds make. 10 mm where
+    nothing moves; it is shown, and nothing is calculated with it."""
+    turned = float(np.abs(table.n_ffw[setpoint]).sum()) * table.cycle / (2 * pi)
+    return float(np.abs(np.diff(table.x_s[setpoint])).sum()) / turned if turned else 0.010
 
 
 def _limits(table: Table, setpoint: str, x_0: float) -> dict[str, Any]:

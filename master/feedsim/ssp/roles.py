@@ -1,4 +1,5 @@
-"""Which component of an SSP plays which part in Fig. 2, whatever the names; anything else than Fig. 2 is refused."""
+"""Which component of an SSP plays which role in Fig. 2: found from the wiring around the plant, whatever the names of
+components and, in the roles of drive and friction, of their variables. Anything else than Fig. 2 is refused."""
 
 from __future__ import annotations
 
@@ -8,46 +9,53 @@ from dataclasses import dataclass
 from feedsim.cosim import wiring
 from feedsim.cosim.plant import axes_of
 from feedsim.cosim.unit import Archive
+from feedsim.cosim.unit_definition import unit_definitions
 from feedsim.errors import InputError
+from feedsim.scenario.roles import DRIVE, FRICTION, Role
 from feedsim.ssp.system_structure import Component, Link, Structure
 
-KINDS = ("setpoint", "controller", "plant", "friction")
 End = tuple[str, str]  # component, variable
+TORQUES = {"M_a": DRIVE, "M_fr": FRICTION}  # inputs of the plant on an axis -> role of what drives them
 
 
 @dataclass(frozen=True)
 class Roles:
     """Names of components by their part.
 
-    controllers, frictions: axis of the plant -> component. setpoints: axis of the plant -> axis of the setpoint unit.
+    drives, frictions: axis of the plant -> component. setpoints: axis of the plant -> axis of the setpoint unit.
+    foreign: component -> signal of its role -> variable, of components that are not the shipped units.
     """
 
     setpoint: str
     plant: str
-    controllers: Mapping[str, str]
+    drives: Mapping[str, str]
     frictions: Mapping[str, str]
     setpoints: Mapping[str, str]
+    foreign: Mapping[str, Mapping[str, str]]
 
     @property
     def axes(self) -> tuple[str, ...]:
-        return tuple(self.controllers)
+        return tuple(self.drives)
+
+    @property
+    def shipped_drives(self) -> tuple[str, ...]:
+        return tuple(name for name in self.drives.values() if name not in self.foreign)
+
+    @property
+    def shipped_frictions(self) -> tuple[str, ...]:
+        return tuple(name for name in self.frictions.values() if name not in self.foreign)
 
 
 def roles(structure: Structure, archives: Mapping[str, Archive], where: str) -> Roles:
     """The roles of the components; `archives` by component.
 
     Raises:
-        InputError: lists every component that is no unit of Fig. 2 or there too often or not at all, every connection
-            that is missing, double, other than Fig. 2's or of two units of measure.
+        InputError: lists every component that plays no role or is there too often or not at all, every connection that
+            is missing, double, other than Fig. 2's or of two units of measure.
     """
-    kinds = {name: str(archive.description.modelName) for name, archive in archives.items()}
-    problems = [
-        f"{where}: component {name} is a {kind!r}; only {', '.join(KINDS)} can be run here"
-        for name, kind in kinds.items()
-        if kind not in KINDS
-    ]
+    problems: list[str] = []
     for kind in ("plant", "setpoint"):
-        found = [name for name in kinds if kinds[name] == kind]
+        found = [name for name, archive in archives.items() if _kind(archive) == kind]
         if len(found) != 1:
             problems.append(
                 f"{where}: one component made from {kind}.fmu is needed; there "
@@ -62,7 +70,16 @@ def roles(structure: Structure, archives: Mapping[str, Archive], where: str) -> 
         _drive(driven, link, archives, where, problems)
     if problems:
         raise InputError.of(where, problems)
-    return _assigned(driven, archives, kinds, where)
+    return _assigned(driven, archives, where)
+
+
+def _kind(archive: Archive) -> str:
+    return str(archive.description.modelName)
+
+
+def _is_shipped(archive: Archive, role: Role) -> bool:
+    """By its name and its variables: a unit that calls itself alike, and is another one, is foreign."""
+    return _kind(archive) == role.shipped and all(signal in archive.variables for signal in role.signals)
 
 
 def _connector_faults(component: Component, archive: Archive, where: str) -> list[str]:
@@ -115,62 +132,127 @@ def _drive(
                         f"{'.'.join(source)}")  # fmt: skip
         return
     driven[target] = source
-    units = [archives[end[0]].unit_of(end[1]) for end in (target, source)]
-    if units[0] != units[1]:
-        problems.append(f"{where}: {'.'.join(target)} is in {units[0]}, but {'.'.join(source)} is in {units[1]}")
+    (unit, bases), (given, others) = (_unit(archives[name], variable) for name, variable in (target, source))
+    if unit != given and (bases is None or bases != others or link.unconverted):
+        kept = ", and the connection forbids to convert" if bases is not None and bases == others else ""
+        problems.append(f"{where}: {'.'.join(target)} is in {unit}, but {'.'.join(source)} is in {given}{kept}")
 
 
-def _assigned(
-    driven: Mapping[End, End], archives: Mapping[str, Archive], kinds: Mapping[str, str], where: str
-) -> Roles:
-    """Roles by the torques that drive the plant; then every connection of Fig. 2 is looked for."""
-    plant, setpoint = (next(name for name in kinds if kinds[name] == kind) for kind in ("plant", "setpoint"))
+def _unit(archive: Archive, variable: str) -> tuple[str, Mapping[str, int] | None]:
+    """The unit of a variable and its base units, where the archive defines it. Without a unit it is SI."""
+    unit = archive.unit_of(variable)
+    definition = unit_definitions(archive).get(unit)
+    return unit, None if definition is None else definition.exponents
+
+
+def _assigned(driven: Mapping[End, End], archives: Mapping[str, Archive], where: str) -> Roles:
+    """Roles by the torques that drive the plant, then signals by what the roles' inputs are connected to."""
+    plant, setpoint = (
+        next(name for name, archive in archives.items() if _kind(archive) == kind) for kind in ("plant", "setpoint")
+    )
     problems: list[str] = []
-    partners: dict[str, dict[str, str]] = {"controller": {}, "friction": {}}
+    outputs: dict[str, End] = {}  # input of the plant -> what drives it
+    partners: dict[Role, dict[str, str]] = {DRIVE: {}, FRICTION: {}}
     for axis in axes_of(archives[plant]):
-        for kind, torque in (("controller", "M_a"), ("friction", "M_fr")):
+        for torque, role in TORQUES.items():
             source = driven.get((plant, f"{axis}.{torque}"))
+            belongs = f"the output {torque} of a {role.shipped} belongs there"
             if source is None:
-                problems.append(f"{where}: {plant}.{axis}.{torque} is not connected; the output {torque} of a {kind} "
-                                "belongs there")  # fmt: skip
-            elif kinds[source[0]] != kind or source[1] != torque:
-                problems.append(f"{where}: {plant}.{axis}.{torque} is connected to {'.'.join(source)}; the output "
-                                f"{torque} of a {kind} belongs there")  # fmt: skip
+                problems.append(f"{where}: {plant}.{axis}.{torque} is not connected; {belongs}")
+            elif source[0] in (plant, setpoint) or (_kind(archives[source[0]]) == role.shipped and source[1] != torque
+                                                    and _is_shipped(archives[source[0]], role)):  # fmt: skip
+                problems.append(f"{where}: {plant}.{axis}.{torque} is connected to {'.'.join(source)}; {belongs}")
             else:
-                partners[kind][axis] = source[0]
-    for kind, found in partners.items():
-        names = list(found.values())
-        problems += [f"{where}: {name} drives {names.count(name)} axes; one is allowed" for name in dict.fromkeys(names)
-                     if names.count(name) > 1]  # fmt: skip
-        problems += [f"{where}: component {name} drives no axis" for name in kinds
-                     if kinds[name] == kind and name not in names and not problems]  # fmt: skip
+                outputs[f"{axis}.{torque}"] = source
+                partners[role][axis] = source[0]
+    names = [name for found in partners.values() for name in found.values()]
+    for axes in (list(found.values()) for found in partners.values()):
+        problems += [f"{where}: {name} drives {axes.count(name)} axes; one is allowed" for name in dict.fromkeys(axes)
+                     if axes.count(name) > 1]  # fmt: skip
+    problems += [f"{where}: {name} is connected as drive and as friction; one is allowed"
+                 for name in partners[DRIVE].values() if name in partners[FRICTION].values()]  # fmt: skip
+    problems += [f"{where}: component {name} drives no axis" for name in archives
+                 if name not in (plant, setpoint, *names) and not problems]  # fmt: skip
     if problems:
         raise InputError.of(where, problems)
-    setpoints = {}
-    for axis, control in partners["controller"].items():
-        source = driven.get((control, "x_s"), ("", ""))
-        setpoints[axis] = source[1].removesuffix(".x_s") if source[0] == setpoint else axis
-    assigned = Roles(setpoint, plant, partners["controller"], partners["friction"], setpoints)
-    if problems := _other_wiring(driven, assigned, where):
+    setpoints = {axis: _setpoint_axis(driven, name, setpoint) or axis for axis, name in partners[DRIVE].items()}
+    foreign: dict[str, dict[str, str]] = {}
+    for role, found in partners.items():
+        torque = next(name for name, each in TORQUES.items() if each is role)
+        for axis, name in found.items():
+            if not _is_shipped(archives[name], role):
+                offered = _offered(axis, role, plant, setpoint, setpoints[axis])
+                foreign[name] = {torque: outputs[f"{axis}.{torque}"][1]}
+                foreign[name] |= _signals(driven, name, role, offered, where, problems)
+    assigned = Roles(setpoint, plant, partners[DRIVE], partners[FRICTION], setpoints, foreign)
+    problems += _other_wiring(driven, assigned, where)
+    if problems:
         raise InputError.of(where, problems)
     return assigned
 
 
+def _setpoint_axis(driven: Mapping[End, End], drive: str, setpoint: str) -> str | None:
+    """The axis of the setpoint unit whose x_s the drive gets."""
+    sources = [source for target, source in driven.items() if target[0] == drive and source[0] == setpoint]
+    return next((variable.removesuffix(".x_s") for _, variable in sources if variable.endswith(".x_s")), None)
+
+
+def _offered(axis: str, role: Role, plant: str, setpoint: str, setpoint_axis: str) -> dict[End, str]:
+    """What the system has for the inputs of a role: where it comes from -> signal."""
+    places = {wiring.PLANT: (plant, axis), wiring.NC: (setpoint, setpoint_axis)}
+    instance = wiring.controller(axis) if role is DRIVE else wiring.friction(axis)
+    found: dict[End, str] = {}
+    for each in wiring.figure_2((axis,)):
+        if each.target.instance == instance and each.source.instance in places:
+            component, prefix = places[each.source.instance]
+            found[component, f"{prefix}.{each.target.name}"] = each.target.name
+    return found
+
+
+def _signals(
+    driven: Mapping[End, End], name: str, role: Role, offered: Mapping[End, str], where: str, problems: list[str]
+) -> dict[str, str]:
+    """Signal -> variable of the component, by what its inputs are connected to."""
+    found: dict[str, str] = {}
+    for (component, variable), source in driven.items():
+        if component != name:
+            continue
+        signal = offered.get(source)
+        if signal is None:
+            listed = ", ".join(".".join(end) for end in offered)
+            problems.append(f"{where}: {name}.{variable} is connected to {'.'.join(source)}; a {role.name} of its axis "
+                            f"can be given {listed}")  # fmt: skip
+        elif signal in found:
+            problems.append(f"{where}: {'.'.join(source)} drives {name}.{found[signal]} and {name}.{variable}; "
+                            "one is allowed")  # fmt: skip
+        else:
+            found[signal] = variable
+    ends = {signal: end for end, signal in offered.items()}
+    problems += [
+        f"{where}: nothing of {name} is connected to {'.'.join(ends[signal.name])}; the {role.name} of an axis needs it"
+        for signal in role.inputs
+        if signal.needed and signal.name not in found
+    ]
+    return found
+
+
 def _other_wiring(driven: Mapping[End, End], found: Roles, where: str) -> list[str]:
     """Every difference from Fig. 2."""
+    names = {wiring.PLANT: found.plant}
+    names |= {wiring.controller(axis): name for axis, name in found.drives.items()}
+    names |= {wiring.friction(axis): name for axis, name in found.frictions.items()}
 
     def end(variable: wiring.Variable) -> End:
         if variable.instance == wiring.NC:
             axis, _, name = variable.name.rpartition(".")
             return found.setpoint, f"{found.setpoints[axis]}.{name}"
-        names = {wiring.PLANT: found.plant}
-        names |= {wiring.controller(axis): name for axis, name in found.controllers.items()}
-        names |= {wiring.friction(axis): name for axis, name in found.frictions.items()}
         return names[variable.instance], variable.name
 
     problems = []
     for connection in wiring.figure_2(found.axes):
         target = end(connection.target)
+        if target[0] in found.foreign or names.get(connection.source.instance) in found.foreign:
+            continue
         given = driven.get(target)
         if connection.source.instance == wiring.ZERO:
             if given is not None:

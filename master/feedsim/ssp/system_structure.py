@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from feedsim.cosim.unit_definition import UnitDefinition
 from feedsim.errors import InputError
 from feedsim.ssp import xml
 from feedsim.ssp.parameter_set import ParameterSet, from_element, number
-from feedsim.ssp.unit_definition import UnitDefinition, append_units, read_units
+from feedsim.ssp.xml import append_units, read_units
 
 ALGORITHM = "com.opensimulationplatform"  # annotation in which libcosim looks for the step size
 SCENARIO = "feedsim.scenario"  # annotation with what the units cannot know: motions, evaluation, limits
@@ -52,6 +53,7 @@ class Link:
     start: tuple[str, str]  # element ("" for the system itself), connector
     end: tuple[str, str]
     transformed: bool = False  # carries a transformation that does something
+    unconverted: bool = False  # units of measure are not to be converted
 
     def __str__(self) -> str:
         ends = (".".join(filter(None, end)) for end in (self.start, self.end))
@@ -60,7 +62,8 @@ class Link:
 
 @dataclass(frozen=True)
 class Structure:
-    """A system. `step` [s] is for libcosim alone; `scenario` is the content of the annotation of that name."""
+    """A system. `step` [s] is for libcosim, and for files whose drives tell no control cycle; `scenario` is the content
+    of the annotation of that name."""
 
     name: str
     components: tuple[Component, ...]
@@ -149,7 +152,10 @@ def read(content: bytes, where: str) -> Structure:
     bindings = _bindings(system, "the system", where, problems)
     experiment = root.find(xml.tag("ssd:DefaultExperiment"))
     given = {} if experiment is None else experiment.attrib
+    algorithm = root.find(f".//{xml.tag('osp:FixedStepAlgorithm')}")
+    advised = {} if algorithm is None else algorithm.attrib
     start, stop = (_time(given, key, where, problems) for key in ("startTime", "stopTime"))
+    step = _time(advised, "baseStepSize", where, problems)
     if problems:
         raise InputError.of(where, problems)
     own = root.find(f".//{xml.tag('ssc:Annotation')}[@type='{SCENARIO}']/{xml.tag('feedsim:Scenario')}")
@@ -161,6 +167,7 @@ def read(content: bytes, where: str) -> Structure:
         bindings=bindings,
         start=start or 0.0,
         stop=stop,
+        step=step,
         scenario=None if own is None else own.text or "",
         description=root.get("description", ""),
         tool=root.get("generationTool", ""),
@@ -213,7 +220,7 @@ def _link(entry: xml.Element) -> Link:
     start, end = (
         (entry.get(f"{which}Element") or "", entry.get(f"{which}Connector", "")) for which in ("start", "end")
     )
-    return Link(start, end, transformed)
+    return Link(start, end, transformed, entry.get("suppressUnitConversion") in ("true", "1"))
 
 
 _IDENTITY = {(factor, offset) for factor in ("1", "1.0") for offset in ("0", "0.0")}
@@ -223,5 +230,5 @@ def _time(given: Mapping[str, str], key: str, where: str, problems: list[str]) -
     try:
         return number(given[key].strip()) if key in given else None
     except InputError as error:
-        problems.append(f"{where}: DefaultExperiment: {key} {error}")
+        problems.append(f"{where}: {key} {error}")
         return None

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 from feedsim.cosim.unit import Archive
+from feedsim.cosim.unit_definition import unit_definitions
 from feedsim.errors import InputError
 from feedsim.fields import did_you_mean
 from feedsim.ssp import parameter_set
 from feedsim.ssp.parameter_set import Parameter, ParameterSet, Value
 from feedsim.ssp.system_structure import Binding, Structure
-from feedsim.ssp.unit_definition import unit_definitions
 
 # Inputs that sets give a start value: component and name -> place of the set that counts, what it says, its set.
 Inputs = dict[tuple[str, str], tuple[str, Parameter, ParameterSet]]
 
 
 def values(
-    structure: Structure, files: Mapping[str, bytes], archives: Mapping[str, Archive], where: str
+    structure: Structure,
+    files: Mapping[str, bytes],
+    archives: Mapping[str, Archive],
+    foreign: Container[str],
+    where: str,
 ) -> dict[str, dict[str, Value]]:
-    """Component -> parameter -> SI value, for all parameters of its archive.
+    """Component -> parameter -> value in the archive's unit, for all parameters of its archive; of the components that
+    are `foreign` those that a set gives, with the inputs that nothing else drives.
 
     Sets of the system count over those of a component; a later set of either over an earlier one. Start values of
     connected inputs are not needed here and pass by unseen.
@@ -37,7 +42,7 @@ def values(
         found[component.name] = {
             name: start_value(archive, name)
             for name, each in archive.variables.items()
-            if each.causality == "parameter"
+            if each.causality == "parameter" and component.name not in foreign
         }
         for place, given, prefix in _sets(component.bindings, files, where, problems):
             for parameter in given.parameters:
@@ -56,7 +61,7 @@ def values(
                 continue
             _set(found, inputs, archives, owner, name.removeprefix(f"{owner}."), parameter, given, structure, place,
                  problems)  # fmt: skip
-    problems += _held_inputs(inputs, structure, archives)
+    problems += _held_inputs(inputs, structure, archives, found, foreign)
     if len(problems) > parameter_set.MOST_PROBLEMS:
         problems[parameter_set.MOST_PROBLEMS :] = [f"{where}: and more like these; the first are listed"]
     if problems:
@@ -127,11 +132,17 @@ def _value(parameter: Parameter, archive: Archive, name: str, given: ParameterSe
     return parameter_set.value(parameter, kind, archive.unit_of(name), definitions)
 
 
-def _held_inputs(inputs: Inputs, structure: Structure, archives: Mapping[str, Archive]) -> list[str]:
+def _held_inputs(
+    inputs: Inputs,
+    structure: Structure,
+    archives: Mapping[str, Archive],
+    found: dict[str, dict[str, Value]],
+    foreign: Container[str],
+) -> list[str]:
     """Inputs without a connection that a set wants at another value than the archive's start value.
 
-    Other tools hold an input there for the whole run. The master cannot: it drives these inputs itself, at the
-    archive's start values, and would give another result without a word.
+    Other tools hold an input there for the whole run, and so does the master where the unit is foreign. Of the shipped
+    units it drives these inputs itself, at the archive's start values, and would give another result without a word.
     """
     connected = {end for link in structure.links for end in (link.start, link.end)}
     faults = []
@@ -140,8 +151,12 @@ def _held_inputs(inputs: Inputs, structure: Structure, archives: Mapping[str, Ar
             continue
         archive = archives[component]
         try:
+            asked_for = _value(parameter, archive, name, given, structure)
+            if component in foreign:
+                found[component][name] = asked_for
+                continue
             start = start_value(archive, name)
-            if _value(parameter, archive, name, given, structure) == start:
+            if asked_for == start:
                 continue
         except InputError as error:
             faults.append(f"{place}: {component}.{name}: {error}")

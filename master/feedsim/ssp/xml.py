@@ -1,10 +1,13 @@
-"""XML of the SSP standard: namespaces with the prefixes that importers expect, and reading without surprises."""
+"""XML of the SSP standard: namespaces with the prefixes that importers expect, reading without surprises, and the
+definitions of units, which several of its documents hold."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from xml.etree import ElementTree as ET
 
+from feedsim.cosim.unit_definition import BASE, UnitDefinition
 from feedsim.cosim.untrusted import refuse_document_type
 from feedsim.errors import InputError
 
@@ -58,3 +61,35 @@ def shown(name: str) -> str:
     """A tag with its usual prefix."""
     namespace, _, local = name.removeprefix("{").partition("}")
     return next((f"{prefix}:{local}" for prefix, known in PREFIXES.items() if known == namespace), name)
+
+
+def append_units(parent: Element, name: str, definitions: Mapping[str, UnitDefinition]) -> None:
+    """Append the definitions as an element `name`; none where there are none."""
+    if not definitions:
+        return
+    group = child(parent, name)
+    for unit, definition in definitions.items():
+        base = {key: str(definition.exponents[key]) for key in BASE if key in definition.exponents}
+        if definition.factor != 1.0:
+            base["factor"] = repr(definition.factor)
+        if definition.offset != 0.0:
+            base["offset"] = repr(definition.offset)
+        child(child(group, "ssc:Unit", {"name": unit}), "ssc:BaseUnit", base)
+
+
+def read_units(group: Element | None, where: str) -> dict[str, UnitDefinition]:
+    """Definitions of a Units element. InputError: a factor or an exponent that is no number."""
+    found: dict[str, UnitDefinition] = {}
+    for entry in () if group is None else group.findall(tag("ssc:Unit")):
+        base = entry.find(tag("ssc:BaseUnit"))
+        if base is None:
+            continue
+        try:
+            exponents = {key: int(base.get(key, "0")) for key in BASE if int(base.get(key, "0"))}
+            factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
+        except ValueError:
+            raise InputError(f"{where}: unit {entry.get('name')}: its definition holds no number") from None
+        if not (isfinite(factor) and isfinite(offset) and factor):
+            raise InputError(f"{where}: unit {entry.get('name')}: factor {factor!r}, offset {offset!r}; not allowed")
+        found[entry.get("name", "")] = UnitDefinition(exponents, factor, offset)
+    return found

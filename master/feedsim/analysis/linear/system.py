@@ -104,7 +104,12 @@ class LinearSystem:
     def drives(self) -> tuple[LinearDrive, ...]:
         operating = self.operating or {}
         return tuple(
-            LinearDrive(axis.drive, self.machine.cycles, axis.I_P, operating.get(name, OperatingPoint()))
+            LinearDrive(
+                self.machine.shipped_drive(name, "the linear model"),
+                self.machine.cycles,
+                axis.I_P,
+                operating.get(name, OperatingPoint()),
+            )
             for name, axis in self.machine.axes.items()
         )
 

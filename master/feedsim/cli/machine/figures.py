@@ -101,7 +101,7 @@ def figures(options: Namespace, described: Described, *, quiet: bool = False) ->
     machine = described.machine
     step = getattr(options, "step", None)
     h = _positive("step", step, "s", "125 us") if step is not None else machine.cycles.T_c if machine else USUAL_STEP
-    friction = {name: axis.friction for name, axis in machine.axes.items()} if machine else None
+    friction = machine.shipped_frictions if machine else None
     if described.structure is None:
         assert machine is not None
         for option in ("at", "cutoff", "static_correction"):
@@ -150,7 +150,7 @@ def _info_of_structure(options: Namespace, described: Described, h: float, quiet
             "structure; runs take the table. Build it anew (feedsim machine build), or name the structure that it "
             "belongs to"
         )
-    friction = {name: axis.friction for name, axis in machine.axes.items()} if machine else None
+    friction = machine.shipped_frictions if machine else None
     return info_of_model(described.name, described.note, built, h, friction, warnings)
 
 

@@ -10,14 +10,13 @@ import numpy as np
 
 from feedsim.compare.options import (
     Options,
+    check_used,
     chosen,
     factor,
     listed,
     missing,
-    no_match,
     sources,
     units_told,
-    unmatched,
     with_units,
 )
 from feedsim.compare.overlap import Overlap
@@ -185,8 +184,7 @@ def _unused(result: Series, reference: Series, tolerances: Tolerances, options: 
         ("reference's unit", options.reference_units, reference.all_names),
         ("hold", options.hold, reference.all_names),
     ):
-        if unused := unmatched(patterns, names):
-            raise InputError(f"{what} given for {no_match(unused[0], names)}")
+        check_used(what, patterns, names)
     for whose, series in (("result", result), ("reference", reference)):
         if series.skipped:
             notes.append(f"columns of text in the {whose} are not compared: {', '.join(series.skipped[:5])}")

@@ -147,6 +147,12 @@ def unmatched(patterns: Iterable[str], names: Sequence[str]) -> list[str]:
     return [pattern for pattern in patterns if not any(matches(name, pattern) for name in names)]
 
 
+def check_used(what: str, patterns: Iterable[str], names: Sequence[str]) -> None:
+    """InputError where what is given for a pattern is given for no name."""
+    for pattern in unmatched(patterns, names):
+        raise InputError(f"{what} given for {no_match(pattern, names)}")
+
+
 def no_match(pattern: str, names: Sequence[str]) -> str:
     """That a pattern matches no name, and which there are."""
     more = ", ..." if len(names) > 12 else ""

@@ -44,11 +44,7 @@ class Shift:
 
 
 def estimated_shift(
-    result: Series,
-    reference: Series,
-    most: float,
-    options: Options | None = None,
-    tolerances: Tolerances | None = None,
+    result: Series, reference: Series, most: float, options: Options | None = None, tolerances: Tolerances | None = None
 ) -> Shift:
     """Shift [s] within +-most, added to the result's time, with the least mean square difference.
 

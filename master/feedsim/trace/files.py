@@ -58,12 +58,8 @@ def _is_stream(path: Path) -> bool:
         mode = path.stat().st_mode
     except FileNotFoundError:
         return False
-    for what, found in (
-        ("a folder", stat.S_ISDIR(mode)),
-        ("a socket", stat.S_ISSOCK(mode)),
-        ("a disk", stat.S_ISBLK(mode)),
-    ):
-        if found:
+    for what, is_one in (("a folder", stat.S_ISDIR), ("a socket", stat.S_ISSOCK), ("a disk", stat.S_ISBLK)):
+        if is_one(mode):
             raise OSError(22, f"it is {what}")
     return not stat.S_ISREG(mode)
 

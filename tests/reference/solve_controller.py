@@ -11,7 +11,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 from reference_files import Case, Table, booleans
-from scipy.interpolate import BarycentricInterpolator
 from scipy.linalg import expm
 from scipy.signal import bilinear, cont2discrete
 
@@ -83,7 +82,10 @@ class Cascade:
         self.measured: list[float] = []  # x_a of the last `speed_window` cycles, oldest first
         self.k = 0
         self.released = True
-        self._begin(x_s_start)
+        # Positions are counted from the start, a difference without rounding: their last bit around 0.1 m would be
+        # 1e-12 rad/s by K_v / I_P, and 1e-10 N.m by K_p and the integrator over a run.
+        self.origin = x_s_start
+        self._begin(0.0)
 
     def _begin(self, x_s: float) -> None:
         """At rest, all that came before forgotten: the setpoint stood at x_s."""
@@ -114,10 +116,11 @@ class Cascade:
         return _Filter(numerator, [1, 2 * p[f"{name}.D_den"] * w, w * w], rate)
 
     def _delayed(self, history: list[float], delay: float) -> float:
-        """`history`: newest last, one sample per T_pos."""
+        """`history`: newest last, one sample per T_pos; the cubic through four of them, by Lagrange."""
         d = delay / self.p["T_pos"]
-        back = max(math.floor(d) - 1, 0) + np.arange(4)
-        return float(BarycentricInterpolator(back, [history[-1 - j] for j in back])(d))
+        first = max(math.floor(d) - 1, 0)
+        back = range(first, first + 4)
+        return sum(history[-1 - j] * math.prod((d - k) / (j - k) for k in back if k != j) for j in back)
 
     def _position(self, x_s: float, n_ffw: float, x_a: float) -> None:
         p = self.p
@@ -207,6 +210,7 @@ class Cascade:
     ) -> float:
         """Work at the next sample instant t_k; return M_a(t_k+1) [N.m]."""
         p = self.p
+        x_s, x_a = x_s - self.origin, x_a - self.origin
         if not release:
             return self._rest(x_s, x_a, n_a)
         if not self.released:

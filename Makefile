@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-importers test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all lint format reference check-reference bench worst-case pose-study identification-study lock ansys clean
+.PHONY: help run test test-c test-python test-processors test-importers test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all lint format reference check-reference bench worst-case pose-study identification-study lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -133,7 +133,7 @@ run: fmus $(VENV)/.run ## build, run both scenarios, leave results, figures and 
 
 -include tests/unit_c/tests.mk
 
-test: test-c test-sanitize test-sanitize-scenario test-valgrind test-python ## everything: C tests, sanitisers, leak check, Python tests
+test: test-c test-sanitize test-sanitize-scenario test-valgrind test-python test-processors ## everything: C tests, sanitisers, leak check, Python tests, other processors' arithmetic
 
 # One scenario on units built with AddressSanitizer and UndefinedBehaviorSanitizer. Python itself is not built with them, so their
 # runtime is loaded ahead of it, and leaks (Python's own included) are left to test-valgrind.
@@ -155,6 +155,9 @@ test-sanitize-scenario: $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu) $(SAN
 # A file of tests stays together on one core: its fixtures are made once. Programs that packages bring (cmake) are found.
 test-python: fmus $(VENV)/.importers
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile
+
+test-processors: fmus $(VENV)/.dev ## references, physics, identification as other processors round (ARGS=--all: all of them)
+	$(PY) tests/processors/run.py $(ARGS)
 
 test-platforms: $(ALL_FMUS) $(VENV)/.dev ## the FMUs of all platforms: Windows under Wine, ARM under qemu, files for macOS
 	ZIG='$(ZIG)' FEEDSIM_PLATFORM_FMUS=$(BUILD)/fmus-all $(PY) -m pytest -s tests/platforms

@@ -25,6 +25,14 @@ def test_relative_links_exist(document: Path) -> None:
             assert (document.parent / target).exists(), f"{document.name} links to {target}"
 
 
+def test_the_walk_through_the_house_meets_files_that_are_there() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([\w.*]+(?:/[\w.*]*)+|\w+\.py)`", page))
+    assert len(named) > 50
+    for name in named:
+        assert any(any(base.glob(name)) for base in (ROOT, ROOT / "master" / "feedsim")), name
+
+
 def test_commands_of_the_page_on_ssp_files(fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What they run is only opened, with what they set; one file, the smaller one, serves all."""
     page = (ROOT / "docs" / "ssp.md").read_text(encoding="utf-8")

@@ -131,9 +131,10 @@ def main() -> int:
     told, times, *words = sys.argv[1:]
     clock = Clock()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ahead of numpy
-    from feedsim import analysis, cosim, nc, report, scenario
+    from feedsim import analysis, cosim, nc, scenario
     from feedsim.cli import main as command
     from feedsim.cosim.system import System
+    from feedsim.report import run as report
     from feedsim.report.partial import Partial
 
     of_runs = sys.modules["feedsim.cosim.run"]

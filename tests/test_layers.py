@@ -36,6 +36,7 @@ SOLE_USERS = {
     "yaml": {"scenario"},
     "matplotlib": {"report"},
     "ruckig": {"motions"},
+    "jinja2": {"report/page.py"},
     "tqdm": {"cli"},
     "pyuff": {"trace/uff.py"},
     "distributed": {"sweep"},

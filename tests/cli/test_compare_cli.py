@@ -133,7 +133,7 @@ def test_report(reference: Path, off: Path, tmp_path: Path) -> None:
     tiles = text[text.index('class="keys"') : text.index("</header>")]
     for part in ("Z.x_a", "5×10⁻⁶", "4×10⁻⁶", "0.5"):
         assert part in tiles
-    assert "the result has no column &#x27;Z.limited&#x27;" in text
+    assert "the result has no column &#39;Z.limited&#39;" in text
     same = tmp_path / "same.html"
     assert run(reference, reference, "--report", same) == 0
     assert "<h1>Comparison: same</h1>" in same.read_text(encoding="utf-8")

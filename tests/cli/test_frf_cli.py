@@ -15,15 +15,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import report
 from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Plan, signal_of
 from feedsim.analysis.responses import Responses, frequencies, names, one, read_overlays, unit_of
 from feedsim.errors import InputError, OutputError
+from feedsim.report import frf as report
 from feedsim.report.bode_plots import speed_controlled_pictures
-from feedsim.report.frf import write as frf_write
-from feedsim.report.frf.page import page
+from feedsim.report.frf import report as report_module
 from feedsim.report.frf.plots import curves_of
+from feedsim.report.frf.report import report_of
+from feedsim.report.page import html
 from feedsim.report.style import Picture
 from feedsim.scenario import load_machine, load_subject
 from feedsim.structure import checked_modes
@@ -326,27 +327,27 @@ def one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     def only(found: Responses) -> list[Picture]:
         return speed_controlled_pictures({"Z": curves_of(found, "Z.n_a/Z.M_a")}, None)
 
-    monkeypatch.setattr(frf_write, "pictures_of", only)
+    monkeypatch.setattr(report_module, "pictures_of", only)
 
 
 @pytest.mark.usefixtures("one_picture")
 def test_a_report_is_replaced_whole(tmp_path: Path) -> None:
-    report.write_frf(subject(), responses(), tmp_path)
+    report.write(subject(), responses(), tmp_path)
     first = contents(tmp_path)
     assert "frf_measured.csv" in first
     (tmp_path / "notes.txt").write_text("mine")
-    report.write_frf(subject(), responses(measured=False), tmp_path)
+    report.write(subject(), responses(measured=False), tmp_path)
     second = contents(tmp_path)
     assert "frf_measured.csv" not in second, "the curves of an earlier measurement are left"
     assert set(first) - set(second) == {"frf_measured.csv"}
     assert (tmp_path / "notes.txt").read_text() == "mine"
-    report.write_frf(subject(), responses(measured=False), tmp_path)
+    report.write(subject(), responses(measured=False), tmp_path)
     assert contents(tmp_path) == second
 
 
 @pytest.mark.usefixtures("one_picture")
 def test_nothing_is_left_when_a_picture_cannot_be_moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    report.write_frf(subject(), responses(), tmp_path)
+    report.write(subject(), responses(), tmp_path)
     before = contents(tmp_path)
     move = Path.replace
 
@@ -357,13 +358,13 @@ def test_nothing_is_left_when_a_picture_cannot_be_moved(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(Path, "replace", failing)
     with pytest.raises(OutputError, match="No space left on device"):
-        report.write_frf(subject(), responses(measured=False), tmp_path)
+        report.write(subject(), responses(measured=False), tmp_path)
     assert contents(tmp_path) == before
 
 
 def test_names_and_warnings_cannot_break_the_page() -> None:
     odd = replace(subject(), name='<script>"&', notes=("a < b",))
-    text = page(odd, responses(warnings=("gain < 1",)), [])
+    text = html(report_of(odd, responses(warnings=("gain < 1",)), []))
     parsed = Page(text)
     assert "script" not in parsed.tags
     assert text.index("gain &lt; 1") < text.index("a &lt; b") < text.index('class="keys"')
@@ -372,8 +373,8 @@ def test_names_and_warnings_cannot_break_the_page() -> None:
 @pytest.mark.usefixtures("one_picture")
 def test_figures_that_are_not_determined_are_null_and_said(tmp_path: Path) -> None:
     found = responses(figures={"Z.speed.bandwidth_first": Figure(float("nan"), "Hz", "m")})
-    report.write_frf(subject(), found, tmp_path)
+    report.write(subject(), found, tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["figures"]["Z.speed.bandwidth_first"]["value"] is None
     assert "not determined" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "-3 dB first - Hz" in report.frf_summary_line(found)
+    assert "-3 dB first - Hz" in report.summary_line(found)

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import cosim, report, scenario
+from feedsim import cosim, scenario
 from feedsim.cosim import logged
 from feedsim.cosim.recording import recorded_columns
 from feedsim.errors import InputError
 from feedsim.motions import Move
 from feedsim.motions.constant_speed import Strokes
+from feedsim.report import run as report
 from feedsim.scenario import Logging
 from feedsim.trace import Trace, read_csv
 from scenario_helpers import MACHINE

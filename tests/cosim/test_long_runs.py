@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, nc, report, scenario
+from feedsim import cosim, nc, scenario
 from feedsim.cosim import loop, recording
 from feedsim.cosim.unit import Log
 from feedsim.errors import InputError, OutputError, SimulationError
 from feedsim.motions import circular
 from feedsim.nc import program, spline
 from feedsim.nc.spline import Held, Joined
+from feedsim.report import run as report
 from feedsim.trace import Table, Trace, least_and_largest, read_csv, release, stretches, table, write_csv
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -282,7 +283,8 @@ def test_run_that_never_begins_takes_no_rows_away(fmus: Path, tmp_path: Path) ->
 MEMORY = """
 import sys, tracemalloc
 from pathlib import Path
-from feedsim import cosim, nc, report, scenario
+from feedsim import cosim, nc, scenario
+from feedsim.report import run as report
 from feedsim.trace import table
 table.IN_MEMORY = 0
 def peak(turns):

@@ -20,7 +20,7 @@ from run_case import Unusable, simulate
 from feedsim import cosim, scenario
 from feedsim.compare import Comparison, compare_series, tolerances_of, unusable
 from feedsim.errors import FeedsimError
-from feedsim.report.compare.write import write_comparison
+from feedsim.report.compare import write as write_comparison
 from feedsim.trace import Series
 
 ARCHIVES = HERE.parents[1] / "fmus"

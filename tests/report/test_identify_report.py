@@ -16,14 +16,7 @@ import pytest
 from feedsim.errors import OutputError
 from feedsim.identify.friction_file import open_loop_line
 from feedsim.identify.result import Balance, Correlation, Identification
-from feedsim.report import (
-    check_identification_writable,
-    identification_headline,
-    identification_table,
-    identification_warnings,
-    rigid_line,
-    write_identification,
-)
+from feedsim.report.identify import check_writable, headline, rigid_line, table_lines, terminal_warnings, write
 from feedsim.report.identify.correlation_plot import correlation_picture
 from feedsim.report.identify.loop_plots import _length, describe, loops_picture, residuals_picture
 from feedsim.report.identify.open_loop_plot import open_loop_picture
@@ -53,7 +46,7 @@ FIGURES = {"stribeck", "plateaus", "loops-speed", "loops-position", "residuals",
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("identified") / "out"
-    write_identification(identified(), folder)
+    write(identified(), folder)
     return folder
 
 
@@ -74,7 +67,7 @@ def test_a_friction_that_cannot_be_is_not_written(tmp_path: Path) -> None:
     found = identification()
     wrong = {**found.estimates, "gamma": replace(found.estimates["gamma"], value=1.2)}
     with pytest.raises(OutputError, match=r"friction\.yaml is not written: gamma"):
-        write_identification(identified(found=replace(found, estimates=wrong)), tmp_path / "out")
+        write(identified(found=replace(found, estimates=wrong)), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -153,7 +146,7 @@ def open_loop_text(found: Identification) -> str:
 
 def test_position_in_open_loop(tmp_path: Path) -> None:
     found = identification(balance=balance())
-    write_identification(identified(found=found), tmp_path)
+    write(identified(found=found), tmp_path)
     before = balance().position[0]
     assert open_loop_line(found) == (
         f"position off by {100 * before * I_P:.3g} mm rms instead of {1e3 * before * I_P:.3g} mm; "
@@ -180,13 +173,13 @@ def test_position_in_open_loop(tmp_path: Path) -> None:
     drift = balance().drifts[0]
     for column, values in zip((1, 2, 3, 4), (drift.time, drift.angle, drift.before, drift.after), strict=True):
         assert [float(row[column]) for row in rows[1:]] == list(values)
-    write_identification(identified(), tmp_path)
+    write(identified(), tmp_path)
     assert not (tmp_path / "open_loop.csv").exists()
 
 
 def test_open_loop_that_was_tried_and_refused(tmp_path: Path) -> None:
     found = identification(balance=balance(applied=False, reason="F_C would change by +23 %"))
-    write_identification(identified(found=found), tmp_path)
+    write(identified(found=found), tmp_path)
     assert open_loop_line(found) == "not applied: F_C would change by +23 %"
     text = open_loop_text(found)
     assert "Not applied: F_C would change by +23 %." in text
@@ -198,7 +191,7 @@ def test_open_loop_that_was_tried_and_refused(tmp_path: Path) -> None:
 def test_open_loop_is_not_spoken_of_where_it_is_none(tmp_path: Path) -> None:
     sines = Balance({}, False, "sine.csv: sines; the open loop needs general motion", applies=False)
     found = identification(balance=sines)
-    write_identification(identified(found=found), tmp_path)
+    write(identified(found=found), tmp_path)
     assert open_loop_line(found) == ""
     assert "sine.csv: sines" in open_loop_text(found)
     assert "rms" not in open_loop_text(found)
@@ -216,13 +209,13 @@ def test_doubts_of_a_stage_1_that_was_not_used(tmp_path: Path) -> None:
     assert stage is not None
     doubtful = replace(stage, warnings=("F_log sits at its bound 0",))
     apart = identified(found=identification(stationary=doubtful, prior=False))
-    write_identification(apart, tmp_path)
+    write(apart, tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert text.index("<main>") < text.index("F_log sits at its bound 0")  # in its section, not above all
     assert told(tmp_path)["curve"]["warnings"] == ["F_log sits at its bound 0"]
     assert told(tmp_path)["curve"]["used"] is False
     assert "F_log sits at its bound 0" not in told(tmp_path)["warnings"]
-    assert identification_headline(apart).startswith("curve of stage 1 alone within")
+    assert headline(apart).startswith("curve of stage 1 alone within")
     assert 'id="stage-1"' not in page(identified(found=identification(stationary=doubtful)), [])
 
 
@@ -235,7 +228,7 @@ def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
                  "F_S and W: known to +-281 % only (95 %)")  # fmt: skip
     telling = ("sigma_1 is known to 6.7 % only", "W: known to +-281 % only (95 %)", "no Stribeck effect shows")
     whole = identified(found=replace(found, estimates=both, warnings=(*repeating, *telling)))
-    assert identification_warnings(whole) == list(telling)
+    assert terminal_warnings(whole) == list(telling)
     assert whole.warnings == [*repeating, *telling]
 
 
@@ -243,19 +236,19 @@ def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
 def test_a_stage_may_be_absent(tmp_path: Path, absent: str) -> None:
     changes: dict[str, Any] = {absent: None} if absent != "both warnings" else {"warnings": (), "advice": ()}
     whole = identified(found=identification(**changes), subject=None)
-    names = {path.name for path in write_identification(whole, tmp_path)}
+    names = {path.name for path in write(whole, tmp_path)}
     assert ("plateaus.csv" in names) == (absent != "stationary")
     assert ("residuals.csv" in names) == (absent != "dynamic")
     assert {"friction.yaml", "report.html", "correlation.png"} <= names
     assert ("stribeck.png" in names) == (absent != "stationary")
     assert told(tmp_path)["machine"] is None
-    line = identification_headline(whole)
+    line = headline(whole)
     assert ("curve within" in line) == (absent != "stationary")
 
 
 def test_files_of_an_earlier_run_go(tmp_path: Path) -> None:
-    write_identification(identified(), tmp_path)
-    write_identification(identified(found=identification(dynamic=None)), tmp_path)
+    write(identified(), tmp_path)
+    write(identified(found=identification(dynamic=None)), tmp_path)
     assert set(contents(tmp_path)) == set(told(tmp_path)["files"])
     assert not (tmp_path / "residuals.csv").exists()
 
@@ -263,13 +256,13 @@ def test_files_of_an_earlier_run_go(tmp_path: Path) -> None:
 def test_place_is_checked_ahead(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="is a file"):
-        check_identification_writable(tmp_path / "file")
-    check_identification_writable(tmp_path / "new")
+        check_writable(tmp_path / "file")
+    check_writable(tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 
 def test_table_for_the_terminal() -> None:
-    lines = identification_table(identified())
+    lines = table_lines(identified())
     assert len(lines) == 1 + len(TRUE)
     assert any(re.fullmatch(r"  F_C +1\.6000 N\.m +1\.5956 to 1\.6044 +0\.27 %", line) for line in lines)
     assert any(line.startswith("  delay") and "0.50 ms" in line for line in lines)
@@ -280,7 +273,7 @@ def test_reasons_are_cut_at_a_word() -> None:
     found = identification()
     reason = "the first words say what matters and all others may as well be left out where there is no room for them"
     long = {**found.estimates, "W": replace(found.estimates["W"], status="undetermined", reason=reason)}
-    lines = identification_table(identified(found=replace(found, estimates=long)))
+    lines = table_lines(identified(found=replace(found, estimates=long)))
     (line,) = (line for line in lines if line.startswith("  W "))
     said = line[line.index("undetermined: ") + len("undetermined: ") :].removesuffix(" ...")
     assert line.endswith(" ...")

@@ -13,14 +13,13 @@ import pytest
 
 from feedsim.identify import Options
 from feedsim.identify.result import Estimate, Identification, Stationary
-from feedsim.report import identification_headline
+from feedsim.report.formatting import counted, powers
 from feedsim.report.frame import STYLE, Tile, frame
-from feedsim.report.identify import stribeck_plots
+from feedsim.report.identify import headline, stribeck_plots
 from feedsim.report.identify.page import page
 from feedsim.report.identify.quantities import speeds_of
 from feedsim.report.identify.stribeck_plots import stribeck_picture, stribeck_title
 from feedsim.report.identify.summary import summary
-from feedsim.report.words import counted, powers
 from identification_helpers import I_P, TRUE, J, curve, identification, identified, records
 from report_helpers import Page
 
@@ -51,7 +50,7 @@ def test_few_speeds_make_no_curve(count: int) -> None:
     assert speeds_of(stage) == count
     texts = {
         "title": stribeck_title(found, stage),
-        "headline": identification_headline(identified(found=found)),
+        "headline": headline(identified(found=found)),
         "tiles": tiles(found),
         "caption": stribeck_picture(found, stage).caption,
     }
@@ -77,7 +76,7 @@ def test_one_is_not_many() -> None:
         stationary=replace(stage, plateaus=stage.plateaus[:1]),
         dynamic=replace(dynamic, stretches=dynamic.stretches[:1]),
     )
-    line = identification_headline(identified(found=one))
+    line = headline(identified(found=one))
     assert "no curve: 1 speed, 1 plateau; pre-sliding from 1 stretch, " in line
     assert [counted(n, "speed") for n in (0, 1, 2)] == ["0 speeds", "1 speed", "2 speeds"]
 

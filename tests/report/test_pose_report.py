@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, report
+from feedsim import cosim
 from feedsim.cli import main
 from feedsim.errors import InputError
 from feedsim.motions import Dwell, Move
-from feedsim.report.page import page
-from feedsim.report.summary import summary
+from feedsim.report import run as report
+from feedsim.report.page import html
+from feedsim.report.run.report import report_of
+from feedsim.report.run.summary import summary
 from feedsim.scenario import Machine, load_structure
 from feedsim.structure.geometry.assemble import assemble
 from feedsim.structure.pose_change import LARGE, LOOKED_AT, PoseChange, pose_change, warnings
@@ -120,7 +122,7 @@ def test_poses_that_are_not_known_are_said_to_be_so(structure: Path | None, reas
     assert change.axes[0].distance == pytest.approx(0.585)
     assert not change.axes[0].modes
     assert not warnings(change)
-    text = page(replace(positioning_run(), pose=cosim.PoseUse(change)), {}, [])
+    text = html(report_of(replace(positioning_run(), pose=cosim.PoseUse(change)), {}, []))
     assert "How much the modes change is not known" in text
     assert "key structure of the machine file" in text
 
@@ -167,7 +169,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     assert crossings.jump_x_a < 1e-9
     assert crossings.held > crossings.jump_x_a
     assert not run.pose.warnings
-    text = page(run, {}, [])
+    text = html(report_of(run, {}, []))
     assert "The plant follows the pose (Z: 3 cells, centres 90 to 210 mm)" in text
     assert "No axis that the plant does not follow moves more than 1 mm" in text
     part = part_of(run)

@@ -14,16 +14,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import report
 from feedsim.analysis import Figure, evaluate
 from feedsim.errors import OutputError
 from feedsim.motions import Arc, Dwell, Move
-from feedsim.report.page import tile
+from feedsim.report import run as report
+from feedsim.report.content import Tile
+from feedsim.report.formatting import duration
+from feedsim.report.page import html
 from feedsim.report.provenance import archives, input_files
-from feedsim.report.run_tables import provenance
+from feedsim.report.run.report import report_of, tile
+from feedsim.report.run.summary import HEADER, real_time_factor, summary
 from feedsim.report.style import PALETTE
-from feedsim.report.summary import HEADER, real_time_factor, summary
-from feedsim.report.words import duration
 from feedsim.scenario import load
 from feedsim.trace import Trace, read_csv
 from report_helpers import FakeRun, Page, circle_run, contents, positioning_run, run_of, small_run
@@ -130,14 +131,14 @@ def test_real_time_factor_is_simulated_over_elapsed_time() -> None:
 
 
 def test_tiles_speak_in_words_and_in_few_digits() -> None:
-    assert tile("Z.settling_time", Figure(math.nan, "ms", "")) == ("not determined", "Z: settling time")
-    assert tile("XZ.G", Figure(8.191, "um", "")) == ("8.19 µm", "XZ: circular deviation G")
-    assert tile("XZ.mean", Figure(-0.7733, "um", "")) == ("−0.77 µm", "XZ: mean radius deviation")
-    assert tile("ZX#2.glitch_X", Figure(1.0, "um", ""))[1] == "ZX no. 2: quadrant glitch, X reverses"
+    assert tile("Z.settling_time", Figure(math.nan, "ms", "")) == Tile("not determined", "Z: settling time", "")
+    assert tile("XZ.G", Figure(8.191, "um", "")) == Tile("8.19 µm", "XZ: circular deviation G", "")
+    assert tile("XZ.mean", Figure(-0.7733, "um", "")) == Tile("−0.77 µm", "XZ: mean radius deviation", "")
+    assert tile("ZX#2.glitch_X", Figure(1.0, "um", "")).label == "ZX no. 2: quadrant glitch, X reverses"
     values = {1.24712: "1.247 s", 12.34567: "12.35 s", 999.96: "1000 s", 123456.7: "123500 s", 0.01234: "0.0123 s"}
     for value, text in values.items():
-        assert tile("Z.duration", Figure(value, "s", ""))[0] == text
-    labels = [tile(f"Z.{name}", Figure(1.0, "s", ""))[1] for name in HEADER]
+        assert tile("Z.duration", Figure(value, "s", "")).value == text
+    labels = [tile(f"Z.{name}", Figure(1.0, "s", "")).label for name in HEADER]
     assert not any("_" in label for label in labels)
 
 
@@ -218,7 +219,7 @@ def test_inputs_are_named_and_hashed(tmp_path: Path) -> None:
     assert str(tmp_path) not in json.dumps(content)
     (tmp_path / "positions.csv").unlink()
     assert [f.sha256 for f in input_files(described) if f.name == "positions.csv"] == [None]
-    page = provenance(FakeRun(described, positioning_run().program, positioning_run().trace))
+    page = html(report_of(FakeRun(described, positioning_run().program, positioning_run().trace), {}, []))
     assert "machine.axes.Z.friction.W=0.1 rad" in page
     assert str(tmp_path) not in page
 

@@ -10,13 +10,12 @@ import pytest
 
 from feedsim.analysis import Figure, PositioningTask, evaluate, tasks
 from feedsim.motions import Dwell, Move
-from feedsim.report import circle_plots, overview_plots, stop_plots
-from feedsim.report.circle_plots import ring_step
 from feedsim.report.labels import clearest, mark_instant, place_beside_level
-from feedsim.report.overview_plots import overview_picture
-from feedsim.report.stop_plots import positioning_picture
+from feedsim.report.run import axis_plots, circle_plots
+from feedsim.report.run.axis_plots import overview_picture, positioning_picture
+from feedsim.report.run.circle_plots import ring_step
+from feedsim.report.run.report import draw
 from feedsim.report.style import LARGEST_SVG, MOST_POINTS, drawing, finish, thinned
-from feedsim.report.write import draw
 from feedsim.scenario import Axis, Positioning
 from report_helpers import FakeRun, circle_run, positioning_run, run_of, small_run
 from scenario_helpers import default_machine, scenario
@@ -109,7 +108,7 @@ def test_legends_stand_above_the_axes(make: Any, monkeypatch: pytest.MonkeyPatch
                 assert axes.get_legend().get_window_extent().x1 <= figure.bbox.x1
         return finish(figure, *rest)
 
-    for module in (circle_plots, overview_plots, stop_plots):
+    for module in (axis_plots, circle_plots):
         monkeypatch.setattr(module, "finish", looked_at)
     run = make()
     draw(run, evaluate(run))
@@ -129,7 +128,7 @@ def test_positioning_labels_stay_inside(settled: float, monkeypatch: pytest.Monk
                     assert extent.x1 <= room.x1 + 1, text.get_text()
         return finish(figure, *rest)
 
-    monkeypatch.setattr(stop_plots, "finish", looked_at)
+    monkeypatch.setattr(axis_plots, "finish", looked_at)
     run = positioning_run()
     (task,) = tasks(run.scenario, run.program)
     assert isinstance(task, PositioningTask)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from feedsim import report
-from feedsim.report.people import scale
+from feedsim.report import sweep as report
+from feedsim.report.formatting import scale
 from feedsim.report.sweep.account import Account, quantile_interval
 from feedsim.report.sweep.figure_plots import running_median
 from feedsim.report.sweep.page import page
@@ -109,7 +109,7 @@ def test_summary_is_in_SI_and_holds_the_indices(tmp_path: Path) -> None:
     record = {"began": "2026-01-01T10:00:00+00:00", "ended": "2026-01-01T10:00:20+00:00", "processes": 2}
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "study.json").write_text(json.dumps(record))
-    written = report.write_sweep(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}), study, plan, tmp_path / "out")
+    written = report.write(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}), study, plan, tmp_path / "out")
     assert {"report.html", "summary.json"} <= {path.name for path in written}
     found = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert found["figures"]["XZ.G"]["unit"] == "m"

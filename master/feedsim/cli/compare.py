@@ -41,11 +41,9 @@ def compare(options: Namespace) -> int:
     try:
         comparisons, durations = _compared(options)
         code = max(each.exit_code for each in comparisons)
-        from feedsim import report
+        from feedsim.report import compare as report
 
-        report.write_comparison(
-            comparisons, html=options.report, xml=options.junit, json=options.json, durations=durations
-        )
+        report.write(comparisons, html=options.report, xml=options.junit, json=options.json, durations=durations)
     except FeedsimError as error:
         print(*(_plain(line) for line in f"feedsim: {error}".split("\n")), sep="\n", file=sys.stderr)
         return 2
@@ -69,9 +67,9 @@ def compare(options: Namespace) -> int:
 
 
 def _compared(options: Namespace) -> tuple[list[Comparison], list[float]]:
-    from feedsim import report
     from feedsim.compare import pairs_of, unusable
     from feedsim.errors import InputError
+    from feedsim.report import compare as report
 
     for option, given in (("--axis", options.axis), ("--machine", options.machine)):
         if given is not None and options.columns is None and options.reference_columns is None:
@@ -81,9 +79,7 @@ def _compared(options: Namespace) -> tuple[list[Comparison], list[float]]:
     pairs = pairs_of(options.files)
     inputs = [path for pair in pairs for path in pair]
     inputs += [path for path in (options.tolerances, options.columns, options.reference_columns) if path is not None]
-    report.check_comparison_writable(
-        [path for path in (options.report, options.junit, options.json) if path is not None], inputs
-    )
+    report.check_writable([path for path in (options.report, options.junit, options.json) if path is not None], inputs)
     choice = _options(options)
     found, durations = [], []
     for result, reference in pairs:

@@ -27,8 +27,10 @@ EPILOG = """examples:
 
 def compensate(options: Namespace) -> None:
     """Read, run, write."""
-    from feedsim import nc, report, scenario
+    from feedsim import nc, scenario
     from feedsim.analysis import compensation as analysis
+    from feedsim.report import compensate as report
+    from feedsim.report.provenance import input_paths
 
     plan = scenario.load(options.scenario, options.overrides)
     announce(plan.machine)
@@ -38,15 +40,15 @@ def compensate(options: Namespace) -> None:
     files, frictions = _frictions(options.frictions, program)
     delays = _delays(options.delays, program)
     _check_lags(plan, [axis for axis in analysis.moving_axes(program) if axis not in delays])
-    report.check_compensation_writable(directory, [*report.input_paths(plan), *files.values()])
+    report.check_writable(directory, [*input_paths(plan), *files.values()])
     with progress_bar(options.quiet, "it", shortened=True) as progress:
         result = analysis.compensate(
             plan, program, frictions=frictions, delays=delays, table=options.table, fmus=options.fmus,
             progress=progress,
         )  # fmt: skip
-    report.write_compensation(result, files, directory)
+    report.write(result, files, directory)
     head = f"{plan.name}: friction compensation -> {directory / 'report.html'}"
-    finish(options.quiet, result.warnings, head, f"  {report.compensation_summary_line(result)}")
+    finish(options.quiet, result.warnings, head, f"  {report.summary_line(result)}")
 
 
 def _frictions(texts: Sequence[str], program: Program) -> tuple[Mapping[str, Path], Mapping[str, Friction]]:

@@ -34,10 +34,10 @@ EPILOG = """examples:
 
 def frf(options: Namespace) -> None:
     """Read, calculate, measure, write."""
-    from feedsim import report
     from feedsim.analysis import linear, responses, truncation
     from feedsim.analysis.campaign import run_campaign
     from feedsim.cosim.plant import plant_modes
+    from feedsim.report import frf as report
     from feedsim.scenario import load_subject
     from feedsim.structure.table_check import table_mismatch
 
@@ -54,7 +54,7 @@ def frf(options: Namespace) -> None:
     overlays, warnings = _overlays(options.overlays, wanted)
     warnings += doubts
     inputs = [*(file for _, file in subject.files), *(overlay.file for overlay in overlays)]
-    report.check_frf_writable(directory, inputs)
+    report.check_writable(directory, inputs)
 
     with progress_bar(options.quiet, " cycles", shortened=True) as progress:
         progress("closed form", 0, 1)
@@ -93,9 +93,9 @@ def frf(options: Namespace) -> None:
         figures=figures,
         warnings=tuple(warnings),
     )
-    report.write_frf(subject, found, directory)
+    report.write(subject, found, directory)
     head = f"{subject.name}: frequency responses -> {directory / 'report.html'}"
-    finish(options.quiet, warnings, head, report.frf_summary_line(found))
+    finish(options.quiet, warnings, head, report.summary_line(found))
 
 
 def _full_model(machine: Machine, progress: Progress, warnings: list[str]) -> Truncation | None:

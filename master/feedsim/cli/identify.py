@@ -32,10 +32,10 @@ ESTIMATE = "estimate"  # of --inertia and --delay: whatever mapping and machine 
 
 def identify(options: Namespace) -> None:
     """Read, identify, write."""
-    from feedsim import report
     from feedsim.cosim.friction_law import FrictionLaw
     from feedsim.identify import Identified, named_apart, read_traces
     from feedsim.identify import identify as identified_from
+    from feedsim.report import identify as report
     from feedsim.scenario import load_columns, load_subject
 
     asked = _asked(options)
@@ -49,16 +49,16 @@ def identify(options: Namespace) -> None:
         sources = tuple(each.provenance for each in recorded)
         known = asked.with_traces(sources, machine)
         directory: Path = options.out or Path("results") / f"identify_{known.axis.lower()}"
-        report.check_identification_writable(directory, _inputs(options, subject))
+        report.check_writable(directory, _inputs(options, subject))
         records = named_apart(recorded)
         with FrictionLaw(options.fmus) as law:
             found = identified_from(records, law, known, progress, free_axis=law.free_axis)
     found = replace(found, seconds=reading | dict(found.seconds))
     identified = Identified(found, records, sources, subject, _settings(options), date.today().isoformat())
-    report.write_identification(identified, directory)
+    report.write(identified, directory)
     # Without the table, all warnings: it holds the reasons that some only repeat.
-    warnings = identified.warnings if options.quiet else report.identification_warnings(identified)
-    finish(options.quiet, warnings, *report.identification_lines(identified, directory))
+    warnings = identified.warnings if options.quiet else report.terminal_warnings(identified)
+    finish(options.quiet, warnings, *report.terminal_lines(identified, directory))
 
 
 def _inputs(options: Namespace, subject: Subject | None) -> list[Path]:

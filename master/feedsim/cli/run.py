@@ -34,7 +34,8 @@ SSP_EXAMPLES = """examples:
 
 def run(options: Namespace) -> None:
     """feedsim run."""
-    from feedsim import analysis, cosim, report
+    from feedsim import analysis, cosim
+    from feedsim.report import run as report
 
     directory: Path = options.out or Path("results") / options.scenario.stem
     with _subject(options) as (plan, program, fmus, worded):

@@ -38,7 +38,7 @@ examples:
 
 def sweep(options: Namespace) -> int:
     """feedsim sweep."""
-    from feedsim import report
+    from feedsim.report import sweep as report
     from feedsim.scenario import load_study
     from feedsim.sweep import design
     from feedsim.sweep.study import AllFailed, run
@@ -53,7 +53,7 @@ def sweep(options: Namespace) -> int:
     if options.dry_run:
         return _dry_run(study, planned, options)
     directory: Path = options.out or Path("results") / options.study.stem
-    report.check_sweep_writable(directory, [study.file, study.scenario, *study.files])
+    report.check_writable(directory, [study.file, study.scenario, *study.files])
     begun = perf_counter()
     last: list[Progress] = []
     try:
@@ -74,16 +74,16 @@ def sweep(options: Namespace) -> int:
                 format=options.format,
                 command=sys.argv,
                 say=None if options.quiet else lambda text: print(f"feedsim: {text}", file=sys.stderr),
-                discard=lambda: report.discard_sweep(directory),
+                discard=lambda: report.discard(directory),
             )
     except AllFailed as error:
-        report.write_sweep(error.table, study, planned, directory)  # which groups failures by what they have in common
+        report.write(error.table, study, planned, directory)  # which groups failures by what they have in common
         raise
     except KeyboardInterrupt:
         done = f"{last[0].done} of {last[0].total} runs are done and kept in" if last else "what is done is kept in"
         print(f"feedsim: interrupted; {done} {directory}; the same command continues", file=sys.stderr)
         return 130
-    report.write_sweep(table, study, planned, directory)
+    report.write(table, study, planned, directory)
     finish(options.quiet, (), _summary(study, last[0], perf_counter() - begun, directory))
     return 0
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from html import escape
 
 from feedsim.analysis import Figure
+from feedsim.report.formatting import minus, shown
 from feedsim.report.style import LARGEST_SVG, Picture, css_variables
-from feedsim.report.words import minus, shown
 
 # Significant digits of a tile; the table has more.
 TILE_DIGITS = 4

@@ -1,10 +1,12 @@
-"""Where the numbers come from: input files with their hashes, archives, parameters of the axes in SI."""
+"""Where the numbers come from: input files with their hashes, archives, software, parameters of the axes in SI."""
 
 from __future__ import annotations
 
 import hashlib
+import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, get_args
 
@@ -60,6 +62,18 @@ def hashed(files: Sequence[tuple[str, Path]]) -> list[InputFile]:
     """Files with what they are, each once, under what it is first."""
     once = {path.absolute(): (role, path) for role, path in reversed(files)}
     return [InputFile(role, path.name, _sha256(path)) for role, path in reversed(once.values())]
+
+
+def software() -> dict[str, str]:
+    """Versions of the package, of what it calculates with, and the platform."""
+    names = ("feedsim", "numpy", "scipy", "ruckig", "fmpy")
+    found = {"python": platform.python_version(), "platform": platform.platform()}
+    for name in names:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed as a package"
+    return found
 
 
 def archives(units: Mapping[str, Mapping[str, str]]) -> list[ArchiveUse]:

@@ -8,9 +8,13 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from feedsim.errors import OutputError
+from feedsim.report.content import Report
+from feedsim.report.page import html
 from feedsim.report.style import Picture
+from feedsim.report.summary import to_json
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
 # What a report of any kind leaves besides report.html and summary.json, which every one replaces; the next one takes
@@ -76,6 +80,38 @@ def write_results(
         sources = {name: fresh / name for name in names} | dict(grown or {})
         _move(sources, directory, _stale(directory, names), Path(scratch) / "kept")
     return tuple(directory / name for name in names)
+
+
+# What a file of results holds: text, bytes, or a function of the path that makes the file there, or that returns where
+# the file is already, complete and on the same disk, to be moved from there.
+Content = str | bytes | Callable[[Path], Path | None]
+
+
+def write_report(
+    directory: Path | str,
+    report: Report,
+    summary: Callable[[Sequence[str]], Mapping[str, Any]],
+    files: Mapping[str, Content],
+) -> tuple[Path, ...]:
+    """Write a report of any kind: its pictures as figures/*.png, ``files``, report.html and summary.json.
+
+    summary: content of summary.json, a function of the names of all files. Whole or not at all, as
+    :func:`write_results` does it. Returns the paths. Raises OutputError.
+    """
+    grown: dict[str, Path] = {}
+
+    def fill(fresh: Path, names: Sequence[str]) -> None:
+        for name, content in files.items():
+            if isinstance(content, str):
+                write_text(fresh / name, content)
+            elif isinstance(content, bytes):
+                (fresh / name).write_bytes(content)
+            elif (already := content(fresh / name)) is not None:
+                grown[name] = already
+        write_text(fresh / REPORT, html(report))
+        write_text(fresh / SUMMARY, to_json(summary(names)))
+
+    return write_results(directory, (*files, REPORT, SUMMARY), report.pictures, fill, grown)
 
 
 def discard(directory: Path | str) -> None:

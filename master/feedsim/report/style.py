@@ -67,6 +67,11 @@ class Picture:
     png: bytes
     svg: str
 
+    @property
+    def is_light(self) -> bool:
+        """Whether a page holds the SVG; one above LARGEST_SVG it holds as PNG."""
+        return len(self.svg.encode()) <= LARGEST_SVG
+
 
 @contextmanager
 def drawing(width: float, height: float) -> Iterator[Drawing]:
@@ -119,9 +124,12 @@ def drawing(width: float, height: float) -> Iterator[Drawing]:
 
 
 @contextmanager
-def remarked(text: str) -> Iterator[None]:
-    """Figures finished inside say `text` in their upper right corner: a picture travels without its page."""
-    token = _REMARK.set(text)
+def remarked(text: str, width: int = 150, lines: int = 2) -> Iterator[None]:
+    """Figures finished inside say `text` in their upper right corner: a picture travels without its page.
+
+    width, lines: characters of a line and lines that fit the narrowest figure; what is longer ends there.
+    """
+    token = _REMARK.set("\n".join(textwrap.wrap(text, width)[:lines]))
     try:
         yield
     finally:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 from feedsim.analysis import Figure
+from feedsim.report.formatting import display_unit, minus, shown, typeset
 from feedsim.report.provenance import InputFile, archives, axis_parameters
-from feedsim.report.words import display_unit, minus, shown, typeset
 from feedsim.scenario import Machine
 
 NUMERIC = ' class="number"'

@@ -21,7 +21,7 @@ NEAR = 0.1
 
 def show(options: Namespace) -> None:
     """feedsim machine show: compute, draw, write."""
-    from feedsim import report
+    from feedsim.report import machine as report
     from feedsim.scenario import load_described
 
     scale = _scale(options.scale)
@@ -33,10 +33,10 @@ def show(options: Namespace) -> None:
             f"{options.machine}: has a table of modes alone, and no table says where things are; a picture needs a "
             "structure file (key structure, docs/structure.md)"
         )
-    report.check_machine_writable(options.out)
+    report.check_writable(options.out)
     found = figures(options, described, quiet=options.quiet)
     chosen = list(dict.fromkeys(_mode(text, found.modes) for text in options.mode))
-    report.write_machine(
+    report.write(
         described.structure, found, described.files, options.out, modes=chosen, scale=scale, animate=options.animate
     )
     shown = [f"mode {k}: {found.modes.frequency[k]:.2f} Hz, {found.moving[k]}" for k in chosen]

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feedsim.compare import Comparison, Curves, Variable, along, seconds
+from feedsim.report.formatting import display_unit, minus, powers
 from feedsim.report.labels import heading, legend_above
 from feedsim.report.style import BLUE, GREEN, MUTED, VERMILLION, Picture, drawing, finish, thinned
-from feedsim.report.words import display_unit, minus, powers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,1 +1,9 @@
-"""Friction compensation: circle without and with it, torque feedforward, what errors cost."""
+"""What a friction compensation leaves: curves and table as CSV, summary.json, report.html and figures/*.png.
+
+It uses the report's core, the run's report and the analyses. Begin with `report`.
+"""
+
+from feedsim.report.compensate.report import check_writable, write
+from feedsim.report.compensate.summary import summary_line
+
+__all__ = ["check_writable", "summary_line", "write"]

@@ -11,8 +11,9 @@ import numpy as np
 from feedsim.analysis import Contour, Turn, contour
 from feedsim.analysis.circularity import quadrant
 from feedsim.analysis.compensation import Compensation, Variation
-from feedsim.report.circle_plots import NOMINAL, RING_GAPS, ring_step
+from feedsim.report.formatting import minus
 from feedsim.report.labels import heading, legend_above, plain_box
+from feedsim.report.run.circle_plots import NOMINAL, RING_GAPS, ring_step
 from feedsim.report.style import (
     BLUE,
     GREEN,
@@ -26,7 +27,6 @@ from feedsim.report.style import (
     finish,
     thinned,
 )
-from feedsim.report.words import minus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

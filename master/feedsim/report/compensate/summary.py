@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.analysis.compensation import Compensation, Quality
-from feedsim.report.parts import inputs_part
 from feedsim.report.provenance import InputFile, axis_parameters, hashed
-from feedsim.report.summary import summary as summary_of_run
+from feedsim.report.run.summary import summary as summary_of_run
+from feedsim.report.summary import inputs_part
 
 Row = tuple[str, float, str, Quality]
 

@@ -1,1 +1,9 @@
-"""Frequency responses: curves, figures, the page that holds them."""
+"""What a look at frequency responses leaves: curves as CSV, summary.json, report.html and figures/*.png.
+
+It uses the report's core and the analyses. Begin with `report`.
+"""
+
+from feedsim.report.frf.report import check_writable, write
+from feedsim.report.frf.summary import summary_line
+
+__all__ = ["check_writable", "summary_line", "write"]

@@ -9,8 +9,8 @@ from typing import Any
 from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.responses import Responses
-from feedsim.report.parts import figures_part, inputs_part, machine_part, software
-from feedsim.report.provenance import InputFile, hashed
+from feedsim.report.provenance import InputFile, hashed, software
+from feedsim.report.summary import figures_part, inputs_part, machine_part
 from feedsim.scenario import Subject
 
 FORMAT = 1

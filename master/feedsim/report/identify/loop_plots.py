@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from feedsim.identify.result import NORMAL_95, Dynamic, Identification, Stretch
+from feedsim.report.formatting import counted
 from feedsim.report.labels import heading, legend_above
 from feedsim.report.style import (
     BLUE,
@@ -23,7 +24,6 @@ from feedsim.report.style import (
     finish,
     thinned,
 )
-from feedsim.report.words import counted
 
 MOST_LOOPS = 6
 COLUMNS = 3

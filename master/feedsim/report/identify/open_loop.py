@@ -11,8 +11,8 @@ import numpy as np
 
 from feedsim.identify.friction_file import change_text
 from feedsim.identify.result import Balance, Identification
+from feedsim.report.formatting import minus, typeset
 from feedsim.report.tables import table
-from feedsim.report.words import minus, typeset
 from feedsim.trace.csv import quoted, shortest
 
 METHOD = (

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from feedsim.identify.result import Balance, Identification
+from feedsim.report.formatting import counted
 from feedsim.report.labels import heading, legend_above
 from feedsim.report.style import BLUE, INK, MUTED, VERMILLION, Picture, drawing, finish, thinned
-from feedsim.report.words import counted
 
 MOST = 3  # records side by side
 

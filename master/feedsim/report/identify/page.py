@@ -15,6 +15,7 @@ from feedsim.identify.friction_file import (
     value_text,
 )
 from feedsim.identify.result import NORMAL_95, Estimate, Identification
+from feedsim.report.formatting import counted, minus, powers, typeset
 from feedsim.report.frame import Tile, frame, picture_section
 from feedsim.report.identify.loop_plots import describe
 from feedsim.report.identify.open_loop import open_loop_section
@@ -27,10 +28,9 @@ from feedsim.report.identify.quantities import (
     speeds_of,
     unit_text,
 )
-from feedsim.report.parts import software
+from feedsim.report.provenance import software
 from feedsim.report.style import Picture
 from feedsim.report.tables import files_table, pairs_table, table
-from feedsim.report.words import counted, minus, powers, typeset
 
 LEADING = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "sigma_0", "sigma_1", "W", "gamma", "M_0", "J", "delay")
 HEADS = [

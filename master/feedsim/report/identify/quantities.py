@@ -8,8 +8,8 @@ import numpy as np
 
 from feedsim.identify import Identified
 from feedsim.identify.result import NORMAL_95, Estimate, Stationary
+from feedsim.report.formatting import display_unit, typeset
 from feedsim.report.provenance import InputFile, hashed
-from feedsim.report.words import display_unit, typeset
 
 MM_PER_MIN = 60e3  # per m/s
 LEAST_SPEEDS = 3  # that make a curve

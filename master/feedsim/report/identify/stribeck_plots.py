@@ -11,6 +11,7 @@ import numpy as np
 from feedsim.identify.level import torque as motor_torque
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Identification, Plateau, Stationary
+from feedsim.report.formatting import counted
 from feedsim.report.identify.quantities import MM_PER_MIN, curve_error, is_curve, speeds_of
 from feedsim.report.labels import heading, legend_above
 from feedsim.report.style import (
@@ -26,7 +27,6 @@ from feedsim.report.style import (
     finish,
     thinned,
 )
-from feedsim.report.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,6 +22,7 @@ from feedsim.identify.friction_file import (
     value_text,
 )
 from feedsim.identify.result import Estimate, Identification
+from feedsim.report.formatting import counted
 from feedsim.report.identify.open_loop import open_loop_part
 from feedsim.report.identify.quantities import (
     MM_PER_MIN,
@@ -32,8 +33,8 @@ from feedsim.report.identify.quantities import (
     shown_unit,
     speeds_of,
 )
-from feedsim.report.parts import inputs_part, machine_part, software
-from feedsim.report.words import counted
+from feedsim.report.provenance import software
+from feedsim.report.summary import inputs_part, machine_part
 from feedsim.trace.csv import quoted, shortest
 
 FORMAT = 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,15 +12,16 @@ from feedsim.report.identify.page import page
 from feedsim.report.identify.plots import pictures_of
 from feedsim.report.identify.quantities import remark
 from feedsim.report.identify.summary import plateaus_csv, residuals_csv, summary
-from feedsim.report.parts import software, to_json
+from feedsim.report.provenance import software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, write_text
 from feedsim.report.style import remarked
+from feedsim.report.summary import to_json
 
 PLATEAUS, RESIDUALS, OPEN_LOOP = "plateaus.csv", "residuals.csv", "open_loop.csv"
 REMARK_WIDTH, REMARK_LINES = 100, 3  # fits the narrowest figure
 
 
-def check_identification_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
 
     inputs: files that are read. Leaves nothing behind.
@@ -29,7 +29,7 @@ def check_identification_writable(directory: Path | str, inputs: Sequence[Path] 
     check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs)
 
 
-def write_identification(identified: Identified, directory: Path | str) -> tuple[Path, ...]:
+def write(identified: Identified, directory: Path | str) -> tuple[Path, ...]:
     """Write friction.yaml, plateaus.csv, residuals.csv and open_loop.csv (where there are any), summary.json,
     report.html, figures.
 
@@ -37,7 +37,7 @@ def write_identification(identified: Identified, directory: Path | str) -> tuple
     """
     found = identified.found
     friction = friction_yaml(identified, software())
-    with remarked("\n".join(textwrap.wrap(remark(identified), REMARK_WIDTH)[:REMARK_LINES])):
+    with remarked(remark(identified), REMARK_WIDTH, REMARK_LINES):
         pictures = pictures_of(identified)
     files = [FRICTION]
     files += [PLATEAUS] if found.stationary is not None else []

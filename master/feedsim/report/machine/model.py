@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.report.machine.projection import Faces, tube
 from feedsim.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, Array
-from feedsim.report.view import Faces, tube
 from feedsim.scenario import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.assembly import Assembly, Geometry

@@ -8,13 +8,12 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 
+from feedsim.report.formatting import display_unit, minus, typeset
 from feedsim.report.frame import Tile, frame, picture_section
 from feedsim.report.machine.record import MEANINGS, USUAL_EXCHANGE, exchange
-from feedsim.report.parts import software
-from feedsim.report.provenance import hashed
+from feedsim.report.provenance import hashed, software
 from feedsim.report.style import Picture
 from feedsim.report.tables import files_table, pairs_table, table
-from feedsim.report.words import display_unit, minus, typeset
 from feedsim.structure.info import MachineInfo
 
 

@@ -8,10 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from feedsim.report.formatting import minus
 from feedsim.report.machine.model import Model, Motion, extent, motion, rotor_disc, solids
+from feedsim.report.machine.projection import (
+    FRONT,
+    OBLIQUE,
+    SIDE,
+    TOP,
+    Faces,
+    View,
+    draw_faces,
+    draw_lines,
+    frame_limits,
+)
 from feedsim.report.style import INK, MUTED, PAPER, PNG_DPI, VERMILLION, Picture, drawing, finish
-from feedsim.report.view import FRONT, OBLIQUE, SIDE, TOP, Faces, View, draw_faces, draw_lines, frame_limits
-from feedsim.report.words import minus
 from feedsim.structure.build import Built
 from feedsim.structure.geometry.outline import deflection, node_motion
 from feedsim.structure.info import MachineInfo

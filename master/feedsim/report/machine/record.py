@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.cosim import SCHEMES
-from feedsim.report.parts import software
-from feedsim.report.provenance import hashed
+from feedsim.report.provenance import hashed, software
 from feedsim.scenario import Coupling
 from feedsim.structure.info import MachineInfo
 

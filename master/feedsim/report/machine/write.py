@@ -11,19 +11,19 @@ from feedsim.report.machine.model import model
 from feedsim.report.machine.page import page
 from feedsim.report.machine.pictures import mode_picture, mode_title, sheet_picture, structure_picture
 from feedsim.report.machine.record import record
-from feedsim.report.parts import to_json
 from feedsim.report.results import FIGURES, REPORT, SUMMARY, check_place, write_results, write_text
 from feedsim.report.style import PALETTE, PAPER, Picture
+from feedsim.report.summary import to_json
 from feedsim.scenario import Structure
 from feedsim.structure.info import MachineInfo
 
 
-def check_machine_writable(directory: Path | str) -> None:
+def check_writable(directory: Path | str) -> None:
     """Raise OutputError unless the pictures can be written to ``directory``; leaves nothing behind."""
     check_place(directory, (REPORT, SUMMARY))
 
 
-def write_machine(
+def write(
     structure: Structure,
     info: MachineInfo,
     files: Sequence[tuple[str, Path]],

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.report.people import Scale, number, scale
+from feedsim.report.formatting import Scale, number, scale
 from feedsim.report.style import Array
 from feedsim.report.sweep.failures import Failure, failures, kinds
 from feedsim.sweep.sensitivity import Sensitivities, sensitivities

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.report.people import number
+from feedsim.report.formatting import number
 from feedsim.report.style import Array
 
 if TYPE_CHECKING:

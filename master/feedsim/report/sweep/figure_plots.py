@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from feedsim.report.formatting import number, plain
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.people import number, plain
 from feedsim.report.style import (
     BLUE,
     GRID,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from feedsim.report.people import plain
+from feedsim.report.formatting import plain
 from feedsim.report.style import BLUE, GRID, VERMILLION, Picture, drawing, finish
 from feedsim.report.sweep.account import Account
 from feedsim.report.sweep.measures import NOTHING, Measure, measures

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from html import escape
 
+from feedsim.report.formatting import counted, minus, number
 from feedsim.report.frame import Tile, frame, picture_section
-from feedsim.report.people import number
 from feedsim.report.style import Picture
 from feedsim.report.sweep.account import QUANTILES, Account
 from feedsim.report.sweep.parameters import parameters_section
@@ -15,7 +15,6 @@ from feedsim.report.sweep.plots import drawn, varying
 from feedsim.report.sweep.provenance import provenance_section
 from feedsim.report.sweep.sensitivity_tables import sensitivity_tables
 from feedsim.report.tables import table
-from feedsim.report.words import counted, minus
 
 METHODS = {
     "grid": "grid: every combination",

@@ -5,10 +5,9 @@ from __future__ import annotations
 from html import escape
 from math import isfinite
 
-from feedsim.report.people import number
+from feedsim.report.formatting import minus, number
 from feedsim.report.sweep.account import Account, Input
 from feedsim.report.tables import table
-from feedsim.report.words import minus
 
 
 def parameters_section(account: Account) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
+from feedsim.report.run.summary import HEADER, is_leading
 from feedsim.report.style import Picture
-from feedsim.report.summary import HEADER, is_leading
 from feedsim.report.sweep.account import Account, Output
 from feedsim.report.sweep.figure_plots import of_account
 from feedsim.report.sweep.grid_plots import grid_picture

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from feedsim.report.parts import software
-from feedsim.report.provenance import InputFile, hashed
+from feedsim.report.provenance import InputFile, hashed, software
 from feedsim.report.sweep.account import Account
 from feedsim.report.tables import files_table, pairs_table, parameters_table
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from html import escape
 
-from feedsim.report.people import number
+from feedsim.report.formatting import minus, number
 from feedsim.report.style import Array
 from feedsim.report.sweep.account import Account
 from feedsim.report.sweep.plots import drawn
 from feedsim.report.tables import table
-from feedsim.report.words import minus
 from feedsim.sweep.sensitivity import Indices, Trends
 
 SOBOL_NOTE = (

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.report.parts import inputs_part, software
+from feedsim.report.provenance import software
 from feedsim.report.style import Array
+from feedsim.report.summary import inputs_part
 from feedsim.report.sweep.account import Account
 from feedsim.report.sweep.provenance import study_files
 from feedsim.sweep.sensitivity import CONFIDENCE, Indices, Trends

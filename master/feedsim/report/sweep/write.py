@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feedsim.report.parts import to_json
-from feedsim.report.results import REPORT, SUMMARY, check_place, discard, write_results, write_text
+from feedsim.report.results import REPORT, SUMMARY, check_place, write_results, write_text
 from feedsim.report.style import remarked
+from feedsim.report.summary import to_json
 from feedsim.report.sweep.account import Account
 from feedsim.report.sweep.page import page
 from feedsim.report.sweep.plots import pictures_of
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 REMARK_WIDTH, REMARK_LINES = 95, 2  # fits the narrowest figure
 
 
-def check_sweep_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless the report can be written to ``directory`` without one of ``inputs`` being lost.
 
     inputs: files that are read. Leaves nothing behind.
@@ -33,12 +32,7 @@ def check_sweep_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> 
     check_place(directory, (REPORT, SUMMARY), inputs)
 
 
-def discard_sweep(directory: Path | str) -> None:
-    """Remove what :func:`write_sweep` has written. Raises OutputError."""
-    discard(directory)
-
-
-def write_sweep(table: Table, study: Study, design: Design, directory: Path | str) -> tuple[Path, ...]:
+def write(table: Table, study: Study, design: Design, directory: Path | str) -> tuple[Path, ...]:
     """Write report.html, summary.json and figures/*.png beside the table; returns their paths.
 
     The table may be that of an unfinished study. The table's own files are left as they are. Raises OutputError.
@@ -46,7 +40,7 @@ def write_sweep(table: Table, study: Study, design: Design, directory: Path | st
     account = Account(table, study, design, _record(Path(directory)))
     machine = study.base.scenario.machine
     remark = f"{study.name}. {machine.name}. {machine.note}".strip()
-    with remarked("\n".join(textwrap.wrap(remark, REMARK_WIDTH)[:REMARK_LINES])):
+    with remarked(remark, REMARK_WIDTH, REMARK_LINES):
         whole, single = pictures_of(account)
 
     def fill(fresh: Path, names: Sequence[str]) -> None:

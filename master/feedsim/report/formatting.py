@@ -1,17 +1,30 @@
-"""Numbers, units and durations as a person reads them."""
+"""Numbers, units and durations as a person reads them; SI values in the units that read best: µm, ms, mm/min."""
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from decimal import Decimal
 
+import numpy as np
+
 from feedsim.analysis import Figure
+from feedsim.report.style import Array
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SMALL = Decimal("1e-4")  # below which a number is written with a power of ten
 DISPLAY_UNITS = {"um": "µm", "1": ""}
 NOT_DETERMINED = "not determined"
+# SI unit -> (largest magnitude up to which the unit is taken, factor, unit), from small to large.
+_SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "m": ((0.999e-3, 1e6, "um"), (10.0, 1e3, "mm")),
+    "s": ((0.999e-3, 1e6, "us"), (0.999, 1e3, "ms")),
+    "m/s": ((np.inf, 60e3, "mm/min"),),
+    "1/s": ((np.inf, 0.06, "(m/min)/mm"),),  # the position controller's gain
+    "H": ((0.999, 1e3, "mH"),),
+    "J": ((0.999, 1e3, "mJ"),),
+}
 
 
 def shown(figure: Figure) -> tuple[str, str]:
@@ -62,3 +75,34 @@ def duration(seconds: float) -> str:
         if seconds * scale >= 1 - 1e-9:
             return f"{seconds * scale:.6g} {unit}"
     return f"{seconds * 1e6:.6g} µs"
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A unit for people and the factor from SI to it."""
+
+    factor: float
+    unit: str
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit as it is printed: µm; nothing for a plain number."""
+        return display_unit(self.unit)
+
+
+def scale(unit: str, values: Array) -> Scale:
+    """The unit in which values of an SI unit read best, by the largest of them."""
+    finite = np.abs(values[np.isfinite(values)])
+    largest = float(finite.max()) if len(finite) else 0.0
+    fitting = ((factor, shown) for limit, factor, shown in _SCALES.get(unit, ()) if largest <= limit)
+    return Scale(*next(fitting, (1.0, unit)))
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number of a table; a dash where there is none."""
+    return minus(f"{value:.{digits}g}") if np.isfinite(value) else "–"
+
+
+def plain(text: str) -> str:
+    """A name of the user's as text of a picture, in which a $ would begin a formula."""
+    return text.replace("$", r"\$")

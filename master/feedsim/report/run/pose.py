@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
 from typing import Any
 
 from feedsim.cosim import PoseUse
-from feedsim.report.tables import pairs_table, table
-from feedsim.report.words import minus
+from feedsim.report.content import Paragraph, Part, Section, Table
+from feedsim.report.formatting import counted, minus
+from feedsim.report.sections import pairs_table
 from feedsim.structure.pose_change import LOOKED_AT, NEAR, SEEN, AxisChange, Compliance, ModeChange, PoseChange
 
-HEADING = '<h2 id="pose">Pose of the plant</h2>\n'
 
-
-def pose_section(pose: PoseUse | None) -> str:
-    """The section of a report; nothing where nothing is known."""
+def pose_section(pose: PoseUse | None) -> Section | None:
+    """The section of a report; none where nothing is known."""
     if pose is None:
-        return ""
-    parts = [HEADING, _followed(pose), _distances(pose.change), _unknown(pose.change)]
-    parts += [_axis(axis) for axis in pose.change.axes if axis.modes]
-    return "\n".join(part for part in parts if part)
+        return None
+    change = pose.change
+    axes = [_axis(axis) for axis in change.axes if axis.modes]
+    return Section("Pose of the plant", [*_followed(pose), *_distances(change), _unknown(change), *axes], "pose")
 
 
 def pose_part(pose: PoseUse | None) -> dict[str, Any] | None:
@@ -86,20 +84,18 @@ def _compliance_part(item: Compliance) -> Mapping[str, Any]:
     return {"of": item.name, "unit": item.unit, "at_lowest": low, "at_pose": here, "at_highest": high}
 
 
-def _followed(pose: PoseUse) -> str:
+def _followed(pose: PoseUse) -> list[Part]:
     if not pose.grid:
-        return ""
+        return []
     cells = ", ".join(
-        f"{axis.axis}: {len(axis.centres)} cell{'s'[: len(axis.centres) != 1]}, centres {axis.limits[0] * 1e3:.5g} to "
+        f"{axis.axis}: {counted(len(axis.centres), 'cell')}, centres {axis.limits[0] * 1e3:.5g} to "
         f"{axis.limits[1] * 1e3:.5g} mm"
         for axis in pose.grid
     )
-    text = (
-        f"<p>The plant follows the pose ({escape(cells)}): its modes are those of the cell that the axes stand in.</p>"
-    )
+    text = Paragraph(f"The plant follows the pose ({cells}): its modes are those of the cell that the axes stand in.")
     found = pose.crossings
     if found is None:
-        return text
+        return [text]
     rows = [
         ("Crossings", f"{found.count}"),
         ("Kinetic energy lost in all", f"{found.kinetic_lost:.3g} J"),
@@ -109,31 +105,29 @@ def _followed(pose: PoseUse) -> str:
         ("Largest jump of a motor speed", f"{found.jump_n_a:.2g} rad/s"),
         ("Largest jump of the tool", f"{found.jump_tool * 1e9:.3g} nm"),
     ]
-    return text + pairs_table((name, minus(value)) for name, value in rows)
+    return [text, pairs_table([(name, minus(value)) for name, value in rows])]
 
 
-def _distances(change: PoseChange) -> str:
+def _distances(change: PoseChange) -> list[Part]:
     if not change.axes:
-        return ""
+        return []
     if change.distance <= NEAR:
-        return (
-            f"<p>No axis that the plant does not follow moves more than {NEAR * 1e3:.3g} mm away from the pose that "
-            "the modes belong to.</p>"
+        text = (
+            f"No axis that the plant does not follow moves more than {NEAR * 1e3:.3g} mm away from the pose that the "
+            "modes belong to."
         )
-    rows = [
-        f'<tr><td>{escape(axis.axis)}</td><td class="number">{axis.pose * 1e3:.6g}</td>'
-        f'<td class="number">{axis.low * 1e3:.6g}</td><td class="number">{axis.high * 1e3:.6g}</td>'
-        f'<td class="number">{axis.distance * 1e3:.4g}</td><td class="number">{_largest(axis)}</td></tr>'
-        for axis in change.axes
-    ]
-    heads = [
-        ("Axis", False), ("Pose [mm]", True), ("Lowest [mm]", True), ("Highest [mm]", True), ("Distance [mm]", True),
-        ("Largest change of a frequency", True),
-    ]  # fmt: skip
-    return (
-        "<p>The modes belong to one pose. The axes leave it, and the modes would change, as follows (setpoints; each "
-        "axis by itself, the others at the pose).</p>" + table(heads, rows)
+        return [Paragraph(text)]
+    text = (
+        "The modes belong to one pose. The axes leave it, and the modes would change, as follows (setpoints; each "
+        "axis by itself, the others at the pose)."
     )
+    heads = ("Axis", "Pose [mm]", "Lowest [mm]", "Highest [mm]", "Distance [mm]", "Largest change of a frequency")
+    rows = [
+        (axis.axis, *(f"{at * 1e3:.6g}" for at in (axis.pose, axis.low, axis.high)), f"{axis.distance * 1e3:.4g}",
+         _largest(axis))
+        for axis in change.axes
+    ]  # fmt: skip
+    return [Paragraph(text), Table("lrrrrr", heads, rows)]
 
 
 def _largest(axis: AxisChange) -> str:
@@ -142,42 +136,35 @@ def _largest(axis: AxisChange) -> str:
     return minus(f"{100 * axis.largest.change:+.2g} %")
 
 
-def _unknown(change: PoseChange) -> str:
+def _unknown(change: PoseChange) -> Paragraph | None:
     if not change.unknown:
-        return ""
-    return (
-        f"<p>How much the modes change is not known: {escape(change.unknown)}. With a structure file of kind geometry "
-        "(key structure of the machine file, docs/structure.md) the modes of any pose can be computed.</p>"
+        return None
+    return Paragraph(
+        f"How much the modes change is not known: {change.unknown}. With a structure file of kind geometry (key "
+        "structure of the machine file, docs/structure.md) the modes of any pose can be computed."
     )
 
 
-def _axis(axis: AxisChange) -> str:
-    rows = [
-        f'<tr><td class="number">{mode.frequency:.4g}</td><td class="number">{mode.ends[0]:.4g}</td>'
-        f'<td class="number">{mode.ends[1]:.4g}</td><td class="number">{minus(f"{100 * mode.change:+.2g}")}</td>'
-        f'<td class="number">{mode.mac:.2f}</td><td>{escape(mode.moving)}</td></tr>'
+def _axis(axis: AxisChange) -> Section:
+    lowest, highest = (f"{axis.axis} {at * 1e3:.5g} mm" for at in (axis.low, axis.high))
+    modes = [
+        (*(f"{f:.4g}" for f in (mode.frequency, *mode.ends)), minus(f"{100 * mode.change:+.2g}"), f"{mode.mac:.2f}",
+         mode.moving)
         for mode in axis.modes
-    ]
-    heads = [
-        ("At the pose [Hz]", True), (f"{axis.axis} {axis.low * 1e3:.5g} mm [Hz]", True),
-        (f"{axis.axis} {axis.high * 1e3:.5g} mm [Hz]", True), ("Change [%]", True), ("MAC", True),
-        ("What moves, at the pose", False),
     ]  # fmt: skip
-    compliances = [
-        f"<tr><td>{escape(item.name)}</td>"
-        + "".join(f'<td class="number">{abs(value) * 1e9:.4g}</td>' for value in item.values)
-        + f"<td>n{escape(item.unit.replace('.', '·'))}</td></tr>"
-        for item in axis.compliances
-    ]
-    compliance_heads = [
-        ("Static compliance", False), (f"{axis.axis} {axis.low * 1e3:.5g} mm", True), ("At the pose", True),
-        (f"{axis.axis} {axis.high * 1e3:.5g} mm", True), ("Unit", False),
-    ]  # fmt: skip
+    heads = ("At the pose [Hz]", f"{lowest} [Hz]", f"{highest} [Hz]", "Change [%]", "MAC", "What moves, at the pose")
     note = (
         f"Modes up to {LOOKED_AT:g} Hz that hold {100 * SEEN:g} % or more of the static compliance of a drive, a scale "
         "or the tool; matched by MAC, which falls early where modes lie close to one another and mix."
     )
-    return (
-        f"<h3>Modes over the positions of {escape(axis.axis)}</h3>\n{table(heads, rows)}"
-        f'<p class="muted">{note}</p>\n{table(compliance_heads, compliances)}'
+    compliances = [
+        (item.name, *(f"{abs(value) * 1e9:.4g}" for value in item.values), f"n{item.unit.replace('.', '·')}")
+        for item in axis.compliances
+    ]
+    return Section(
+        f"Modes over the positions of {axis.axis}",
+        [
+            Table("rrrrrl", heads, modes, note),
+            Table("lrrrl", ("Static compliance", lowest, "At the pose", highest, "Unit"), compliances),
+        ],
     )

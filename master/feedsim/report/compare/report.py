@@ -1,0 +1,163 @@
+"""The report of comparisons as HTML, beside JUnit XML and JSON for programs: each file whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from math import isfinite
+from pathlib import Path
+
+from feedsim.compare import Comparison, Variable
+from feedsim.errors import OutputError
+from feedsim.report.compare.machine_readable import junit, to_json
+from feedsim.report.compare.plots import picture_of, reach_text
+from feedsim.report.content import Paragraph, Part, Report, Section, Span, Table, Text, Tile, code
+from feedsim.report.formatting import counted, display_unit, minus, powers
+from feedsim.report.page import html as as_html
+from feedsim.report.style import Picture
+from feedsim.trace import written_whole
+
+MOST_PICTURES = 12
+
+
+def check_writable(outputs: Sequence[Path], inputs: Sequence[Path]) -> None:
+    """OutputError where an output would replace an input or another output."""
+    seen: list[Path] = []
+    for path in outputs:
+        whole = path.resolve()
+        if path.is_dir():
+            raise OutputError(f"{path}: is a directory; a file name is needed")
+        if any(whole == given.resolve() for given in inputs):
+            raise OutputError(f"{path}: is an input and would be replaced; take another name")
+        if whole in seen:
+            raise OutputError(f"{path}: is given for two outputs")
+        seen.append(whole)
+
+
+def write(
+    comparisons: Sequence[Comparison],
+    *,
+    html: Path | None = None,
+    xml: Path | None = None,
+    json: Path | None = None,
+    durations: Sequence[float] = (),
+) -> tuple[Path, ...]:
+    """Write the report, JUnit XML and JSON that are asked for; returns the paths. Folders are made. OutputError."""
+    contents: list[tuple[Path | None, Callable[[], bytes]]] = [
+        (html, lambda: as_html(report_of(comparisons)).encode("utf-8")),
+        (xml, lambda: junit(comparisons, durations)),
+        (json, lambda: to_json(comparisons).encode("utf-8")),
+    ]
+    written = []
+    for path, content in contents:
+        if path is None:
+            continue
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror or error}") from error
+        data = content()
+        with written_whole(path) as file:
+            file.write(data)
+        written.append(path)
+    return tuple(written)
+
+
+def report_of(comparisons: Sequence[Comparison]) -> Report:
+    """Content of the report: of several pairs a table of all, and those that differ first."""
+    counts = {kind: sum(each.verdict == kind for each in comparisons) for kind in ("same", "different", "unusable")}
+    verdict = next((kind for kind in ("unusable", "different") if counts[kind]), "same")
+    one = comparisons[0] if len(comparisons) == 1 else None
+    return Report(
+        f"Comparison: {verdict}" if one else f"{counted(len(comparisons), 'comparison')}: {verdict}",
+        f"{one.result} against {one.reference}"
+        if one
+        else ", ".join(f"{number} {kind}" for kind, number in counts.items() if number),
+        warnings=[one.problem] if one and one.problem else [],
+        tiles=_tiles(comparisons, counts),
+        main=list(_single(one, 1, draw=True, alone=True)) if one else [_pairs(comparisons), *_sections(comparisons)],
+        footer="Deviation: distance of the result from the reference, less what the tolerance in time forgives. "
+        "How results are compared: docs/comparing.md.",
+    )
+
+
+def _sections(comparisons: Sequence[Comparison]) -> Iterator[Section]:
+    """A section per pair, those that differ first and, up to MOST_PICTURES, with a picture."""
+    pictures = 0
+    for number, each in sorted(enumerate(comparisons, 1), key=lambda item: item[1].same):
+        parts: list[Part] = [Paragraph(f"against {each.reference}", "muted")]
+        parts += _single(each, number, draw=not each.same and pictures < MOST_PICTURES, alone=False)
+        pictures += any(isinstance(part, Picture) for part in parts)
+        yield Section(each.result, parts, _anchor(number))
+
+
+def _single(comparison: Comparison, number: int, *, draw: bool, alone: bool) -> Iterator[Part]:
+    """A pair: what came out, notes, picture, variables."""
+    if not alone or comparison.problem:
+        yield Paragraph(minus(comparison.line))
+    yield from (Paragraph(note, "note") for note in comparison.notes)
+    if draw and (picture := picture_of(comparison, number)):
+        yield picture
+    if comparison.variables:
+        yield _variables(comparison)
+
+
+def _tiles(comparisons: Sequence[Comparison], counts: dict[str, int]) -> list[Tile]:
+    compared = [each for pair in comparisons for each in pair.those("same", "different")]
+    outside = [each for each in compared if each.verdict == "different"]
+    missing = [each for pair in comparisons for each in pair.those("missing")]
+    tiles = [Tile(f"{len(outside)} of {len(compared)}", "variables outside", "variables that leave their tube")]
+    if missing:
+        tiles.append(Tile(str(len(missing)), "variables missing", "columns of the reference that the result lacks"))
+    worst = max(compared, key=lambda each: (each.ratio, each.deviation), default=None)
+    if worst is not None:
+        tiles.append(Tile(worst.name, "worst variable", worst.line))
+        tiles.append(Tile(_number(worst.deviation, worst.unit), "off by", worst.line))
+        tiles.append(Tile(_number(worst.allowed, worst.unit), "allowed", worst.line))
+        tiles.append(Tile(f"{worst.time:.6g} s", "at", worst.line))
+    if len(comparisons) > 1:
+        tiles += [Tile(str(number), kind, f"pairs that are {kind}") for kind, number in counts.items() if number]
+    return tiles
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{minus(powers(f'{value:.4g}'))} {display_unit(unit)}".strip() if isfinite(value) else "no number"
+
+
+def _pairs(comparisons: Sequence[Comparison]) -> Section:
+    rows: list[tuple[Text, ...]] = []
+    for number, each in enumerate(comparisons, 1):
+        worst = each.problem or (f"{each.worst.name}: {each.worst.line}" if each.worst else "")
+        rows.append((Span(each.result, "link", _anchor(number)), each.reference, _verdict(each.verdict), minus(worst)))
+    return Section("All pairs", [Table("lllp", ("Result", "Reference", "Verdict", "Worst"), rows)])
+
+
+def _anchor(number: int) -> str:
+    return f"pair-{number}"
+
+
+def _variables(comparison: Comparison) -> Table:
+    ranked = sorted(comparison.variables, key=lambda each: -each.ratio if each.verdict != "same" else 1.0)
+    heads = (
+        "Variable", "Verdict", "Off by", "Allowed", "Unit", "In time", "Worst at [s]", "Result", "Reference",
+        "Rows outside",
+    )  # fmt: skip
+    return Table("llrrlrrrrr", heads, [_row(each) for each in ranked])
+
+
+def _row(each: Variable) -> tuple[Text, ...]:
+    name: tuple[str | Span, ...] = (code(each.name),)
+    if each.source and each.source != each.name:
+        name += (" ", Span(each.source, "muted"))
+    if each.verdict in ("missing", "unusable"):
+        return name, _verdict(each.verdict), each.reason
+    if each.reason:
+        name += (f"\n{each.reason}",)
+    return (
+        name, _verdict(each.verdict), _number(each.deviation, ""), _number(each.allowed, ""), display_unit(each.unit),
+        reach_text(each), f"{each.time:.9g}", minus(f"{each.value:.9g}"), minus(f"{each.expected:.9g}"),
+        f"{each.outside} of {each.rows}",
+    )  # fmt: skip
+
+
+def _verdict(verdict: str) -> Text:
+    return verdict if verdict == "same" else Span(verdict, "alarm")

@@ -1,0 +1,128 @@
+"""The report on a friction compensation: curves, compensation.csv, summary.json, report.html, figures, whole or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+from feedsim.analysis import Figure
+from feedsim.analysis.compensation import Compensation
+from feedsim.report.compensate.plots import pictures_of
+from feedsim.report.compensate.summary import friction_files, rows_of, summary, table_csv
+from feedsim.report.content import Report, Section, Table, Text, Tile, code
+from feedsim.report.formatting import display_unit, minus, powers, typeset
+from feedsim.report.provenance import axis_parameters
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.run.report import motions_section, provenance
+from feedsim.report.sections import figures_footer, figures_section, files_table
+from feedsim.report.style import Picture, remarked
+from feedsim.trace import write_csv
+
+RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE = "result.csv", "uncompensated.csv", "feedforward.csv", "compensation.csv"
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(directory, (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, REPORT, SUMMARY), inputs)
+
+
+def write(compensation: Compensation, files: Mapping[str, Path], directory: Path | str) -> tuple[Path, ...]:
+    """Write the runs with (result.csv) and without compensation, feedforward.csv, compensation.csv (where there is a
+    table), summary.json, report.html and figures; returns the paths.
+
+    files: axis -> file that its compensation's friction comes from. Files of an earlier run are replaced. Raises
+    OutputError.
+    """
+    curves: dict[str, Content] = {
+        RESULT: partial(write_csv, trace=compensation.after.trace),
+        UNCOMPENSATED: partial(write_csv, trace=compensation.before.trace),
+        FEEDFORWARD: partial(write_csv, trace=compensation.feedforward),
+    }
+    if compensation.table:
+        curves[TABLE] = table_csv(compensation)
+    machine = compensation.scenario.machine
+    with remarked(f"{machine.name}. {machine.note}"):
+        pictures = pictures_of(compensation)
+    report = report_of(compensation, files, pictures)
+    return write_report(directory, report, partial(summary, compensation, files), curves)
+
+
+def report_of(compensation: Compensation, files: Mapping[str, Path], pictures: Sequence[Picture]) -> Report:
+    """Content of the report. files: axis -> file of its compensation's friction."""
+    scenario = compensation.scenario
+    return Report(
+        f"Friction compensation: {scenario.name}",
+        f"{scenario.machine.name} · torque feedforward on {', '.join(compensation.frictions)}",
+        warnings=compensation.warnings,
+        notes=(scenario.machine.note, scenario.note),
+        tiles=list(_tiles(compensation)),
+        main=[
+            *pictures,
+            _errors(compensation) if compensation.table else None,
+            _frictions(compensation, files),
+            figures_section(compensation.figures),
+            motions_section(compensation.after),
+        ],
+        provenance=provenance(compensation.after),
+        footer=figures_footer(
+            "Values in full precision: summary.json; time series: result.csv, uncompensated.csv, feedforward.csv.",
+            "docs/figures.md, docs/compensation.md",
+        ),
+    )
+
+
+def _tiles(compensation: Compensation) -> Iterable[Tile]:
+    figures = compensation.figures
+    named = [("G", "circular deviation G")]
+    named += [(f"glitch_{axis}", f"quadrant glitch, {axis} reverses") for axis in compensation.turn.axes]
+    for key, label in named:
+        before, after = figures[f"before.{key}"], figures[f"after.{key}"]
+        yield Tile(f"{_um(before)} → {_um(after)} µm", label, typeset(f"without and {after.meaning}"))
+    for axis in compensation.frictions:
+        delay = figures[f"{axis}.delay"]
+        yield Tile(minus(f"{delay.value:.3f} ms"), f"{axis}: delay of the feedforward", typeset(delay.meaning))
+
+
+def _um(figure: Figure) -> str:
+    """To 0.01 um; what is smaller to its first digit."""
+    small = 0 < abs(figure.value) < 0.01
+    return minus(powers(f"{figure.value:.1g}" if small else f"{figure.value:.2f}"))
+
+
+def _errors(compensation: Compensation) -> Section:
+    """Peaks, dips and G for every error."""
+    rows = []
+    for what, change, unit, quality in rows_of(compensation):
+        numbers = [*quality.peak.values(), *quality.dip.values(), quality.G]
+        amount = minus(f"{change:+.3g} {unit}") if unit else ""
+        rows.append((what, amount, *(minus(f"{1e6 * number:.3f}") for number in numbers)))
+    each = [f"{kind}, {axis} reverses [µm]" for kind in ("peak", "dip") for axis in compensation.turn.axes]
+    note = (
+        "An error of the delay or of a parameter, of all axes at once. Peak and dip: largest and smallest radius "
+        "deviation within ±45° of the reversals of an axis, less the median of the turn. Too little compensation "
+        "leaves peaks, too much leaves dips."
+    )
+    table = Table("lrr" + "r" * len(each), ("Compensation", "Error", *each, "G [µm]"), rows, note)
+    return Section("What errors cost", [table], "errors")
+
+
+def _frictions(compensation: Compensation, files: Mapping[str, Path]) -> Section:
+    """Parameters of the compensation beside the machine's own."""
+    machine = compensation.scenario.machine
+    sets = []
+    for axis, friction in compensation.frictions.items():
+        own = machine.axes[axis]
+        sets += [axis_parameters(each)["friction"] for each in (own.model_copy(update={"friction": friction}), own)]
+    rows: list[tuple[Text, ...]] = []
+    for name in dict.fromkeys(name for each in sets for name in each):
+        found = [each.get(name) for each in sets]
+        unit = next(value[1] for value in found if value is not None)
+        rows.append((code(name), display_unit(unit), *(minus(f"{v[0]:.6g}") if v else "–" for v in found)))
+    whose = [f"{axis}, {whose}" for axis in compensation.frictions for whose in ("compensation", "machine")]
+    table = Table("ll" + "r" * len(whose), ("Parameter", "SI unit", *whose), rows)
+    given = files_table(friction_files(files)) if files else None
+    return Section("Friction of the compensation and of the machine", [table, given])

@@ -1,0 +1,154 @@
+"""What a report says, as values: a kind of report fills a `Report`, `feedsim.report.page` sets it as HTML.
+
+No text here knows how it will look: what is to be set apart is a `Span`, what hangs together a `Section`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from feedsim.analysis import Figure
+from feedsim.report.formatting import minus, shown
+from feedsim.report.style import Picture
+
+# Significant digits of a tile; the table has more.
+TILE_DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Span:
+    """A stretch of text that is set apart; a link leads to an anchor of the same page."""
+
+    text: str
+    kind: Literal["code", "muted", "alarm", "link"]
+    anchor: str = ""
+
+
+# Plain text, or a mixture; line feeds break the line.
+Text = str | Span | tuple[str | Span, ...]
+
+
+def code(text: str) -> Span:
+    """A name of a variable, a parameter or a figure, a command."""
+    return Span(text, "code")
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph: usual, in muted print, or a note set apart."""
+
+    text: Text
+    kind: Literal["", "muted", "note"] = ""
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """A list."""
+
+    items: Sequence[Text]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table, which scrolls where the screen is narrow.
+
+    Attributes:
+        columns: a letter each: l text, r numbers, p text that needs room, h what a row is called.
+        heads: of the columns; none where the rows explain themselves.
+        rows: cells; of a row with fewer than there are columns the last one takes the rest.
+        note: below, in muted print.
+    """
+
+    columns: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[Text]]
+    note: Text = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Animation:
+    """A moving picture: content of a GIF."""
+
+    title: str
+    caption: str
+    gif: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Parts under a title; a section inside another one is a step lower. anchor: the title's id, for links."""
+
+    title: str
+    parts: Sequence[Part | None]
+    anchor: str = ""
+
+
+Part = Paragraph | Bullets | Table | Picture | Animation | Section
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A number at the top of a page: value with unit, what it is, and its full meaning."""
+
+    value: str
+    label: str
+    meaning: str
+
+    @property
+    def number_and_unit(self) -> tuple[str, str]:
+        """The value taken apart, for a unit in smaller print; no unit where it is not one number with its unit."""
+        number, _, unit = self.value.rpartition(" ")
+        if not any(c.isdigit() for c in number) or any(c.isdigit() for c in unit.rstrip("²³")):
+            return self.value, ""
+        return number, unit
+
+    @property
+    def is_words(self) -> bool:
+        """Whether the value is no number."""
+        return self.value[-1:].isalpha() and not any(c.isdigit() for c in self.value)
+
+
+def tile_value(figure: Figure) -> str:
+    """Value with unit, to TILE_DIGITS digits at most."""
+    value, unit = shown(figure)
+    if unit and sum(c.isdigit() for c in value.lstrip("−0.")) > TILE_DIGITS:
+        rounded = float(f"{figure.value:.{TILE_DIGITS}g}")
+        whole = len(f"{abs(rounded):.0f}") if abs(rounded) >= 1 else 0
+        value = minus(f"{rounded:.{max(0, TILE_DIGITS - whole)}f}")
+    return f"{value} {unit}".strip()
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """A report of any kind, in the order in which it is read; what is None or empty is left out.
+
+    Attributes:
+        warnings: above everything else. notes: what the numbers are worth, each once.
+        tiles: leading numbers.
+        main: sections, tables and pictures.
+        provenance: where the numbers come from: the last section, in small print.
+    """
+
+    title: str
+    subtitle: str
+    main: Sequence[Part | None]
+    footer: Text
+    provenance: Section | None = None
+    warnings: Sequence[str] = ()
+    notes: Sequence[str] = ()
+    tiles: Sequence[Tile] = ()
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """All pictures, in their order."""
+        return list(_pictures(self.main))
+
+
+def _pictures(parts: Sequence[Part | None]) -> Iterator[Picture]:
+    for part in parts:
+        if isinstance(part, Picture):
+            yield part
+        elif isinstance(part, Section):
+            yield from _pictures(part.parts)

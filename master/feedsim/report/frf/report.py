@@ -1,0 +1,175 @@
+"""The report on frequency responses: frf.csv, frf_measured.csv, summary.json, report.html and figures, whole or not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from functools import partial
+from pathlib import Path
+
+from feedsim.analysis import Figure
+from feedsim.analysis.campaign import Campaign
+from feedsim.analysis.responses import Responses
+from feedsim.analysis.truncation import Truncation
+from feedsim.report.content import Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.formatting import display_unit, minus, number, typeset
+from feedsim.report.frf.plots import pictures_of
+from feedsim.report.frf.summary import input_files, summary
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.sections import (
+    archives_table,
+    figures_footer,
+    figures_section,
+    parameters_section,
+    provenance_section,
+)
+from feedsim.report.style import Picture, remarked
+from feedsim.report.truncation_plots import truncation_pictures
+from feedsim.scenario import Subject
+from feedsim.trace.response_files import write_response
+
+CURVES, MEASURED = "frf.csv", "frf_measured.csv"
+TILES = {  # figure of an axis -> label
+    "speed.bandwidth_first": "speed loop, −3 dB first",
+    "speed.bandwidth_last": "speed loop, −3 dB last",
+    "speed.phase_margin": "speed loop, phase margin",
+    "speed.gain_margin": "speed loop, gain margin",
+    "position.bandwidth_first": "position loop, −3 dB",
+    "position.gain_margin": "position loop, gain margin",
+}
+AS_DECIBEL = ("gain_margin",)
+MEASURED_PARTS = ("magnitude", "phase", "share")
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(directory, (CURVES, MEASURED, REPORT, SUMMARY), inputs)
+
+
+def write(subject: Subject, responses: Responses, directory: Path | str) -> tuple[Path, ...]:
+    """Write frf.csv (closed form), frf_measured.csv where there is a measurement, summary.json, report.html, figures.
+
+    Returns the paths. Files of an earlier run are replaced. Raises OutputError.
+    """
+    files: dict[str, Content] = {CURVES: partial(write_response, response=responses.closed)}
+    if responses.campaign is not None:
+        files[MEASURED] = partial(write_response, response=responses.campaign.response)
+    report = report_of(subject, responses, draw(responses))
+    return write_report(directory, report, partial(summary, subject, responses), files)
+
+
+def draw(responses: Responses) -> list[Picture]:
+    """The pictures; each says machine, pose and what its numbers are worth."""
+    machine = responses.machine
+    pose = ", ".join(f"{axis} {position * 1e3:.6g} mm" for axis, position in machine.pose.items())
+    with remarked(f"{machine.name} at {pose}. {machine.note}"):
+        pictures = pictures_of(responses)
+        if responses.truncation is not None:
+            pictures += _truncation_pictures(responses, responses.truncation)
+    return pictures
+
+
+def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture]) -> Report:
+    """Content of the report."""
+    low, high = responses.band
+    measured = "closed form and measurement on the units" if responses.campaign else "closed form"
+    return Report(
+        f"Frequency responses: {subject.name}",
+        f"{responses.machine.name} · axes {', '.join(responses.axes)} · {low:g} to {high:g} Hz · {measured}",
+        warnings=responses.warnings,
+        notes=subject.notes,
+        tiles=list(_tiles(responses)),
+        main=[*pictures, _resonances(responses), _agreement(responses), figures_section(responses.figures)],
+        provenance=_provenance(subject, responses),
+        footer=figures_footer(
+            f"Values in full precision: summary.json; curves: frf.csv{', frf_measured.csv' * bool(responses.campaign)}."
+        ),
+    )
+
+
+def _tiles(responses: Responses) -> Iterable[Tile]:
+    for axis in responses.axes:
+        for key, label in TILES.items():
+            if (figure := responses.figures.get(f"{axis}.{key}")) is not None:
+                shown = figure
+                if key.rpartition(".")[2] in AS_DECIBEL and math.isfinite(figure.value) and figure.value > 0:
+                    shown = Figure(20 * math.log10(figure.value), "dB", figure.meaning)
+                yield Tile(_value(shown), f"{axis}: {label}", typeset(figure.meaning))
+
+
+def _value(figure: Figure) -> str:
+    if figure.unit in ("dB", "deg") and math.isfinite(figure.value):
+        return minus(f"{figure.value:.1f} {display_unit(figure.unit)}")
+    return tile_value(figure)
+
+
+def _resonances(responses: Responses) -> Section | None:
+    """Pairs of anti-resonance and resonance of n/M per axis."""
+    rows = [
+        (axis, f"{pair.antiresonance.frequency:.1f}", f"{pair.resonance.frequency:.1f}",
+         f"{pair.resonance.value - pair.antiresonance.value:.1f}")
+        for axis in responses.axes
+        for pair in responses.result.axes[axis].pairs
+        if pair.antiresonance.frequency <= responses.band[1]
+    ]  # fmt: skip
+    heads = ("Axis", "Anti-resonance [Hz]", "Resonance [Hz]", "Rise [dB]")
+    note = "Of |n/M| J_tot ω, the speed-controlled system; pairs that rise by less than 1 dB are left out."
+    return Section("Resonances", [Table("lrrr", heads, rows, note)]) if rows else None
+
+
+def _agreement(responses: Responses) -> Section | None:
+    """How far what was measured is from the closed form."""
+    keys = [name.rpartition(".")[0] for name in responses.figures if name.endswith(".measured_magnitude")]
+    if not keys:
+        return None
+    rows: list[tuple[Text, ...]] = [
+        (code(key), *(number(responses.figures[f"{key}.measured_{part}"].value, 3) for part in MEASURED_PARTS))
+        for key in keys
+    ]
+    note = (
+        "Largest deviation of the measurement from the closed form, 5 to 500 Hz, over the lines whose coherence "
+        "exceeds 0.99. The closed form knows no friction."
+    )
+    table = Table("lrrr", ("Response", "Magnitude [dB]", "Phase [°]", "Lines that count [%]"), rows, note)
+    return Section("Measured against closed form", [table])
+
+
+def _provenance(subject: Subject, responses: Responses) -> Section:
+    campaign = responses.campaign
+    in_scenario = [("Set in the scenario", ", ".join(subject.settings) or "nothing")]
+    rows = [
+        (subject.kind.capitalize(), f"{subject.name} ({subject.file.name})"),
+        *(in_scenario if subject.kind == "scenario" else []),
+        ("Set on the command line", ", ".join(subject.overrides) or "nothing"),
+        ("Machine", responses.machine.name),
+        ("Closed form", "linear, exact for the sampled system, no friction, no limits"),
+        ("Measurement", _measured(campaign) if campaign else "none"),
+        *((each.reference, f"RMS {each.rms:.4g} {display_unit(each.unit)}, peak {each.peak:.4g}, {each.lines} lines, "
+           f"period {each.period:g} s") for each in (campaign.excited if campaign else ())),
+    ]  # fmt: skip
+    archives = archives_table(campaign.units) if campaign else None
+    return provenance_section(rows, input_files(subject, responses), archives, parameters_section(responses.machine))
+
+
+def _measured(campaign: Campaign) -> str:
+    plan = campaign.plan
+    friction = "friction on" if plan.friction else "friction off"
+    moving = f"axis moving at {plan.offset_speed:g} rad/s" if plan.offset_speed else "axes at rest"
+    signal = "pseudo-random binary sequence" if plan.signal == "prbs" else "multisine"
+    return (
+        f"{signal} into {plan.inject}, {plan.realisations} realisation(s) of {plan.periods} period(s) after "
+        f"{plan.settle} to settle, seed {plan.seed}, {friction}, {moving}; {campaign.simulated:.4g} s in "
+        f"{campaign.wall_time:.3g} s"
+    )
+
+
+def _truncation_pictures(responses: Responses, truncation: Truncation) -> list[Picture]:
+    low, high = responses.band
+    frequency = responses.closed.frequency
+    within = frequency[(frequency >= low) & (frequency <= max(high, 1.2 * truncation.cutoff))]
+    axes = tuple(responses.machine.axes)
+    tool = any(name.startswith("tool.") for name in responses.closed)
+    return truncation_pictures(truncation.tables, axes, within, truncation.cutoff, shown=responses.axes, tool=tool)

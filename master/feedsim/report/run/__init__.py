@@ -1,0 +1,10 @@
+"""What a run leaves: curves as CSV, summary.json, report.html and figures/*.png.
+
+It uses the report's core, the analyses and the recorded traces. Begin with `report`; `pose` has the plant's pose.
+"""
+
+from feedsim.report.provenance import input_paths
+from feedsim.report.run.report import check_writable, growing, write
+from feedsim.report.run.summary import Run, summary_line
+
+__all__ = ["Run", "check_writable", "growing", "input_paths", "summary_line", "write"]

@@ -1,0 +1,190 @@
+"""The report of a run: result.csv, log.csv, summary.json, report.html and figures, written whole or not at all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+from feedsim.analysis import Figure, PositioningTask, tasks
+from feedsim.report.content import Report, Section, Table, Tile, tile_value
+from feedsim.report.formatting import duration, number, typeset
+from feedsim.report.partial import PARTIAL, Partial
+from feedsim.report.provenance import friction_origins, input_files
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.run.axis_plots import overview_picture, positioning_picture
+from feedsim.report.run.circle_plots import contour_picture, torque_picture
+from feedsim.report.run.pose import pose_section
+from feedsim.report.run.summary import HEADER, Run, is_leading, log_text, real_time_factor, summary
+from feedsim.report.sections import (
+    archives_table,
+    figures_footer,
+    figures_section,
+    parameters_section,
+    provenance_section,
+)
+from feedsim.report.style import Picture
+from feedsim.trace import write_csv
+
+RESULT, LOG = "result.csv", "log.csv"
+TILES = {
+    "overshoot": "overshoot",
+    "settling_time": "settling time",
+    "duration": "duration of the motion",
+    "peak_torque": "largest motor torque",
+    "plateau_torque": "motor torque at constant speed",
+    "rest_torque": "friction torque at rest",
+    "ringing_frequency": "ringing frequency",
+    "G": "circular deviation G",
+    "F_max": "largest radial deviation F max",
+    "F_min": "smallest radial deviation F min",
+    "mean": "mean radius deviation",
+}
+MOST_MOTIONS = 200
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless a run's results can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(directory, (RESULT, REPORT, SUMMARY, LOG, PARTIAL), inputs)
+
+
+def growing(directory: Path | str) -> Partial:
+    """What takes a run's rows while it goes on, for :func:`write`."""
+    return Partial(directory, RESULT)
+
+
+def write(
+    run: Run, figures: Mapping[str, Figure], directory: Path | str, recorded: Partial | None = None
+) -> tuple[Path, ...]:
+    """Write result.csv, summary.json, report.html, figures/*.png and log.csv, if there is one; returns their paths.
+
+    figures: as from ``analysis.evaluate``. recorded: the run's rows where they have been written already, in the same
+    directory; the file becomes result.csv, or stays as it is where the results cannot be written. Files of an earlier
+    run are replaced. Raises OutputError.
+    """
+
+    def result(path: Path) -> Path | None:
+        if recorded is None or not recorded.left:
+            write_csv(path, run.trace)
+            return None
+        recorded.finished()
+        return recorded.path
+
+    files: dict[str, Content] = {RESULT: result}
+    if run.log is not None:
+        files[LOG] = partial(write_csv, trace=run.log)
+    return write_report(directory, report_of(run, figures, draw(run, figures)), partial(summary, run, figures), files)
+
+
+def report_of(run: Run, figures: Mapping[str, Figure], pictures: Sequence[Picture]) -> Report:
+    """Content of the report."""
+    scenario, machine = run.scenario, run.scenario.machine
+    factor = real_time_factor(run)
+    speed = f" ({factor:.2g} times real time)" if factor is not None else ""
+    footer = (
+        "Values in full precision: summary.json; time series: result.csv. "
+        f"{run.program.duration:.4g} s simulated in {run.wall_time:.3g} s{speed}."
+    )
+    return Report(
+        scenario.name,
+        f"{machine.name} · {len(scenario.motions)} motion(s), {run.program.duration:.4g} s",
+        warnings=run.warnings,
+        notes=(machine.note, scenario.note),
+        tiles=[tile(name, figure) for name, figure in figures.items() if is_leading(name, HEADER)],
+        main=[*pictures, figures_section(figures), motions_section(run), pose_section(run.pose)],
+        provenance=provenance(run),
+        footer=figures_footer(footer) if figures else footer,
+    )
+
+
+def tile(name: str, figure: Figure) -> Tile:
+    """A figure with its name in words."""
+    prefix, _, key = name.partition(".")
+    label = f"quadrant glitch, {key[7:]} reverses" if key.startswith("glitch_") else TILES.get(key, key)
+    return Tile(tile_value(figure), f"{prefix.replace('#', ' no. ')}: {label}", typeset(figure.meaning))
+
+
+def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
+    """The figures of a report: those of every evaluation, and an overview of the axes that none of them shows."""
+    signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
+    pictures: list[Picture] = []
+    covered: set[str] = set()
+    for task in tasks(run.scenario, run.program):
+        stem = task.prefix.replace("#", "-")
+        own = {
+            name.removeprefix(f"{task.prefix}."): f for name, f in figures.items() if name.startswith(f"{task.prefix}.")
+        }
+        if not own:
+            continue
+        if isinstance(task, PositioningTask):
+            axis = task.approach.axis
+            pictures.append(
+                positioning_picture(
+                    run.trace, task.approach, own, f"positioning-{stem}", band=task.band, torque_sign=signs[axis]
+                )
+            )
+            covered.add(axis)
+        else:
+            pictures.append(contour_picture(run.trace, task.turn, own, f"contour-{stem}"))
+            torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
+            pictures += [torques] if torques is not None else []
+            covered |= set(task.turn.axes)
+    reached = {axis: run.program.reached(axis) for axis in run.program.x_s if axis not in covered}
+    moving = [axis for axis, (low, high) in reached.items() if low < high]
+    overview = overview_picture(run.trace, moving, signs, "overview")
+    return [*pictures, overview] if overview is not None else pictures
+
+
+def motions_section(run: Run) -> Section:
+    """Every motion with its path, its start and its exact end."""
+    segments = run.program.segments
+    rows = [
+        (str(segment.index), segment.description, segment.way, f"{segment.start:.4f}", f"{segment.end:.4f}")
+        for segment in segments[:MOST_MOTIONS]
+    ]
+    more = len(segments) - MOST_MOTIONS
+    note = (
+        "Every motion ends exactly where its profile does; the next one starts on the next instant of the interpolator "
+        f"(T_ipo {duration(run.scenario.machine.cycles.T_ipo)})."
+    )
+    note = f"and {more} more\n{note}" if more > 0 else note
+    return Section("Motions", [Table("rllrr", ("No.", "Motion", "Path", "Start [s]", "End [s]"), rows, note)])
+
+
+def provenance(run: Run) -> Section:
+    """Inputs, units, coupling, and the parameters of every axis."""
+    scenario, machine = run.scenario, run.scenario.machine
+    cycles, coupling = machine.cycles, scenario.coupling
+    rows = [
+        ("Scenario", f"{scenario.name} ({scenario.file.name})"),
+        ("Set in the scenario", ", ".join(scenario.settings) or "nothing"),
+        ("Set on the command line", ", ".join(scenario.overrides) or "nothing"),
+        ("Machine", machine.name),
+        *((f"Friction of {axis}", text) for axis, text in friction_origins(machine).items()),
+        ("Cycles", ", ".join(f"{n} {duration(getattr(cycles, n))}" for n in ("T_c", "T_pos", "T_ipo"))),
+        ("Recording", f"every {duration(scenario.recording.interval)}, {len(run.trace)} rows"),
+        *([("Log", log_text(scenario.logging, run.log))] if scenario.logging is not None else []),
+        ("Coupling", f"{coupling.scheme}, {coupling.substeps} exchange step(s) per control cycle"),
+    ]
+    return provenance_section(
+        rows,
+        input_files(scenario),
+        archives_table(run.units),
+        _coupling(run.coupling),
+        parameters_section(machine),
+    )
+
+
+def _coupling(coupling: Mapping[str, float]) -> Section | None:
+    rows = []
+    for axis in dict.fromkeys(name.partition(".")[0] for name in coupling):
+        work, residual = (coupling.get(f"{axis}.{name}", math.nan) for name in ("friction_work", "residual"))
+        share = abs(residual / work) if work else math.nan
+        rows.append((axis, *(number(value, 3) for value in (work, residual, share))))
+    heads = ("Axis", "Friction work [J]", "Interface energy residual [J]", "Share")
+    note = "The residual is the energy that the exchange between plant and friction creates or loses."
+    return Section("Coupling", [Table("lrrr", heads, rows, note)]) if rows else None

@@ -17,7 +17,7 @@ from harness import ROOT, Contestant, Costs, arguments, digits, measure, table
 import fmpy
 
 from feedsim import cosim, nc, scenario
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 
 STEPS = 200_000
 ROUNDS = 5

@@ -27,8 +27,8 @@ from fits import Line
 from watched import memory
 
 from feedsim import cosim, nc, scenario
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.system import System
-from feedsim.cosim.unit import Archive
 from feedsim.scenario import Scenario
 from feedsim.structure import checked_modes
 

@@ -18,9 +18,10 @@ import pose_reference
 from numpy.typing import NDArray
 
 from feedsim import cosim, scenario
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.interpreter import Interpreter
 from feedsim.cosim.operations import When, do_step, get_row, set_real, set_slopes
-from feedsim.cosim.unit import Archive, Log, Port, Unit
+from feedsim.cosim.unit import Log, Port, Unit
 from feedsim.scenario import Machine, Scenario, load_structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.modes import TOOL_PORTS, Modes, read_modes

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim import cosim
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 
 H = 125e-6  # control cycle [s]
 STEPS = 8000  # 1 s

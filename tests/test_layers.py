@@ -31,7 +31,7 @@ ORDER = [
     "errors",
 ]
 SOLE_USERS = {
-    "fmpy": {"cosim/unit.py"},
+    "fmpy": {"cosim/archive.py", "cosim/unit.py"},
     "ctypes": {"cosim/unit.py", "cosim/friction_law.py", "cosim/exchange.py"},
     "yaml": {"scenario"},
     "matplotlib": {"report"},

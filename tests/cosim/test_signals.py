@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.cosim import signals, unit
-from feedsim.cosim.unit import Archive
+from feedsim.cosim import archive, signals
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.unpacked import STORE
 
 NAMES = [name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -84,13 +84,13 @@ def test_other_threads_are_left_alone() -> None:
 
 
 def test_reading_an_archive_swallows_none(number: int, fmus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    read = unit.read_model_description
+    read = archive.read_model_description
 
     def validating(path: str) -> object:
         _swallow(number)
         return read(path)
 
     STORE.clear()  # what is unpacked already is not read again
-    monkeypatch.setattr(unit, "read_model_description", validating)
+    monkeypatch.setattr(archive, "read_model_description", validating)
     with pytest.raises(Ended), Archive(fmus / "friction.fmu"):
         pytest.fail("the signal was swallowed")

@@ -17,7 +17,8 @@ import pytest
 
 from feedsim import cosim, nc, scenario
 from feedsim.cosim import unpacked
-from feedsim.cosim.unit import Archive, Unit
+from feedsim.cosim.archive import Archive
+from feedsim.cosim.unit import Unit
 from feedsim.cosim.unpacked import STORE
 from feedsim.cosim.untrusted import Allowance
 from feedsim.errors import InputError
@@ -141,7 +142,7 @@ def test_a_forked_process_has_its_own_and_leaves_its_parents(fmus: Path, scratch
     code = f"""
 import os, sys, tempfile
 from pathlib import Path
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.unpacked import STORE
 file = Path({str(fmus / "friction.fmu")!r})
 idle = Archive(file).directory
@@ -247,7 +248,7 @@ WORKERS = """
 import multiprocessing, sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 opened = []
 def work(file):
     with Archive(file) as archive:
@@ -287,7 +288,8 @@ def test_a_lock_held_while_forking_is_renewed(fmus: Path, scratch: Path) -> None
     code = f"""
 import os, signal
 from pathlib import Path
-from feedsim.cosim.unit import Archive, Unit
+from feedsim.cosim.archive import Archive
+from feedsim.cosim.unit import Unit
 from feedsim.cosim.unpacked import STORE
 STORE.loading.acquire()
 child = os.fork()

@@ -10,14 +10,16 @@ from pathlib import Path
 import pytest
 
 from feedsim import cli
-from feedsim.cosim import binaries, untrusted
+from feedsim.cosim import archive as archives
+from feedsim.cosim import untrusted
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.cosim.unit import Archive, Unit
+from feedsim.cosim.unit import Unit
 from feedsim.errors import InputError
 from ssp_helpers import UNPACKED, contents, write
 
 ROOT = Path(__file__).resolve().parents[2]
-HOST = binaries.folders()[0]
+HOST = archives.folders()[0]
 
 
 @pytest.fixture
@@ -96,7 +98,7 @@ def test_the_folder_of_each_platform(
     bare = {name: content for name, content in friction.items() if not name.startswith("binaries/")}
     monkeypatch.setattr(platform, "system", lambda: host[0])
     monkeypatch.setattr(platform, "machine", lambda: host[1])
-    assert binaries.folders() == (folder, other)
+    assert archives.folders() == (folder, other)
     if host in targets._HOSTS:
         assert targets.host_target().folder == folder
     for place in (folder, other):
@@ -107,7 +109,7 @@ def test_the_folder_of_each_platform(
             assert law({}, [0.0, 1.0], 1e-3).shape == (2,)
     both = {f"binaries/{place}/friction{suffix}": library for place in (folder, other)}
     with Archive(write(tmp_path / "both.fmu", bare | both)) as archive:
-        assert binaries.library(archive.directory, "friction", archive.platforms, "both").parent.name == folder
+        assert archives.library(archive.directory, "friction", archive.platforms, "both").parent.name == folder
 
 
 def test_the_command_line_says_it(

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from feedsim.cosim import wiring
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.wiring import Connection, Variable
 from feedsim.errors import InputError
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from feedsim import cli, scenario, ssp
-from feedsim.cosim import binaries
+from feedsim.cosim import archive
 from feedsim.errors import InputError, OutputError
 from ssp_helpers import STRUCTURE, UNPACKED, altered, contents, edited, export_short, short_scenario, write
 
@@ -336,7 +336,7 @@ def test_writing_is_whole_or_not_at_all(fmus: Path, tmp_path: Path, capsys: pyte
     assert cli.main([*fine, str(tmp_path / "x.ssp")]) == 0
     said = capsys.readouterr().out
     assert said.startswith(f"{tmp_path / 'x.ssp'}: ")
-    assert binaries.folders()[0] in said.rpartition("runs on ")[2]
+    assert archive.folders()[0] in said.rpartition("runs on ")[2]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["folder.ssp", "short.yaml", "x.ssp"]
 
 

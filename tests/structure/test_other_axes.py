@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from feedsim import cli, cosim, scenario
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.plant import axes_of, open_plant
-from feedsim.cosim.unit import Archive
 from feedsim.errors import InputError, OutputError
 from feedsim.scenario import load_machine, load_structure
 from feedsim.structure import read_modes

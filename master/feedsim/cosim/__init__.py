@@ -1,9 +1,12 @@
-"""Co-simulation of the units: instances, wiring, schedule, run (sole user of fmpy, in `unit`)."""
+"""Co-simulation of the units: archives, instances, roles, wiring, what a control cycle is, run, log.
 
-from feedsim.cosim.logging import logged
+May use nc, structure and what is below them; sole user of fmpy, of ctypes and of the native loop.
+Start with run.py: ``run``; then schedule.py, which says once what a control cycle is, and system.py, on which units.
+"""
+
 from feedsim.cosim.loop import Progress
 from feedsim.cosim.pose import Crossings, PoseUse
-from feedsim.cosim.run import Run, check, fmus_directory, run
+from feedsim.cosim.run import Run, check, fmus_directory, logged, run
 from feedsim.cosim.schedule import SCHEMES, Scheme
 
 __all__ = ["SCHEMES", "Crossings", "PoseUse", "Progress", "Run", "Scheme", "check", "fmus_directory", "logged", "run"]

@@ -12,8 +12,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.run import fmus_directory
-from feedsim.cosim.unit import Archive, Floats, Unit
+from feedsim.cosim.unit import Floats, Unit
 from feedsim.errors import InputError, SimulationError
 
 RESPONSE = "friction_response"  # src/friction_fmu/response.h

@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,38 +29,6 @@ ON_THE_GRID = 1e-6  # of a control cycle: instants come from decimal text
 STANDS = 1e-9
 # Rows that are worked on at a time.
 BLOCK = 1 << 19
-
-
-class FullRate(Protocol):
-    """What is needed of a run (feedsim.cosim.Run is one)."""
-
-    @property
-    def scenario(self) -> Scenario: ...
-    @property
-    def fine(self) -> Trace | None: ...
-
-
-def logged(source: FullRate | Trace, logging: Logging | None = None, *, ideal: Sequence[str] = ()) -> Trace:
-    """A log of a run that has been simulated, without simulating again.
-
-    Args:
-        source: a run with its signals at the control cycle (`fine`), or those signals alone.
-        logging: how to log; default: as the run's scenario says. Its interval must be a multiple of the control cycle
-            of the signals, its axes and signals among theirs.
-        ideal: axes with an ideal current loop, where `source` is a trace; of a run they are known.
-
-    Raises:
-        InputError: a run without logging, a signal that was not recorded, an interval off the grid.
-    """
-    if isinstance(source, Trace):
-        fine = source
-    else:
-        if source.fine is None:
-            raise InputError(f"{source.scenario.file}: the run has no signals at the control cycle; give it 'logging'")
-        fine = source.fine
-        logging = logging or source.scenario.logging
-        ideal = ideal_axes(source.scenario)
-    return log(fine, logging or Logging(), ideal)
 
 
 def log(fine: Trace, logging: Logging, ideal: Sequence[str] = (), scratch: Path | None = None) -> Trace:

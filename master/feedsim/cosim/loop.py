@@ -86,11 +86,11 @@ class Setpoints:
 
     def __init__(self, system: System, program: Program, ratio: int) -> None:
         ports = [control.setpoint for control in system.controllers]
+        planned = {"x_s": program.x_s, "n_ffw": program.n_ffw}
         self._columns = [
-            [(alias, columns[axis]) for alias, name in zip(port.aliases, port.names, strict=True)
-             for columns in [{"x_s": program.x_s, "n_ffw": program.n_ffw}[name]]]
+            [(alias, planned[name][axis]) for alias, name in zip(port.aliases, port.names, strict=True)]
             for axis, port in zip(system.axes, ports, strict=True)
-        ]  # fmt: skip
+        ]
         self._ratio, self._length = ratio, len(program.time)
         self._rows = min(len(program.time), max(RING, 2 * (REPORTED_EVERY // ratio + 1)))
         self._filled = 0

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim import units
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 from feedsim.errors import FeedsimError, InputError
 from feedsim.scenario import Machine
 from feedsim.structure.build import SAME_POSITION

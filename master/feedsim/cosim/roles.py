@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.cosim import unit_definition
-from feedsim.cosim.unit import Alias, Archive
+from feedsim.cosim.archive import Archive
+from feedsim.cosim.unit import Alias
 from feedsim.errors import InputError
 from feedsim.fields import did_you_mean
 from feedsim.scenario import ForeignUnit, Machine

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +17,9 @@ from feedsim.cosim.pose import PoseUse, pose_use
 from feedsim.cosim.recording import Recording, Sink, recorded_columns
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
+from feedsim.errors import InputError
 from feedsim.nc import Program, plan
-from feedsim.scenario import Scenario
+from feedsim.scenario import Logging, Scenario
 from feedsim.structure import checked_modes
 from feedsim.trace import Trace
 
@@ -163,3 +164,26 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
         cycles, coupling = scenario.machine.cycles, scenario.coupling
         cycle = Cycle(system, SCHEMES[coupling.scheme], cycles.T_c, coupling.substeps)
         return (*system.warnings, *cycle.warnings, *trust.foreseen(scenario, modes), *pose.warnings)
+
+
+def logged(source: Run | Trace, logging: Logging | None = None, *, ideal: Sequence[str] = ()) -> Trace:
+    """A log of a run that has been simulated, without simulating again.
+
+    Args:
+        source: a run with its signals at the control cycle (`fine`), or those signals alone.
+        logging: how to log; default: as the run's scenario says. Its interval must be a multiple of the control cycle
+            of the signals, its axes and signals among theirs.
+        ideal: axes with an ideal current loop, where `source` is a trace; of a run they are known.
+
+    Raises:
+        InputError: a run without logging, a signal that was not recorded, an interval off the grid.
+    """
+    if isinstance(source, Trace):
+        fine = source
+    else:
+        if source.fine is None:
+            raise InputError(f"{source.scenario.file}: the run has no signals at the control cycle; give it 'logging'")
+        fine = source.fine
+        logging = logging or source.scenario.logging
+        ideal = ideal_axes(source.scenario)
+    return log(fine, logging or Logging(), ideal)

@@ -9,9 +9,10 @@ from typing import Self
 import numpy as np
 
 from feedsim.cosim import wiring
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.plant import axes_of, open_plant
 from feedsim.cosim.roles import RoleUnit, archive_path, check_instances, filled
-from feedsim.cosim.unit import Archive, Floats, Port, Unit
+from feedsim.cosim.unit import Floats, Port, Unit
 from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Machine

@@ -1,36 +1,28 @@
-"""One FMU instance, through fmpy: the only room that knows fmpy and ctypes.
+"""One FMU instance, through fmpy and ctypes.
 
-An :class:`Archive` is an unpacked ``.fmu``; a :class:`Unit` is an instance of it; a :class:`Port` is a group of Real
-variables of one unit that travel together. A port's buffers are numpy arrays, possibly views of a larger one, whose
+A :class:`Unit` is an instance of an archive; a :class:`Port` is a group of Real variables of one unit that travel
+together. A port's buffers are numpy arrays, possibly views of a larger one, whose
 addresses go straight into the FMI calls: wiring two units is sharing memory, and a cycle makes no copies.
 """
 
 from __future__ import annotations
 
-import copy
 import ctypes
-import os
 import re
-import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-from typing import IO, Any, NoReturn, Self
+from typing import Any, NoReturn
 
 import numpy as np
-from fmpy import read_model_description
-from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from numpy.typing import NDArray
 
-from feedsim.cosim import binaries, signals, untrusted
-from feedsim.cosim.unpacked import STORE, Content, Description, check_there
+from feedsim.cosim.archive import Archive
 from feedsim.errors import InputError, SimulationError
 
 Floats = NDArray[np.float64]
 
-_DESCRIPTION = "modelDescription.xml"
-_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 # Compiled ahead: what a signal raises inside a callback is lost, so callbacks are kept short.
 _CALL = re.compile(r"^fmi2[A-Za-z]+: ")
 OK, WARNING = 0, 1  # fmi2Status; 2 discard, 3 error, 4 fatal
@@ -75,139 +67,6 @@ class Alias:
     def to_signal(self, variable: Any) -> Any:
         """Values of the signal for those of the variable."""
         return variable * self.factor + self.offset if self.converts else variable
-
-
-class Archive:
-    """An ``.fmu`` file, unpacked for as long as this object is open (a context manager).
-
-    Unpacked is what a run needs: description, resources, and the library for this platform. Archives of the same
-    content share it, and a later one finds it still there (feedsim.cosim.unpacked).
-
-    Attributes:
-        directory: where it is unpacked to; only to be read.
-        variables: by name.
-        platforms: the folders in its binaries/, for this platform and others.
-    """
-
-    def __init__(self, path: Path, allowance: untrusted.Allowance | None = None) -> None:
-        """`allowance`: of the file that `path` stood in, where it stood in one.
-
-        Raises:
-            InputError: no such file, or not an FMI 2.0 archive with co-simulation that can be trusted.
-        """
-        check_there(path)
-        self.path = path
-        allowance = allowance or untrusted.Allowance(path)
-        self._content: Content | None = STORE.take(path, allowance, partial(_unpack, path, allowance))
-        self.directory = self._content.directory
-        found = self._content.description
-        self.description, self.variables, self.platforms = found.model, found.variables, found.platforms
-
-    @property
-    def guid(self) -> str:
-        return str(self.description.guid)
-
-    @property
-    def version(self) -> str:
-        return str(self.description.version)
-
-    def close(self) -> None:
-        """Its units are to be closed before it."""
-        content, self._content = self._content, None
-        if content is not None:
-            STORE.give_back(content)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def declared_unit(self, name: str) -> str | None:
-        """Unit of variable `name` as the archive declares it; None where it declares none."""
-        variable = self.variables[name]
-        declared = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
-        return str(declared) if declared else None
-
-    def unit_of(self, name: str) -> str:
-        """The same, "1" where it declares none."""
-        return self.declared_unit(name) or "1"
-
-    def slave(self, name: str) -> FMU2Slave:
-        """FMPy's wrapper for an instance `name`, around a library that is loaded once.
-
-        Raises:
-            InputError: there is none for this platform, or none that can be loaded here.
-        """
-        if self._content is None:
-            raise ValueError(f"{self.path}: the archive is closed")
-        with STORE.loading:
-            if self._content.library is None:
-                loaded = self._load()
-                self._content.library, self._content.unload = loaded, loaded.freeLibrary
-            slave: FMU2Slave = copy.copy(self._content.library)  # looking its functions up takes a millisecond
-        slave.instanceName = name
-        return slave
-
-    def _load(self) -> FMU2Slave:
-        identifier = self.description.coSimulation.modelIdentifier
-        path = binaries.library(self.directory, identifier, self.platforms, f"{self.path}")
-        before = Path.cwd()
-        try:
-            return FMU2Slave(
-                guid=self.guid,
-                unzipDirectory=str(self.directory),
-                modelIdentifier=identifier,
-                libraryPath=str(path),
-            )
-        except Exception as error:
-            os.chdir(before)  # fmpy goes to the library's folder and does not come back when it fails
-            folder = f"binaries/{path.parent.name}"
-            told = str(error).replace(f"{self.directory.absolute()}{os.sep}", "")
-            there = ", ".join(self.platforms)
-            raise InputError(
-                f"{self.path}: its binary for this platform, in {folder}, cannot be loaded: {told}; it has binaries "
-                f"for {there}"
-            ) from error
-
-
-def _unpack(path: Path, allowance: untrusted.Allowance, file: IO[bytes], content: Content) -> None:
-    """Fill a content from the archive `path`, open as `file`."""
-    wanted = ("resources/", *(f"binaries/{folder}/" for folder in binaries.folders()))
-    with untrusted.readable(f"{path}: not a usable FMI 2.0 archive"), zipfile.ZipFile(file) as package:
-        found = untrusted.entries(package, str(path))
-        if _DESCRIPTION not in found:
-            raise InputError(f"{path}: not a usable FMI 2.0 archive: it has no {_DESCRIPTION}")
-        needed = [entry for name, entry in found.items() if name == _DESCRIPTION or name.startswith(wanted)]
-        content.size = sum(entry.file_size for entry in needed)
-        allowance.take(content.size, str(path))
-        for entry in needed:
-            untrusted.copy(package, entry, content.directory / entry.filename)
-    parts = [name.split("/") for name in found if name.startswith("binaries/")]
-    platforms = tuple(sorted({part[1] for part in parts if len(part) > 2}))
-    model = _read_description(path, content.directory)
-    content.description = Description(model, {each.name: each for each in model.modelVariables}, platforms)
-
-
-def _read_description(path: Path, directory: Path) -> Any:
-    what = f"{path}: not a usable FMI 2.0 archive"
-    file = directory / _DESCRIPTION
-    if (size := file.stat().st_size) > untrusted.LARGEST_DOCUMENT:
-        raise InputError(f"{what}: {_DESCRIPTION} has {size} bytes, allowed: {untrusted.LARGEST_DOCUMENT}")
-    untrusted.refuse_document_type(file.read_bytes(), f"{path}: {_DESCRIPTION}")
-    try:
-        with signals.held():  # FMPy's validation has a bare `except:`
-            description = read_model_description(str(directory))
-    except Exception as error:
-        raise InputError(f"{what}: {error}") from error
-    if description.fmiVersion != "2.0":
-        raise InputError(f"{what}: it is of FMI {description.fmiVersion}")
-    if description.coSimulation is None:
-        raise InputError(f"{path}: has no co-simulation interface")
-    identifier = str(description.coSimulation.modelIdentifier)
-    if not _IDENTIFIER.fullmatch(identifier):
-        raise InputError(f"{what}: its modelIdentifier {identifier[:80]!r} is no C identifier")
-    return description
 
 
 class Unit:

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from feedsim import units
-from feedsim.cosim.unit import Alias, Archive
+from feedsim.cosim.archive import Archive
+from feedsim.cosim.unit import Alias
 from feedsim.errors import InputError
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")

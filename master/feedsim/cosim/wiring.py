@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 from feedsim.errors import InputError
 
 NC = "nc"  # source of setpoints: x_s, n_ffw and release per axis

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from feedsim.cosim import check, fmus_directory, wiring
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.roles import RoleUnit, archive_path, filled
 from feedsim.cosim.system import plant_parameters
-from feedsim.cosim.unit import Archive
 from feedsim.cosim.unit_definition import UnitDefinition, unit_definitions
 from feedsim.errors import InputError
 from feedsim.nc import Program, plan

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from feedsim import units
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.untrusted import readable
 from feedsim.errors import InputError
 from feedsim.motions.setpoints import Recorded

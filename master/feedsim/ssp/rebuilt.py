@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from feedsim import units
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 from feedsim.errors import InputError
 from feedsim.scenario.machine import FILTER_TYPES
 from feedsim.scenario.roles import DRIVE, FRICTION, Role

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from feedsim.cosim import wiring
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.plant import axes_of
-from feedsim.cosim.unit import Archive
 from feedsim.cosim.unit_definition import unit_definitions
 from feedsim.errors import InputError
 from feedsim.scenario.roles import DRIVE, FRICTION, Role

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 
-from feedsim.cosim.unit import Archive
+from feedsim.cosim.archive import Archive
 from feedsim.cosim.unit_definition import unit_definitions
 from feedsim.errors import InputError
 from feedsim.fields import did_you_mean

@@ -86,11 +86,7 @@ def test_wrong_input_ends_with_2_and_nothing_written(
 
 @pytest.mark.parametrize(
     ("content", "words"),
-    [
-        ("mode,frequency [Hz],n_X\n0,0,1\n", ["damping ratio", "my modes.csv:1"]),
-        ("", ["empty"]),
-        (None, ["modes"]),
-    ],
+    [("mode,frequency [Hz],n_X\n0,0,1\n", ["damping ratio", "my modes.csv:1"]), ("", ["empty"]), (None, ["modes"])],
 )
 def test_broken_modes_file(
     content: str | None, words: list[str], scenario_file: Path, fmus: Path, tmp_path: Path

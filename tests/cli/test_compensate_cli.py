@@ -184,11 +184,7 @@ def test_nothing_of_an_earlier_run_is_left(done: tuple[Process, Path], fmus: Pat
     [
         ([SCENARIOS / "z_positioning.yaml"], 2, "z_positioning.yaml: there is no circle"),
         ([CIRCLE, "--friction", "Z"], 2, "--friction Z: AXIS=FILE.yaml is needed"),
-        (
-            [CIRCLE, "--friction", "Y=a.yaml"],
-            2,
-            "--friction Y=a.yaml: axis Y rests; the axes that move are X, Z",
-        ),
+        ([CIRCLE, "--friction", "Y=a.yaml"], 2, "--friction Y=a.yaml: axis Y rests; the axes that move are X, Z"),
         ([CIRCLE, "--friction", "Z=missing.yaml"], 2, "missing.yaml"),
         ([CIRCLE, "--friction", "Z=bad.yaml"], 2, "bad.yaml:1"),
         ([CIRCLE, "--delay", "4"], 2, "--delay 4: 4 has no unit; a time is expected"),

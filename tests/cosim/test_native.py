@@ -38,10 +38,7 @@ SHORT = {
         "motions=[{kind: move, by: {Z: 4 mm}, feed: 5000 mm/min}, {kind: dwell, duration: 50 ms}]",
         "evaluate=[]",
     ),
-    "xz_circle": (
-        "motions=[{kind: circle, plane: [X, Z], radius: 1 mm, feed: 3000 mm/min, turns: 1}]",
-        "evaluate=[]",
-    ),
+    "xz_circle": ("motions=[{kind: circle, plane: [X, Z], radius: 1 mm, feed: 3000 mm/min, turns: 1}]", "evaluate=[]"),
 }
 
 

@@ -72,9 +72,7 @@ def load(path: Path) -> ctypes.CDLL:
         function.restype, function.argtypes = c_int, [c_void_p, *arguments]
     library.fmi2GetTypesPlatform.restype = library.fmi2GetVersion.restype = c_char_p
     library.fmi2Instantiate.restype = c_void_p
-    library.fmi2Instantiate.argtypes = [
-        *(c_char_p, c_int, c_char_p, c_char_p, POINTER(Callbacks), c_int, c_int),
-    ]
+    library.fmi2Instantiate.argtypes = [*(c_char_p, c_int, c_char_p, c_char_p, POINTER(Callbacks), c_int, c_int)]
     library.fmi2FreeInstance.restype, library.fmi2FreeInstance.argtypes = None, [c_void_p]
     return library
 

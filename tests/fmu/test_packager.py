@@ -307,25 +307,16 @@ def test_files_are_compiled_as_one_program_only_where_that_works(tmp_path: Path)
         (["describe", "gearbox"], 2, "no unit 'gearbox' (units: controller, friction, plant, setpoint;"),
         (["describe", "friction", "--cc", "no-such-compiler"], 3, "no-such-compiler"),
         (["describe", "plant", "--modes", "nowhere.csv"], 2, "nowhere.csv"),
-        (
-            ["describe", "friction", "--axes", str(ROOT / "src/plant_fmu/resources/axes.csv")],
-            2,
-            "friction: takes no axes (it takes no files)",
-        ),
+        (["describe", "friction", "--axes", str(ROOT / "src/plant_fmu/resources/axes.csv")], 2,
+         "friction: takes no axes (it takes no files)"),
         (["build", "plant", "friction", "--out", "x.fmu"], 2, "--out is for one unit"),
         (["describe", "plant", "--poses", "nowhere.bin"], 2, "nowhere.bin: cannot be read"),
-        (
-            ["describe", "plant", "--name", "a\0b"],
-            2,
-            "the machine's name 'a\\x00b' has characters that cannot be printed",
-        ),
-        (
-            ["repack", "x.fmu", "--axes", "nowhere.csv", "--modes", "m.csv", "--out", "y.fmu"],
-            2,
-            "nowhere.csv: cannot be",
-        ),
+        (["describe", "plant", "--name", "a\0b"], 2,
+         "the machine's name 'a\\x00b' has characters that cannot be printed"),
+        (["repack", "x.fmu", "--axes", "nowhere.csv", "--modes", "m.csv", "--out", "y.fmu"], 2,
+         "nowhere.csv: cannot be"),
     ],
-)
+)  # fmt: skip
 def test_wrong_use_is_answered(arguments: list[str], code: int, text: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(arguments) == code
     assert text in capsys.readouterr().err

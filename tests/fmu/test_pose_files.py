@@ -59,10 +59,7 @@ FAULTS: dict[str, tuple[bytes, str]] = {
     "frequency": (Grid(rows=_swapped(table(AXES), (4, 0), -60)).content(), r"mode 4: frequency \[Hz\] is -60"),
     "damping": (Grid(rows=_swapped(table(AXES), (4, 1), -1)).content(), r"mode 4: damping ratio \[1\] is -1"),
     "damped rigid mode": (Grid(rows=_swapped(table(AXES), (0, 1), 0.1)).content(), "mode 0: damping ratio 0.1 at freq"),
-    "still": (
-        Grid(rows=table(AXES) * np.array([1, 1, 1, 0, 1, *[1] * 6])).content(),
-        "n_spindle_2 is 0 in every mode",
-    ),
+    "still": (Grid(rows=table(AXES) * np.array([1, 1, 1, 0, 1, *[1] * 6])).content(), "n_spindle_2 is 0 in every mode"),
     "transfer": (
         Grid(transfers=np.array([np.eye(6)] * 6 + [1.1 * np.eye(6)])).content(),
         r"transfer from cell 4 \(X 0.9 m, W 0 m\) to cell 5: row 0 has the length 1.1",

@@ -327,10 +327,5 @@ def test_what_the_unit_refuses_is_not_packed(plant: Archive, fmus: Path, tmp_pat
         content = friction.read(binary.replace("plant.", "friction."))
     base = altered(plant.path, tmp_path / "base.fmu", {binary: content})
     with pytest.raises(InputError, match="cannot be instantiated"):
-        repack(
-            base,
-            machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv"),
-            named(),
-            tmp_path / "out.fmu",
-        )
+        repack(base, machine_tables.read(tmp_path / "axes.csv", tmp_path / "modes.csv"), named(), tmp_path / "out.fmu")
     assert not (tmp_path / "out.fmu").exists()

@@ -54,11 +54,7 @@ def shown(slave: FMU2Slave, archive: Archive) -> tuple[int, bool, list[float]]:
     """Row, finished, and the values of all axes."""
     known = references(archive)
     outputs = [known[f"{axis}.{name}"] for axis in AXES for name in ("x_s", "n_ffw")]
-    return (
-        slave.getInteger([known["row"]])[0],
-        bool(slave.getBoolean([known["finished"]])[0]),
-        slave.getReal(outputs),
-    )
+    return (slave.getInteger([known["row"]])[0], bool(slave.getBoolean([known["finished"]])[0]), slave.getReal(outputs))
 
 
 def expect(slave: FMU2Slave, archive: Archive, row: int) -> None:

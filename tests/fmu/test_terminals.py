@@ -86,10 +86,7 @@ EXPECTED: dict[str, dict[str, dict[str, str]]] = {
         **{f"{axis}.motor": {name: f"{axis}.{name}" for name in DRIVE} for axis in AXES},
         **{f"{axis}.friction": {name: f"{axis}.{name}" for name in CONTACT} for axis in AXES},
     },
-    "controller": {
-        "setpoint": {name: name for name in SETPOINT},
-        "motor": {name: name for name in DRIVE},
-    },
+    "controller": {"setpoint": {name: name for name in SETPOINT}, "motor": {name: name for name in DRIVE}},
     "friction": {"friction": {name: name for name in CONTACT}},
     "setpoint": {f"{axis}.setpoint": {name: f"{axis}.{name}" for name in SETPOINT} for axis in AXES},
 }
@@ -147,10 +144,7 @@ def test_terminals_plugged_together_are_the_wiring_of_figure_2(units: Mapping[st
     plugged: list[tuple[wiring.Variable, wiring.Variable]] = []
     for axis in AXES:
         control, contact = wiring.controller(axis), wiring.friction(axis)
-        for other, unit, kind in (
-            (control, "controller", "motor"),
-            (contact, "friction", "friction"),
-        ):
+        for other, unit, kind in ((control, "controller", "motor"), (contact, "friction", "friction")):
             plugged += _plugged((wiring.PLANT, units["plant"], f"{axis}.{kind}"), (other, units[unit], kind))
         plugged += _plugged(
             (wiring.NC, units["setpoint"], f"{axis}.setpoint"), (control, units["controller"], "setpoint")

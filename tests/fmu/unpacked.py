@@ -92,10 +92,7 @@ def declared(unit: str) -> Iterator[dict[str, str]]:
         yield (
             {"unit": "", "min": "NO_MIN", "max": "NO_MAX", "depends": ""}
             | row
-            | {
-                "kind": match[2],
-                "axis": match[1] or "",
-            }
+            | {"kind": match[2], "axis": match[1] or ""}
         )
 
 

@@ -8,13 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.identify.friction_file import (
-    constant_load_hint,
-    friction_yaml,
-    interval_text,
-    relative_text,
-    value_text,
-)
+from feedsim.identify.friction_file import constant_load_hint, friction_yaml, interval_text, relative_text, value_text
 from feedsim.identify.result import NORMAL_95, Estimate
 from feedsim.scenario.friction_file import read_friction
 from identification_helpers import TRUE, identified

@@ -41,26 +41,17 @@ class Solved:
     ("solved", "reasons", "held"),
     [
         (Solved({"sigma_1": 0.69}), {"sigma_1": "known to +-135 % only (95 %)"}, {"sigma_1": 0.0}),
-        (
-            Solved({EXCESS: 1.43}),
-            {"F_S": "F_S - F_C known to +-280 % only (95 %)", "v_s": f"{GOES_WITH} F_S"},
-            {"F_S": 1.6, "v_s": 0.6},
-        ),
-        (
-            Solved({"gamma": 1.42}),
-            {"gamma": "known to +-278 % only (95 %)", "W": f"{GOES_WITH} gamma"},
-            {"gamma": 1.0, "W": 0.0},
-        ),
-        (
-            Solved({}, {"gamma": 0.999}),
-            {"gamma": "no engaging zone shows, the full stiffness", "W": f"{GOES_WITH} gamma"},
-            {"gamma": 1.0, "W": 0.0},
-        ),
+        (Solved({EXCESS: 1.43}), {"F_S": "F_S - F_C known to +-280 % only (95 %)", "v_s": f"{GOES_WITH} F_S"},
+         {"F_S": 1.6, "v_s": 0.6}),
+        (Solved({"gamma": 1.42}), {"gamma": "known to +-278 % only (95 %)", "W": f"{GOES_WITH} gamma"},
+         {"gamma": 1.0, "W": 0.0}),
+        (Solved({}, {"gamma": 0.999}),
+         {"gamma": "no engaging zone shows, the full stiffness", "W": f"{GOES_WITH} gamma"}, {"gamma": 1.0, "W": 0.0}),
         (Solved({}, {"sigma_2": 0.0}), {"sigma_2": "the record fits best without"}, {"sigma_2": 0.0}),
         (Solved({"sigma_0": np.inf}), {"sigma_0": "the record does not answer to it"}, {"sigma_0": 300.0}),
         (Solved({}, at_bound=("v_s",)), {"v_s": "the fit ends at the end of its range (0.6 rad/s)"}, {"v_s": 0.6}),
     ],
-)
+)  # fmt: skip
 def test_reasons(solved: Any, reasons: dict[str, str], held: dict[str, float]) -> None:
     free = ["sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "v_s", "W", "gamma"]
     judged = verdict(solved, free)

@@ -66,8 +66,7 @@ def test_mapping_gives_units_signs_and_the_motor_side(tmp_path: Path) -> None:
 def test_a_motor_encoder_in_increments_needs_no_pitch(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", {"t": TIME, "enc": ANGLE * 4096 / (2 * pi), "M [N.m]": TORQUE})
     columns = mapped(
-        tmp_path,
-        "position: {column: enc, unit: increments, at: motor, factor: 0.087890625 deg}\ntorque: {column: M}\n",
+        tmp_path, "position: {column: enc, unit: increments, at: motor, factor: 0.087890625 deg}\ntorque: {column: M}\n"
     )
     found = read_records(path, columns)
     np.testing.assert_allclose(only(found).angle, ANGLE, **DIGITS)
@@ -165,28 +164,18 @@ REST = "torque: {column: ActTorque}\n"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            "position: {column: ActPoss}\npitch: 20 mm\n",
-            "m.yaml:1: position: {}:1 has no column 'ActPoss'; there is t, A",
-        ),
-        (
-            "position: {column: ActPos, unit: um}\npitch: 20 mm\n",
-            "m.yaml:1: position: column 'ActPos' is in mm by its header, in um by the mapping",
-        ),
-        (
-            "position: {column: ActPos, factor: 3 N}\npitch: 20 mm\n",
-            "m.yaml:1: position: column 'ActPos' in mm times a factor in N: the values are a",
-        ),
-        (
-            "position: {column: ActPos, factor: {variable: g, unit: '1'}}\npitch: 20 mm\n",
-            "m.yaml:1: position: {}: no variable 'g'; a CSV file has none, write the number itself",
-        ),
-        (
-            "position: {column: ActPos}\n",
-            "{}:1: position 'ActPos' counts on the slide; its pitch is needed: pitch: 20 mm in the mapping, or",
-        ),
+        ("position: {column: ActPoss}\npitch: 20 mm\n",
+         "m.yaml:1: position: {}:1 has no column 'ActPoss'; there is t, A"),
+        ("position: {column: ActPos, unit: um}\npitch: 20 mm\n",
+         "m.yaml:1: position: column 'ActPos' is in mm by its header, in um by the mapping"),
+        ("position: {column: ActPos, factor: 3 N}\npitch: 20 mm\n",
+         "m.yaml:1: position: column 'ActPos' in mm times a factor in N: the values are a"),
+        ("position: {column: ActPos, factor: {variable: g, unit: '1'}}\npitch: 20 mm\n",
+         "m.yaml:1: position: {}: no variable 'g'; a CSV file has none, write the number itself"),
+        ("position: {column: ActPos}\n",
+         "{}:1: position 'ActPos' counts on the slide; its pitch is needed: pitch: 20 mm in the mapping, or"),
     ],
-)
+)  # fmt: skip
 def test_mapping_against_trace(tmp_path: Path, text: str, message: str) -> None:
     path = simple(tmp_path / "a.csv")
     assert message.format(path) in refusal(path, mapped(tmp_path, text + REST))

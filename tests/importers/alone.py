@@ -98,10 +98,7 @@ def with_table(case: Case, fmus: Path, folder: Path) -> System:
     # Start values that are the first row's: some importers initialise a unit before it knows its inputs.
     held = {given: float(signals[name][0]) for given, name in case.inputs.items()}
     return System(
-        {
-            "signals": Component(table),
-            case.unit: Component(fmus / f"{case.unit}.fmu", {**case.start, **held}),
-        },
+        {"signals": Component(table), case.unit: Component(fmus / f"{case.unit}.fmu", {**case.start, **held})},
         tuple((("signals", port[name]), (case.unit, given)) for given, name in case.inputs.items()),
     )
 

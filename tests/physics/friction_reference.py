@@ -62,9 +62,7 @@ def line(n_0: float, slope: float, stop: float) -> Motion:
     """n = n_0 + slope t."""
     zero = -n_0 / slope
     return Motion(
-        lambda t: n_0 + slope * t,
-        lambda t: n_0 * t + slope * t * t / 2,
-        (zero,) if 0.0 < zero < stop else (),
+        lambda t: n_0 + slope * t, lambda t: n_0 * t + slope * t * t / 2, (zero,) if 0.0 < zero < stop else ()
     )
 
 

@@ -322,11 +322,7 @@ X_AXIS = {
 
 @pytest.mark.parametrize(
     ("J", "parameters"),
-    [
-        (J_TOT, {}),
-        (0.08592, X_AXIS),
-        (J_TOT, {"ideal_current_loop": 1, "filter_1.type": 0}),
-    ],
+    [(J_TOT, {}), (0.08592, X_AXIS), (J_TOT, {"ideal_current_loop": 1, "filter_1.type": 0})],
     ids=["Z", "X", "ideal current loop"],
 )
 def test_equivalent_time_of_the_speed_loop(archive: Archive, J: float, parameters: Mapping[str, float]) -> None:

@@ -165,11 +165,7 @@ def test_torque_of_the_drive(setting: str, at: OperatingPoint) -> None:
         for f in tones:
             s = np.array([2j * np.pi * f])
             E, G_n = linear.torque(s)
-            expected = {
-                "n_add": E * linear.from_setpoint(s),
-                "M_add": E,
-                "n_a": -E * linear.from_speed(s) - G_n,
-            }[name]
+            expected = {"n_add": E * linear.from_setpoint(s), "M_add": E, "n_a": -E * linear.from_speed(s) - G_n}[name]
             assert phasor(torque, f) == pytest.approx(complex(expected[0]), rel=1e-6), f"{name} at {f:g} Hz"
 
 

@@ -197,12 +197,7 @@ def test_pure_lugre_is_told_as_such(law: FrictionLaw) -> None:
 
 def test_what_small_sines_do_not_tell_is_said(law: FrictionLaw) -> None:
     found = dynamic(
-        [exact(law, [SineMove(5e-6, 2, 20)], TRUE, noise=0.05)],
-        law,
-        prior=stage_1(1e-3),
-        J=INERTIA,
-        delay=0.0,
-        I_P=I_P,
+        [exact(law, [SineMove(5e-6, 2, 20)], TRUE, noise=0.05)], law, prior=stage_1(1e-3), J=INERTIA, delay=0.0, I_P=I_P
     )
     assert any(text.startswith("W needs") and "20 um" in text for text in found.advice)
     assert any(text.startswith("gamma needs") and "50 um" in text for text in found.advice)

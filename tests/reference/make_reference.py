@@ -24,12 +24,7 @@ SOLVERS = {
     "controller": solve_controller.solve,
     "setpoint": solve_setpoint.solve,
 }
-CASES = {
-    "friction": friction_cases,
-    "plant": plant_cases,
-    "controller": controller_cases,
-    "setpoint": setpoint_cases,
-}
+CASES = {"friction": friction_cases, "plant": plant_cases, "controller": controller_cases, "setpoint": setpoint_cases}
 CONTINUOUS = ("friction", "plant")
 ALL = (*UNITS, system.FOLDER)
 

@@ -38,14 +38,10 @@ class Scenario:
 
 SYSTEMS = (
     Scenario(
-        "z_positioning",
-        ("Z.x_a", "Z.n_a", "Z.M_a", "Z.M_fr", "Z.i_q", "X.x_a", "Y.x_a", "Y.M_a", "tool.x_Z"),
-        1e-3,
+        "z_positioning", ("Z.x_a", "Z.n_a", "Z.M_a", "Z.M_fr", "Z.i_q", "X.x_a", "Y.x_a", "Y.M_a", "tool.x_Z"), 1e-3
     ),
     Scenario(
-        "xz_circle",
-        ("X.x_a", "X.M_a", "X.M_fr", "Z.x_a", "Z.M_a", "Z.M_fr", "Y.x_a", "tool.x_X", "tool.x_Z"),
-        2e-3,
+        "xz_circle", ("X.x_a", "X.M_a", "X.M_fr", "Z.x_a", "Z.M_a", "Z.M_fr", "Y.x_a", "tool.x_X", "tool.x_Z"), 2e-3
     ),
 )
 

@@ -86,11 +86,7 @@ def test_circle_by_tool_point() -> None:
 
 @pytest.mark.parametrize(
     ("changes", "overshoot"),
-    [
-        ({"emf_feedforward": 0.0}, 1.58 * 3.17),
-        ({"f": 0.0}, 4.6),
-        ({"ideal_current_loop": 1.0}, 1.29 * 3.17),
-    ],
+    [({"emf_feedforward": 0.0}, 1.58 * 3.17), ({"f": 0.0}, 4.6), ({"ideal_current_loop": 1.0}, 1.29 * 3.17)],
 )
 def test_overshoot_of_other_drives(changes: dict[str, float], overshoot: float) -> None:
     m = with_drives(machine("ramped"), **changes)

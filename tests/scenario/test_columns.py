@@ -99,81 +99,51 @@ def test_spellings_of_drives(unit: str, meant: str) -> None:
         (GOOD + "pitch: 0 mm", "m.yaml:7: pitch: 0 mm is outside the allowed range: at least 1e-08 m"),
         (GOOD + "torque_constant: 2 N.m", "m.yaml:7: torque_constant: '2 N.m' is a torque; a torque constant is"),
         (GOOD + "delay: {torqe: 1 ms}", "m.yaml:7: delay.torqe: unknown key; did you mean 'torque'?"),
-        (
-            GOOD + "delay: {torque: -2 s}",
-            "m.yaml:7: delay.torque: -2 s is outside the allowed range: from -1 s to 1 s",
-        ),
+        (GOOD + "delay: {torque: -2 s}", "m.yaml:7: delay.torque: -2 s is outside the allowed range: from -1 s to 1 s"),
         (GOOD + "setpoint: q", "m.yaml:7: setpoint: 'q'; a group of keys is expected"),
         (GOOD + "setpoint: {unit: mm}", "m.yaml:7: setpoint.column: missing; Name in the header"),
         (GOOD + "setpoint: {column: ''}", "m.yaml:7: setpoint.column: the text is empty"),
         (GOOD + "setpoint: {column: q, unit: mmm}", "m.yaml:7: setpoint.unit: unknown unit 'mmm'; did you mean 'mm'?"),
-        (
-            GOOD + "setpoint: {column: q, unit: N}",
-            "m.yaml:7: setpoint.unit: N: the values are a force; a length or an a",
-        ),
+        (GOOD + "setpoint: {column: q, unit: N}",
+         "m.yaml:7: setpoint.unit: N: the values are a force; a length or an a"),
         (
             GOOD + "setpoint: {column: q, unit: increments}",
             "a plain number; a length or an angle is expected here, in m or rad for example; give the factor of one "
             "unit, for example factor: 0.001 m",
         ),
-        (
-            GOOD + "setpoint: {column: q, unit: deg, at: scale}",
-            "m.yaml:7: setpoint.at: the values are angles, which are",
-        ),
-        (
-            GOOD + "setpoint: {column: q, at: moter}",
-            "m.yaml:7: setpoint.at: 'moter' is not allowed here; did you mean 'm",
-        ),
+        (GOOD + "setpoint: {column: q, unit: deg, at: scale}",
+         "m.yaml:7: setpoint.at: the values are angles, which are"),
+        (GOOD + "setpoint: {column: q, at: moter}",
+         "m.yaml:7: setpoint.at: 'moter' is not allowed here; did you mean 'm"),
         (GOOD + "setpoint: {column: q, sign: 2}", "m.yaml:7: setpoint.sign: 2 is not allowed here; allowed: 1, -1"),
-        (
-            GOOD + "setpoint: {column: q, factor: much}",
-            "m.yaml:7: setpoint.factor: 'much' is no factor; a number with a",
-        ),
+        (GOOD + "setpoint: {column: q, factor: much}",
+         "m.yaml:7: setpoint.factor: 'much' is no factor; a number with a"),
         (GOOD + "setpoint: {column: q, factor: 0 mm}", "m.yaml:7: setpoint.factor.value: 0.0 is outside the allowed"),
         (GOOD + "setpoint: {column: q, factor: 3 mq}", "m.yaml:7: setpoint.factor.unit: unknown unit 'mq'"),
-        (
-            GOOD + "setpoint: {column: q, factor: {unit: mm}}",
-            "m.yaml:7: setpoint.factor.variable: a factor needs either 'value' or 'variable'",
-        ),
-        (
-            GOOD + "setpoint: {column: q, factor: {unit: mm, value: 1, variable: g}}",
-            "m.yaml:7: setpoint.factor.variable: a factor needs either 'value' or 'variable'",
-        ),
-        (
-            GOOD + "load: {column: p, unit: V, factor: 3 A}",
-            "m.yaml:7: load.unit: V times A: the values are a",
-        ),
+        (GOOD + "setpoint: {column: q, factor: {unit: mm}}",
+         "m.yaml:7: setpoint.factor.variable: a factor needs either 'value' or 'variable'"),
+        (GOOD + "setpoint: {column: q, factor: {unit: mm, value: 1, variable: g}}",
+         "m.yaml:7: setpoint.factor.variable: a factor needs either 'value' or 'variable'"),
+        (GOOD + "load: {column: p, unit: V, factor: 3 A}", "m.yaml:7: load.unit: V times A: the values are a"),
         (GOOD + "torque: {column: m, unit: Nm}", "m.yaml:6: current: stands beside torque; one of both is enough"),
         (GOOD + "mass: 95 kg\ninertia: 0.01 kg.m^2", "m.yaml:7: mass: stands beside inertia; give one of both"),
-        (
-            "position: {column: x}\ntorque: {column: m}\ntorque_constant: 2 Nm/A",
-            "m.yaml:3: torque_constant: is of no use: the trace's torque is taken, not a current",
-        ),
-        (
-            "position: {column: x}",
-            "m.yaml:1: missing: one of torque, current, force, for example current: {column: i_q",
-        ),
+        ("position: {column: x}\ntorque: {column: m}\ntorque_constant: 2 Nm/A",
+         "m.yaml:3: torque_constant: is of no use: the trace's torque is taken, not a current"),
+        ("position: {column: x}",
+         "m.yaml:1: missing: one of torque, current, force, for example current: {column: i_q"),
         ("torque: {column: m}", "m.yaml:1: missing: position or speed, for example position: {column: x, unit: mm}"),
-        (
-            "time: {column: t, interval: 2 ms}\nposition: {column: x}\ntorque: {column: m}",
-            "m.yaml:1: time: 'interval' is for traces without a column of time; give either the interval or the column",
-        ),
-        (
-            "time: {factor: 2 ms}\nposition: {column: x}\ntorque: {column: m}",
-            "m.yaml:1: time: 'factor' needs the 'column' that it belongs to",
-        ),
-        (
-            "time: {column: t, unit: mm}\nposition: {column: x}\ntorque: {column: m}",
-            "m.yaml:1: time.unit: mm: the values are a length; a time is expected here, in s for example",
-        ),
-        (
-            "time: {interval: 0 s}\nposition: {column: x}\ntorque: {column: m}",
-            "time.interval: 0 s is outside the allow",
-        ),
+        ("time: {column: t, interval: 2 ms}\nposition: {column: x}\ntorque: {column: m}",
+         "m.yaml:1: time: 'interval' is for traces without a column of time; give either the interval or the column"),
+        ("time: {factor: 2 ms}\nposition: {column: x}\ntorque: {column: m}",
+         "m.yaml:1: time: 'factor' needs the 'column' that it belongs to"),
+        ("time: {column: t, unit: mm}\nposition: {column: x}\ntorque: {column: m}",
+         "m.yaml:1: time.unit: mm: the values are a length; a time is expected here, in s for example"),
+        ("time: {interval: 0 s}\nposition: {column: x}\ntorque: {column: m}",
+         "time.interval: 0 s is outside the allow"),
         ("axis: time\nposition: {column: x}\ntorque: {column: m}", "m.yaml:1: axis: 'time' is no axis name"),
         ("- 1", "m.yaml:1: a file of 'key: value' lines is expected, not a list"),
     ],
-)
+)  # fmt: skip
 def test_refusals(refused: Refused, text: str, message: str) -> None:
     assert message in refused(text)
 

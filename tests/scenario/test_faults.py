@@ -33,10 +33,8 @@ def refused(tmp_path: Path) -> Refused:
 @pytest.mark.parametrize(
     ("motion", "message"),
     [
-        (
-            "move, by: {Z: 1 mm}, feed: 5000 mm",
-            ".feed: '5000 mm' is a length; a speed is expected, for example 5000 mm/min",
-        ),
+        ("move, by: {Z: 1 mm}, feed: 5000 mm",
+         ".feed: '5000 mm' is a length; a speed is expected, for example 5000 mm/min"),
         ("move, by: {Z: 1 mm}, feed: 5000", ".feed: 5000 has no unit; a speed is expected, for example 5000 mm/min"),
         ("move, by: {Z: 1 mm}, feed: 0 m/s", ".feed: 0 m/s is outside the allowed range: more than 0 m/s"),
         ("move, by: {Z: 1 mm}, feed: true", ".feed: true is no quantity; a speed is expected"),
@@ -54,62 +52,42 @@ def refused(tmp_path: Path) -> Refused:
         ("circle, plane: [X], radius: 1 mm, feed: 1 m/s", ".plane.1: the list is too short; two entries are needed"),
         ("circle, plane: [X, Y, Z], radius: 1 mm, feed: 1 m/s", ".plane: 3 entries; at most 2"),
         ("circle, plane: [X, Z], radius: 1 mm, feed: 1 m/s, turns: 1.5", ".turns: 1.5 is no whole number"),
-        (
-            "circle, plane: [X, Z], radius: 1 mm, feed: 1 m/s, turns: 0",
-            ".turns: 0 is outside the allowed range: at least 1",
-        ),
-        (
-            "circle, plane: [X, Z], radius: 1 mm, feed: 1 m/s, direction: counter-clockwise",
-            ".direction: 'counter-clockwise' is not allowed here; did you mean 'counterclockwise'?",
-        ),
+        ("circle, plane: [X, Z], radius: 1 mm, feed: 1 m/s, turns: 0",
+         ".turns: 0 is outside the allowed range: at least 1"),
+        ("circle, plane: [X, Z], radius: 1 mm, feed: 1 m/s, direction: counter-clockwise",
+         ".direction: 'counter-clockwise' is not allowed here; did you mean 'counterclockwise'?"),
         ("arc, plane: [X, Z], feed: 1 m/s, angle: 90 deg", ": an arc needs its centre once"),
         ("arc, plane: [X, Z], feed: 1 m/s, centre_by: {X: 1 mm, Z: 0 m}", ": an arc needs its end once"),
-        (
-            "arc, plane: [X, Z], feed: 1 m/s, angle: 1 rad, centre_by: {X: 1 mm, Y: 1 mm}",
-            ": 'centre_by' must give X and Z, the axes of the plane",
-        ),
+        ("arc, plane: [X, Z], feed: 1 m/s, angle: 1 rad, centre_by: {X: 1 mm, Y: 1 mm}",
+         ": 'centre_by' must give X and Z, the axes of the plane"),
         ("dwell, duration: 0 s", ".duration: 0 s is outside the allowed range: more than 0 s"),
         ("constant_speed, axis: Z", ".speeds: missing; List of speeds, or {from: ..., to: ..., count: ...}"),
         ("constant_speed, axis: Z, speeds: 5 m/min", ".speeds: '5 m/min'; a list is expected"),
         ("constant_speed, axis: Z, speeds: []", ".speeds: 0 entries; at least 1 needed"),
         ("constant_speed, axis: Z, speeds: [1 m/min, 5 mm]", ".speeds.1: '5 mm' is a length; a speed is expected"),
         ("constant_speed, axis: Z, speeds: {from: 1 m/min}", ".speeds.to: missing; a speed, for example to: 5000"),
-        (
-            "constant_speed, axis: Z, speeds: {from: 1 m/s, to: 2 m/s, count: 1}",
-            ".speeds.count: 1 is outside the allowed range: at least 2",
-        ),
-        (
-            "constant_speed, axis: Z, speeds: {from: 1 m/s, to: 2 m/s, cuont: 3}",
-            ".speeds.cuont: unknown key; did you mean 'count'?",
-        ),
+        ("constant_speed, axis: Z, speeds: {from: 1 m/s, to: 2 m/s, count: 1}",
+         ".speeds.count: 1 is outside the allowed range: at least 2"),
+        ("constant_speed, axis: Z, speeds: {from: 1 m/s, to: 2 m/s, cuont: 3}",
+         ".speeds.cuont: unknown key; did you mean 'count'?"),
         ("constant_speed, axis: Z, speeds: {from: 1 m/s, to: 1 m/s}", ".speeds: 'from' and 'to' are both 1 m/s"),
         ("constant_speed, axis: Q, speeds: [1 m/min]", ".axis: the machine has no axis 'Q'; it has X, Y, Z"),
-        (
-            "constant_speed, axis: Z, speeds: [1 m/s], rest: -1 s",
-            ".rest: -1 s is outside the allowed range: at least 0",
-        ),
+        ("constant_speed, axis: Z, speeds: [1 m/s], rest: -1 s",
+         ".rest: -1 s is outside the allowed range: at least 0"),
         ("sine, axis: Z, moves: []", ".moves: 0 entries; at least 1 needed"),
-        (
-            "sine, axis: Z, moves: [{amplitude: 1 um, frequency: 10, periods: 2}]",
-            ".moves.0.frequency: 10 has no unit; an angular speed or frequency is expected, for example 5 Hz",
-        ),
-        (
-            "sine, axis: Z, moves: [{amplitude: 1 um, frequency: 1 Hz, periods: 2.5}]",
-            ".moves.0.periods: 2.5 is no whole number",
-        ),
-        (
-            "sine, axis: Z, fade: 0, moves: [{amplitude: 1 um, frequency: 1 Hz, periods: 2}]",
-            ".fade: 0 is outside the allowed range: from 0.5 to 100",
-        ),
+        ("sine, axis: Z, moves: [{amplitude: 1 um, frequency: 10, periods: 2}]",
+         ".moves.0.frequency: 10 has no unit; an angular speed or frequency is expected, for example 5 Hz"),
+        ("sine, axis: Z, moves: [{amplitude: 1 um, frequency: 1 Hz, periods: 2.5}]",
+         ".moves.0.periods: 2.5 is no whole number"),
+        ("sine, axis: Z, fade: 0, moves: [{amplitude: 1 um, frequency: 1 Hz, periods: 2}]",
+         ".fade: 0 is outside the allowed range: from 0.5 to 100"),
         ("setpoints, file: none.csv, columns: {Z: q}", ".file: no such file: "),
         ("setpoints, file: s.yaml, columns: {}", ".columns: 0 entries; at least 1 needed"),
-        (
-            "setpoints, file: s.yaml, columns: {Z: {column: q, unit: furlong}}",
-            ".columns.Z.unit: unknown unit 'furlong'",
-        ),
+        ("setpoints, file: s.yaml, columns: {Z: {column: q, unit: furlong}}",
+         ".columns.Z.unit: unknown unit 'furlong'"),
         ("setpoints, file: s.yaml, columns: {Z: q}, between: [2 s, 1 s]", ".between: the first time 2 s is not before"),
     ],
-)
+)  # fmt: skip
 def test_motions(refused: Refused, motion: str, message: str) -> None:
     found = refused("motions:", f"  - {{kind: {motion}}}")
     assert f"s.yaml:4: motions.0{message}" in found
@@ -127,46 +105,30 @@ def test_motions(refused: Refused, motion: str, message: str) -> None:
         (["motions: 5"], "s.yaml:3: motions: 5; a list is expected"),
         (["motions: []"], "s.yaml:3: motions: 0 entries; at least 1 needed"),
         ([], "s.yaml:1: motions: missing"),
-        (
-            [MOVE, "recording: {interval: 1.1 ms}"],
-            "s.yaml:4: recording.interval: 0.0011 s is no whole multiple of the control",
-        ),
-        (
-            [MOVE, "recording: {interval: 1 ms, variables: []}"],
-            "s.yaml:4: recording.variables: 0 entries; at least 1 needed",
-        ),
+        ([MOVE, "recording: {interval: 1.1 ms}"],
+         "s.yaml:4: recording.interval: 0.0011 s is no whole multiple of the control"),
+        ([MOVE, "recording: {interval: 1 ms, variables: []}"],
+         "s.yaml:4: recording.variables: 0 entries; at least 1 needed"),
         ([MOVE, "recording:"], "s.yaml:4: recording: nothing (null); a group of keys is expected"),
         ([MOVE, "coupling: {substeps: 0}"], "s.yaml:4: coupling.substeps: 0 is outside the allowed range: at least 1"),
-        (
-            [MOVE, "evaluate: [{kind: positioning, axis: X}]"],
-            "s.yaml:4: evaluate.0: positioning of axis X, which no motion moves",
-        ),
-        (
-            [MOVE, "evaluate: [{kind: circle}]"],
-            "s.yaml:4: evaluate.0: a circle is to be evaluated, but no motion is of kind",
-        ),
-        (
-            [MOVE, "evaluate: [{kind: positioning, axis: Z, motion: 1}]"],
-            "s.yaml:4: evaluate.0.motion: 1 is no entry of motions (entries: 0 only, counted from 0)",
-        ),
-        (
-            [MOVE, "evaluate: [{kind: positioning, axis: X, motion: 0}]"],
-            "s.yaml:4: evaluate.0: positioning of axis X, which motions.0 (move) does not move",
-        ),
-        (
-            [MOVE, "evaluate: [{kind: circle, motion: 0}]"],
-            "s.yaml:4: evaluate.0: a circle is to be evaluated, but motions.0 (move) is not of kind circle",
-        ),
-        (
-            [MOVE, "evaluate: [{kind: circle, motion: -1}]"],
-            "s.yaml:4: evaluate.0.motion: -1 is outside the allowed range: at least 0",
-        ),
+        ([MOVE, "evaluate: [{kind: positioning, axis: X}]"],
+         "s.yaml:4: evaluate.0: positioning of axis X, which no motion moves"),
+        ([MOVE, "evaluate: [{kind: circle}]"],
+         "s.yaml:4: evaluate.0: a circle is to be evaluated, but no motion is of kind"),
+        ([MOVE, "evaluate: [{kind: positioning, axis: Z, motion: 1}]"],
+         "s.yaml:4: evaluate.0.motion: 1 is no entry of motions (entries: 0 only, counted from 0)"),
+        ([MOVE, "evaluate: [{kind: positioning, axis: X, motion: 0}]"],
+         "s.yaml:4: evaluate.0: positioning of axis X, which motions.0 (move) does not move"),
+        ([MOVE, "evaluate: [{kind: circle, motion: 0}]"],
+         "s.yaml:4: evaluate.0: a circle is to be evaluated, but motions.0 (move) is not of kind circle"),
+        ([MOVE, "evaluate: [{kind: circle, motion: -1}]"],
+         "s.yaml:4: evaluate.0.motion: -1 is outside the allowed range: at least 0"),
         ([MOVE, "notes: x"], "s.yaml:4: notes: unknown key; did you mean 'note'?"),
         ([MOVE, "sets: x"], "s.yaml:4: sets: unknown key; did you mean 'set'?"),
         ([MOVE, "name: t"], "s.yaml:4: duplicate key 'name' (first in line 1)"),
         ([MOVE, "note: 5"], "s.yaml:4: note: 5 is no text; put it in quotes"),
     ],
-)
+)  # fmt: skip
 def test_scenario(refused: Refused, lines: list[str], message: str) -> None:
     assert message in refused(*lines)
 
@@ -184,43 +146,25 @@ def test_turn_beyond_the_circle(refused: Refused) -> None:
         ("W: 0.040 rad", "W: -1 mrad", "axes.X.friction.W: -1 mrad is outside the allowed range: at least 0 rad"),
         ("gamma: 0.35", "gamma: 135 %", "axes.X.friction.gamma: 135 % is outside the allowed range: from 0 to 1"),
         ("F_C: 2.4 N.m", "F_c: 2.4 N.m", "axes.X.friction.F_c: unknown key; did you mean 'F_C'?"),
-        (
-            "position: 1 ms",
-            "position: 1.1 ms",
-            "cycles.position: 0.0011 s is no whole multiple of the control cycle, 0.000125 s",
-        ),
-        (
-            "interpolation: 2 ms",
-            "interpolation: 1.5 ms",
-            "interpolation: 0.0015 s is no whole multiple of the position cycle",
-        ),
+        ("position: 1 ms", "position: 1.1 ms",
+         "cycles.position: 0.0011 s is no whole multiple of the control cycle, 0.000125 s"),
+        ("interpolation: 2 ms", "interpolation: 1.5 ms",
+         "interpolation: 0.0015 s is no whole multiple of the position cycle"),
         ("control: 125 us", "control: 125", "cycles.control: 125 has no unit; a time is expected, for example 125 us"),
-        (
-            "K_v: 4 (m/min)/mm",
-            "K_v: 66.7 Hz",
-            "drive.K_v: '66.7 Hz' is an angular speed or frequency; a position controller",
-        ),
-        (
-            "symmetry_lag: false",
-            "symmetry_lag: off",
-            "symmetry_lag: 'off' is neither true nor false; write true or false",
-        ),
+        ("K_v: 4 (m/min)/mm", "K_v: 66.7 Hz",
+         "drive.K_v: '66.7 Hz' is an angular speed or frequency; a position controller"),
+        ("symmetry_lag: false", "symmetry_lag: off",
+         "symmetry_lag: 'off' is neither true nor false; write true or false"),
         ("p: 5 ", "p: 5.0 ", "axes.X.drive.p: 5.0 is no whole number"),
         ("type: band_stop", "type: band-stop", "'band-stop' is not allowed here; did you mean 'band_stop'?"),
-        (
-            "f: 455 Hz",
-            "f: 4000 Hz",
-            "filter_1.f: 4000 Hz is not below half the sampling rate of the control cycle, 4000 Hz",
-        ),
-        (
-            "travel: [0 mm, 1770 mm]",
-            "travel: [9 mm, 9 mm]",
-            "travel: the lowest position 0.009 m is not below the highest",
-        ),
+        ("f: 455 Hz", "f: 4000 Hz",
+         "filter_1.f: 4000 Hz is not below half the sampling rate of the control cycle, 4000 Hz"),
+        ("travel: [0 mm, 1770 mm]", "travel: [9 mm, 9 mm]",
+         "travel: the lowest position 0.009 m is not below the highest"),
         ("display_sign: 1", "display_sign: 2", "display_sign: 2 is not allowed here; allowed: 1, -1"),
         ("  X: ", "  tool: ", "machine.axes.tool: 'tool' is no axis name"),
     ],
-)
+)  # fmt: skip
 def test_machine_file_and_line_are_named(tmp_path: Path, refused: Refused, old: str, new: str, message: str) -> None:
     path, line = changed_machine(tmp_path, old, new)
     found = [problem for problem in refused(MOVE, machine=path).splitlines() if message in problem]
@@ -231,21 +175,15 @@ def test_machine_file_and_line_are_named(tmp_path: Path, refused: Refused, old: 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (
-            "omega_0: 747.3 rad/s",
-            "",
-            "axes.X.drive.omega_0: missing key 'omega_0'; needed as long as reference_model is true",
-        ),
-        (
-            "travel: [0 mm, 1770 mm]",
-            "travel: [0 mm, 700 mm]",
-            "m.yaml:14: machine.pose.X: the pose of X, 0.8 m, is outside its travel, 0 to 0.7 m",
-        ),
+        ("omega_0: 747.3 rad/s", "",
+         "axes.X.drive.omega_0: missing key 'omega_0'; needed as long as reference_model is true"),
+        ("travel: [0 mm, 1770 mm]", "travel: [0 mm, 700 mm]",
+         "m.yaml:14: machine.pose.X: the pose of X, 0.8 m, is outside its travel, 0 to 0.7 m"),
         ("pose: {X: 800 mm, ", "pose: {", "m.yaml:14: machine.pose: the pose lacks the position of axis X"),
         ("pose: {", "pose: {A: 0 m, ", "machine.pose.A: the machine has no axis 'A'; it has X, Y, Z"),
         ("modes.csv\n", "none.csv\n", "machine.modes: no such file: "),
     ],
-)
+)  # fmt: skip
 def test_what_concerns_several_lines(tmp_path: Path, refused: Refused, old: str, new: str, message: str) -> None:
     assert message in refused(MOVE, machine=changed_machine(tmp_path, old, new)[0])
 

@@ -126,9 +126,7 @@ def test_degrees_of_freedom_with_nothing() -> None:
 def test_massless_is_fine_where_stiffness_holds_it() -> None:
     mass = MASS.copy()
     mass[1, 1] = 0.0
-    assert check(assembly(mass, STIFFNESS)) == [
-        "1 degree of freedom follows statically, without mass: body[1] ux",
-    ]
+    assert check(assembly(mass, STIFFNESS)) == ["1 degree of freedom follows statically, without mass: body[1] ux"]
 
 
 def test_a_massless_mechanism_is_named() -> None:

@@ -136,11 +136,7 @@ def test_millimetres_and_tonnes_by_nodes_give_the_same_modes(tmp_path: Path) -> 
                 factor = 1000.0 if turns[dof] and not port.startswith("n_") else 1.0
                 stream.write(f"{port},{owner[dof]},{words[direction[dof]]},{float(vector[dof] * factor)!r}\n")
     read = structure(
-        tmp_path,
-        axes=["X", "Y", "Z"],
-        nodes="nodes.csv",
-        lines="lines.csv",
-        units={"length": "mm", "mass": "t"},
+        tmp_path, axes=["X", "Y", "Z"], nodes="nodes.csv", lines="lines.csv", units={"length": "mm", "mass": "t"}
     )
     assert_reference(read.assembly)
     np.testing.assert_allclose(read.assembly.mass.toarray(), source.mass.toarray(), rtol=1e-14)
@@ -304,10 +300,7 @@ FILE_FAULTS = {
     "cut off": (HEADER + "3 3 3\n1 1 1\n2 2 1\n", "mass.mtx: cannot be read as a Matrix Market file"),
     "outside": (HEADER + "3 3 1\n4 1 1\n", "mass.mtx: cannot be read as a Matrix Market file"),
     "text": (HEADER + "3 3 1\n1 1 heavy\n", "mass.mtx: cannot be read as a Matrix Market file"),
-    "another size": (
-        HEADER + "2 2 2\n1 1 1\n2 2 1\n",
-        "the mass matrix has 2 degrees of freedom; the",
-    ),
+    "another size": (HEADER + "2 2 2\n1 1 1\n2 2 1\n", "the mass matrix has 2 degrees of freedom; the"),
     "both triangles": (
         HEADER + "3 3 5\n1 1 9\n2 2 9\n3 3 9\n2 1 1\n1 2 1\n",
         "mass.mtx: the entry in row 1, column 2 (from 1) occurs twice",

@@ -16,11 +16,7 @@ STRUCTURE = default_structure()
 ASSEMBLER = Assembler(STRUCTURE)
 TRAVEL = {name: axis.travel for name, axis in STRUCTURE.axes.items()}
 CORNERS = [dict(zip(TRAVEL, ends, strict=True)) for ends in product(*TRAVEL.values())]
-MOVED = {
-    "X": {"column", "slide", "ram", "screw Y", "screw Z"},
-    "Y": {"slide", "ram", "screw Z"},
-    "Z": {"ram"},
-}
+MOVED = {"X": {"column", "slide", "ram", "screw Y", "screw Z"}, "Y": {"slide", "ram", "screw Z"}, "Z": {"ram"}}
 DIRECTIONS = dict(zip("XYZ", np.eye(3), strict=True))
 
 

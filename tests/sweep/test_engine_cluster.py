@@ -177,10 +177,7 @@ def test_another_version_is_refused(a_cluster: Cluster, monkeypatch: pytest.Monk
         ({"sources": "0" * 64}, r"worker tcp://.*other sources"),
     ):
         monkeypatch.setattr(same, "told", lambda changed=changed: told | changed)
-        with (
-            pytest.raises(InputError, match=message),
-            open_engine(Chores("version"), scheduler=a_cluster.address),
-        ):
+        with pytest.raises(InputError, match=message), open_engine(Chores("version"), scheduler=a_cluster.address):
             pass
 
 

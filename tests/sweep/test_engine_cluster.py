@@ -17,7 +17,7 @@ import pytest
 from cluster_helpers import Cluster, scheduler
 from engine_helpers import Chores, chore
 from feedsim.errors import InputError, SimulationError
-from feedsim.sweep import cluster, engine, same, worker
+from feedsim.sweep import cluster, engine, provenance, worker
 from feedsim.sweep.engine import open_engine
 from feedsim.sweep.task import Outcome, Task
 
@@ -90,7 +90,7 @@ class Kept:
 
 def test_a_place_is_kept_as_long_as_anybody_needs_it(tmp_path: Path) -> None:
     work, host = Kept(), SimpleNamespace(address="tcp://here:1", local_directory=str(tmp_path))
-    first, second = (worker.Carrier(work, same.told()) for _ in range(2))
+    first, second = (worker.Carrier(work, provenance.versions()) for _ in range(2))
     for carrier in (first, second):
         carrier.setup(host)
         assert len(worker.work_batch(carrier.key, (chore(0),), 1.0).outcomes) == 1
@@ -125,7 +125,7 @@ def test_a_result_that_dies_with_its_worker_is_waited_for(a_cluster: Cluster, mo
     assert sorted(outcome.run for outcome in found if outcome.error is None) == [0, 1, 2]
 
 
-OTHER = "import feedsim.sweep.same as same; told = dict(same.told(), feedsim='0.0.0'); same.told = lambda: told"
+OTHER = "import feedsim.sweep.provenance as p; own = dict(p.versions(), feedsim='0.0.0'); p.versions = lambda: own"
 OTHERS = {
     "that says so": OTHER,
     "that takes other batches": f"{OTHER}; import feedsim.sweep.worker as worker; worker.work_batch = len",
@@ -171,12 +171,12 @@ def test_no_workers(a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_another_version_is_refused(a_cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     a_cluster.worker("one")
-    told = dict(same.told())
+    told = dict(provenance.versions())
     for changed, message in (
         ({"feedsim": "9.9.9"}, r"worker tcp://.*: has feedsim .*, here is 9\.9\.9"),
         ({"sources": "0" * 64}, r"worker tcp://.*other sources"),
     ):
-        monkeypatch.setattr(same, "told", lambda changed=changed: told | changed)
+        monkeypatch.setattr(provenance, "versions", lambda changed=changed: told | changed)
         with pytest.raises(InputError, match=message), open_engine(Chores("version"), scheduler=a_cluster.address):
             pass
 
@@ -192,6 +192,6 @@ def test_a_worker_without_feedsim_is_refused(a_cluster: Cluster) -> None:
 
 
 def test_other_packages_are_warned_of() -> None:
-    answer = dict(same.told()) | {"numpy": "1.0"}
-    (warning,) = same.differences({"tcp://a:1": answer, "tcp://b:2": dict(same.told())})
+    answer = dict(provenance.versions()) | {"numpy": "1.0"}
+    (warning,) = provenance.differences({"tcp://a:1": answer, "tcp://b:2": dict(provenance.versions())})
     assert warning.startswith("tcp://a:1: numpy 1.0 in place of ")

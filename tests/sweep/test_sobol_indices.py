@@ -68,7 +68,7 @@ def test_closed_forms(f: Callable[[Array], Array], draw: Sequence[Any], exact: t
     np.testing.assert_allclose(found.total, exact[1], atol=0.02)
     for interval, truth in ((found.first_interval, exact[0]), (found.total_interval, exact[1])):
         assert np.all((interval[:, 0] <= truth) & (truth <= interval[:, 1]))
-    assert (found.points, found.left_out, found.reason) == (4096, 0, "")
+    assert (found.used, found.left_out, found.reason) == (4096, 0, "")
 
 
 def test_linear_model_with_normal_inputs() -> None:
@@ -135,7 +135,9 @@ def test_what_cannot_be_is_told() -> None:
 
     def indices(first: list[tuple[float, float]], total: list[tuple[float, float]]) -> Indices:
         f, t = np.array(first), np.array(total)
-        return Indices(f.mean(axis=1), t.mean(axis=1), f, t, 64, 0)
+        return Indices(
+            first=f.mean(axis=1), total=t.mean(axis=1), first_interval=f, total_interval=t, used=64, left_out=0
+        )
 
     fine = [(-0.1, 0.05), (0.8, 1.2), (-0.01, 0.0)]
     assert beyond(indices(fine, [(0.0, 0.1), (0.9, 1.3), (0.0, 0.0)])) == []
@@ -156,7 +158,7 @@ def test_a_failed_run_takes_its_base_point_out_of_all_samples() -> None:
     found = sobol_indices(f_A, f_B, f_AB)
     kept = np.delete(np.arange(256), [3, 77, 200])
     expected = sobol_indices(f_A[kept], f_B[kept], f_AB[:, kept])
-    assert (found.points, found.left_out) == (253, 3)
+    assert (found.used, found.left_out) == (253, 3)
     np.testing.assert_array_equal(found.first, expected.first)
     np.testing.assert_array_equal(found.total_interval, expected.total_interval)
 
@@ -218,7 +220,7 @@ def test_rank_correlation_is_that_of_scipy() -> None:
     known = np.isfinite(y)
     expected = [stats.spearmanr(each[known], y[known]).statistic for each in x]
     np.testing.assert_allclose(found.rank_correlation, expected, atol=1e-12)
-    assert (found.rows, found.left_out) == (299, 1)
+    assert (found.used, found.left_out) == (299, 1)
     assert found.rank_correlation[0] > 0.9 > 3 * found.noise
     assert found.noise == pytest.approx(1.96 / np.sqrt(298))
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from feedsim.report.sweep.account import Account
-from feedsim.report.sweep.failures import LEVEL, end_chance, span_chance
 from feedsim.report.sweep.figure_plots import scatter_picture
 from feedsim.report.sweep.measures import measures
 from feedsim.scenario import load_study
 from feedsim.sweep.design import design
-from feedsim.sweep.table import table_of
+from feedsim.sweep.failures import LEVEL, end_chance, span_chance
+from feedsim.sweep.table import FAILED, OK, table_of
 from feedsim.sweep.task import Outcome
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -63,9 +63,10 @@ def account_of(folder: Path, sampling: str, failing: str) -> Account:
     ],
 )
 def test_the_parameter_that_decides_is_named(tmp_path: Path, sampling: str, failing: str, named: list[str]) -> None:
-    (failure,) = account_of(tmp_path, sampling, failing).failures
-    found = [text.split()[0] for text in failure.where.split("; ") if text]
-    assert sorted(found) == sorted(named), failure.where
+    account = account_of(tmp_path, sampling, failing)
+    (failure,) = account.failures
+    found = [account.inputs[each.parameter].name for each in failure.where]
+    assert sorted(found) == sorted(named), account.where(failure)
 
 
 def test_how_many_of_the_runs_there_failed(tmp_path: Path) -> None:
@@ -74,7 +75,7 @@ def test_how_many_of_the_runs_there_failed(tmp_path: Path) -> None:
     values = account.inputs[1].values
     low, high = values[~account.ok].min(), values[~account.ok].max()
     there = int(((values >= low) & (values <= high)).sum())
-    assert failure.where == f"W {low:.4g} to {high:.4g} rad ({len(failure.runs)} of {there} runs there)"
+    assert account.where(failure) == f"W {low:.4g} to {high:.4g} rad ({len(failure.runs)} of {there} runs there)"
 
 
 def test_other_failures_are_not_compared_with(tmp_path: Path) -> None:
@@ -82,7 +83,7 @@ def test_other_failures_are_not_compared_with(tmp_path: Path) -> None:
     account = account_of(tmp_path, "{method: latin_hypercube, runs: 60}", "(F_S < 0.5) | (W > 0.3)")
     message = account.table["message"]
     message[(account.inputs[0].values < 2.1) & ~account.ok] = "first"
-    where = {each.message: each.where for each in account.failures}
+    where = {each.message: account.where(each) for each in account.failures}
     assert [text.split()[0] for text in where["no"].split("; ")] == ["W"]
 
 
@@ -93,7 +94,7 @@ def test_chance_names_a_parameter_in_one_study_of_twenty_at_most(tmp_path: Path)
     studies = 300
     for _ in range(studies):
         chosen = random.random(40) < 0.25
-        account.ok = ~chosen
+        account.table["status"][:] = np.where(chosen, FAILED, OK)
         account.table["message"][:] = np.where(chosen, "no", "")
         account.__dict__.pop("failures", None)
         told += any(failure.where for failure in account.failures)

@@ -134,8 +134,8 @@ def test_failed_runs_are_grouped_and_located(tmp_path: Path) -> None:
     assert (len(first.runs), len(second.runs)) == (6, 1)
     assert set(first.runs) == set(fast.tolist())
     low, high = 60e3 * plan.values[fast, 1].min(), 60e3 * plan.values[fast, 1].max()
-    assert first.where == f"feed {low:.4g} to {high:.4g} mm/min (6 of 6 runs there)"
-    assert second.where == ""  # one run is no place
+    assert account.where(first) == f"feed {low:.4g} to {high:.4g} mm/min (6 of 6 runs there)"
+    assert account.where(second) == ""  # one run is no place
     text = html(table, study, plan)
     assert "axis &lt;Z&gt; reaches" in text
     assert "<Z>" not in text
@@ -171,7 +171,7 @@ def test_a_part_of_a_study(tmp_path: Path) -> None:
     # 16 whole base points and a piece of the next
     part = table_of(study, plan, {"XZ.G": ("m", glitch(plan))}, done=83)
     account = Account(part, study, plan)
-    assert account.sensitivities.sobol["XZ.G"].points == 16
+    assert account.sensitivities.sobol["XZ.G"].used == 16
     assert account.sensitivities.sobol["XZ.G"].left_out == 0
     assert "The study is not finished: 83 of 160 runs are done." in account.warnings
 

@@ -1,48 +1,37 @@
-"""Everything that a worker needs for the runs of a study, as bytes: it may have no file system in common with us.
+"""Everything that a worker needs for the runs of a study, and what it makes of a task.
 
-A bundle is known by the SHA-256 of its content, and laid out once per worker process.
+A bundle is all of it as bytes, since a worker may have no file system in common with us. It is known by the SHA-256 of
+its content, and laid out once per worker process: a workplace, its scenario ready to be changed. A run leaves nothing
+behind but its outcome: no file, and a failure as words.
 """
 
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
+import re
 import sys
-from collections.abc import Iterable, Mapping
+import tempfile
+import time
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Any
 
-from feedsim.errors import InputError
+from feedsim import analysis, cosim, units
+from feedsim.errors import FeedsimError, InputError
+from feedsim.nc import Program, plan
+from feedsim.scenario import Base, Scenario, Study
+from feedsim.sweep.provenance import UNITS, read
+from feedsim.sweep.task import Outcome, Task
 
-if TYPE_CHECKING:
-    from feedsim.scenario import Base, Study
-    from feedsim.sweep.task import Outcome, Task
-
-_UNITS = ("plant", "controller", "friction")
+# Figures come in units for people; tables hold these instead, where the dimension is the same.
+_TABLE_UNITS = ("m", "s")
+# Of an axis, what its motion does not depend on.
+_NO_MOTION = {"M_0", "friction", "drive"}
 _NATIVE = {"win32": "exchange.dll", "darwin": "exchange.dylib"}.get(sys.platform, "exchange.so")
-
-
-class Place(Protocol):
-    """Where runs are made."""
-
-    def run(self, task: Task) -> Outcome:
-        """Make a run. Raises MemoryError alone; all else that goes wrong is told in the outcome."""
-
-    def close(self) -> None:
-        """Leave nothing behind."""
-
-
-class Work(Protocol):
-    """What an engine has to know of a bundle."""
-
-    @property
-    def digest(self) -> str:
-        """What it is known by."""
-
-    def open(self, within: Path | None = None) -> Place:
-        """Lay it out in a folder of its own in `within`, None: where the system keeps what is temporary."""
 
 
 @dataclass(frozen=True)
@@ -76,10 +65,8 @@ class Bundle:
     @classmethod
     def of_base(cls, base: Base, files: Iterable[Path], fmus: Path | None = None) -> Bundle:
         """The same for runs of a scenario, with the data files that they may read."""
-        from feedsim.cosim import fmus_directory
-
-        fmus = fmus or fmus_directory()
-        archives = {f"{unit}.fmu": fmus / f"{unit}.fmu" for unit in _UNITS}
+        fmus = fmus or cosim.fmus_directory()
+        archives = {f"{unit}.fmu": fmus / f"{unit}.fmu" for unit in UNITS}
         for file in archives.values():
             if not file.is_file():
                 raise InputError(
@@ -88,13 +75,14 @@ class Bundle:
         native = fmus / _NATIVE
         return cls(
             base=base.to_json(),
-            files={str(file): _content(file) for file in sorted(set(files))},
-            fmus={name: _content(file) for name, file in archives.items()},
-            native=(_content(native), this_platform()) if native.is_file() else None,
+            files={str(file): read(file) for file in sorted(set(files))},
+            fmus={name: read(file) for name, file in archives.items()},
+            native=(read(native), this_platform()) if native.is_file() else None,
         )
 
     @cached_property
     def digest(self) -> str:
+        """What it is known by."""
         found = hashlib.sha256()
         parts = [("base", self.base.encode()), *self.files.items(), *self.fmus.items()]
         if self.native is not None:
@@ -104,10 +92,8 @@ class Bundle:
             found.update(content)
         return found.hexdigest()
 
-    def open(self, within: Path | None = None) -> Place:
-        from feedsim.scenario import Base
-        from feedsim.sweep.work import Workplace
-
+    def open(self, within: Path | None = None) -> Workplace:
+        """Lay it out in a folder of its own in `within`, None: where the system keeps what is temporary."""
         fmus = dict(self.fmus)
         if self.native is not None and self.native[1] == this_platform():
             fmus[_NATIVE] = self.native[0]
@@ -119,8 +105,89 @@ def this_platform() -> str:
     return f"{sys.platform}-{platform.machine().lower()}"
 
 
-def _content(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+class Workplace:
+    """A bundle laid out in a folder of its own, until it is closed."""
+
+    def __init__(
+        self, base: Base, files: Mapping[str, bytes], fmus: Mapping[str, bytes], within: Path | None = None
+    ) -> None:
+        """Lay out.
+
+        Args:
+            files: data files of the scenario, by the names that `base` has for them.
+            fmus: archives and native cycle loop, by file name.
+            within: where the folder is made; None: where the system keeps what is temporary.
+        """
+        self._folder = tempfile.TemporaryDirectory(prefix="feedsim-", dir=within, ignore_cleanup_errors=True)
+        folder = Path(self._folder.name)
+        try:
+            moved = {}
+            for i, (name, content) in enumerate(files.items()):
+                # A folder for each, so that no two names collide, and the file's own name, which messages tell.
+                file = folder / "files" / f"{i}" / re.split(r"[/\\]", name)[-1]
+                file.parent.mkdir(parents=True)
+                file.write_bytes(content)
+                moved[name] = str(file)
+            self._fmus = folder / "fmus"
+            self._fmus.mkdir()
+            for name, content in fmus.items():
+                (self._fmus / name).write_bytes(content)
+            self._base = base.relocated(moved)
+        except BaseException:
+            self.close()
+            raise
+        self._planned: tuple[Any, Program] | None = None
+        # Messages name the user's files, and are the same in every process.
+        self._names = {str(file): name for name, file in moved.items()} | {f"{folder}{os.sep}": ""}
+        self._unpacked = re.compile(rf"{re.escape(str(Path(tempfile.gettempdir()) / 'feedsim-'))}\w+[/\\]?")
+
+    def run(self, task: Task) -> Outcome:
+        """Make a run. Whatever goes wrong is told in the outcome, but for MemoryError: the machine's fault."""
+        begun = time.perf_counter()
+        try:
+            figures, warnings = self._figures(task)
+        except MemoryError:
+            raise
+        except Exception as error:
+            said = str(error) if isinstance(error, FeedsimError) else f"{type(error).__name__}: {error}"
+            return Outcome(task.run, None, self._as_named(said), time.perf_counter() - begun)
+        return Outcome(task.run, figures, None, time.perf_counter() - begun, tuple(map(self._as_named, warnings)))
+
+    def _figures(self, task: Task) -> tuple[dict[str, tuple[float, str]], Sequence[str]]:
+        scenario = self._base.with_changes(task.changes)
+        program = self._program(scenario)
+        result = cosim.run(scenario, program=program, fmus=self._fmus)
+        found = {name: _si(figure) for name, figure in analysis.evaluate(result).items()}
+        return found, result.warnings
+
+    def _program(self, scenario: Scenario) -> Program:
+        """The motion; that of the last run serves again while nothing that it depends on is another."""
+        key = _motion_depends_on(scenario)
+        if self._planned is None or self._planned[0] != key:
+            self._planned = None
+            self._planned = key, plan(scenario)
+        return self._planned[1]
+
+    def _as_named(self, message: str) -> str:
+        for there, name in self._names.items():
+            message = message.replace(there, name)
+        return self._unpacked.sub("", message)
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+        self._folder.cleanup()
+
+
+def _si(figure: analysis.Figure) -> tuple[float, str]:
+    dimension = units.unit(figure.unit).dimension
+    unit = next((unit for unit in _TABLE_UNITS if units.unit(unit).dimension == dimension), figure.unit)
+    return units.convert(float(figure.value), figure.unit, unit), unit
+
+
+def _motion_depends_on(scenario: Scenario) -> Any:
+    machine = scenario.machine
+    axes = {
+        name: {field: getattr(axis, field) for field in type(axis).model_fields if field not in _NO_MOTION}
+        for name, axis in machine.axes.items()
+    }
+    return scenario.motions, [*machine.axes], axes, machine.pose, machine.cycles, machine.path

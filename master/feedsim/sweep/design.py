@@ -53,10 +53,19 @@ class Design:
         """Number of runs."""
         return len(self.values)
 
+    @property
+    def independent(self) -> NDArray[np.int64]:
+        """Runs that are independent: all, of samples for Sobol indices A and B.
+
+        The other samples repeat their values time and again, and would make clusters.
+        """
+        if self.matrices is None:
+            return np.arange(self.runs)
+        return np.concatenate([self.matrices.a, self.matrices.b])
+
     def changes(self, run: int) -> tuple[Change, ...]:
         """What a run sets in the study's scenario."""
-        row = self.values[run].tolist()
-        return changes_of(self.parameters, row)
+        return changes_of(self.parameters, self.values[run].tolist())
 
     def task(self, run: int) -> Task:
         """The run for a worker."""

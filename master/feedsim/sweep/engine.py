@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from feedsim.errors import InputError, SimulationError
-from feedsim.sweep import cluster, same
+from feedsim.sweep import cluster, provenance
 from feedsim.sweep.batches import AIM, LONGEST, Batch, Batches
-from feedsim.sweep.bundle import Place, Work
+from feedsim.sweep.bundle import Bundle, Workplace
 from feedsim.sweep.task import Outcome, Task
 
 LOST = 20.0  # s without the scheduler, after which a study is given up
@@ -57,7 +57,7 @@ class Engine(Protocol):
 
 @contextmanager
 def open_engine(
-    bundle: Work, workers: int | None = None, scheduler: str | None = None, say: Callable[[str], None] | None = None
+    bundle: Bundle, workers: int | None = None, scheduler: str | None = None, say: Callable[[str], None] | None = None
 ) -> Iterator[Engine]:
     """An engine for the runs of `bundle`; its workers end with the block.
 
@@ -100,9 +100,9 @@ class Here:
     where = "this process"
     warnings: tuple[str, ...] = ()
 
-    def __init__(self, bundle: Work) -> None:
+    def __init__(self, bundle: Bundle) -> None:
         self._bundle = bundle
-        self._place: Place | None = None
+        self._place: Workplace | None = None
 
     def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
         if self._place is None:  # kept, as workers keep theirs: what a first run finds out serves all
@@ -132,24 +132,24 @@ class _Sent:
 class Crowd:
     """Runs made by the workers of a Dask scheduler."""
 
-    def __init__(self, client: Any, bundle: Work, where: str, *, own: bool) -> None:
+    def __init__(self, client: Any, bundle: Bundle, where: str, *, own: bool) -> None:
         from feedsim.sweep import worker
 
         self._client = client
         self.own = own  # a cluster of our own goes as a whole; another's has to be tidied
         self.where = where
-        answers = client.run(eval, same.QUESTION, on_error="return")
-        faults = [found for address, answer in answers.items() if (found := same.fault(address, answer, same.told()))]
+        answers = client.run(eval, provenance.QUESTION, on_error="return")
+        faults = [found for address, answer in answers.items() if (found := provenance.fault(address, answer))]
         if faults:
             raise InputError.of("the workers cannot be used", faults)
         self.workers = len(answers)
         several = sum(threads > 1 for threads in client.nthreads().values())
         self.warnings = (
-            *same.differences(answers),
+            *provenance.differences(answers),
             *([f"{several} of {len(answers)} workers have several threads, which take turns: a run needs a process of "
                "its own; start workers with --nthreads 1"] if several else []),
         )  # fmt: skip
-        self._carrier = worker.Carrier(bundle, same.told())
+        self._carrier = worker.Carrier(bundle, provenance.versions())
         client.register_plugin(self._carrier)
         client.run(worker.prepare, self._carrier.key)
         self.refused: dict[str, str] = {}
@@ -297,10 +297,10 @@ class _Flight:
         """Find out which of the workers there are now cannot take part."""
         with suppress(Exception):  # the scheduler may be gone
             self._there = frozenset(self._client.nthreads())
-            asked = self._client.run(eval, same.QUESTION, workers=sorted(self._fit), on_error="return")
+            asked = self._client.run(eval, provenance.QUESTION, workers=sorted(self._fit), on_error="return")
             for address, answer in asked.items():
                 known = isinstance(answer, dict | ModuleNotFoundError)  # else the worker has gone meanwhile
-                if known and (fault := same.fault(address, answer, same.told())):
+                if known and (fault := provenance.fault(address, answer)):
                     self._crowd.refuse(address, fault)
 
     def _look(self) -> None:

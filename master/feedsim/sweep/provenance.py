@@ -1,4 +1,7 @@
-"""What the rows of a study come from: fingerprints of everything that decides them, versions, the machine."""
+"""What the rows of a study come from: fingerprints of everything that decides them, versions, the machine.
+
+Also whether the feedsim of a worker is the one that sent it the work: only then do its figures belong into one table.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -18,6 +22,8 @@ from feedsim.errors import InputError
 from feedsim.scenario import Study
 from feedsim.sweep.design import Design
 
+# What a worker is asked, in words that every Python knows, whatever is installed there.
+QUESTION = "__import__('feedsim.sweep.provenance', fromlist=['versions']).versions()"
 UNITS = ("plant", "controller", "friction")
 # Methods of which a study with more runs has those of a smaller one, with the same seed, as its first ones: points of a
 # Sobol sequence, and for indices what is made of them sample by sample.
@@ -30,13 +36,13 @@ def parts(study: Study, design: Design, fmus: Path) -> dict[str, str]:
 
     InputError: a file cannot be read.
     """
-    hashes = {str(file): _of_bytes(_read(file)) for file in study.files}
+    hashes = {str(file): _of_bytes(read(file)) for file in study.files}
     text = study.base.content(hashes)
     return {
         "version of feedsim": _version("feedsim"),
         "parameters and sampling": _of_bytes(_canonical(_plan(study, hashes)) + _values(study, design)),
         "scenario and machine": _of_bytes(text.encode()),
-        **{f"{unit}.fmu": _of_bytes(_read(fmus / f"{unit}.fmu")) for unit in UNITS},
+        **{f"{unit}.fmu": _of_bytes(read(fmus / f"{unit}.fmu")) for unit in UNITS},
     }
 
 
@@ -109,6 +115,56 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
+@cache
+def versions() -> dict[str, str]:
+    """Version of feedsim, hash of its Python sources, and what else figures may depend on in the last digit."""
+    return {
+        "feedsim": _version("feedsim"),
+        "sources": _sources(),
+        "Python": platform.python_version(),
+        "numpy": _version("numpy"),
+        "scipy": _version("scipy"),
+        "ruckig": _version("ruckig"),
+        "machine": f"{sys.platform} {platform.machine()}",
+    }
+
+
+def fault(address: str, answer: Any, here: Mapping[str, str] | None = None) -> str | None:
+    """What is wrong with the worker at `address` that answered so; None where nothing is. here: versions of the client,
+    by default of this process."""
+    here = here or versions()
+    if isinstance(answer, ModuleNotFoundError):
+        return f"worker {address}: has no feedsim {here['feedsim']} ({answer}); install the same version there"
+    if not isinstance(answer, Mapping):
+        return f"worker {address}: does not tell its version of feedsim: {answer}"
+    if answer["feedsim"] != here["feedsim"]:
+        return (
+            f"worker {address}: has feedsim {answer['feedsim']}, here is {here['feedsim']}; a study needs the same "
+            "everywhere"
+        )
+    if answer["sources"] != here["sources"]:
+        return (
+            f"worker {address}: its feedsim {here['feedsim']} has other sources than the one that the study was begun "
+            "with; install the same there and start the worker anew (or the files have changed meanwhile: begin anew)"
+        )
+    return None
+
+
+def differences(answers: Mapping[str, Mapping[str, str]]) -> list[str]:
+    """Sentences on workers with other versions of what feedsim calculates with: the last digits may differ."""
+    here = versions()
+    found: dict[str, list[str]] = {}
+    for address, answer in answers.items():
+        for name in ("Python", "numpy", "scipy", "ruckig", "machine"):
+            if answer.get(name) != here[name]:
+                found.setdefault(f"{name} {answer.get(name)} in place of {here[name]}", []).append(address)
+    return [
+        f"{', '.join(addresses[:3])}{f' and {len(addresses) - 3} more' if len(addresses) > 3 else ''}: {what}; figures "
+        "from there may differ in the last digits"
+        for what, addresses in found.items()
+    ]
+
+
 def _canonical(value: Any) -> bytes:
     return json.dumps(value, sort_keys=True, ensure_ascii=False, separators=(",", ":"), default=str).encode()
 
@@ -117,7 +173,8 @@ def _of_bytes(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _read(file: Path) -> bytes:
+def read(file: Path) -> bytes:
+    """Content of a file. InputError: it cannot be read."""
     try:
         return file.read_bytes()
     except FileNotFoundError:
@@ -131,3 +188,14 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "unknown" if name in sys.modules else "not installed"
+
+
+def _sources() -> str:
+    """SHA-256 over the package's Python files, wherever they lie and however their lines end."""
+    root = Path(__file__).resolve().parents[1]
+    found = hashlib.sha256()
+    for file in sorted(root.rglob("*.py")):
+        content = file.read_bytes().replace(b"\r\n", b"\n")
+        found.update(f"{file.relative_to(root).as_posix()} {len(content)}\n".encode())
+        found.update(content)
+    return found.hexdigest()

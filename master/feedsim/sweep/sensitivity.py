@@ -42,9 +42,23 @@ CONSTANT = 1e-12
 _BLOCK = 4_000_000  # numbers of a block of resampling weights, 32 MB
 
 
-@dataclass(frozen=True, eq=False)
-class Indices:
-    """Sobol indices of one figure.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Measures:
+    """What moves one figure: measures of its d parameters, and what they are from.
+
+    Attributes:
+        used: base points or rows with a value; left_out: those without, because a run has no value.
+        reason: why there are no measures; empty where there are.
+    """
+
+    used: int
+    left_out: int
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Indices(Measures):
+    """Sobol indices of one figure, from base points.
 
     Attributes:
         first, total: (d,) [1]; NaN where there are none.
@@ -52,45 +66,34 @@ class Indices:
             base points (percentiles). They suppose random points: those of a Sobol sequence are more even, which makes
             intervals of additive figures too wide, but which points of A meet which of B is not random, which makes
             those of others too narrow; BCa and studentised intervals hold no more often (docs/sweeps.md).
-        points: base points that were used.
-        left_out: base points that were not, because one of their runs has no value.
-        reason: why there are no indices; empty where there are.
     """
 
     first: Array
     total: Array
     first_interval: Array
     total_interval: Array
-    points: int
-    left_out: int
-    reason: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Trends:
-    """Cheap measures of one figure from any sample: how it rises with each parameter.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Trends(Measures):
+    """Cheap measures of one figure from the rows of any sample: how it rises with each parameter.
 
     Attributes:
         rank_correlation: (d,) Spearman's, -1 to 1: how well "larger here, larger there" holds; 0 also where a figure
             has its minimum in the middle. NaN for words and for a parameter that is the same in all rows.
         regression: (d,) coefficients of the linear regression on all numeric parameters, in standard deviations of the
             figure per standard deviation of the parameter.
-        explained: share of the scatter that this regression explains [1], R^2: below some 0.7 it says little.
         share: (d,) share of the scatter that lies between the groups of rows with the same value; NaN for a parameter
             that hardly any two rows share. On a whole grid, the first-order Sobol index of evenly weighted values.
+        explained: share of the scatter that this regression explains [1], R^2: below some 0.7 it says little.
         noise: magnitude that a rank correlation reaches by chance in one case of twenty.
-        rows, left_out: rows with a value, and without.
-        reason: why there are no measures; empty where there are.
     """
 
     rank_correlation: Array
     regression: Array
-    explained: float
     share: Array
-    noise: float
-    rows: int
-    left_out: int
-    reason: str = ""
+    explained: float = np.nan
+    noise: float = np.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +118,7 @@ def sensitivities(table: Table, design: Design, seed: int = 0) -> Sensitivities:
     row = np.full(design.runs, -1)  # of the table, -1 for a run that is not there
     row[np.asarray(table["run"], dtype=np.int64)] = np.arange(len(table))
     matrices = design.matrices
-    drawn = np.arange(design.runs) if matrices is None else np.concatenate([matrices.a, matrices.b])
-    drawn = row[drawn][row[drawn] >= 0]
+    drawn = row[design.independent][row[design.independent] >= 0]
     entries = design.values[np.asarray(table["run"], dtype=np.int64)][drawn].T
     columns = [None if parameter.worded else entry for parameter, entry in zip(design.parameters, entries, strict=True)]
     groups = [np.unique(entry, return_inverse=True)[1].astype(np.int64) for entry in entries]
@@ -139,11 +141,11 @@ def _warnings(sobol: Mapping[str, Indices], parameters: Sequence[str]) -> tuple[
         if each.reason:
             told.setdefault(f"no Sobol indices: {each.reason}", []).append(name)
         elif each.left_out:
-            points = each.points + each.left_out
+            points = each.used + each.left_out
             what = f"Sobol indices without {each.left_out} of {points} base points, of which a run has no value"
             told.setdefault(what, []).append(name)
-        if not each.reason and each.points < USEFUL_POINTS:
-            what = f"Sobol indices from {each.points} base points: they and their intervals can be far off"
+        if not each.reason and each.used < USEFUL_POINTS:
+            what = f"Sobol indices from {each.used} base points: they and their intervals can be far off"
             told.setdefault(f"{what}; at least {USEFUL_POINTS} make a ranking", []).append(name)
         if impossible := [parameters[k] for k in beyond(each)]:
             what = f"Sobol indices of {', '.join(impossible)} lie beyond what is possible by more than their intervals"
@@ -179,7 +181,7 @@ def sobol_indices(f_A: Array, f_B: Array, f_AB: Array, *, seed: int = 0) -> Indi
         total=total[0],
         first_interval=np.asarray(np.nanpercentile(firsts, ends, axis=0).T),
         total_interval=np.asarray(np.nanpercentile(totals, ends, axis=0).T),
-        points=points,
+        used=points,
         left_out=left_out,
     )
 
@@ -205,7 +207,7 @@ def trends(columns: list[Array | None], groups: list[NDArray[np.int64]], values:
     left_out = len(values) - rows
     if rows < 3 or is_constant(y):
         reason = "fewer than three runs have a value" if rows < 3 else "the figure is the same in all runs"
-        return Trends(nan, nan.copy(), np.nan, nan.copy(), np.nan, rows, left_out, reason)
+        return Trends(rank_correlation=nan, regression=nan, share=nan, used=rows, left_out=left_out, reason=reason)
     inside = [None if column is None else np.asarray(column[known], dtype=np.float64) for column in columns]
     varied = [k for k, column in enumerate(inside) if column is not None and not is_constant(column)]
     ranked = nan.copy()
@@ -217,7 +219,10 @@ def trends(columns: list[Array | None], groups: list[NDArray[np.int64]], values:
     coefficients = nan.copy()
     coefficients[varied] = regression
     shares = np.array([_share_between(group[known], y) for group in groups])
-    return Trends(ranked, coefficients, explained, shares, 1.96 / np.sqrt(rows - 1), rows, left_out)
+    return Trends(
+        rank_correlation=ranked, regression=coefficients, share=shares, explained=explained,
+        noise=1.96 / np.sqrt(rows - 1), used=rows, left_out=left_out,
+    )  # fmt: skip
 
 
 def is_constant(values: Array) -> bool:
@@ -235,9 +240,10 @@ def _why_no_indices(points: int, left_out: int) -> str:
 
 
 def _no_indices(d: int, points: int, left_out: int, reason: str) -> Indices:
-    nan = np.full(d, np.nan)
-    none = np.full((d, 2), np.nan)
-    return Indices(nan, nan.copy(), none, none.copy(), points, left_out, reason)
+    nan, none = np.full(d, np.nan), np.full((d, 2), np.nan)
+    return Indices(
+        first=nan, total=nan, first_interval=none, total_interval=none, used=points, left_out=left_out, reason=reason
+    )
 
 
 def _estimates(means: Array) -> tuple[Array, Array]:

@@ -21,8 +21,7 @@ from feedsim.sweep.bundle import Bundle
 from feedsim.sweep.design import design
 from feedsim.sweep.engine import Engine, open_engine
 from feedsim.sweep.journal import Journal
-from feedsim.sweep.table import Table, chosen, table_of
-from feedsim.sweep.table_files import RECORD, STEM, Format, parquet, write_table
+from feedsim.sweep.table import RECORD, STEM, Format, Table, chosen, parquet, table_of, write_table
 from feedsim.sweep.task import Task
 from feedsim.trace.files import written_whole
 

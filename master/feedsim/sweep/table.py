@@ -1,23 +1,37 @@
-"""The table of a study: a row for every run, with the values of its parameters and its figures."""
+"""The table of a study: a row for every run, with the values of its parameters and its figures.
+
+As a file: CSV for everything, or Parquet (with pyarrow), which has units and provenance in its metadata.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import csv
+import io
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError
+from feedsim.errors import InputError, OutputError
 from feedsim.fields import did_you_mean
 from feedsim.scenario import Parameter
 from feedsim.sweep.design import Design
 from feedsim.sweep.task import Outcome
 from feedsim.trace import matches
+from feedsim.trace.files import written_whole
 
 OK, FAILED = "ok", "failed"
 FIRST, LAST = ("run",), ("status", "message", "warnings", "seconds")
+Format = Literal["csv", "parquet"]
+STEM = "table"
+RECORD = "study.json"
+_KEY = b"feedsim"  # of the metadata
+_HEADER = re.compile(r"(.*?)(?: \[([^\[\]]*)\])?")
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,3 +154,156 @@ def _parameter_column(parameter: Parameter, values: NDArray[np.float64]) -> NDAr
 def _in_one_line(texts: Sequence[str]) -> str:
     """Texts as a cell that is one line."""
     return " | ".join(" ".join(text.split()) for text in texts)
+
+
+def write_table(table: Table, path: str | Path) -> None:
+    """Write a table, whole or not at all: .csv or .parquet.
+
+    The same rows give the same bytes, the column of seconds aside. OutputError: it cannot be written; InputError: no
+    such format, or pyarrow is missing.
+    """
+    path = Path(path)
+    if path.suffix == ".parquet":
+        _write_parquet(table, path)
+    elif path.suffix == ".csv":
+        with written_whole(path) as file:
+            text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+            csv.writer(text, lineterminator="\n").writerows(_rows(table))
+            text.detach()
+    else:
+        raise InputError(f"{path}: a table is written as .csv or .parquet")
+
+
+def read_table(path: str | Path) -> Table:
+    """Read a table from its file, or from the folder of a study.
+
+    What the study was comes from the file's metadata (Parquet) or the study.json beside it; without that, the columns
+    between `run` and `status` all count as figures. InputError: no table, or one that cannot be read.
+    """
+    path = Path(path)
+    if path.is_dir():
+        found = [path / f"{STEM}.{kind}" for kind in ("parquet", "csv") if (path / f"{STEM}.{kind}").is_file()]
+        if not found:
+            raise InputError(f"{path}: no {STEM}.csv and no {STEM}.parquet in this folder")
+        path = max(found, key=lambda file: file.stat().st_mtime_ns)
+    if not path.is_file():
+        raise InputError(f"no such file: {path}")
+    return _read_parquet(path) if path.suffix == ".parquet" else _read_csv(path)
+
+
+def parquet() -> Any:
+    """pyarrow. InputError where it is not installed."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise InputError('Parquet needs pyarrow: pip install "feedsim[parquet]"; or choose --format csv') from None
+    return pyarrow
+
+
+def _rows(table: Table) -> Iterator[list[str]]:
+    yield [table.label(name) for name in table.columns]
+    # A row at a time: of many columns as text only one is held.
+    for row in zip(*table.columns.values(), strict=True):
+        yield [_cell(value) for value in row]
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, np.integer):
+        return str(int(value))
+    number = float(value)
+    return "" if np.isnan(number) else repr(number)
+
+
+def _read_csv(path: Path) -> Table:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path} cannot be read: {error}") from None
+    if not rows or "run" not in rows[0] or "status" not in rows[0]:
+        raise InputError(f"{path}:1: not the table of a study: it has no columns run and status")
+    heads = [_head(text) for text in rows[0]]
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(heads):
+            raise InputError(f"{path}:{number}: {len(row)} cells, {len(heads)} columns")
+    columns: dict[str, NDArray[Any]] = {}
+    for i, (name, unit) in enumerate(heads):
+        cells = [row[i] for row in rows[1:]]
+        try:
+            if name == "run":
+                columns[name] = np.array([int(cell) for cell in cells], dtype=np.int64)
+            elif unit:
+                columns[name] = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
+            else:
+                columns[name] = np.array(cells, dtype=object)
+        except ValueError as error:
+            raise InputError(f"{path}: column {name!r}: {error}") from None
+    return _read_table(columns, dict(heads), _record(path.parent / RECORD))
+
+
+def _head(text: str) -> tuple[str, str]:
+    match = _HEADER.fullmatch(text)
+    return (match[1], match[2] or "") if match else (text, "")
+
+
+def _read_table(columns: dict[str, NDArray[Any]], units: dict[str, str], record: Mapping[str, Any]) -> Table:
+    between = [name for name in columns if name not in FIRST + LAST]
+    listed = record.get("parameters")
+    parameters = [entry["name"] for entry in listed] if isinstance(listed, list) else []
+    known = tuple(name for name in between if name in parameters)
+    sampling = record.get("sampling")
+    runs = sampling.get("runs") if isinstance(sampling, dict) else None
+    figures = tuple(name for name in between if name not in known)
+    return Table(columns, units, known, figures, runs or len(columns["run"]), record)
+
+
+def _record(path: Path) -> Mapping[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _write_parquet(table: Table, path: Path) -> None:
+    arrow = parquet()
+    fields, arrays = [], []
+    for name, values in table.columns.items():
+        kind = arrow.string() if values.dtype == object else arrow.int64() if name == "run" else arrow.float64()
+        fields.append(arrow.field(name, kind, metadata={"unit": table.unit(name)}))
+        # NaN means that there is no value, which Parquet says as null.
+        arrays.append(arrow.array(values, kind, from_pandas=True))
+    content = json.dumps(dict(table.provenance), ensure_ascii=False, sort_keys=True)
+    whole = arrow.Table.from_arrays(arrays, schema=arrow.schema(fields, metadata={_KEY: content}))
+    try:
+        with written_whole(path) as file:
+            arrow.parquet.write_table(whole, file)
+    except arrow.ArrowException as error:
+        raise OutputError(f"{path} cannot be written: {error}") from None
+
+
+def _read_parquet(path: Path) -> Table:
+    arrow = parquet()
+    try:
+        whole = arrow.parquet.read_table(path)
+    except (OSError, arrow.ArrowException) as error:
+        raise InputError(f"{path} cannot be read: {error}") from None
+    if not {"run", "status"} <= set(whole.column_names):
+        raise InputError(f"{path}: not the table of a study: it has no columns run and status")
+    columns: dict[str, NDArray[Any]] = {}
+    units: dict[str, str] = {}
+    for column in whole.schema:
+        values = whole.column(column.name)
+        if arrow.types.is_string(column.type):
+            columns[column.name] = np.array(values.to_pylist(), dtype=object)
+        else:
+            columns[column.name] = np.asarray(values.to_numpy(), dtype=np.int64 if column.name == "run" else np.float64)
+        units[column.name] = (column.metadata or {}).get(b"unit", b"").decode()
+    try:
+        record = json.loads((whole.schema.metadata or {}).get(_KEY, b"{}"))
+    except ValueError:
+        record = {}
+    return _read_table(columns, units, record)

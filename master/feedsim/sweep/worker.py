@@ -13,8 +13,8 @@ from typing import Any
 from distributed import WorkerPlugin, get_worker
 
 from feedsim.cosim.unpacked import STORE
-from feedsim.sweep import same
-from feedsim.sweep.bundle import Place, Work
+from feedsim.sweep import provenance
+from feedsim.sweep.bundle import Bundle, Workplace
 from feedsim.sweep.task import Outcome, Task
 
 
@@ -43,7 +43,7 @@ class Carrier(WorkerPlugin):
         key: what its batches ask for.
     """
 
-    def __init__(self, content: Work, asked: dict[str, str]) -> None:
+    def __init__(self, content: Bundle, asked: dict[str, str]) -> None:
         self.content = content
         self.asked = asked  # versions where the study is run from
         self.key = f"{content.digest}-{uuid.uuid4().hex}"
@@ -61,7 +61,7 @@ class Carrier(WorkerPlugin):
 
 
 _carried: dict[str, Carrier] = {}  # by their keys
-_places: dict[str, Place] = {}  # by the digest of the work, for all carriers of it
+_places: dict[str, Workplace] = {}  # by the digest of the work, for all carriers of it
 # FMPy changes the working folder of the process, and libraries need not bear threads: one run at a time.
 _lock = threading.Lock()
 
@@ -94,7 +94,8 @@ def work_batch(key: str, tasks: tuple[Task, ...], seconds: float) -> Done:
         if carrier is None:
             address = str(get_worker().address)
             return Done((), refused=f"worker {address}: has not got what the study needs", worker=address)
-        if carrier.asked != same.told() and (fault := same.fault(carrier.address, same.told(), carrier.asked)):
+        own = provenance.versions()
+        if carrier.asked != own and (fault := provenance.fault(carrier.address, own, carrier.asked)):
             return Done((), refused=fault, worker=carrier.address)
         place, begun = _place(carrier), time.perf_counter()
         for task in tasks:
@@ -107,7 +108,7 @@ def work_batch(key: str, tasks: tuple[Task, ...], seconds: float) -> Done:
     return Done(tuple(outcomes))
 
 
-def _place(carrier: Carrier) -> Place:
+def _place(carrier: Carrier) -> Workplace:
     digest = carrier.content.digest
     if digest not in _places:
         _places[digest] = carrier.content.open(carrier.folder)

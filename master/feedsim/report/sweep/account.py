@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from feedsim.report.formatting import Scale, number, scale
 from feedsim.report.style import Array
-from feedsim.report.sweep.failures import Failure, failures, kinds
+from feedsim.sweep.failures import Failure, Where, failures, kinds, levels
 from feedsim.sweep.sensitivity import Sensitivities, sensitivities
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from feedsim.sweep.table import Table
 
 QUANTILES = (5, 50, 95)
-FEW_LEVELS = 12  # distinct values up to which a parameter is drawn level by level
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -55,9 +54,7 @@ class Input(Column):
     @cached_property
     def levels(self) -> Array:
         """Its distinct values where they are few and come back, else none."""
-        found = np.unique(self.values)
-        few = len(found) <= FEW_LEVELS and 2 * len(found) <= len(self.values)
-        return found if self.words or few else found[:0]
+        return levels(self.values, worded=bool(self.words))
 
     @property
     def logarithmic(self) -> bool:
@@ -120,14 +117,8 @@ class Account:
 
     @cached_property
     def drawn(self) -> NDArray[np.int64]:
-        """Rows of runs that are independent: all, of samples for Sobol indices A and B.
-
-        The other samples repeat their values time and again, and would make clusters.
-        """
-        matrices = self.design.matrices
-        if matrices is None:
-            return np.arange(len(self.runs))
-        return np.flatnonzero(np.isin(self.runs, np.concatenate([matrices.a, matrices.b])))
+        """Rows of runs that are independent."""
+        return np.flatnonzero(np.isin(self.runs, self.design.independent))
 
     @cached_property
     def inputs(self) -> tuple[Input, ...]:
@@ -218,7 +209,21 @@ class Account:
     @cached_property
     def failures(self) -> tuple[Failure, ...]:
         """Failed runs by message, the most frequent first."""
-        return failures(self)
+        return failures(self.table, self.design)
+
+    def where(self, failure: Failure) -> str:
+        """Where runs that failed alike lie; empty where no parameter tells."""
+        return "; ".join(map(self._place, failure.where))
+
+    def _place(self, where: Where) -> str:
+        each = self.inputs[where.parameter]
+        shown = (", " if where.by_level else " to ").join(each.text(each.scale.factor * v) for v in where.values)
+        text = f"{each.name} {shown} {each.scale.shown_unit}".rstrip()
+        text += f" ({where.failed} of {where.there} runs there)"
+        if where.medians is not None:
+            failed, done = (number(each.scale.factor * value) for value in where.medians)
+            text += f", median {failed}, where runs are done {done}"
+        return text
 
 
 def quantile_interval(ordered: Array, share: float) -> tuple[float, float]:

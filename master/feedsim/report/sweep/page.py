@@ -140,7 +140,7 @@ def _failures(account: Account) -> str:
         more = f" and {len(each.runs) - MOST_RUNS} more" if len(each.runs) > MOST_RUNS else ""
         rows.append(
             f'<tr><td class="number">{len(each.runs)}</td><td class="meaning">{escape(each.message)}</td>'
-            f"<td>{escape(each.where)}</td><td>{numbers}{more}</td></tr>"
+            f"<td>{escape(account.where(each))}</td><td>{numbers}{more}</td></tr>"
         )
     left = len(account.failures) - MOST_FAILURES
     heads = [("Runs", True), ("Message (of the first)", False), ("Where", False), ("Numbers", False)]

@@ -59,7 +59,7 @@ def _sobol(names: tuple[str, ...], found: Indices, trend: Trends) -> str:
     rows.append(f"<tr><td>all</td>{''.join(map(_cell, sums))}</tr>")
     heads = [("Parameter", False), ("First order", True), ("95 %", True), ("Total", True), ("95 %", True)]
     heads += [("Rank correlation", True), ("Regression", True)]
-    points = f"{found.points} base points" + (f", {found.left_out} left out" if found.left_out else "")
+    points = f"{found.used} base points" + (f", {found.left_out} left out" if found.left_out else "")
     return table(heads, rows) + f'<p class="muted">{points}. Of the samples A and B: {_fit(trend)}</p>'
 
 
@@ -85,7 +85,7 @@ def _fit(found: Trends) -> str:
         if math.isfinite(found.explained)
         else "no regression"
     )
-    return f"{found.rows} runs; {explained}; rank correlations up to ±{number(found.noise, 2)} can be chance."
+    return f"{found.used} runs; {explained}; rank correlations up to ±{number(found.noise, 2)} can be chance."
 
 
 def _size(found: Trends, k: int) -> float:

@@ -56,7 +56,7 @@ def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
         "sobol_indices": {name: _indices(found.parameters, each) for name, each in found.sobol.items()},
         "trends": {name: _trends(found.parameters, each) for name, each in found.trends.items()},
         "failures": [
-            {"message": each.message, "count": len(each.runs), "runs": list(each.runs), "where": each.where}
+            {"message": each.message, "count": len(each.runs), "runs": list(each.runs), "where": account.where(each)}
             for each in account.failures
         ],
         "inputs": inputs_part(study_files(account)),
@@ -74,7 +74,7 @@ def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
 def _indices(names: Sequence[str], found: Indices) -> dict[str, Any]:
     return {
         "reason": found.reason,
-        "points": found.points,
+        "points": found.used,
         "left_out": found.left_out,
         "confidence": CONFIDENCE,
         "parameters": {
@@ -92,7 +92,7 @@ def _indices(names: Sequence[str], found: Indices) -> dict[str, Any]:
 def _trends(names: Sequence[str], found: Trends) -> dict[str, Any]:
     return {
         "reason": found.reason,
-        "runs": found.rows,
+        "runs": found.used,
         "left_out": found.left_out,
         "explained": _finite(found.explained),
         "noise": _finite(found.noise),

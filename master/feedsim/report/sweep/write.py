@@ -14,7 +14,7 @@ from feedsim.report.sweep.account import Account
 from feedsim.report.sweep.page import page
 from feedsim.report.sweep.plots import pictures_of
 from feedsim.report.sweep.summary import summary
-from feedsim.sweep.table_files import RECORD
+from feedsim.sweep.table import RECORD
 
 if TYPE_CHECKING:
     from feedsim.scenario import Study

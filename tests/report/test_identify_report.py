@@ -17,12 +17,18 @@ from feedsim.errors import OutputError
 from feedsim.identify.friction_file import open_loop_line
 from feedsim.identify.result import Balance, Correlation, Identification
 from feedsim.report.identify import check_writable, headline, rigid_line, table_lines, terminal_warnings, write
-from feedsim.report.identify.correlation_plot import correlation_picture
-from feedsim.report.identify.loop_plots import _length, describe, loops_picture, residuals_picture
-from feedsim.report.identify.open_loop_plot import open_loop_picture
-from feedsim.report.identify.page import page
+from feedsim.report.identify.plots import (
+    _length,
+    correlation_picture,
+    describe,
+    loops_picture,
+    open_loop_picture,
+    residuals_picture,
+)
 from feedsim.report.identify.quantities import at_slide, curve_error
+from feedsim.report.identify.report import report_of
 from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_picture
+from feedsim.report.page import html
 from feedsim.report.provenance import friction_origins
 from feedsim.scenario import load_machine
 from feedsim.scenario.friction_file import read_friction
@@ -85,7 +91,7 @@ def test_the_simple_model_stands_beside(written: Path) -> None:
     assert rigid_line(identified()).startswith("rigid axis with simple friction: J 0.01640 kg.m^2, F_C 1.9000 N.m")
     without = identified(found=identification(rigid={}))
     assert rigid_line(without) == ""
-    assert "Rigid axis" not in page(without, [])
+    assert "Rigid axis" not in html(report_of(without, []))
 
 
 def test_a_run_tells_where_its_friction_is_from(written: Path) -> None:
@@ -129,7 +135,7 @@ def test_page(written: Path) -> None:
 
 def open_loop_text(found: Identification) -> str:
     """The section of the page, without its tags."""
-    text = page(identified(found=found), [])
+    text = html(report_of(identified(found=found), []))
     start = text.index('id="position-in-open-loop"')
     return re.sub(r"<[^>]+>", " ", text[start : text.index("<h2", start)])
 
@@ -191,7 +197,7 @@ def test_open_loop_is_not_spoken_of_where_it_is_none(tmp_path: Path) -> None:
     assert "open_loop" not in read_friction(tmp_path / "friction.yaml").identified
     assert not (tmp_path / "open_loop.csv").exists()
     assert open_loop_line(identification()) == ""
-    assert "open-loop" not in page(identified(), [])
+    assert "open-loop" not in html(report_of(identified(), []))
 
 
 def test_doubts_of_a_stage_1_that_was_not_used(tmp_path: Path) -> None:
@@ -206,7 +212,7 @@ def test_doubts_of_a_stage_1_that_was_not_used(tmp_path: Path) -> None:
     assert told(tmp_path)["curve"]["used"] is False
     assert "F_log sits at its bound 0" not in told(tmp_path)["warnings"]
     assert headline(apart).startswith("curve of stage 1 alone within")
-    assert 'id="stage-1"' not in page(identified(found=identification(stationary=doubtful)), [])
+    assert 'id="stage-1"' not in html(report_of(identified(found=identification(stationary=doubtful)), []))
 
 
 def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
@@ -373,7 +379,7 @@ class TestFigures:
 
 def test_text_of_others_is_escaped() -> None:
     whole = identified(sources=(provenance("<b>.csv", note="a < b"),))
-    text = page(whole, [])
+    text = html(report_of(whole, []))
     assert "<b>.csv" not in text
     assert "&lt;b&gt;.csv" in text
     assert "a &lt; b" in text

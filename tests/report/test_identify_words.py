@@ -13,13 +13,14 @@ import pytest
 
 from feedsim.identify import Options
 from feedsim.identify.result import Estimate, Identification, Stationary
+from feedsim.report.content import Report, Tile
 from feedsim.report.formatting import counted, powers
-from feedsim.report.frame import STYLE, Tile, frame
 from feedsim.report.identify import headline, stribeck_plots
-from feedsim.report.identify.page import page
 from feedsim.report.identify.quantities import speeds_of
+from feedsim.report.identify.report import report_of
 from feedsim.report.identify.stribeck_plots import stribeck_picture, stribeck_title
 from feedsim.report.identify.summary import summary
+from feedsim.report.page import html
 from identification_helpers import I_P, TRUE, J, curve, identification, identified, records
 from report_helpers import Page
 
@@ -39,7 +40,7 @@ def stage_of(found: Identification) -> Stationary:
 
 
 def tiles(found: Identification) -> str:
-    text = page(identified(found=found), [])
+    text = html(report_of(identified(found=found), []))
     return " ".join(Page(text[text.index('<div class="keys">') : text.index("</header>")]).words)
 
 
@@ -133,7 +134,9 @@ def test_small_values_in_tiles_and_table() -> None:
     found = identification()
     small = replace(found.estimates["sigma_2"], value=1.47e-5, sigma=2e-7)
     light = replace(found.estimates["J"], value=1.5057e-5)
-    text = page(identified(found=replace(found, estimates={**found.estimates, "sigma_2": small, "J": light})), [])
+    text = html(
+        report_of(identified(found=replace(found, estimates={**found.estimates, "sigma_2": small, "J": light})), [])
+    )
     assert "<b>1.470×10⁻⁵ <small>N·m·s/rad</small></b>" in text
     assert "<b>1.5057×10⁻⁵ <small>kg·m²</small></b>" in text
     assert '<td class="number">1.431×10⁻⁵ to 1.509×10⁻⁵</td>' in text
@@ -142,14 +145,14 @@ def test_small_values_in_tiles_and_table() -> None:
 
 def test_tiles_hold_what_is_in_them() -> None:
     """Nothing that may not be broken, and units in small print."""
-    (rule,) = re.findall(r"\n\.key \{[^}]*\}", STYLE)
-    assert "overflow-wrap: anywhere" in rule
-    (number,) = re.findall(r"\n\.key b \{[^}]*\}", STYLE)
-    assert "nowrap" not in number
     shown = [
         Tile(text, "", "") for text in ("8.19 → 0.80 µm", "±0.5 %", "0.35", "no curve", "not determined", "5 m < 6")
     ]
-    text = frame("", "", warnings=[], notes=[], tiles=shown, main=[], footer="")
+    text = html(Report("", "", [], "", tiles=shown))
+    (rule,) = re.findall(r"\n\.key \{[^}]*\}", text)
+    assert "overflow-wrap: anywhere" in rule
+    (number,) = re.findall(r"\n\.key b \{[^}]*\}", text)
+    assert "nowrap" not in number
     assert re.findall(r"<b[^>]*>(.*?)</b>", text) == [
         "8.19 → 0.80 <small>µm</small>", "±0.5 <small>%</small>", "0.35", "no curve", "not determined", "5 m &lt; 6",
     ]  # fmt: skip

@@ -15,10 +15,11 @@ from scipy import stats
 
 from feedsim.report import sweep as report
 from feedsim.report.formatting import scale
+from feedsim.report.page import html
 from feedsim.report.sweep.account import Account, quantile_interval
 from feedsim.report.sweep.figure_plots import running_median
-from feedsim.report.sweep.page import page
 from feedsim.report.sweep.plots import pictures_of
+from feedsim.report.sweep.report import report_of
 from feedsim.report.sweep.summary import summary
 from feedsim.scenario import Study, load_study
 from feedsim.sweep.design import Design, design
@@ -77,9 +78,9 @@ def glitch(plan: Design) -> Any:
     return 4e-6 * plan.values[:, 0]
 
 
-def html(table: Table, study: Study, plan: Design) -> str:
+def page(table: Table, study: Study, plan: Design) -> str:
     account = Account(table, study, plan)
-    return page(account, *pictures_of(account))
+    return html(report_of(account, *pictures_of(account)))
 
 
 def cells(text: str, first: str) -> list[str]:
@@ -92,7 +93,7 @@ def cells(text: str, first: str) -> list[str]:
 def test_statistics_in_units_for_people(tmp_path: Path) -> None:
     study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 101}", SAMPLED)
     values = 1e-6 * np.linspace(2, 12, 101)
-    text = html(table_of(study, plan, {"XZ.G": ("m", values)}), study, plan)
+    text = page(table_of(study, plan, {"XZ.G": ("m", values)}), study, plan)
     # mean 7, std of even spacing 10/100 sqrt(101 102/12), quantiles at 5, 50 and 95 of 100 steps
     found = cells(text, "XZ.G")
     assert [*found[:4], *found[7:]] == ["XZ.G", "µm", "7.00", "2.93", "2", "12", "101"]
@@ -136,7 +137,7 @@ def test_failed_runs_are_grouped_and_located(tmp_path: Path) -> None:
     low, high = 60e3 * plan.values[fast, 1].min(), 60e3 * plan.values[fast, 1].max()
     assert account.where(first) == f"feed {low:.4g} to {high:.4g} mm/min (6 of 6 runs there)"
     assert account.where(second) == ""  # one run is no place
-    text = html(table, study, plan)
+    text = page(table, study, plan)
     assert "axis &lt;Z&gt; reaches" in text
     assert "<Z>" not in text
     assert "7 of 60 runs failed and have no figures; statistics are of the others." in text
@@ -161,7 +162,7 @@ def test_warnings_of_runs_are_told_once(tmp_path: Path) -> None:
 def test_too_many_failures_for_indices_leave_rank_correlations(tmp_path: Path) -> None:
     study, plan = study_of(tmp_path, "{method: sensitivity, runs: 32}", SAMPLED)
     failed = {5 * k: "no" for k in range(10)}
-    text = html(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}, failed=failed), study, plan)
+    text = page(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}, failed=failed), study, plan)
     assert "XZ.G: no Sobol indices: 10 of 32 base points have a run without a value" in text
     assert "rank correlation" in text
 
@@ -183,7 +184,7 @@ def test_constant_figures_are_told_but_not_drawn(tmp_path: Path) -> None:
     whole, single = pictures_of(account)
     assert [each.stem for each in single] == ["distribution-XZ-G", "scatter-XZ-G"]
     assert "XZ.still: no Sobol indices: the figure is the same in all runs." in account.warnings
-    assert cells(page(account, whole, single), "XZ.still")[2:4] == ["3", "0"]
+    assert cells(html(report_of(account, whole, single)), "XZ.still")[2:4] == ["3", "0"]
 
 
 ONE_RADIUS = GRID.replace("values: [5 mm, 10 mm, 20 mm]", "values: [15 mm]")
@@ -212,7 +213,7 @@ def test_names_with_signs_of_other_languages(tmp_path: Path) -> None:
     assert len({each.stem for each in [*whole, *single]}) == len(whole) + len(single)
     for picture in [*whole, *single]:
         ElementTree.fromstring(picture.svg.replace("xlink:href", "href"))  # well-formed
-    text = page(account, whole, single)
+    text = html(report_of(account, whole, single))
     assert "<i>" not in text
     assert "&lt;b&gt;A&lt;/b&gt; &amp; $x$" in text
 
@@ -221,9 +222,9 @@ def test_ten_thousand_rows_stay_small_and_the_same(tmp_path: Path) -> None:
     study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 10000}", SAMPLED)
     noise = 1e-7 * np.random.default_rng(0).standard_normal(10000)
     table = table_of(study, plan, {"XZ.G": ("m", glitch(plan) + noise)})
-    text = html(table, study, plan)
+    text = page(table, study, plan)
     assert len(text) < 1_000_000  # a scatter plot of vectors would have some 10 MB
-    assert text == html(table, study, plan)
+    assert text == page(table, study, plan)
 
 
 def test_running_median() -> None:
@@ -258,7 +259,7 @@ def test_the_laws_numbers_and_the_nominal_value_are_told(tmp_path: Path) -> None
     study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 50}", parameters)
     table = table_of(study, plan, {"XZ.G": ("m", glitch(plan))})
     account = Account(table, study, plan, {"nominal": {"XZ.G": 9.6e-6}})
-    text = page(account, *pictures_of(account))
+    text = html(report_of(account, *pictures_of(account)))
     listed = text[text.index('id="parameters"') :]
     assert [cells(listed, name)[2] for name in ("a", "b", "c", "scheme")] == [
         "factor, normal, mean 1, deviation 0.05, from 0.8",
@@ -287,7 +288,7 @@ def test_intervals_of_quantiles_hold(share: float) -> None:
 
 def test_a_study_for_indices_shows_the_cheap_measures_too(tmp_path: Path) -> None:
     study, plan = study_of(tmp_path, "{method: sensitivity, runs: 64}", SAMPLED)
-    text = html(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}), study, plan)
+    text = page(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}), study, plan)
     row = cells(text[text.index("What moves the figures") :], "F_C")
     assert row[-2:] == ["1.00", "1.00"]  # rank correlation and regression of a figure that is F_C
     assert "the regression explains 100 % of the scatter (R²)" in text

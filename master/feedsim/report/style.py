@@ -211,11 +211,6 @@ def thinned(x: Array, *ys: Array) -> tuple[Array, ...]:
     return (x[rows], *(y[rows] for y in ys))
 
 
-def css_variables(dark: bool) -> str:
-    """The palette as CSS declarations."""
-    return " ".join(f"--{name}: {on_dark if dark else on_light};" for name, on_light, on_dark in PALETTE)
-
-
 def _inline(svg: str, stem: str, title: str) -> str:
     """SVG for use inside a page: no prologue, ids of its own, the palette as variables, scaled to its container."""
     svg = svg[svg.index("<svg") :].rstrip()

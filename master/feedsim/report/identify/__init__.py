@@ -1,9 +1,9 @@
 """The report of an identification of friction: friction.yaml, tables as CSV, summary.json, report.html and figures.
 
-It uses the report's core and what `feedsim.identify` found. Begin with `write`.
+It uses the report's core and what `feedsim.identify` found. Begin with `report`.
 """
 
+from feedsim.report.identify.report import check_writable, write
 from feedsim.report.identify.summary import headline, rigid_line, table_lines, terminal_lines, terminal_warnings
-from feedsim.report.identify.write import check_writable, write
 
 __all__ = ["check_writable", "headline", "rigid_line", "table_lines", "terminal_lines", "terminal_warnings", "write"]

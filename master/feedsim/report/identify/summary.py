@@ -21,9 +21,8 @@ from feedsim.identify.friction_file import (
     remark_text,
     value_text,
 )
-from feedsim.identify.result import Estimate, Identification
+from feedsim.identify.result import Balance, Estimate, Identification
 from feedsim.report.formatting import counted
-from feedsim.report.identify.open_loop import open_loop_part
 from feedsim.report.identify.quantities import (
     MM_PER_MIN,
     at_slide,
@@ -56,7 +55,7 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
         "correlation": {"names": list(found.correlation.names), "matrix": _matrix(found.correlation.matrix)},
         "curve": _curve(found),
         "pre_sliding": _pre_sliding(found),
-        "open_loop": open_loop_part(found),
+        "open_loop": _open_loop(found),
         "settings": dict(identified.settings),
         "machine": machine_part(identified.subject.machine) if identified.subject is not None else None,
         "traces": [
@@ -174,6 +173,17 @@ def residuals_csv(found: Identification) -> str:
     return "\n".join(lines) + "\n"
 
 
+def open_loop_csv(balance: Balance) -> str:
+    """Recorded angle from the start on, and its error in open loop before and after, record after record."""
+    lines = ["record,time [s],angle [rad],error before [rad],error after [rad]"]
+    for drift in balance.drifts:
+        columns: Sequence[Any] = (drift.time, drift.angle, drift.before, drift.after)
+        texts = [shortest(np.asarray(values)) for values in columns]
+        head = quoted(drift.record)
+        lines += [f"{head},{','.join(row)}" for row in zip(*texts, strict=True)]
+    return "\n".join(lines) + "\n"
+
+
 def _estimate(estimate: Estimate, I_P: float) -> dict[str, Any]:
     slide = at_slide(estimate.name, I_P)
     low, high = estimate.interval
@@ -233,6 +243,31 @@ def _pre_sliding(found: Identification) -> dict[str, Any] | None:
         ],
         "sigma_were_the_delay_known": {name: _finite(sigma) for name, sigma in stage.without_delay.items()},
     }
+
+
+def _open_loop(found: Identification) -> dict[str, Any] | None:
+    """For summary.json; None where the step was not asked for."""
+    balance = found.balance
+    if balance is None:
+        return None
+    return {
+        "applied": balance.applied,
+        "applies": balance.applies,
+        "reason": balance.reason,
+        "records": list(balance.records),
+        "position": {
+            **_pair(balance.position, "rad"),
+            "meaning": "rms of recorded less reached angle, with the values before and with those found",
+            "at_slide": _pair((balance.position[0] * found.I_P, balance.position[1] * found.I_P), "m"),
+        },
+        "torque": {**_pair(balance.torque, "N.m"), "meaning": "rms of the torque residual"},
+        "changes": {name: _pair(pair, "N.m") for name, pair in balance.changes.items()},
+    }
+
+
+def _pair(pair: tuple[float, float], unit: str) -> dict[str, Any]:
+    before, after = (float(value) if math.isfinite(value) else None for value in pair)
+    return {"before": before, "after": after, "unit": unit}
 
 
 def _matrix(matrix: Any) -> list[list[float | None]]:

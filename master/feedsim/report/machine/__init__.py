@@ -1,8 +1,8 @@
 """A machine's structure: its figures, pictures of it and of its modes, the page that holds them.
 
-It uses the report's core and what `feedsim.structure` found. Begin with `write`.
+It uses the report's core and what `feedsim.structure` found. Begin with `report`.
 """
 
-from feedsim.report.machine.write import check_writable, write
+from feedsim.report.machine.report import check_writable, write
 
 __all__ = ["check_writable", "write"]

@@ -110,7 +110,7 @@ def _lines(info: MachineInfo, most: int | None) -> Iterator[str]:
                 str(k),
                 f"{info.modes.frequency[k]:.3f}" if info.modes.frequency[k] else "0",
                 f"{100 * info.modes.damping[k]:.3g}",
-                _moves(info, k),
+                moves(info, k),
             )
             for k in range(shown)
         ],
@@ -137,7 +137,8 @@ def exchange(info: MachineInfo) -> Iterator[str]:
             )
 
 
-def _moves(info: MachineInfo, k: int) -> str:
+def moves(info: MachineInfo, k: int) -> str:
+    """What moves in mode k, with the shares of the kinetic energy."""
     pseudo = info.solution is not None and k >= len(info.modes.frequency) - info.solution.corrections
     return f"(static correction) {info.moving[k]}" if pseudo else info.moving[k]
 

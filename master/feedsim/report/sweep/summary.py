@@ -8,14 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.report.provenance import software
+from feedsim.report.provenance import InputFile, hashed, software
 from feedsim.report.style import Array
 from feedsim.report.summary import inputs_part
 from feedsim.report.sweep.account import Account
-from feedsim.report.sweep.provenance import study_files
 from feedsim.sweep.sensitivity import CONFIDENCE, Indices, Trends
 
 FORMAT = 1
+
+
+def study_files(account: Account) -> list[InputFile]:
+    """Study file, scenario and machine files, data files."""
+    study, scenario = account.study, account.study.base.scenario
+    named = [("study", study.file)]
+    named += [(place or "scenario", path) for place, path in scenario.files]
+    named += [("data", path) for path in study.files]
+    return hashed(named)
 
 
 def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:

@@ -1,0 +1,257 @@
+"""The report of an identification: friction.yaml, CSV files, summary.json, report.html and figures, whole or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+from feedsim.identify import Identified
+from feedsim.identify.friction_file import (
+    FRICTION,
+    change_text,
+    constant_load_hint,
+    friction_yaml,
+    interval_text,
+    relative_text,
+    remark_text,
+    value_text,
+)
+from feedsim.identify.result import NORMAL_95, Estimate, Identification
+from feedsim.report.content import Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code
+from feedsim.report.formatting import counted, minus, powers, typeset
+from feedsim.report.identify.plots import describe, pictures_of
+from feedsim.report.identify.quantities import (
+    at_slide,
+    curve_error,
+    input_files,
+    is_curve,
+    remark,
+    shown_unit,
+    speeds_of,
+    unit_text,
+)
+from feedsim.report.identify.summary import open_loop_csv, plateaus_csv, residuals_csv, summary
+from feedsim.report.provenance import software
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.sections import provenance_section
+from feedsim.report.style import Picture, remarked
+
+PLATEAUS, RESIDUALS, OPEN_LOOP = "plateaus.csv", "residuals.csv", "open_loop.csv"
+REMARK_WIDTH, REMARK_LINES = 100, 3  # fits the narrowest figure
+LEADING = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "sigma_0", "sigma_1", "W", "gamma", "M_0", "J", "delay")
+HEADS = ("Parameter", "Meaning", "Value", "Unit", "95 % interval", "±", "At the slide", "Unit", "Remark")
+METHOD = (
+    "Stage 1 fits the stationary friction to mean torques at constant speed; stage 2 drives the friction model with "
+    "the recorded motion and fits its torque. Equations and sources: docs/identification.md."
+)
+OPEN_LOOP_METHOD = (
+    "Driven by the recorded torque, a rigid axis with this friction drifts away from the recorded position: what is "
+    "wrong all through the record shows there, and is lost in the residual of the torque. Constant load M_0 and "
+    "Coulomb friction F_C are therefore taken from the position in open loop, F_S moves with F_C."
+)
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs)
+
+
+def write(identified: Identified, directory: Path | str) -> tuple[Path, ...]:
+    """Write friction.yaml, plateaus.csv, residuals.csv and open_loop.csv (where there are any), summary.json,
+    report.html, figures.
+
+    Returns the paths. Files of an earlier run are replaced. Raises OutputError.
+    """
+    found = identified.found
+    files: dict[str, Content] = {FRICTION: friction_yaml(identified, software())}
+    if found.stationary is not None:
+        files[PLATEAUS] = plateaus_csv(found)
+    if found.dynamic is not None:
+        files[RESIDUALS] = residuals_csv(found)
+    if found.balance is not None and found.balance.drifts:
+        files[OPEN_LOOP] = open_loop_csv(found.balance)
+    with remarked(remark(identified), REMARK_WIDTH, REMARK_LINES):
+        pictures = pictures_of(identified)
+    return write_report(directory, report_of(identified, pictures), partial(summary, identified), files)
+
+
+def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
+    """Content of the report."""
+    found = identified.found
+    machine = f"{identified.subject.machine.name} · " if identified.subject is not None else ""
+    drifts = found.balance is not None and found.balance.drifts
+    tables = ", ".join([PLATEAUS, RESIDUALS, *([OPEN_LOOP] if drifts else [])])
+    return Report(
+        f"Friction of axis {found.axis}",
+        f"{machine}identified from {', '.join(identified.traces)} · {identified.date}",
+        warnings=identified.warnings,
+        notes=identified.notes,
+        tiles=list(_tiles(identified)),
+        main=[
+            _use(found),
+            Section("What further moves would tell", [_bullets(found.advice)]) if found.advice else None,
+            *pictures,
+            _parameters(found),
+            _stage_1(found),
+            _open_loop(found),
+            _rigid(found),
+            _stretches(found),
+        ],
+        provenance=_provenance(identified),
+        footer=f"{METHOD} Values in full precision: summary.json; the parameters as files take them: {FRICTION}; "
+        f"what the figures show: {tables}.",
+    )
+
+
+def _tiles(identified: Identified) -> Iterator[Tile]:
+    found = identified.found
+    if (stage := found.stationary) is not None:
+        alone = "" if found.prior else ", stage 1 alone"
+        if is_curve(stage):
+            text = f"±{100 * curve_error(stage):.2g} %"
+            meaning = f"largest half width of the 95 % band of the Stribeck curve{alone}"
+            yield Tile(text, f"error of the curve (95 %){alone}", meaning)
+        else:
+            count = counted(speeds_of(stage), "speed")
+            yield Tile("no curve", f"{count}, three make a curve", "distinct speeds of the plateaus")
+        meaning = "largest relative deviation of a plateau's friction from the curve"
+        yield Tile(f"{100 * stage.worst_curve:.2g} %", f"worst plateau{alone}", meaning)
+    for name in LEADING:
+        estimate = found.estimates.get(name)
+        if estimate is None or estimate.status not in ("estimated", "given"):
+            continue
+        factor, unit = shown_unit(estimate)
+        label = f"{name}, {estimate.meaning}" + (f" (±{relative_text(estimate)})" if relative_text(estimate) else "")
+        value = f"{minus(powers(value_text(estimate, factor)))} {unit_text(unit)}".strip()
+        yield Tile(value, typeset(label), typeset(estimate.meaning))
+    if found.dynamic is not None:
+        meaning = "friction torque measured less that of the model, over all stretches"
+        yield Tile(f"{found.dynamic.rms:.3g} N·m", "residual of stage 2, rms", meaning)
+
+
+def _use(found: Identification) -> Section:
+    command = f"feedsim run SCENARIO.yaml --set machine.axes.{found.axis}.friction={FRICTION}"
+    hint = constant_load_hint(found)
+    load = Paragraph(f"The {typeset(hint)}.") if hint else None
+    return Section("Use", [Paragraph((code(command), " (with the file's path)")), load])
+
+
+def _bullets(texts: Sequence[str]) -> Bullets:
+    return Bullets([typeset(text) for text in texts])
+
+
+def _parameters(found: Identification) -> Section:
+    note = (
+        "Values count on the motor's side; at the slide with the lead I_P = pitch/(2π), "
+        f"{found.I_P * 1e3:.5g} mm/rad: forces F/I_P, stiffness σ₀/I_P², mass J/I_P². Intervals come from "
+        "the model linearised at the optimum; they know scatter, not a wrong model."
+    )
+    rows = [_row(estimate, found.I_P) for estimate in found.estimates.values()]
+    return Section("Parameters", [Table("llrlrrrll", HEADS, rows, note)], "parameters")
+
+
+def _stage_1(found: Identification) -> Section | None:
+    """What stage 1 says of itself where the values do not rest on it; else that is among the warnings."""
+    stage = found.stationary
+    if stage is None or found.prior:
+        return None
+    parts: list[Part] = [
+        Paragraph(
+            "Both stages are of the same records, which must not count twice: the values above are those of stage 2 "
+            "alone, the curve of stage 1 stands beside them."
+        )
+    ]
+    if stage.warnings:
+        parts += [Paragraph("Its own doubts, which are none about the values above:"), _bullets(stage.warnings)]
+    return Section("Stage 1", parts, "stage-1")
+
+
+def _open_loop(found: Identification) -> Section | None:
+    """Applied or refused and why; position, torque and parameters before and after."""
+    balance = found.balance
+    if balance is None:
+        return None
+    verdict = "Applied: the values above hold it." if balance.applied else f"Not applied: {balance.reason}."
+    parts: list[Part] = [Paragraph(typeset(verdict))]
+    if balance.drifts:
+        per_slide = (("rad", 1e3 * found.I_P, "mm"), ("N·m", 1 / found.I_P, "N"))
+        rows = [
+            _change("Error of the position, rms", balance.position, *per_slide[0]),
+            _change("Residual of the torque, rms", balance.torque, *per_slide[1]),
+            *(_change(code(name), pair, *per_slide[1]) for name, pair in balance.changes.items()),
+        ]
+        last = "After" if balance.applied else "Tried"
+        heads = ("", "Before", last, "Unit", "At the slide before", last.lower(), "Unit", "Change")
+        parts.append(Table("lrrlrrlr", heads, rows))
+    parts.append(Paragraph(OPEN_LOOP_METHOD, "muted"))
+    return Section("Position in open loop", parts, "position-in-open-loop")
+
+
+def _change(name: Text, pair: tuple[float, float], unit: str, factor: float, unit_there: str) -> tuple[Text, ...]:
+    """A row: before and after on the motor's side and at the slide, and the change, in percent unless it is M_0."""
+    change = f"{pair[1] - pair[0]:+.3g} N·m" if name == code("M_0") else change_text(*pair)
+    here = (minus(f"{value:.4g}") for value in pair)
+    there = (minus(f"{factor * value:.4g}") for value in pair)
+    return name, *here, unit, *there, unit_there, minus(change)
+
+
+def _rigid(found: Identification) -> Section | None:
+    rows = [_row(estimate, found.I_P) for estimate in found.rigid.values()]
+    note = (
+        "M = J dn/dt + σ₂ n + F_C sgn n + M_0, linear least squares over all parts of the records in which the axis "
+        "moves: a check of inertia, torque constant and signs. No friction model but the sign of the speed: its F_C "
+        "and σ₂ are other quantities than those above."
+    )
+    return Section("Rigid axis with simple friction", [Table("llrlrrrll", HEADS, rows, note)]) if rows else None
+
+
+def _row(estimate: Estimate, I_P: float) -> tuple[Text, ...]:
+    factor, unit = shown_unit(estimate)
+    slide = at_slide(estimate.name, I_P)
+    there = (minus(powers(value_text(estimate, slide[0]))), unit_text(slide[1])) if slide else ("", "")
+    return (
+        code(estimate.name), typeset(estimate.meaning), minus(powers(value_text(estimate, factor))), unit_text(unit),
+        minus(powers(interval_text(estimate, factor))), relative_text(estimate), *there,
+        typeset(remark_text(estimate)),
+    )  # fmt: skip
+
+
+def _stretches(found: Identification) -> Section | None:
+    stage = found.dynamic
+    if stage is None or not stage.stretches:
+        return None
+    rows = [
+        (each.record, describe(each, found.I_P), f"{each.time[0]:.3f}", f"{each.time[-1]:.3f}", f"{each.rms:.3g}",
+         f"{each.weight:.3g}")
+        for each in stage.stretches
+    ]  # fmt: skip
+    heads = ("Record", "Move", "Begin [s]", "End [s]", "Residual rms [N·m]", "Scatter reckoned with [N·m]")
+    known = ""
+    if stage.without_delay:
+        parts = [
+            f"{name} ±{100 * NORMAL_95 * sigma / abs(stage.estimates[name].value):.2g} %"
+            for name, sigma in stage.without_delay.items()
+            if name in stage.estimates and stage.estimates[name].value
+        ]
+        known = f"Were the delay known, the intervals would be {', '.join(parts)}."
+    return Section("Stretches of stage 2", [Table("llrrrr", heads, rows, known)])
+
+
+def _provenance(identified: Identified) -> Section:
+    rows = []
+    for name, source in zip(identified.traces, identified.sources, strict=True):
+        columns = ", ".join(f"{role} from {column}" for role, column in source.columns.items())
+        given = [f"pitch {source.pitch * 1e3:.9g} mm"] if source.pitch is not None else []
+        given += [f"torque constant {source.torque_constant:.9g} N·m/A"] if source.torque_constant is not None else []
+        rows.append((name, "; ".join([columns, *given])))
+    if identified.subject is not None:
+        subject = identified.subject
+        rows.append((subject.kind.capitalize(), f"{subject.name} ({subject.file.name})"))
+        rows.append(("Set on the command line", ", ".join(subject.overrides) or "nothing"))
+    rows += [(f"--{name}", value) for name, value in identified.settings.items()]
+    rows.append(("Duration", ", ".join(f"{step} {taken:.3g} s" for step, taken in identified.found.seconds.items())))
+    return provenance_section(rows, input_files(identified))

@@ -1,0 +1,132 @@
+"""The report on a machine's structure: pictures (PNG, SVG, GIF), summary.json and report.html, whole or not at all."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from feedsim.report.content import Animation, Paragraph, Report, Section, Table, Text, Tile
+from feedsim.report.formatting import display_unit, number, typeset
+from feedsim.report.machine.animation import mode_gif
+from feedsim.report.machine.model import model
+from feedsim.report.machine.pictures import mode_picture, mode_title, sheet_picture, structure_picture
+from feedsim.report.machine.record import MEANINGS, USUAL_EXCHANGE, exchange, moves, record
+from feedsim.report.provenance import hashed
+from feedsim.report.results import FIGURES, REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.sections import provenance_section
+from feedsim.report.style import PALETTE, PAPER, Picture
+from feedsim.scenario import Structure
+from feedsim.structure.info import MachineInfo
+
+
+def check_writable(directory: Path | str) -> None:
+    """Raise OutputError unless the pictures can be written to ``directory``; leaves nothing behind."""
+    check_place(directory, (REPORT, SUMMARY))
+
+
+def write(
+    structure: Structure,
+    info: MachineInfo,
+    files: Sequence[tuple[str, Path]],
+    directory: Path | str,
+    *,
+    modes: Sequence[int] = (),
+    scale: float = 1.0,
+    animate: bool = False,
+) -> tuple[Path, ...]:
+    """Write the structure's picture, and those of `modes`, or without any a sheet of the first ones.
+
+    Each as figures/*.png and *.svg, animated ones as *.gif; report.html, summary.json. Returns the paths.
+
+    Raises:
+        InputError: the model has no geometry.
+        OutputError: it cannot be written.
+    """
+    built = info.built
+    assert built is not None
+    of = model(structure, built.assembly)
+    pictures = [structure_picture(info, of)]
+    if modes:
+        pictures += [mode_picture(info, built, of, k, scale) for k in modes]
+    elif (sheet := sheet_picture(info, built, of, scale)) is not None:
+        pictures.append(sheet)
+    gifs = {k: mode_gif(info, built, of, k, scale) for k in modes if animate}
+    drawings: dict[str, Content] = {f"{FIGURES}/{picture.stem}.svg": standalone(picture) for picture in pictures}
+    drawings |= {f"{FIGURES}/mode_{k}.gif": gif for k, gif in gifs.items()}
+
+    def summary(names: Sequence[str]) -> dict[str, Any]:
+        return record(info, files) | {"files": list(names)}
+
+    caption = "One period, slowed down and exaggerated."
+    moving = [Animation(mode_title(info, k), caption, gif) for k, gif in gifs.items()]
+    return write_report(directory, report_of(info, files, [*pictures, *moving]), summary, drawings)
+
+
+def standalone(picture: Picture) -> str:
+    """The picture's SVG as a file of its own: colours as numbers, a size, a light ground."""
+    svg = picture.svg
+    for name, colour, _ in PALETTE:
+        svg = svg.replace(f"var(--{name})", colour)
+    if match := re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg):
+        svg = svg.replace("<svg", f'<svg width="{match[1]}pt" height="{match[2]}pt"', 1)
+    end = svg.index(">") + 1
+    ground = f'<rect width="100%" height="100%" fill="{PAPER}"/>'
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{svg[:end]}{ground}{svg[end:]}\n'
+
+
+def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Sequence[Picture | Animation]) -> Report:
+    """Content of the report."""
+    solution = info.solution
+    assert solution is not None
+    cutoff = f"{solution.cutoff / (2 * math.pi):g} Hz"
+    rows = [
+        ("Eigenproblem", f"{solution.method}; {solution.verification}"),
+        ("Dropped", f"{solution.dropped} modes above {cutoff}"),
+        ("Static correction", f"{solution.corrections} pseudo-modes" if solution.corrections else "none"),
+    ]
+    return Report(
+        f"Structure: {info.name}",
+        f"{info.title} · {solution.shapes.shape[0]} degrees of freedom · modes up to {cutoff}",
+        warnings=info.warnings,
+        notes=[info.note],
+        tiles=list(_tiles(info)),
+        main=[*pictures, _axes(info), _modes(info)],
+        provenance=provenance_section(rows, hashed(list(files))),
+        footer="Values in full precision: summary.json. Pictures: figures/.",
+    )
+
+
+def _tiles(info: MachineInfo) -> Iterator[Tile]:
+    if math.isfinite(info.total_mass):
+        yield Tile(f"{info.total_mass:.0f} kg", "total mass", "Mass of everything")
+    elastic = info.modes.frequency[info.modes.frequency > 0]
+    if len(elastic):
+        yield Tile(f"{elastic[0]:.2f} Hz", "lowest elastic mode", "Frequency of the first mode that is not rigid")
+    for axis in info.axes:
+        if math.isfinite(axis.moving_mass):
+            yield Tile(f"{axis.moving_mass:.0f} kg", f"{axis.name}: moving mass", MEANINGS["moving_mass"][1])
+
+
+def _axes(info: MachineInfo) -> Section | None:
+    rows: list[tuple[Text, ...]] = []
+    for key, (unit, meaning) in MEANINGS.items():
+        values = [getattr(axis, key) for axis in info.axes]
+        if any(math.isfinite(value) for value in values):
+            rows.append((typeset(meaning), display_unit(unit), *(number(value, 5) for value in values)))
+    note = (
+        f"h = {info.step * 1e6:.6g} µs. The default exchange of plant and friction is stable up to "
+        f"{100 * USUAL_EXCHANGE.stable_share:.0f} % of 2 J_inf/h."
+    )
+    heads = ("Figure", "Unit", *(axis.name for axis in info.axes))
+    parts = [Paragraph(typeset(line), "muted") for line in exchange(info)]
+    return Section("Axes", [Table("ll" + "r" * len(info.axes), heads, rows, note), *parts]) if info.axes else None
+
+
+def _modes(info: MachineInfo) -> Section:
+    pairs = zip(info.modes.frequency.tolist(), info.modes.damping.tolist(), strict=True)
+    rows = [(str(k), f"{f:.3f}", f"{100 * d:.3g}", moves(info, k)) for k, (f, d) in enumerate(pairs)]
+    heads = ("Mode", "Frequency [Hz]", "Damping [%]", "What moves")
+    return Section("Modes", [Table("rrrl", heads, rows, "Shares of the kinetic energy.")])

@@ -1,0 +1,321 @@
+"""The report on a study of many runs: summary.json, report.html and figures beside its table, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from feedsim.report.content import Paragraph, Part, Report, Section, Table, Text, Tile, code
+from feedsim.report.formatting import counted, minus, number
+from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.sections import parameters_section, provenance_section
+from feedsim.report.style import Array, Picture, remarked
+from feedsim.report.sweep.account import QUANTILES, Account, Input
+from feedsim.report.sweep.plots import drawn, pictures_of, varying
+from feedsim.report.sweep.summary import study_files, summary
+from feedsim.sweep.sensitivity import Indices, Trends
+from feedsim.sweep.table import RECORD
+
+if TYPE_CHECKING:
+    from feedsim import sweep
+    from feedsim.scenario import Study
+
+REMARK_WIDTH, REMARK_LINES = 95, 2  # fits the narrowest figure
+METHODS = {
+    "grid": "grid: every combination",
+    "latin_hypercube": "Latin hypercube",
+    "sobol": "Sobol sequence",
+    "sensitivity": "samples for Sobol indices",
+}
+MOST_FAILURES = 50  # kinds
+MOST_RUNS = 12  # numbers of a kind
+SOBOL_NOTE = (
+    "First order: the share of the scatter that would be gone if the parameter were known. Total: the share that would "
+    "stay if everything but it were known; a parameter with a total near 0 may be held where it is. Total above first "
+    "order: it acts together with others. 95 % intervals by bootstrap over the base points, rough ones: docs/sweeps.md "
+    "says how often they hold."
+)
+TREND_NOTE = (
+    "Rank correlation: −1 to 1, how well “larger here, larger there” holds. Regression: standard deviations of the "
+    "figure per standard deviation of the parameter; true as far as the share it explains (R²) is near 1."
+)
+SHARE_NOTE = (
+    "Share: the part of the scatter between the parameter's values, where values repeat. None of them sees what only "
+    "joint changes do, nor a minimum in the middle; Sobol indices (method: sensitivity) do."
+)
+FAILURES_NOTE = (
+    "Messages that differ in numbers only are one. Where: parameters whose values tell these runs from those that are "
+    "done by more than chance (5 %, corrected for the number of tests), with the range that the runs lie in and how "
+    "many of all runs there failed so; empty where no parameter does, or too few runs are done."
+)
+# What the record of a study holds of how it was made, and in words.
+RECORDED = {
+    "command": "Command", "workers": "Made by", "began": "Began", "ended": "Ended", "machine": "Computer",
+    "versions": "Software of the runs", "fingerprint": "Fingerprint",
+}  # fmt: skip
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the report can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(directory, (REPORT, SUMMARY), inputs)
+
+
+def write(table: sweep.Table, study: Study, design: sweep.Design, directory: Path | str) -> tuple[Path, ...]:
+    """Write report.html, summary.json and figures/*.png beside the table; returns their paths.
+
+    The table may be that of an unfinished study. The table's own files are left as they are. Raises OutputError.
+    """
+    account = Account(table, study, design, _record(Path(directory)))
+    machine = study.base.scenario.machine
+    with remarked(f"{study.name}. {machine.name}. {machine.note}".strip(), REMARK_WIDTH, REMARK_LINES):
+        whole, single = pictures_of(account)
+    return write_report(directory, report_of(account, whole, single), partial(summary, account), {})
+
+
+def _record(directory: Path) -> dict[str, Any]:
+    """study.json beside the table, as far as it can be read: without it the page tells less."""
+    try:
+        content = json.loads((directory / RECORD).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) -> Report:
+    """Content of the report: pictures of the whole study, and those of single figures."""
+    study, scenario = account.study, account.study.base.scenario
+    method = METHODS.get(study.sampling.method, study.sampling.method)
+    return Report(
+        study.name,
+        f"{scenario.name} · {scenario.machine.name} · {counted(len(study.parameters), 'parameter')} · {method}",
+        warnings=account.warnings,
+        notes=(scenario.machine.note, scenario.note, study.note),
+        tiles=list(_tiles(account)),
+        main=[
+            _statistics(account),
+            *whole,
+            Section("Figure by figure", [_not_drawn(account), *single]) if single else _not_drawn(account),
+            _sensitivities(account),
+            _failures(account),
+            _parameters(account),
+        ],
+        provenance=_provenance(account),
+        footer="Every run is a row of the table beside this page; values here in full precision: summary.json. Figures "
+        "are defined in docs/figures.md, sampling and sensitivities in docs/sweeps.md, which come with the software.",
+    )
+
+
+def _tiles(account: Account) -> Iterator[Tile]:
+    rows, asked = len(account.table), account.design.runs
+    yield Tile(str(rows), "runs" if rows == asked else f"of {asked} runs", "rows of the table")
+    yield Tile(str(account.failed), "failed", "runs that have no figures; their messages stand below")
+    if (wall := account.wall_time) is not None:
+        yield Tile(f"{wall:.4g} s", "time", "from the beginning to the end of all runs")
+        yield Tile(f"{rows / wall:.3g} 1/s", "runs per second", "rows over time")
+    if rows:
+        yield Tile(f"{1e3 * account.busy / rows:.3g} ms", "per run", "mean time of a run on its worker")
+    if (processes := account.processes) is not None:
+        yield Tile(str(processes), "process" if processes == 1 else "processes", "that made the runs")
+    if (efficiency := account.efficiency) is not None:
+        yield Tile(f"{100 * efficiency:.0f} %", "efficiency", "share of the workers' time that went into runs")
+
+
+def _not_drawn(account: Account) -> Paragraph | None:
+    left_out = len(varying(account)) - len(drawn(account))
+    count = f"{counted(left_out, 'figure')} more in the tables and in summary.json, not drawn; "
+    return Paragraph((count, code("figures:"), " in the study file chooses."), "muted") if left_out > 0 else None
+
+
+def _statistics(account: Account) -> Section | None:
+    grid = account.study.sampling.method == "grid"
+    nominal = any(math.isfinite(each.nominal) for each in account.outputs)
+    rows: list[tuple[Text, ...]] = []
+    for each in account.outputs:
+        statistics = each.statistics
+        cells = [number(each.nominal, 3)] if nominal else []
+        mean, std = statistics["mean"], statistics["std"]
+        cells += [number(mean) if grid else rounded(mean, std / math.sqrt(max(len(each.known), 1)))]
+        cells.append(number(std, 4 if grid else 3))
+        for share in QUANTILES:
+            value, ends = statistics[f"q{share}"], each.quantile_intervals[f"q{share}"]
+            cells.append(number(value) if grid else with_interval(value, ends))
+        cells += [number(statistics["min"]), number(statistics["max"]), str(len(each.known))]
+        rows.append((code(each.name), each.scale.shown_unit, *cells))
+    heads = ("Figure", "Unit", *(("Nominal",) if nominal else ()),
+             "Mean", "Std", "5 %", "50 %", "95 %", "Min", "Max", "Runs")  # fmt: skip
+    told = {
+        "grid": "On a grid the numbers describe the grid, no probability.",
+        "sensitivity": "Here and in the pictures these are the runs of the samples A and B, which are independent; the "
+        "others serve the Sobol indices.",
+    }.get(account.study.sampling.method, "They are worth what the distributions of the parameters are worth.")
+    if not grid:
+        told += (
+            " In brackets the 95 % interval of a quantile, between two of the sorted values; none where the runs are "
+            "too few."
+        )
+    told += " Nominal: the scenario without changes." if nominal else ""
+    table = Table("ll" + "r" * (len(heads) - 2), heads, rows, f"Over the runs that have the figure. {told}")
+    return Section("Figures of all runs", [table], "figures") if rows else None
+
+
+def with_interval(value: float, ends: tuple[float, float]) -> str:
+    """A value with its interval, both with the digits that the interval leaves."""
+    low, high = ends
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return number(value, 3)
+    width = max(value - low, high - value)
+    return " ".join([rounded(value, width), f"({rounded(low, width)} to {rounded(high, width)})"])
+
+
+def rounded(value: float, doubt: float) -> str:
+    """A number to the second digit of its doubt."""
+    if not (math.isfinite(value) and math.isfinite(doubt) and doubt > 0):
+        return number(value)
+    return minus(f"{value:.{max(0, 1 - math.floor(math.log10(doubt)))}f}")
+
+
+def _sensitivities(account: Account) -> Section | None:
+    """A table per drawn figure of what moves it; None where there is nothing."""
+    found = account.sensitivities
+    parts: list[Part] = []
+    for output in drawn(account):
+        sobol, trend = found.sobol.get(output.name), found.trends[output.name]
+        if sobol is not None and not sobol.reason:
+            body: list[Part] = [_sobol(found.parameters, sobol, trend)]
+        else:  # the cheap measures need no whole base points
+            body = [Paragraph(f"No Sobol indices: {sobol.reason}.")] if sobol is not None else []
+            body.append(_trends(found.parameters, trend))
+        parts.append(Section(output.name, body))
+    note = f"{SOBOL_NOTE} {TREND_NOTE}" if found.sobol else f"{TREND_NOTE} {SHARE_NOTE}"
+    return Section("What moves the figures", [Paragraph(note, "muted"), *parts], "sensitivities") if parts else None
+
+
+def _sobol(names: tuple[str, ...], found: Indices, trend: Trends) -> Table:
+    order = sorted(range(len(names)), key=lambda k: (-found.total[k], k))
+    rows = [
+        (names[k], _two(found.first[k]), _span(found.first_interval[k]), _two(found.total[k]),
+         _span(found.total_interval[k]), _two(trend.rank_correlation[k]), _two(trend.regression[k]))
+        for k in order
+    ]  # fmt: skip
+    rows.append(("all", _two(found.first.sum()), "", _two(found.total.sum()), "", "", ""))
+    heads = ("Parameter", "First order", "95 %", "Total", "95 %", "Rank correlation", "Regression")
+    points = f"{found.used} base points" + (f", {found.left_out} left out" if found.left_out else "")
+    return Table("lrrrrrr", heads, rows, f"{points}. Of the samples A and B: {_fit(trend)}")
+
+
+def _trends(names: tuple[str, ...], found: Trends) -> Part:
+    if found.reason:
+        return Paragraph(f"No measures: {found.reason}.")
+    order = sorted(range(len(names)), key=lambda k: (-_size(found, k), k))
+    columns = (found.rank_correlation, found.regression, found.share)
+    rows = [(names[k], *(_two(column[k]) for column in columns)) for k in order]
+    return Table("lrrr", ("Parameter", "Rank correlation", "Regression", "Share"), rows, _fit(found))
+
+
+def _fit(found: Trends) -> str:
+    """What the cheap measures are worth."""
+    if found.reason:
+        return f"no rank correlations: {found.reason}."
+    explained = (
+        f"the regression explains {100 * found.explained:.3g} % of the scatter (R²)"
+        if math.isfinite(found.explained)
+        else "no regression"
+    )
+    return f"{found.used} runs; {explained}; rank correlations up to ±{number(found.noise, 2)} can be chance."
+
+
+def _size(found: Trends, k: int) -> float:
+    sizes = [abs(each[k]) for each in (found.share, found.rank_correlation) if math.isfinite(each[k])]
+    return float(sizes[0]) if sizes else 0.0
+
+
+def _two(value: float) -> str:
+    return minus(f"{value:.2f}").replace("−0.00", "0.00") if math.isfinite(value) else "–"
+
+
+def _span(interval: Array) -> str:
+    return " to ".join(_two(float(end)) for end in interval)
+
+
+def _failures(account: Account) -> Section | None:
+    rows = []
+    for each in account.failures[:MOST_FAILURES]:
+        numbers = ", ".join(str(run) for run in each.runs[:MOST_RUNS])
+        more = f" and {len(each.runs) - MOST_RUNS} more" if len(each.runs) > MOST_RUNS else ""
+        rows.append((str(len(each.runs)), each.message, account.where(each), numbers + more))
+    left = len(account.failures) - MOST_FAILURES
+    note = FAILURES_NOTE + (f" {left} more kinds of messages in the table." if left > 0 else "")
+    table = Table("rpll", ("Runs", "Message (of the first)", "Where", "Numbers"), rows, note)
+    return Section("Failed runs", [table], "failed") if rows else None
+
+
+def _parameters(account: Account) -> Section:
+    """What was varied: keys, distributions with their numbers, and what was drawn."""
+    rows: list[tuple[Text, ...]] = []
+    for each in account.inputs:
+        if each.words:
+            span = ", ".join(each.words)
+        else:
+            span = f"{number(each.values.min())} to {number(each.values.max())}" if len(each.values) else ""
+        keys = tuple(part for key in each.parameter.keys for part in ("\n", code(key)))[1:]
+        rows.append((each.name, keys, law(each), minus(span), each.scale.shown_unit))
+    heads = ("Parameter", "Key", "Distribution", "Drawn", "Unit")
+    return Section("Parameters", [Table("lllll", heads, rows)], "parameters")
+
+
+def law(each: Input) -> str:
+    """What a parameter is distributed like: "factor, normal, mean 1, deviation 0.07, from 0.85, to 1.2"."""
+    found = each.parameter.distribution
+    told = ["factor"] if each.parameter.factor else []
+    if found is None:
+        return ", ".join([*told, f"one of {len(each.parameter.choices)} values"])
+    middle = sum(found.support) / 2 if found.mode is None else found.mode
+    mode = middle if found.kind == "triangular" else None
+    told.append(found.kind)
+    for word, value in (
+        ("mean", found.mean), ("deviation", found.deviation), ("from", found.low), ("mode", mode), ("to", found.high)
+    ):  # fmt: skip
+        if value is not None and math.isfinite(value):
+            told.append(f"{word} {number(value * each.scale.factor)}")
+    if found.count is not None:
+        told.append(f"{found.count} values")
+    return ", ".join(told)
+
+
+def _provenance(account: Account) -> Section:
+    study, scenario = account.study, account.study.base.scenario
+    rows = [
+        ("Study", f"{study.name} ({study.file.name})"),
+        ("Scenario", f"{scenario.name} ({scenario.file.name})"),
+        ("Set on the command line", ", ".join(study.overrides) or "nothing"),
+        ("Sampling", f"{study.sampling.method}, {account.design.runs} runs, seed {study.sampling.seed}"),
+        ("Machine", scenario.machine.name),
+        *_recorded(account.record),
+    ]
+    note = Paragraph("The parameters are the scenario's; each run changes those above.", "muted")
+    parameters = parameters_section(scenario.machine)
+    return provenance_section(rows, study_files(account), parameters, note, software_of="Software of this page")
+
+
+def _recorded(record: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """What is on record of how the table was made."""
+    for key, name in RECORDED.items():
+        value = record.get(key)
+        if value in (None, "", {}, []):
+            continue
+        if isinstance(value, Mapping):
+            yield name, ", ".join(f"{part} {text}" for part, text in value.items())
+        elif isinstance(value, list):
+            yield name, " ".join(str(part) for part in value)
+        else:
+            yield name, str(value)
+    parts = record.get("parts")
+    if isinstance(parts, Mapping):
+        yield from ((f"Hash of {part}", str(text)) for part, text in parts.items() if isinstance(text, str))

@@ -10,7 +10,6 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +19,11 @@ import pytest
 from feedsim.cli import main
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
-from feedsim.identify import Options, identify
-from feedsim.identify.identify import ORDER, merged_correlation, transitions
+from feedsim.identify import Options, identify, stages
 from feedsim.identify.read import distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate
+from feedsim.identify.stages import ORDER, merged_correlation, transitions
 from feedsim.scenario import load_machine
 from feedsim.scenario.friction_file import Line, friction_text, read_friction
 from feedsim.trace import write_csv
@@ -46,7 +45,6 @@ from report_helpers import contents
 ROOT = Path(__file__).resolve().parents[2]
 MACHINE = ROOT / "scenarios" / "machines" / "test_centre"
 CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
-room = import_module("feedsim.identify.identify")  # its name in the package is that of the function
 MOVES = ((5e-6, 10.0, 20), (20e-6, 5.0, 12), (100e-6, 2.0, 7), (200e-6, 1.0, 5))
 FILES = {"friction.yaml", "plateaus.csv", "residuals.csv", "report.html", "summary.json"}
 Done = subprocess.CompletedProcess[str]
@@ -249,9 +247,9 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         words["progress"]("half", 0.5)
         return dynamic(estimates())
 
-    monkeypatch.setattr(room, "stationary", first)
-    monkeypatch.setattr(room, "dynamic", second)
-    monkeypatch.setattr(room, "plateaus", lambda record, J: stationary(estimates()).plateaus[:2])
+    monkeypatch.setattr(stages, "stationary", first)
+    monkeypatch.setattr(stages, "dynamic", second)
+    monkeypatch.setattr(stages, "plateaus", lambda record, J: stationary(estimates()).plateaus[:2])
     return asked
 
 
@@ -280,7 +278,7 @@ def test_an_estimate_of_stage_1_outlives_a_doubt_of_stage_2(
     doubtful = dynamic(estimates())
     vague = replace(estimates()["F_C"], value=9.0, sigma=np.nan, status="undetermined")
     both = replace(doubtful, estimates={**doubtful.estimates, "F_C": vague})
-    monkeypatch.setattr(room, "dynamic", lambda *words, **more: both)
+    monkeypatch.setattr(stages, "dynamic", lambda *words, **more: both)
     assert identify(records(), no_law, options()).estimates["F_C"].value == 1.6
 
 
@@ -288,7 +286,7 @@ def test_an_estimate_of_stage_1_outlives_a_doubt_of_stage_2(
 def test_without_reversals_pre_sliding_is_held(
     calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch, fallback: dict[str, float], value: float
 ) -> None:
-    monkeypatch.setattr(room, "transitions", lambda records: ())
+    monkeypatch.setattr(stages, "transitions", lambda records: ())
     found = identify(records(), no_law, options(fallback=fallback, delay=1e-3))
     assert found.dynamic is None
     assert found.estimates["sigma_0"].value == pytest.approx(value)
@@ -300,9 +298,9 @@ def test_without_reversals_pre_sliding_is_held(
 
 
 def test_without_plateaus_stage_2_stands_alone(calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(room, "plateaus", lambda record, J: ())
+    monkeypatch.setattr(stages, "plateaus", lambda record, J: ())
     alone = replace(dynamic(estimates()), estimates=estimates())
-    monkeypatch.setattr(room, "dynamic", lambda *words, prior, **more: alone if prior is None else None)
+    monkeypatch.setattr(stages, "dynamic", lambda *words, prior, **more: alone if prior is None else None)
     found = identify(records(), no_law, options())
     assert found.stationary is None
     assert found.estimates["F_C"].value == 1.6
@@ -329,14 +327,14 @@ def test_no_record_counts_twice(calls: dict[str, Any], monkeypatch: pytest.Monke
         plateaus=tuple(replace(p, record="sine.csv") for p in own.plateaus),
         estimates={**own.estimates, "F_C": replace(own.estimates["F_C"], value=7.0)},
     )
-    monkeypatch.setattr(room, "stationary", lambda *words, **more: shared)
+    monkeypatch.setattr(stages, "stationary", lambda *words, **more: shared)
     alone = replace(dynamic(estimates()), estimates=estimates())
 
     def second(chosen: Any, law: Any, **words: Any) -> Any:
         calls["stage 2"] = words
         return alone
 
-    monkeypatch.setattr(room, "dynamic", second)
+    monkeypatch.setattr(stages, "dynamic", second)
     found = identify(records(), no_law, options())
     assert calls["stage 2"]["prior"] is None
     assert found.estimates["F_C"].value == 1.6
@@ -350,22 +348,22 @@ def test_doubts_of_stage_1_count_where_it_is_used(
     own = stationary(estimates())
     plateaus = tuple(replace(p, record=record) for p in own.plateaus)
     doubtful = replace(own, plateaus=plateaus, warnings=("3 speeds only",))
-    monkeypatch.setattr(room, "stationary", lambda *words, **more: doubtful)
+    monkeypatch.setattr(stages, "stationary", lambda *words, **more: doubtful)
     alone = replace(dynamic(estimates()), estimates=estimates(), warnings=("gamma: vague",))
-    monkeypatch.setattr(room, "dynamic", lambda *words, **more: alone)
+    monkeypatch.setattr(stages, "dynamic", lambda *words, **more: alone)
     found = identify(records(), no_law, options())
     assert found.prior == (record == "constant.csv")
     assert ("3 speeds only" in found.warnings) == found.prior
     assert "gamma: vague" in found.warnings
     assert found.stationary is doubtful
     # Stage 1 alone is what there is: its doubts are those of the result.
-    monkeypatch.setattr(room, "transitions", lambda records: ())
+    monkeypatch.setattr(stages, "transitions", lambda records: ())
     assert "3 speeds only" in identify(records(), no_law, options()).warnings
 
 
 def test_nothing_to_be_found(calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(room, "plateaus", lambda record, J: ())
-    monkeypatch.setattr(room, "transitions", lambda records: ())
+    monkeypatch.setattr(stages, "plateaus", lambda record, J: ())
+    monkeypatch.setattr(stages, "transitions", lambda records: ())
     with pytest.raises(InputError, match="no stretches at constant speed; no reversals"):
         identify(records(), no_law, options())
     with pytest.raises(InputError, match="no records"):

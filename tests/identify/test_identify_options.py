@@ -13,8 +13,7 @@ import pytest
 from feedsim.cli import main
 from feedsim.errors import InputError
 from feedsim.identify import Estimate, Options
-from feedsim.identify.parameters import FRICTION, KINDS
-from feedsim.identify.search import DELAYS
+from feedsim.identify.parameters import DELAYS, FRICTION, KINDS
 from feedsim.scenario import Friction
 from feedsim.trace import Trace, write_csv
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim.identify.determined import GOES_WITH, verdict
+from feedsim.identify.identifiability import GOES_WITH, verdict
 from feedsim.identify.output_error import _doubts
-from feedsim.identify.search import EXCESS
+from feedsim.identify.parameters import EXCESS
 from identification_helpers import TRUE, estimates, stationary
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from feedsim.errors import InputError
 from feedsim.identify import stribeck
-from feedsim.identify.level import curve, torque
+from feedsim.identify.parameters import curve, torque
 from feedsim.identify.result import Plateau, Stationary
 from identify_records import I_P, SPEEDS, TRUE, stationary
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim.identify.aliases import _BY_KEY, ALIASES, alias_of
 from feedsim.identify.read import read_records
+from feedsim.identify.signal_names import _BY_KEY, ALIASES, alias_of
 from feedsim.scenario import Machine, load_machine
 from record_helpers import ANGLE, DIGITS, K_T, LEAD, PITCH, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table
 

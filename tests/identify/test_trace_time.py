@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.identify.even_time import stretches
 from feedsim.identify.read import read_records
-from feedsim.identify.record import EVEN
+from feedsim.identify.record import EVEN, even_pieces
 from record_helpers import DIGITS, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table
 
 REST = "torque: {column: ActTorque}\n"
@@ -26,7 +25,7 @@ def test_jitter_is_evened_out() -> None:
     rng = np.random.default_rng(4)
     time = TIME + 0.9 * EVEN * 0.002 * rng.uniform(-1, 1, len(TIME))
     time[[0, -1]] = TIME[[0, -1]]
-    (piece,), said = stretches(time, place)
+    (piece,), said = even_pieces(time, place)
     np.testing.assert_allclose(piece.time, TIME, rtol=0, atol=1e-15)
     assert said == ()
 
@@ -35,18 +34,18 @@ def test_uneven_time_is_refused() -> None:
     time = TIME.copy()
     time[40:] += 0.0006  # 30 % of a step: neither jitter nor a missing row
     with pytest.raises(InputError, match=r"f:42: the time is not even: 0\.0806 s comes 2\.6 ms after the row"):
-        stretches(time, place)
+        even_pieces(time, place)
     # Too few digits: steps of 2 and 3 ms, or of 1 and 2 ms, which look like gaps.
     for interval in (2.5, 1.25):
         with pytest.raises(InputError, match=rf"time: {{interval: {interval} ms}}"):
-            stretches(np.round(np.arange(500) * interval + 1e-9) * 1e-3, place)
+            even_pieces(np.round(np.arange(500) * interval + 1e-9) * 1e-3, place)
 
 
 def test_single_rows() -> None:
     with pytest.raises(InputError, match="f:2: a single row"):
-        stretches(TIME[:1], place)
+        even_pieces(TIME[:1], place)
     with pytest.raises(InputError, match="no rows"):
-        stretches(TIME[:0], place)
+        even_pieces(TIME[:0], place)
 
 
 def test_gaps_make_pieces(tmp_path: Path) -> None:
@@ -80,10 +79,10 @@ def test_fragments_between_gaps_do_not_cost_the_file(tmp_path: Path, rows: int) 
 
 def test_fragments_alone_are_no_record() -> None:
     with pytest.raises(InputError, match="f:2: no 8 rows follow one another without a gap"):
-        stretches(TIME[np.r_[0:7, 10:17, 30:37]], place)
-    (piece, _), _said = stretches(TIME[np.r_[0:8, 10:18]], place)
+        even_pieces(TIME[np.r_[0:7, 10:17, 30:37]], place)
+    (piece, _), _said = even_pieces(TIME[np.r_[0:8, 10:18]], place)
     assert len(piece.time) == 8
-    (short,), none = stretches(TIME[:3], place)
+    (short,), none = even_pieces(TIME[:3], place)
     assert (len(short.time), none) == (3, ())
 
 

@@ -17,7 +17,7 @@ from feedsim import analysis, cosim, nc, scenario
 from feedsim.analysis.compensation import compensate
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.identify import Options, identify
-from feedsim.identify.level import curve
+from feedsim.identify.parameters import curve
 from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate, Identification
 from feedsim.scenario import Delay, Friction, Level, Noise

@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.identify.identifiability import reversals, turnover_rows
 from feedsim.identify.output_error import dynamic
 from feedsim.identify.record import Record
 from feedsim.identify.result import Dynamic, Estimate
 from feedsim.identify.search import Solution
 from feedsim.identify.torque import RecordTorque
-from feedsim.identify.worth import reversals, turnover_rows
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.identify.level import curve, torque
+from feedsim.identify.parameters import curve, torque
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
 from feedsim.identify.result import Stationary

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from feedsim.identify import Options
+from feedsim.identify import Options, stages
 from feedsim.identify.result import Estimate, Identification, Stationary
 from feedsim.report.content import Report, Tile
 from feedsim.report.formatting import counted, powers
@@ -23,8 +22,6 @@ from feedsim.report.identify.summary import summary
 from feedsim.report.page import html
 from identification_helpers import I_P, TRUE, J, curve, identification, identified, records
 from report_helpers import Page
-
-room = import_module("feedsim.identify.identify")  # its name in the package is that of the function
 
 
 def few(count: int) -> Identification:
@@ -162,7 +159,7 @@ def test_tiles_hold_what_is_in_them() -> None:
 def test_sines_alone_say_nothing_of_the_given_inertia(chosen: slice, warned: bool) -> None:
     given = Estimate("J", J, "kg.m2", "inertia", status="given")
     law: Any = None
-    run = room._Run(records()[chosen], law, Options("Z", I_P, J=given), lambda *_: None, None)
+    run = stages._Run(records()[chosen], law, Options("Z", I_P, J=given), lambda *_: None)
     run._compare(SimpleNamespace(J=replace(given, value=0.0132, sigma=1e-5, status="estimated")))
     assert len(run.warnings) == warned
     assert not warned or "the inertia is given as 0.0164 kg.m2" in run.warnings[0]

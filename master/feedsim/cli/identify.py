@@ -52,7 +52,7 @@ def identify(options: Namespace) -> None:
         report.check_writable(directory, _inputs(options, subject))
         records = named_apart(recorded)
         with FrictionLaw(options.fmus) as law:
-            found = identified_from(records, law, known, progress, free_axis=law.free_axis)
+            found = identified_from(records, law, known, progress)
     found = replace(found, seconds=reading | dict(found.seconds))
     identified = Identified(found, records, sources, subject, _settings(options), date.today().isoformat())
     report.write(identified, directory)

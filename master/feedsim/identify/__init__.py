@@ -1,11 +1,11 @@
 """Friction of an axis from recorded traces: records, both stages of identification, and what they find."""
 
 from feedsim.identify.friction_file import Identified
-from feedsim.identify.identify import Progress, identify
 from feedsim.identify.options import STAGES, Asked, Options
 from feedsim.identify.read import Provenance, Recorded, named_apart, read_records, read_traces
 from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate, Identification
+from feedsim.identify.stages import Progress, identify
 
 __all__ = [
     "STAGES",

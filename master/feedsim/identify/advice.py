@@ -1,4 +1,21 @@
-"""Which moves are missing for which parameter, in words."""
+"""Which moves are missing for which parameter, in words.
+
+Which moves tell what (the reasoning behind the recommended sets):
+
+- sigma_0 acts right after every reversal; any move of a few micrometres shows it.
+- W and gamma act while the drive train engages anew after a reversal: the travel must cover a good part of W for W,
+  nearly all of it for gamma, which else looks like a smaller sigma_0.
+- sigma_1 acts on the rate of deflection, sigma_1 dz/dt: it needs speed while the bristles still stick, which is a high
+  frequency at a small amplitude.
+- A torque channel that is late by tau shifts the torque by -tau dM/dt. In pre-sliding M = k sigma_0 z, so it looks like
+  a damping of -tau k sigma_0: for small moves the delay and sigma_1 are one and the same. They part in what makes the
+  torque change without deflecting bristles: the inertia of a move that slides. J dn/dt of amplitude J A omega^2 / I_P
+  shows the delay as a torque of tau J A omega^3 / I_P, so the frequency counts in the third power. Two things limit it:
+  noise is a share of the torque, so that a loud move in the record of the quiet ones drowns those (a record of its own
+  does not); and the first mode of the structure, below whose frequency omega_1 alone the axis is an inertia. The mode
+  adds a share (omega/omega_1)^2 to J and, by its damping D, a lag of about 2 D (omega/omega_1)^3 of that share, which
+  passes for a delay of 2 D omega^2/omega_1^3 times the share of mass that it carries.
+"""
 
 from __future__ import annotations
 

@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.identify.averages import white
 from feedsim.identify.fit import correlation
-from feedsim.identify.parameters import KINDS, RIGID
-from feedsim.identify.record import Record
+from feedsim.identify.parameters import RIGID, estimate
+from feedsim.identify.record import Record, runs
 from feedsim.identify.result import Correlation, Estimate
-from feedsim.identify.runs import runs
 
 Array = NDArray[np.float64]
 
@@ -197,12 +196,11 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     sigma = np.sqrt(np.diag(covariance))
     estimates = {}
     for name in RIGID:
-        unit, meaning = KINDS[name].unit, KINDS[name].meaning
         if name in held:
-            estimates[name] = Estimate(name, 0.0, unit, meaning, status="undetermined", reason=held[name])
+            estimates[name] = estimate(name, 0.0, status="undetermined", reason=held[name])
             continue
         k = names.index(name)
-        estimates[name] = Estimate(name, float(values[k]), unit, meaning, float(sigma[k]))
+        estimates[name] = estimate(name, float(values[k]), float(sigma[k]))
     if not values[0] > 0:
         raise InputError(
             f"the inertia comes out at {values[0]:.4g} kg.m2: the signs of torque and motion do not fit together, or "

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import nan, pi
+from math import pi
 from pathlib import Path
 
 from feedsim.errors import InputError
-from feedsim.identify.parameters import FRICTION, KINDS, Kind, check_held
+from feedsim.identify.parameters import FRICTION, KINDS, Kind, check_held, estimate
 from feedsim.identify.read import Provenance
 from feedsim.identify.result import Estimate
 from feedsim.scenario import Machine
@@ -101,11 +101,11 @@ class Asked:
             )
         I_P = next(iter(pitches)) / (2 * pi)
         own = machine.axes.get(axis) if machine is not None else None
-        J, modes = self._inertia(I_P, sources), None
+        J, modes = self._given_inertia(I_P, sources), None
         if J is None and "inertia" not in self.estimated and machine is not None and own is not None:
             modes = checked_modes(machine)
             reason = f"J_tot of the modes of {machine.name}, whose flexibility is taken off the torque"
-            J = _inertia(modes.J_tot(axis), reason)
+            J = estimate("J", modes.J_tot(axis), status="given", reason=reason)
         friction = machine.shipped_frictions.get(axis) if machine is not None else None
         delays = {source.torque_delay for source in sources}
         of_mapping = delays.pop() if len(delays) == 1 and "delay" not in self.estimated else None
@@ -133,15 +133,13 @@ class Asked:
             raise InputError("the traces do not tell which axis they are of; give --axis, for example --axis Z")
         return next(iter(named))
 
-    def _inertia(self, I_P: float, sources: Sequence[Provenance]) -> Estimate | None:
+    def _given_inertia(self, I_P: float, sources: Sequence[Provenance]) -> Estimate | None:
         """What is said, else what the mapping says; None: neither, or it is to be estimated."""
         if self.mass is not None:
-            return _inertia(self.mass * I_P**2, self.mass_reason)
+            return estimate("J", self.mass * I_P**2, status="given", reason=self.mass_reason)
         if self.inertia is not None:
-            return _inertia(self.inertia, "as given")
+            return estimate("J", self.inertia, status="given", reason="as given")
         of_mapping = [source.inertia for source in sources if source.inertia is not None]
-        return _inertia(of_mapping[0], "of the mapping") if of_mapping and "inertia" not in self.estimated else None
-
-
-def _inertia(value: float, reason: str) -> Estimate:
-    return Estimate("J", value, KINDS["J"].unit, KINDS["J"].meaning, nan, "given", reason)
+        if not of_mapping or "inertia" in self.estimated:
+            return None
+        return estimate("J", of_mapping[0], status="given", reason="of the mapping")

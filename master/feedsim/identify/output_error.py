@@ -5,31 +5,35 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.identify.advice import advice
-from feedsim.identify.determined import GOES_WITH, Verdict, verdict
 from feedsim.identify.fit import Prior, correlation
-from feedsim.identify.motion import noise_of
-from feedsim.identify.motion_noise import motion_covariance
-from feedsim.identify.parameters import KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL
-from feedsim.identify.record import Record
-from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
-from feedsim.identify.search import Search, Solution, joined, spread
-from feedsim.identify.starts import grid, sliding
-from feedsim.identify.torque import Law, RecordTorque, deflection, models
-from feedsim.identify.worth import (
+from feedsim.identify.identifiability import (
+    GOES_WITH,
     LEAST_EXPLAINED,
     LEAST_REVERSALS,
     LEAST_ROWS,
+    Verdict,
     explained,
     has_sines,
     reversals,
     turnover_rows,
+    verdict,
 )
+from feedsim.identify.motion import noise_of
+from feedsim.identify.parameters import KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
+from feedsim.identify.record import Record
+from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
+from feedsim.identify.search import Search, Solution, grid, joined, motion_covariance, sliding, spread
+from feedsim.identify.torque import RecordTorque, deflection, models
+
+if TYPE_CHECKING:
+    from feedsim.cosim.friction_law import FrictionLaw
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -71,7 +75,7 @@ class _Known:
 
 def dynamic(
     records: Sequence[Record],
-    law: Law,
+    law: FrictionLaw,
     *,
     prior: Stationary | None = None,
     J: Estimate | None = None,
@@ -140,8 +144,7 @@ def _known(
     hold: Mapping[str, float],
     free: Collection[str],
 ) -> _Known:
-    values = {**NO_EFFECT, "M_0": 0.0, "J": 0.0}
-    values |= {"delay": delay if delay is not None else 0.0, "sigma_1": 0.0}
+    values = {**NO_EFFECT, "J": 0.0, "delay": delay if delay is not None else 0.0}
     held: dict[str, tuple[Status, str]] = {
         name: ("held", "usual value, records of friction hardly tell it") for name in USUAL if name not in free
     }
@@ -204,7 +207,7 @@ def _base(known: _Known, with_prior: bool, with_delay: bool) -> list[str]:
     """What is free at first."""
     wanted = ["sigma_0", "J", *(["delay"] if with_delay else [])]
     if with_prior:
-        wanted += [*PRE_SLIDING[1:], *STATIONARY]
+        wanted += [*(name for name in PRE_SLIDING if name not in wanted), *STATIONARY]
         wanted += [name for name in USUAL if name in known.told]
         wanted = [name for name in wanted if name not in STATIONARY or name in known.told]
     else:
@@ -327,11 +330,9 @@ def _result(
     ]
     sigma = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     estimates = {}
-    for name, kind in KINDS.items():
+    for name in KINDS:
         status, reason = held.get(name, ("estimated" if name in names else "held", ""))
-        estimates[name] = Estimate(
-            name, found.values[name], kind.unit, kind.meaning, sigma.get(name, nan), status, reason
-        )
+        estimates[name] = estimate(name, found.values[name], sigma.get(name, nan), status, reason)
     without = dict(sigma)
     if "delay" in names:
         at = names.index("delay")

@@ -1,14 +1,43 @@
-"""Parameters that identification estimates: unit, meaning, and the range that is physically possible."""
+"""The friction law as identification knows it: parameters, who tells them, ranges of the search, curve over speed.
+
+Unit, range, meaning and start value are those of the friction unit's table. A parameter of it that no stage names here
+is held at its start value, and nothing else in this room needs to know it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf, isfinite, nan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from feedsim import units, variables
 from feedsim.errors import InputError
+from feedsim.identify.result import Estimate, Status
 from feedsim.scenario import Friction
+
+Array = NDArray[np.float64]
+
+_TABLE = variables.parameters("friction")
+FRICTION = tuple(_TABLE)
+# What reversals tell (stage 2), and what plateaus of constant speed tell (stage 1), in the order in which it is shown.
+PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma")
+CONSTANT_SPEED = ("F_C", "F_S", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
+RIGID = ("J", "sigma_2", "F_C", "M_0")  # of a rigid axis with Coulomb and viscous friction
+# Held at the unit's start values unless they are freed: no record of friction alone tells them well.
+USUAL: Mapping[str, float] = {name: float(_TABLE[name].start) for name in ("beta", "v_log")}
+STATIONARY = tuple(name for name in CONSTANT_SPEED if name not in USUAL)  # all of stage 1 that stage 2 takes over
+FIXED = tuple(name for name in FRICTION if name not in (*PRE_SLIDING, *CONSTANT_SPEED))  # no stage tells them
+# Where a parameter has no effect: what machine files mean that do not give it; v_s where F_S is F_C.
+NO_EFFECT: Mapping[str, float] = {
+    **{"sigma_1": 0.0, "sigma_2": 0.0, "M_0": 0.0, "v_s": float(_TABLE["v_s"].start)},
+    **{name: field.default for name in FRICTION if not (field := Friction.model_fields[name]).is_required()},
+}
+# F_S moves as its excess over F_C: F_S >= F_C then is a bound like any other.
+EXCESS = "excess"
 
 
 @dataclass(frozen=True)
@@ -41,24 +70,6 @@ class Kind:
             raise InputError(f"{what} {units.show(value, self.unit)}; allowed: {self.range}")
 
 
-PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma")
-# What plateaus tell, in the order in which it is shown; and all of it that stage 2 takes over.
-CONSTANT_SPEED = ("F_C", "F_S", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
-STATIONARY = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0")
-RIGID = ("J", "sigma_2", "F_C", "M_0")  # of a rigid axis with Coulomb and viscous friction
-
-_TABLE = variables.parameters("friction")
-FRICTION = tuple(_TABLE)
-# Held at the unit's start values unless they are freed: no record of friction alone tells them well.
-USUAL: Mapping[str, float] = {
-    name: float(each.start) for name, each in _TABLE.items() if name not in (*PRE_SLIDING, *STATIONARY)
-}
-# What leaves no trace in the friction: what machine files mean that do not give it.
-NO_EFFECT: Mapping[str, float] = {"sigma_2": 0.0} | {
-    name: field.default for name in FRICTION if not (field := Friction.model_fields[name]).is_required()
-}
-
-
 def _kind(name: str) -> Kind:
     """Of a parameter of the unit: what is estimated can be written into a machine file."""
     row = _TABLE[name]
@@ -66,13 +77,18 @@ def _kind(name: str) -> Kind:
 
 
 KINDS = {
-    **{name: _kind(name) for name in (*PRE_SLIDING, *CONSTANT_SPEED[:-1])},
+    **{name: _kind(name) for name in (*PRE_SLIDING, *CONSTANT_SPEED) if name in _TABLE},
     "M_0": Kind("N.m", "constant load against the motor torque"),
-    **{name: _kind(name) for name in USUAL if name not in CONSTANT_SPEED},
+    **{name: _kind(name) for name in FIXED},
     "J": Kind("kg.m2", "inertia", above=0.0),
     # Wide against the offsets between the channels of one log; what is beyond is a wrong unit, or two logs.
     "delay": Kind("s", "delay of the torque channel against the motion", -20e-3, 20e-3),
 }
+
+
+def estimate(name: str, value: float, sigma: float = nan, status: Status = "estimated", reason: str = "") -> Estimate:
+    """With unit and meaning of the parameter."""
+    return Estimate(name, value, KINDS[name].unit, KINDS[name].meaning, sigma, status, reason)
 
 
 def check_held(hold: Mapping[str, float]) -> None:
@@ -81,3 +97,107 @@ def check_held(hold: Mapping[str, float]) -> None:
         KINDS[name].check(f"{name} is held at", value)
     if "F_S" in hold and "F_C" in hold and hold["F_S"] < hold["F_C"]:
         raise InputError(f"F_S is held at {hold['F_S']:g} N.m, below F_C at {hold['F_C']:g} N.m; allowed: at least F_C")
+
+
+# --- the search ------------------------------------------------------------------------------------------------------
+
+
+def inner(name: str) -> str:
+    """Name under which the solver moves a parameter."""
+    return EXCESS if name == "F_S" else name
+
+
+def outer(name: str) -> str:
+    """The parameter's own name."""
+    return "F_S" if name == EXCESS else name
+
+
+def inner_to_outer(moved: Sequence[str], wanted: Sequence[str]) -> Array:
+    """(wanted, moved) matrix that turns what the solver moves into parameters: F_S = F_C + excess."""
+    turn = np.zeros((len(wanted), len(moved)))
+    for row, name in enumerate(wanted):
+        turn[row, moved.index(inner(name))] = 1.0
+        if name == "F_S" and "F_C" in moved:
+            turn[row, moved.index("F_C")] = 1.0
+    return turn
+
+
+Range = Mapping[str, Any]  # lower, upper, scale, scatter, log of a fit.Parameter
+
+# Stage 1, within what is physical: beyond these bounds plateaus tell nothing, and the solver goes astray.
+V_S = 20.0, 2.0  # below the lowest speed, above the highest: a Stribeck effect that is over before, or no end of it
+V_LOG = 1e-2, 1e2  # likewise: a logarithm all along, or a straight line
+BETA = 0.2, 4.0  # flatter, the peak has no end within decades of speed; steeper, it is a step
+ASYMMETRY = -0.5, 0.5  # beyond, it plays the constant load's part
+MOST_TORQUE = 2.0  # of the largest measured: no part of the friction, and no load, is more
+LEAST_F_C = 1e-3  # of the largest torque: what is reported is relative to it
+
+
+def plateau_ranges(slow: float, fast: float, top: float) -> dict[str, Range]:
+    """Of what stage 1 moves, from the lowest and highest speed [rad/s] and the largest torque [N.m] of the plateaus."""
+    most, part, rise = MOST_TORQUE * top, 0.1 * top, (0.0, 0.5 * top)
+    stribeck = slow, max(fast / 3, 2 * slow)
+    return {
+        "F_C": {"lower": LEAST_F_C * top, "upper": most, "scale": 0.3 * top, "scatter": (0.2 * top, top)},
+        EXCESS: {"lower": 0.0, "upper": most, "scale": part, "scatter": rise},
+        "v_s": {"lower": slow / V_S[0], "upper": V_S[1] * fast, "scatter": stribeck, "log": True},
+        "beta": {"lower": BETA[0], "upper": BETA[1], "scatter": (0.5, 2.0), "log": True},
+        "F_log": {"lower": 0.0, "upper": most, "scale": part, "scatter": rise},
+        "v_log": {"lower": V_LOG[0] * slow, "upper": V_LOG[1] * fast, "scatter": (slow, fast * 1.01), "log": True},
+        "sigma_2": {"lower": 0.0, "upper": most / fast, "scale": part / fast, "scatter": (0.0, 0.5 * top / fast)},
+        "asymmetry": {"lower": ASYMMETRY[0], "upper": ASYMMETRY[1], "scale": 0.1, "scatter": (-0.05, 0.05)},
+        "M_0": {"lower": -most, "upper": most, "scale": part, "scatter": (-0.05 * top, 0.05 * top)},
+    }
+
+
+# Stage 2, likewise.
+DECADES = {"sigma_0": 2.0, "W": 1.5, "v_s": 1.5}  # either way from their start, which is of the right order
+DELAYS = (-5e-3, 20e-3)  # [s]: filters and buses make the torque late; what makes it early is less
+MOST_EXCESS = 2.0  # of the friction: static friction beyond three times Coulomb's is none
+MOST_ASYMMETRY = 0.6  # beyond, it plays the constant load's part
+LEAST_SHARE = 1e-3  # of the start: the law and the scales divide by F_C, beta, v_log and J
+LEAST_GAMMA = 1e-3  # at 0 nothing is engaged at a reversal, and sigma_0 acts on nothing
+
+
+def reversal_ranges(start: Mapping[str, float]) -> dict[str, Range]:
+    """Of what stage 2 moves, from the start values; no wider than what is physical."""
+    F_C = start["F_C"]
+    found: dict[str, dict[str, Any]] = {name: {} for name in KINDS}
+    for name, decades in DECADES.items():  # known by their order of magnitude at first, and above 0
+        span = 10**decades
+        found[name] = {"lower": start[name] / span, "upper": start[name] * span, "log": True}
+    for name in ("F_C", "beta", "v_log", "J"):
+        found[name] = {"lower": LEAST_SHARE * start[name]}
+    found["sigma_1"] = {"scale": max(abs(start["sigma_1"]), 1e-4 * start["sigma_0"])}
+    found["sigma_2"] = {"scale": max(abs(start["sigma_2"]), 1e-4 * F_C)}
+    found["gamma"] = {"lower": LEAST_GAMMA, "scale": 1.0}
+    found["F_log"] = found["M_0"] = {"scale": F_C}
+    found["asymmetry"] = {"lower": -MOST_ASYMMETRY, "upper": MOST_ASYMMETRY, "scale": 0.1}
+    found["delay"] = {"lower": DELAYS[0], "upper": DELAYS[1], "scale": 1e-4}
+    for name, kind in KINDS.items():
+        lower, upper = found[name].get("lower", -inf), found[name].get("upper", inf)
+        found[name] = {**found[name], "lower": max(lower, kind.lower), "upper": min(upper, kind.upper)}
+    return {**found, EXCESS: {"lower": 0.0, "upper": MOST_EXCESS * max(F_C, start["F_S"]), "scale": F_C}}
+
+
+# --- friction at constant speed: the static level of Eq. 7, its viscous part, and the constant load -------------------
+
+
+def level(values: Mapping[str, float], speed: Array) -> Array:
+    """(K,) static level at |speed| without asymmetry [N.m]: sigma_0 g of Eq. 7 (Wiesauer, Bleicher, CIRP CMMO 2021)."""
+    size = np.abs(speed)
+    stribeck = np.exp(-((size / values["v_s"]) ** values["beta"]))
+    rise = values["F_log"] * np.log1p(size / values["v_log"])
+    return np.asarray(values["F_C"] + (values["F_S"] - values["F_C"]) * stribeck + rise, dtype=np.float64)
+
+
+def curve(values: Mapping[str, float], speed: Array) -> Array:
+    """(K,) friction torque |M_fr| at |speed| [rad/s] without asymmetry [N.m]: level plus viscous part."""
+    return level(values, speed) + values["sigma_2"] * np.abs(speed)
+
+
+def torque(values: Mapping[str, float], speed: Array) -> Array:
+    """(K,) motor torque that keeps a speed [N.m]: friction with its asymmetry, and the constant load M_0."""
+    side = np.sign(speed)
+    lean = 1.0 + values["asymmetry"] * side
+    return np.asarray(values["M_0"] + side * lean * level(values, speed) + values["sigma_2"] * speed, dtype=np.float64)

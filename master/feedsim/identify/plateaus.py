@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from feedsim.identify.averages import derivative, mean, resolution, white, window
-from feedsim.identify.record import Record
+from feedsim.identify.record import Record, runs
 from feedsim.identify.result import Plateau
-from feedsim.identify.runs import runs
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.fields import no_axis
-from feedsim.identify.even_time import stretches
-from feedsim.identify.record import Array, Record
+from feedsim.identify.record import Array, Record, even_pieces
 from feedsim.identify.signals import Channel, Chosen, choose
 from feedsim.identify.signs import checked
 from feedsim.scenario import Columns, Drive, Machine
@@ -89,7 +88,7 @@ def read_records(
         counts (with a warning), since currents are logged in different amplitudes; a pitch that differs is refused.
 
     The motor's angle is position/I_P with I_P = pitch/(2 pi), the torque K_t i_q or F I_P. Records are pieces without
-    gaps; nothing is resampled (see even_time.stretches).
+    gaps; nothing is resampled (see record.even_pieces).
 
     Raises InputError with file and line: what cannot be read, columns that are missing or not clear, units, time that
     is not even, pitch or torque constant that is needed and not given, a sign or unit wrong beyond doubt (signs.py).
@@ -108,7 +107,7 @@ def read_records(
         time = signals.pop("time")
     else:
         time = np.asarray(np.arange(len(next(iter(values.values())))) * chosen.interval, dtype=np.float64)
-    pieces, gaps = stretches(time, recording.row)
+    pieces, gaps = even_pieces(time, recording.row)
     motor = _motor_side(chosen.channels, signals, drive)
     records = tuple(
         Record(

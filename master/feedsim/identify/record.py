@@ -1,9 +1,13 @@
-"""What identification works on: recorded motion and torque of one axis, motor side, even in time."""
+"""What identification works on: recorded motion and torque of one axis, motor side, on even time.
+
+Nothing is resampled: rows stay rows, pieces without gaps, or are refused.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,3 +82,104 @@ class Record:
             cut(self.setpoint),
             self.columns,
         )
+
+
+# A step of more than that many usual ones is a gap, where rows are missing; the least gap has 2.
+GAP = 1.75
+# More gaps than that, and than that share of all steps, are no gaps but uneven time: a clock of too few digits.
+MOST_GAPS, SHARE_OF_GAPS = 10, 0.05
+# Rows between gaps that make a stretch: fewer tell neither a motion nor whether they are even.
+LEAST_ROWS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Rows first <= i < last without a gap, and their even time [s]."""
+
+    first: int
+    last: int
+    time: Array
+
+
+def even_pieces(time: Array, row: Callable[[int], str]) -> tuple[tuple[Piece, ...], tuple[str, ...]]:
+    """Split at gaps and even out jitter.
+
+    time: (N,) [s]; row: where a row of that index stands, for messages.
+
+    The usual step is the median. A step of more than GAP of it is a gap. Between gaps every instant must lie within
+    EVEN of a step of the even grid through the first and the last one, which then takes its place. Where there are
+    gaps, fragments of fewer than LEAST_ROWS rows are left out.
+
+    Returns the pieces and what there is to say about gaps.
+
+    Raises:
+        InputError: fewer than 2 rows; time that does not increase; steps that are neither even nor gaps, or too many
+            gaps to be some.
+    """
+    if len(time) < 2:
+        raise InputError(f"{row(0)}: a single row; at least 2 are needed" if len(time) else "no rows")
+    steps = np.diff(time)
+    if (wrong := np.flatnonzero(steps <= 0)).size:
+        at = int(wrong[0]) + 1
+        raise InputError(f"{row(at)}: time {time[at]:.9g} s follows {time[at - 1]:.9g} s; it must increase")
+    usual = float(np.median(steps))
+    breaks = [int(i) for i in np.flatnonzero(steps > GAP * usual)]
+    if len(breaks) > max(MOST_GAPS, SHARE_OF_GAPS * len(steps)):
+        raise _uneven(time, breaks[0] + 1, usual, float(time[-1] - time[0]) / len(steps), row)
+    edges = [0, *(i + 1 for i in breaks), len(time)]
+    found, dropped = [], []
+    for first, last in pairwise(edges):
+        if breaks and last - first < LEAST_ROWS:
+            dropped.append(last - first)
+            continue
+        found.append(_even(time, first, last, row))
+    if not found:
+        raise InputError(f"{row(0)}: no {LEAST_ROWS} rows follow one another without a gap")
+    return tuple(found), tuple(_gaps(time, breaks, usual, dropped, row))
+
+
+def _even(time: Array, first: int, last: int, row: Callable[[int], str]) -> Piece:
+    own = time[first:last]
+    grid = np.linspace(own[0], own[-1], len(own))
+    step = float(grid[-1] - grid[0]) / (len(own) - 1)
+    off = np.abs(own - grid)
+    if np.max(off) > EVEN * step:
+        steps = np.diff(own)
+        at = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
+        raise _uneven(time, first + at, float(np.median(steps)), step, row)
+    return Piece(first, last, grid)
+
+
+def _uneven(time: Array, at: int, usual: float, mean: float, row: Callable[[int], str]) -> InputError:
+    step = float(time[at] - time[at - 1])
+    return InputError(
+        f"{row(at)}: the time is not even: {time[at]:.9g} s comes {1e3 * step:.6g} ms after the row before, the usual "
+        f"step is {1e3 * usual:.6g} ms ({100 * EVEN:g} % off the grid is tolerated). If only the digits of the time "
+        f"are too few, give its interval in place of its column in a mapping file, where the mean step is "
+        f"{1e3 * mean:.6g} ms: time: {{interval: {1e3 * mean:.3g} ms}}; what was sampled unevenly is to be resampled"
+    )
+
+
+def _gaps(time: Array, breaks: list[int], usual: float, dropped: list[int], row: Callable[[int], str]) -> list[str]:
+    if not breaks:
+        return []
+    first = breaks[0]
+    missing = sum(max(round(float(time[i + 1] - time[i]) / usual) - 1, 1) for i in breaks)
+    text = (
+        f"{row(first + 1)}: rows are missing between {time[first]:.6g} and {time[first + 1]:.6g} s"
+        + (f", and at {len(breaks) - 1} more place{'s'[: len(breaks) > 2]}" if len(breaks) > 1 else "")
+        + f" (about {missing} in all); the pieces are taken as records of their own"
+    )
+    if not dropped:
+        return [text]
+    left_out = (
+        f"{len(dropped)} fragment{'s'[: len(dropped) > 1]} of fewer than {LEAST_ROWS} rows beside gaps left out "
+        f"({sum(dropped)} row{'s'[: sum(dropped) > 1]})"
+    )
+    return [text, left_out]
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Rows (first, behind the last) of the runs of a mask (N,) that are true, in their order."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]

@@ -149,7 +149,7 @@ class Dynamic:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """One record driven in open loop by its torque (balance.py).
+    """One record driven in open loop by its torque (open_loop.py).
 
     Attributes:
         time (N,) [s]; angle (N,): recorded, from the start on [rad].
@@ -165,7 +165,7 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """What the position in open loop says of F_C and M_0 (balance.py).
+    """What the position in open loop says of F_C and M_0 (open_loop.py).
 
     Attributes:
         estimates: all that were given; where it was applied, with the new F_C, F_S and M_0. Their standard deviation is

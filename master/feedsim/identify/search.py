@@ -1,42 +1,21 @@
-"""The least-squares problem of the output-error fit: which parameters move, their bounds, what is known before."""
+"""The least-squares problem of the output-error fit: its first values, which parameters move, their bounds."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.identify.fit import Fit, Parameter, Prior, fit
-from feedsim.identify.parameters import KINDS
+from feedsim.identify.parameters import EXCESS, inner, inner_to_outer, reversal_ranges
 from feedsim.identify.torque import START_PRIOR, STARTS, RecordTorque
 
 Array = NDArray[np.float64]
 
-# F_S moves as its excess over F_C: F_S >= F_C then is a bound like any other.
-EXCESS = "excess"
-LOGARITHMIC = ("sigma_0", "W", "v_s")  # known by their order of magnitude at first, and above 0
-SCALES = {"delay": 1e-4, "asymmetry": 0.1}
-# Bounds of the search, within what is physical (KINDS).
-DECADES = {"sigma_0": 2.0, "W": 1.5, "v_s": 1.5}  # either way from their start, which is of the right order
-DELAYS = (-5e-3, 20e-3)  # [s]: filters and buses make the torque late; what makes it early is less
-MOST_EXCESS = 2.0  # of the friction: static friction beyond three times Coulomb's is none
-MOST_ASYMMETRY = 0.6  # beyond, it plays the constant load's part
-LEAST_SHARE = 1e-3  # of the start: the law and the scales divide by F_C, beta, v_log and J
-LEAST_GAMMA = 1e-3  # at 0 nothing is engaged at a reversal, and sigma_0 acts on nothing
+DRAWS = 8  # their mean square is known to within a half, their root to a quarter: an order of magnitude is wanted
 REACH = {"z": 1.0, "c": 0.5}
-
-
-def inner(name: str) -> str:
-    """Name under which the solver moves a parameter."""
-    return EXCESS if name == "F_S" else name
-
-
-def outer(name: str) -> str:
-    """The parameter's own name."""
-    return "F_S" if name == EXCESS else name
 
 
 def with_excess(prior: Prior) -> Prior:
@@ -71,11 +50,7 @@ class Solution:
 
     def covariance(self, names: Sequence[str]) -> Array:
         """Of parameters by their own names, all of them free."""
-        turn = np.zeros((len(names), len(self.fit.names)))
-        for row, name in enumerate(names):
-            turn[row, self.fit.names.index(inner(name))] = 1
-            if name == "F_S" and "F_C" in self.fit.names:
-                turn[row, self.fit.names.index("F_C")] = 1
+        turn = inner_to_outer(self.fit.names, names)
         used = np.any(turn != 0, axis=0)
         return np.asarray(turn[:, used] @ self.fit.covariance[np.ix_(used, used)] @ turn[:, used].T, dtype=np.float64)
 
@@ -111,7 +86,8 @@ class Search:
     ) -> Solution:
         """Best values of `free` from `values` on."""
         begin = {**values, EXCESS: max(values["F_S"] - values["F_C"], 0.0)}
-        parameters = [_parameter(inner(name), begin) for name in free]
+        ranges = reversal_ranges(begin)
+        parameters = [Parameter(inner(name), begin[inner(name)], **ranges[inner(name)]) for name in free]
         starts = [(k, name) for k in range(len(self.models)) for name in STARTS]
         parameters += [
             Parameter(f"{name}_{k}", float(states[k, STARTS.index(name)]), -REACH[name], REACH[name], scale=REACH[name])
@@ -143,38 +119,35 @@ class Search:
         return Solution(point, shares, found)
 
 
-def _parameter(name: str, begin: Mapping[str, float]) -> Parameter:
-    start = begin[name]
-    if name in LOGARITHMIC:
-        span = 10 ** DECADES[name]
-        return Parameter(name, start, *_within(name, start / span, start * span), log=True)
-    lower, upper = -inf, inf
-    if name == "delay":
-        lower, upper = DELAYS
-    elif name in ("F_C", "beta", "v_log", "J"):
-        lower = LEAST_SHARE * start
-    elif name == "asymmetry":
-        lower, upper = -MOST_ASYMMETRY, MOST_ASYMMETRY
-    elif name == "gamma":
-        lower = LEAST_GAMMA
-    elif name == EXCESS:
-        lower, upper = 0.0, MOST_EXCESS * max(begin["F_C"], begin["F_S"])
-    if name != EXCESS:
-        lower, upper = _within(name, lower, upper)
-    scale = {
-        "sigma_1": max(abs(start), 1e-4 * begin["sigma_0"]),
-        "sigma_2": max(abs(start), 1e-4 * begin["F_C"]),
-        "M_0": begin["F_C"],
-        "F_log": begin["F_C"],
-        EXCESS: begin["F_C"],
-        "gamma": 1.0,
-    }.get(name, SCALES.get(name))
-    return Parameter(name, start, lower, upper, scale=scale)
+def motion_covariance(
+    models: Sequence[RecordTorque], fit: Fit, values: dict[str, float], states: Array, weights: Sequence[Array]
+) -> Array:
+    """(P, P) covariance of the fit's parameters by noise and resolution of the recorded motion.
 
+    The fit takes the motion for exact and all scatter for the torque's. A position in steps of 1 um is not exact: the
+    law answers to motion that was not there, the same way in every fit of the record, so that the residuals do not show
+    it. The motion is therefore disturbed once more by as much as its samples say that they are disturbed already, and
+    the linearised fit tells how far the parameters move with that (delta method).
 
-def _within(name: str, lower: float, upper: float) -> tuple[float, float]:
-    """Bounds, no wider than physical."""
-    return max(lower, KINDS[name].lower), min(upper, KINDS[name].upper)
+    weights: those that the fit was made with.
+    """
+    reach = fit.covariance @ fit.jacobian.T
+    known = np.all(np.isfinite(reach), axis=1)
+    total = np.zeros_like(fit.covariance)
+    first = 0
+    for k, (model, weight) in enumerate(zip(models, weights, strict=True)):
+        rows = slice(first, first + len(model.rows))
+        first = rows.stop
+        z, c = (float(share) for share in states[k])
+        before = model.residual(values, z, c)
+        for draw in range(DRAWS):
+            moved = model.disturbed(np.random.default_rng([k, draw]))
+            if moved is None:
+                break
+            change = (moved.residual(values, z, c) - before) / weight[model.stretch]
+            shift = np.where(known, reach[:, rows] @ change, 0.0)
+            total += np.outer(shift, shift) / DRAWS
+    return np.asarray(total, dtype=np.float64)
 
 
 def spread(residual: Array) -> float:
@@ -196,3 +169,110 @@ def spread(residual: Array) -> float:
     silent = np.flatnonzero(rho < drowned)
     last = int(silent[0]) if len(silent) else len(rho)
     return float(np.sqrt(variance * (1 + 2 * np.sum(rho[1:last]))))
+
+
+SLIDING = 0.1  # of the highest speed: above, the friction is taken as Coulomb plus viscous
+AFTER_REVERSAL = 3  # rows: what the stiffest bristle that a record can show deflects in
+PER_DECADE = 3  # starts of the stiffness
+MOST_STIFFNESSES = 10
+ZONES = (3.0, 7.0, 14.0)  # width of the engaging zone over the largest deflection F_C/sigma_0
+SHARES = (0.25, 0.6)  # gamma
+PURE = (0.0, 1.0)  # W and gamma of pure LuGre
+
+
+def sliding(models: Sequence[RecordTorque], values: Mapping[str, float], unknown: Collection[str]) -> dict[str, float]:
+    """J, sigma_2, F_C and M_0, as far as they are `unknown`, by linear least squares where the axis slides.
+
+    Moves that hardly slide leave F_C: the largest friction torques (95 % of them lie below) stand for it.
+    """
+    rows = [model.moved(values["delay"]) for model in models]
+    speed = np.concatenate([row[1] for row in rows])
+    acceleration = np.concatenate([row[2] for row in rows])
+    torque = np.concatenate([model.measured - row[3] for model, row in zip(models, rows, strict=True)])
+    fast = np.abs(speed) > SLIDING * np.max(np.abs(speed))
+    shapes = {"J": acceleration, "sigma_2": speed, "F_C": np.sign(speed), "M_0": np.ones_like(speed)}
+    names = [name for name in shapes if name in unknown]
+    if not names:
+        return {}
+    known = sum((values[name] * shapes[name] for name in shapes if name not in unknown), np.zeros_like(speed))
+    matrix = np.column_stack([shapes[name] for name in names])[fast]
+    scale = np.linalg.norm(matrix, axis=0)
+    weights = np.linalg.lstsq(matrix / scale, (torque - known)[fast], rcond=None)[0] / scale
+    found = dict(zip(names, map(float, weights), strict=True))
+    if "J" in found and found["J"] <= 0:
+        found["J"] = 1e-3 * float(np.std(torque) / max(np.std(acceleration), 1e-300))
+    if "sigma_2" in found:
+        found["sigma_2"] = max(found["sigma_2"], 0.0)
+    if "F_C" in found and not found["F_C"] > 0:
+        inertia = found.get("J", values["J"]) * acceleration
+        found["F_C"] = float(np.quantile(np.abs(torque - inertia - found.get("M_0", values["M_0"])), 0.95))
+    return found
+
+
+def stiffnesses(models: Sequence[RecordTorque], values: Mapping[str, float]) -> Array:
+    """Starts of sigma_0 [N.m/rad], in equal ratios.
+
+    The least: the range of the friction torque over that of the angle, where that is largest (no spring of a bristle is
+    softer than what the smallest move shows). The most: the friction turns round within a few rows of a reversal.
+    """
+    least, steps = 0.0, []
+    for model in models:
+        friction = model.friction_measured(values)
+        speed = model.moved(values["delay"])[1]
+        interval = model.motion.interval
+        for k in range(len(model.parts)):
+            own = np.flatnonzero(model.stretch == k)
+            angle = np.cumsum(speed[own]) * interval
+            reach = float(np.quantile(friction[own], 0.98) - np.quantile(friction[own], 0.02))
+            least = max(least, reach / max(float(np.ptp(angle)), 1e-300))
+            turns = np.flatnonzero(speed[own][1:] * speed[own][:-1] < 0) + 1
+            turns = turns[turns + AFTER_REVERSAL < len(own)]
+            steps.append(np.abs(angle[turns + AFTER_REVERSAL] - angle[turns]))
+    travelled = np.concatenate(steps) if steps else np.zeros(0)
+    most = 4 * least
+    if len(travelled) and np.median(travelled) > 0:
+        most = max(most, 2 * values["F_C"] / float(np.median(travelled)))
+    count = int(np.clip(round(PER_DECADE * np.log10(most / least)) + 1, 4, MOST_STIFFNESSES))
+    return np.geomspace(least, most, count)
+
+
+def grid(
+    models: Sequence[RecordTorque], values: Mapping[str, float], free: Collection[str], count: int
+) -> list[dict[str, float]]:
+    """The `count` best sets of sigma_0, sigma_1, W, gamma of a grid, each of another W and gamma; the best one first.
+
+    The law is linear in sigma_1: its best value comes with every point of the grid. Parameters that are not free keep
+    their values.
+    """
+    zones = [PURE, *((zone, share) for zone in ZONES for share in SHARES)]
+    shapes: Sequence[tuple[float, float] | None] = zones if {"W", "gamma"} <= set(free) else [None]
+    levels = stiffnesses(models, values) if "sigma_0" in free else np.array([values["sigma_0"]])
+    found: list[tuple[float, dict[str, float]]] = []
+    for shape in shapes:
+        best: tuple[float, dict[str, float]] | None = None
+        for sigma_0 in levels:
+            trial = {**values, "sigma_0": float(sigma_0)}
+            if shape is not None:
+                trial |= {"W": shape[0] * values["F_C"] / float(sigma_0), "gamma": shape[1]}
+            cost = _damped(models, trial, "sigma_1" in free)
+            if best is None or cost < best[0]:
+                best = cost, trial
+        assert best is not None
+        found.append(best)
+    found.sort(key=lambda pair: pair[0])
+    return [trial for _, trial in found[:count]]
+
+
+def _damped(models: Sequence[RecordTorque], trial: dict[str, float], free: bool) -> float:
+    """Sum of squares over the stretches' torque power, with the best sigma_1 put into the trial."""
+    ends = []
+    for sigma_1 in (0.0, 1.0) if free else (trial["sigma_1"],):
+        trial["sigma_1"] = sigma_1
+        ends.append(
+            np.concatenate([model.residual(trial, 0.0, 0.0) / model.recorded_rms()[model.stretch] for model in models])
+        )
+    if not free:
+        return float(np.sum(ends[0] ** 2))
+    slope = ends[1] - ends[0]
+    trial["sigma_1"] = max(0.0, -float(slope @ ends[0]) / max(float(slope @ slope), 1e-300))
+    return float(np.sum((ends[0] + trial["sigma_1"] * slope) ** 2))

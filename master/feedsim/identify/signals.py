@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.identify.aliases import alias_of
+from feedsim.identify.signal_names import alias_of
 from feedsim.scenario.columns import (
     DIMENSIONS,
     DRIVING,

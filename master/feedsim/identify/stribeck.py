@@ -10,17 +10,26 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
 from feedsim.errors import InputError
-from feedsim.identify import doubts
-from feedsim.identify.doubts import Points
+from feedsim.identify import stribeck_identifiability as identifiability
 from feedsim.identify.fit import Fit, Parameter, correlation, fit
-from feedsim.identify.level import curve, torque
-from feedsim.identify.parameters import CONSTANT_SPEED, KINDS, check_held
-from feedsim.identify.parameters import USUAL as USUAL_OF_ALL
-from feedsim.identify.result import Correlation, Estimate, Plateau, Stationary, Status
+from feedsim.identify.parameters import (
+    CONSTANT_SPEED,
+    EXCESS,
+    NO_EFFECT,
+    USUAL,
+    check_held,
+    curve,
+    estimate,
+    inner,
+    inner_to_outer,
+    outer,
+    plateau_ranges,
+    torque,
+)
+from feedsim.identify.result import Correlation, Plateau, Stationary, Status
+from feedsim.identify.stribeck_identifiability import Points
 
 Array = NDArray[np.float64]
-
-USUAL = {name: value for name, value in USUAL_OF_ALL.items() if name in CONSTANT_SPEED}
 
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6
@@ -29,16 +38,8 @@ CLEAR = 0.99  # the same, of the drop that a Stribeck effect, or a shape that is
 HALF = 0.5  # of the sum of squares: what lies below is worth to free a parameter that is held by default
 SHAPED: Mapping[str, str] = {"beta": "v_s", "v_log": "F_log"}  # held by default -> without which it has no effect
 
-# Bounds of the search, within what is physical: beyond them plateaus tell nothing, and the solver goes astray.
-V_S = 20.0, 2.0  # below the lowest speed, above the highest: a Stribeck effect that is over before, or no end of it
-V_LOG = 1e-2, 1e2  # likewise: a logarithm all along, or a straight line
-BETA = 0.2, 4.0  # flatter, the peak has no end within decades of speed; steeper, it is a step
-ASYMMETRY = -0.5, 0.5  # beyond, it plays the constant load's part
-MOST_TORQUE = 2.0  # of the largest measured: no part of the friction, and no load, is more
-LEAST_F_C = 1e-3  # of the largest torque: what is reported is relative to it
-
-# The fit moves F_C and rise = F_S - F_C >= 0 in place of F_S: F_C <= F_S is a bound then.
-ORDER = ("F_C", "rise", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
+# The fit moves F_C and F_S - F_C >= 0 in place of F_S.
+ORDER = tuple(inner(name) for name in CONSTANT_SPEED)
 
 
 def stationary(
@@ -91,8 +92,8 @@ class _Problem:
 
     def solve(self) -> tuple[Fit, dict[str, str], float]:
         """The fit that stands, why what is held, and the share of the torque that plateaus scatter by besides noise."""
-        free = [name for name in ORDER if ("F_S" if name == "rise" else name) not in self.given]
-        reasons = doubts.unseparated(self.points) | doubts.too_few(self.points, free)
+        free = [name for name in ORDER if outer(name) not in self.given]
+        reasons = identifiability.unseparated(self.points) | identifiability.too_few(self.points, free)
         reasons = {name: reason for name, reason in reasons.items() if name in free}
         while True:
             left = [name for name in free if name not in reasons]
@@ -100,7 +101,7 @@ class _Problem:
                 raise InputError("every parameter of stationary friction is held: nothing is left to estimate")
             found, extra = self.weighted(left, reasons)
             more = self.needless(found, reasons, extra)
-            more = more or doubts.unanswered(self.points, found, self.inner(found.mapping(), reasons))
+            more = more or identifiability.unanswered(self.points, found, self.inner(found.mapping(), reasons))
             more = {name: reason for name, reason in more.items() if name in left}
             if not more or len(more) == len(left):
                 return found, reasons, extra
@@ -114,8 +115,8 @@ class _Problem:
 
         A fit makes one of noise alone: with none, the drop of chi^2 is that of as many random numbers.
         """
-        parts = [name for name in ("rise", "v_s", "beta") if name in found.names]
-        if not {"rise", "v_s"} <= set(parts) or found.sigma["v_s"] <= doubts.VAGUE * found["v_s"]:
+        parts = [name for name in (EXCESS, "v_s", "beta") if name in found.names]
+        if not {EXCESS, "v_s"} <= set(parts) or found.sigma["v_s"] <= identifiability.VAGUE * found["v_s"]:
             return {}
         reason = (
             f"the torque at the speeds from {self.points.speeds[0]:.3g} rad/s on is met as well without a Stribeck "
@@ -129,13 +130,13 @@ class _Problem:
         return dict.fromkeys(parts, reason)
 
     def inner(self, moved: Mapping[str, float], reasons: Mapping[str, str]) -> dict[str, float]:
-        """All values, F_S and rise both, from those that are moved."""
-        neutral = {"rise": 0.0, "F_log": 0.0, "sigma_2": 0.0, "asymmetry": 0.0, "M_0": 0.0}
+        """All values, F_S and its excess both, from those that are moved."""
+        neutral = {name: NO_EFFECT[name] for name in ("F_log", "sigma_2", "asymmetry", "M_0")} | {EXCESS: 0.0}
         values = {**self.usual, **{name: neutral[name] for name in reasons if name in neutral}}
         values |= {**self.given, **moved}
         if "F_S" in self.given:
-            values["rise"] = self.given["F_S"] - values["F_C"]
-        values["F_S"] = values["F_C"] + values["rise"]
+            values[EXCESS] = self.given["F_S"] - values["F_C"]
+        values["F_S"] = values["F_C"] + values[EXCESS]
         return values
 
     def weighted(self, left: Sequence[str], reasons: Mapping[str, str]) -> tuple[Fit, float]:
@@ -172,28 +173,15 @@ class _Problem:
     def parameter(self, name: str, start: float) -> Parameter:
         """Bounds and the range of further starts, from what the plateaus span."""
         points = self.points
-        top, fast, slow = float(np.max(np.abs(points.torque))), float(points.speeds[-1]), float(points.speeds[0])
-        least, most = 0.0 if name == "rise" else KINDS[name].lower, MOST_TORQUE * top
-        if name == "v_s":
-            scatter = slow, max(fast / 3, 2 * slow)
-            return Parameter(name, start, slow / V_S[0], V_S[1] * fast, scatter=scatter, log=True)
-        if name == "v_log":
-            return Parameter(name, start, V_LOG[0] * slow, V_LOG[1] * fast, scatter=(slow, fast * 1.01), log=True)
-        if name == "beta":
-            return Parameter(name, start, *BETA, scatter=(0.5, 2.0), log=True)
-        if name == "asymmetry":
-            return Parameter(name, start, *ASYMMETRY, 0.1, scatter=(-0.05, 0.05))
-        if name == "M_0":
-            return Parameter(name, start, -most, most, 0.1 * top, scatter=(-0.05 * top, 0.05 * top))
-        if name == "sigma_2":
-            return Parameter(name, start, least, most / fast, 0.1 * top / fast, scatter=(0.0, 0.5 * top / fast))
+        top = float(np.max(np.abs(points.torque)))
+        within = dict(plateau_ranges(float(points.speeds[0]), float(points.speeds[-1]), top)[name])
+        if name == "F_C" and "F_S" in self.given:
+            # Held F_S is an upper bound: the excess must not be negative.
+            highest = min(within["upper"], self.given["F_S"])
+            within |= {"upper": highest, "scatter": (0.2 * top, min(top, highest))}
         if name == "F_C":
-            # Held F_S is an upper bound: the rise must not be negative.
-            highest = min(most, self.given.get("F_S", most))
-            return Parameter(
-                name, min(start, highest), LEAST_F_C * top, highest, 0.3 * top, scatter=(0.2 * top, min(top, highest))
-            )
-        return Parameter(name, start, least, most, 0.1 * top, scatter=(0.0, 0.5 * top))
+            start = min(start, within["upper"])
+        return Parameter(name, start, **within)
 
 
 def _guess(points: Points) -> dict[str, float]:
@@ -205,7 +193,7 @@ def _guess(points: Points) -> dict[str, float]:
     climb = float(friction[-1] - friction[lowest])
     return {
         "F_C": float(friction[lowest]),
-        "rise": max(rise, 0.0),
+        EXCESS: max(rise, 0.0),
         # Down to 5 % at the speed of the lowest torque.
         "v_s": max(float(points.speeds[lowest]) / 3, slow / 2),
         "F_log": 0.3 * max(climb, 0.0),
@@ -261,24 +249,18 @@ def _conclude(
 ) -> Stationary:
     """Everything that is reported."""
     values = problem.inner(found.mapping(), reasons)
-    # From what was moved to what is reported: F_S = F_C + rise.
-    names = tuple("F_S" if name == "rise" else name for name in found.names)
-    turn = np.eye(len(names))
-    if "rise" in found.names and "F_C" in found.names:
-        turn[found.names.index("rise"), found.names.index("F_C")] = 1.0
+    names = tuple(map(outer, found.names))
+    turn = inner_to_outer(found.names, names)
     covariance = turn @ found.covariance @ turn.T
     matrix = correlation(covariance)
     sigma = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
-    told = {"F_S" if name == "rise" else name: reason for name, reason in reasons.items()}
+    told = {outer(name): reason for name, reason in reasons.items()}
     estimates = {}
     for name in CONSTANT_SPEED:
-        kind = KINDS[name]
         status: Status = "estimated" if name in names else "undetermined" if name in told else "held"
         reason = told.get(name, "" if status == "estimated" else "held at a given or usual value")
-        estimates[name] = Estimate(
-            name, values[name], kind.unit, kind.meaning, float(sigma.get(name, nan)), status, reason
-        )
-    said = doubts.warnings(points, found, matrix, names, I_P)
+        estimates[name] = estimate(name, values[name], float(sigma.get(name, nan)), status, reason)
+    said = identifiability.warnings(points, found, matrix, names, I_P)
     said += [f"{name} is not estimated but held at {values[name]:.4g}: {reason}" for name, reason in told.items()]
     if extra > 0:
         said.append(

@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from copy import copy
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.identify.motion import Motion, motion
+from feedsim.identify.motion import Motion, Part, motion, noise_of, parts
 from feedsim.identify.parameters import FRICTION
 from feedsim.identify.record import Record
-from feedsim.identify.stretches import Part, parts
+
+if TYPE_CHECKING:
+    from feedsim.cosim.friction_law import FrictionLaw
 
 Array = NDArray[np.float64]
 
 STARTS = ("z", "c")  # state at a record's begin, as shares
 START_PRIOR = {"z": 3**-0.5, "c": 12**-0.5}  # standard deviation of what may lie anywhere within its range
 KEPT = 4  # results of the law kept per record: a difference quotient of another record's start asks for the same again
-
-
-class Law(Protocol):
-    """The friction law: M_fr (N+1,) [N.m] at the N+1 instants of `n` [rad/s], h [s] apart, linear in between, from the
-    bristle deflection z [rad] and the position in the engaging zone c [rad] on."""
-
-    def __call__(
-        self, parameters: Mapping[str, float], n: Array, h: float, *, z: float = 0.0, c: float = 0.0
-    ) -> Array: ...
 
 
 def deflection(values: Mapping[str, float]) -> float:
@@ -46,7 +41,7 @@ class RecordTorque:
     nothing is left of them.
     """
 
-    def __init__(self, record: Record, law: Law, *, coarse: bool = False) -> None:
+    def __init__(self, record: Record, law: FrictionLaw, *, coarse: bool = False) -> None:
         """coarse: a step of the law per row, for a first look."""
         self.record, self.law = record, law
         self.motion: Motion = motion(record)
@@ -72,8 +67,8 @@ class RecordTorque:
             fine = self.moved(values["delay"])[0]
             # Linear in sigma_2: that part is added outside and costs no run.
             law = {name: values[name] for name in FRICTION} | {"sigma_2": 0.0}
-            start = {"z": z * deflection(values), "c": c * values["W"]}
-            found = self.law(law, fine, self.record.interval / self.count, **start)
+            h, start = self.record.interval / self.count, z * deflection(values)
+            found = self.law(law, fine, h, z=start, c=c * values["W"])
             if len(self._law) >= KEPT:
                 del self._law[next(iter(self._law))]
             self._law[key] = np.asarray(found[:: self.count][self.rows], dtype=np.float64)
@@ -113,8 +108,21 @@ class RecordTorque:
         """(rows,) model less record [N.m]."""
         return self.friction_model(values, z, c) - self.friction_measured(values)
 
+    def disturbed(self, rng: np.random.Generator) -> RecordTorque | None:
+        """The same rows of the record with as much noise on the motion again; None where it has none."""
+        source = self.motion.source
+        samples = getattr(self.record, source)
+        noise = noise_of(samples)
+        if noise == 0:
+            return None
+        again = replace(self.record, **{source: samples + noise * rng.standard_normal(len(samples))})
+        moved = copy(self)
+        moved.motion = motion(again, source)
+        moved._law, moved._moved = {}, {}
+        return moved
 
-def models(records: Sequence[Record], law: Law, *, coarse: bool = False) -> tuple[RecordTorque, ...]:
+
+def models(records: Sequence[Record], law: FrictionLaw, *, coarse: bool = False) -> tuple[RecordTorque, ...]:
     """Of the records that move at all."""
     made = (RecordTorque(record, law, coarse=coarse) for record in records)
     return tuple(model for model in made if len(model.rows))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feedsim.identify.level import torque as motor_torque
+from feedsim.identify.parameters import torque as motor_torque
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Identification, Plateau, Stationary
 from feedsim.report.formatting import counted

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from math import nan
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from feedsim.errors import InputError
-from feedsim.identify.balance import FreeAxis, balanced
-from feedsim.identify.flexible import with_structure
 from feedsim.identify.inertia import Inertia, inertia
-from feedsim.identify.motion import motion
+from feedsim.identify.motion import Part, motion, parts
+from feedsim.identify.open_loop import balanced
 from feedsim.identify.options import Options
 from feedsim.identify.output_error import dynamic
-from feedsim.identify.parameters import CONSTANT_SPEED, FRICTION, KINDS, NO_EFFECT, PRE_SLIDING, USUAL
+from feedsim.identify.parameters import CONSTANT_SPEED, FIXED, FRICTION, NO_EFFECT, PRE_SLIDING, USUAL, estimate
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
 from feedsim.identify.result import (
@@ -29,12 +29,12 @@ from feedsim.identify.result import (
     Identification,
     Plateau,
     Stationary,
-    Status,
 )
-from feedsim.identify.stretches import Part, parts
 from feedsim.identify.stribeck import stationary
-from feedsim.identify.torque import Law
-from feedsim.variables import table
+from feedsim.identify.structure_torque import with_structure
+
+if TYPE_CHECKING:
+    from feedsim.cosim.friction_law import FrictionLaw
 
 Progress = Callable[[str, int, int], None]  # what is being done, how many of its steps are done, of how many
 
@@ -46,20 +46,14 @@ SLIDING = 1.0  # [rad], some 20 times a usual pre-sliding: amplitude above which
 
 
 def identify(
-    records: Sequence[Record],
-    law: Law,
-    options: Options,
-    progress: Progress | None = None,
-    *,
-    free_axis: FreeAxis | None = None,
+    records: Sequence[Record], law: FrictionLaw, options: Options, progress: Progress | None = None
 ) -> Identification:
     """Friction parameters of one axis.
 
-    law: the friction model as a function of the speed; free_axis: as what holds back a rigid axis, for records of
-    general motion, whose F_C and M_0 are then taken from the position in open loop (balance.py). Stage 1 takes every
-    stretch at constant speed; stage 2 takes the records with sines or, where there are none, all whose axis reverses.
-    Stage 1 enters stage 2 as a prior, unless both are of the same records. Either may be absent; what it would tell is
-    then held, with the reason.
+    law: the friction model. Stage 1 takes every stretch at constant speed; stage 2 takes the records with sines or,
+    where there are none, all whose axis reverses. Stage 1 enters stage 2 as a prior, unless both are of the same
+    records. Either may be absent; what it would tell is then held, with the reason. Of records of general motion F_C
+    and M_0 are then taken from the position in open loop (open_loop.py).
 
     Raises InputError: no records, neither plateaus nor reversals, or a fit that cannot be made.
     """
@@ -67,18 +61,14 @@ def identify(
         raise InputError("no records to identify from")
     if options.modes is not None:
         records = [with_structure(record, options.modes, options.axis) for record in records]
-    run = _Run(records, law, options, progress or (lambda what, done, total: None), free_axis)
-    return run.result()
+    return _Run(records, law, options, progress or (lambda what, done, total: None)).result()
 
 
 class _Run:
     """One identification: steps, how long each took, and what there is to say."""
 
-    def __init__(
-        self, records: Sequence[Record], law: Law, options: Options, progress: Progress, free_axis: FreeAxis | None
-    ) -> None:
+    def __init__(self, records: Sequence[Record], law: FrictionLaw, options: Options, progress: Progress) -> None:
         self.records, self.law, self.options, self.progress = records, law, options, progress
-        self.free_axis = free_axis
         self.seconds: dict[str, float] = {}
         self.warnings: list[str] = []
         self.advice: list[str] = []
@@ -192,14 +182,11 @@ class _Run:
             self.warnings.append(f"no pre-sliding parameters: {error}")
             return None
 
-    def _balanced(self, estimates: Mapping[str, Estimate]) -> Balance | None:
+    def _balanced(self, estimates: Mapping[str, Estimate]) -> Balance:
         """F_C and M_0 from the position in open loop, where stage 2 was fitted to general motion."""
-        if self.free_axis is None:
-            return None
         self.progress("open loop", 0, 1)
-        found = balanced(
-            transitions(self.records), self.free_axis, estimates, self.law, hold=self.options.hold, I_P=self.options.I_P
-        )
+        options = self.options
+        found = balanced(transitions(self.records), self.law, estimates, hold=options.hold, I_P=options.I_P)
         self.progress("open loop", 1, 1)
         return found
 
@@ -242,7 +229,8 @@ class _Run:
 
     def _held(self, names: Collection[str]) -> tuple[dict[str, float], tuple[str, ...]]:
         """What of `names` is held at which value, besides the usual ones, and what is freed."""
-        held = {name: value for name, value in self.options.hold.items() if name in names}
+        constant = {name: self.options.fallback.get(name, NO_EFFECT[name]) for name in FIXED}
+        held = {name: value for name, value in (constant | dict(self.options.hold)).items() if name in names}
         return held, tuple(name for name in self.options.free if name in names)
 
     def _merged(self, first: Stationary | None, second: Dynamic | None, J: Estimate | None) -> dict[str, Estimate]:
@@ -260,7 +248,8 @@ class _Run:
                     if name not in known or each.status == "estimated"
                 }
         if "delay" not in found and self.options.delay is not None:
-            found["delay"] = _held("delay", self.options.delay, "given", "not used: stage 2 is absent")
+            reason = "not used: stage 2 is absent"
+            found["delay"] = estimate("delay", self.options.delay, status="given", reason=reason)
         for name in FRICTION:
             if name not in found:
                 found[name] = self._absent(name, found)
@@ -273,43 +262,34 @@ class _Run:
 
     def _absent(self, name: str, found: Mapping[str, Estimate]) -> Estimate:
         """A parameter that no stage tells."""
-        reason = self.reasons.get(2 if name in PRE_SLIDING else 1, "")
-        if name in self.options.hold:
-            return _held(name, self.options.hold[name], "held", "as asked for")
-        if name in USUAL and name not in self.options.free:
-            return _held(name, USUAL[name], "held", "usual value")
-        if name in self.options.fallback:
-            return _held(name, self.options.fallback[name], "held", f"{reason}; value of the machine file".lstrip("; "))
+        options, reason = self.options, self.reasons.get(2 if name in PRE_SLIDING else 1, "")
+
+        def held(value: float, why: str) -> Estimate:
+            return estimate(name, value, status="held", reason=f"{reason}; {why}".lstrip("; "))
+
+        if name in options.hold:
+            return estimate(name, options.hold[name], status="held", reason="as asked for")
+        if name in USUAL and name not in options.free:
+            return estimate(name, USUAL[name], status="held", reason="usual value")
+        if name in options.fallback:
+            return held(options.fallback[name], "value of the machine file")
         if name in ("F_C", "F_S"):
             other = found.get("F_C" if name == "F_S" else "F_S")
             if other is None:
                 raise InputError(f"{name} cannot be told from the records: {reason}")
-            return _held(name, other.value, "held", f"{reason}; as {other.name}".lstrip("; "))
+            return held(other.value, f"as {other.name}")
         if name == "sigma_0":
-            return _held(
-                name, found["F_S"].value / USUAL_DEFLECTION, "held", f"{reason}; usual deflection".lstrip("; ")
-            )
+            return held(found["F_S"].value / USUAL_DEFLECTION, "usual deflection")
         if name == "sigma_1":
-            value = found["sigma_0"].value * USUAL_RELAXATION
-            return _held(name, value, "held", f"{reason}; usual relaxation time".lstrip("; "))
-        value = NO_EFFECT[name] if name in NO_EFFECT else float(table("friction")[name].start)
-        return _held(name, value, "held", f"{reason}; no effect".lstrip("; "))
+            return held(found["sigma_0"].value * USUAL_RELAXATION, "usual relaxation time")
+        return held(NO_EFFECT[name], "no effect")
 
-    def _timed(self, step: str) -> AbstractContextManager[None]:
-        return _Timed(self.seconds, step)
-
-
-class _Timed(AbstractContextManager[None]):
-    """Adds the time that a block takes to `seconds`."""
-
-    def __init__(self, seconds: dict[str, float], step: str) -> None:
-        self.seconds, self.step = seconds, step
-
-    def __enter__(self) -> None:
-        self.begin = perf_counter()
-
-    def __exit__(self, *_: object) -> None:
-        self.seconds[self.step] = perf_counter() - self.begin
+    @contextmanager
+    def _timed(self, step: str) -> Iterator[None]:
+        """Adds the time that a block takes."""
+        begin = perf_counter()
+        yield
+        self.seconds[step] = perf_counter() - begin
 
 
 def transitions(records: Sequence[Record]) -> tuple[Record, ...]:
@@ -346,8 +326,3 @@ def _reverses(record: Record, found: Sequence[Part]) -> bool:
         return True
     speed = motion(record).coarse()
     return len({float(np.sign(np.sum(speed[part.rows]))) for part in found}) > 1
-
-
-def _held(name: str, value: float, status: Status, reason: str) -> Estimate:
-    kind = KINDS[name]
-    return Estimate(name, value, kind.unit, kind.meaning, nan, status, reason)

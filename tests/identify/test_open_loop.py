@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError, SimulationError
-from feedsim.identify.balance import NEEDED, balanced, first_deflection, first_speed, substeps
+from feedsim.identify.open_loop import NEEDED, balanced, first_deflection, first_speed, substeps
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Balance, Estimate
 
@@ -97,7 +97,7 @@ OFF = {"F_C": 1.6 * 1.04, "F_S": 2.1 + 0.04 * 1.6, "M_0": 0.24}
 
 def found(records: Record | list[Record], law: FrictionLaw, given: Mapping[str, Estimate], **options: Any) -> Balance:
     records = [records] if isinstance(records, Record) else records
-    return balanced(records, law.free_axis, given, law, **options)
+    return balanced(records, law, given, **options)
 
 
 def assert_true(balance: Balance, relative: float) -> None:
@@ -173,7 +173,7 @@ def test_steps_of_the_free_axis_are_all_that_is_wrong(
     general: Record, law: FrictionLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     record = general.between(1230, len(general))
-    monkeypatch.setattr("feedsim.identify.balance.STEP", 0.05)
+    monkeypatch.setattr("feedsim.identify.open_loop.STEP", 0.05)
     assert_true(found(record, law, estimates(OFF)), EXACT / 9)  # three steps per interval
 
 
@@ -300,12 +300,13 @@ def test_bristles_too_stiff_for_the_record(general: Record, law: FrictionLaw) ->
     assert_refused(found(general, law, given), given, "sigma_0 or sigma_1 is so large")
 
 
-def test_a_motion_that_is_no_number(general: Record, law: FrictionLaw) -> None:
+def test_a_motion_that_is_no_number(general: Record, law: FrictionLaw, monkeypatch: pytest.MonkeyPatch) -> None:
     def runs_off(*_: Any, **__: Any) -> tuple[Array, Array]:
         raise SimulationError("no finite number at 0.5 s")
 
+    monkeypatch.setattr(law, "free_axis", runs_off)
     given = estimates(OFF)
-    assert_refused(balanced([general], runs_off, given, law), given, "no finite number at 0.5 s")
+    assert_refused(balanced([general], law, given), given, "no finite number at 0.5 s")
 
 
 @pytest.mark.parametrize("name", NEEDED)

@@ -17,18 +17,20 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from math import ceil, inf, isfinite, nan, sqrt
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError, SimulationError
 from feedsim.identify.fit import Fit, Parameter, Residuals, fit
-from feedsim.identify.level import level
-from feedsim.identify.parameters import FRICTION
+from feedsim.identify.parameters import FRICTION, level
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Balance, Drift, Estimate
-from feedsim.identify.torque import Law, RecordTorque, deflection
+from feedsim.identify.torque import RecordTorque, deflection
+
+if TYPE_CHECKING:
+    from feedsim.cosim.friction_law import FrictionLaw
 
 Array = NDArray[np.float64]
 
@@ -47,29 +49,10 @@ SINES = "sines; the open loop needs general motion"
 NEEDED = (*FRICTION, "M_0", "J")
 
 
-class FreeAxis(Protocol):
-    """Angle and speed, each (N + 1,), of a rigid axis from 0 on under the torque M_a (N,) [N.m], held for h [s] each:
-    J dn/dt = M_a - M_0 - M_fr, from the speed n [rad/s] and the bristle deflection z [rad] on."""
-
-    def __call__(
-        self,
-        parameters: Mapping[str, float],
-        J: float,
-        M_0: float,
-        M_a: Array,
-        h: float,
-        *,
-        n: float = 0.0,
-        z: float = 0.0,
-        substeps: int = 1,
-    ) -> tuple[Array, Array]: ...
-
-
 def balanced(
     records: Sequence[Record],
-    free_axis: FreeAxis,
+    law: FrictionLaw,
     estimates: Mapping[str, Estimate],
-    law: Law,
     *,
     hold: Collection[str] = (),
     I_P: float | None = None,
@@ -79,7 +62,7 @@ def balanced(
     Args:
         records: of general motion, motor side. Those with sines, of small moves, without a position or shorter than
             `SHORTEST` are left out.
-        free_axis, law: the friction model as it moves an axis, and as a torque (for the residual of the torque).
+        law: the friction model as it moves an axis, and as a torque (for the residual of the torque).
         estimates: every friction parameter, M_0, J, and the delay of the torque (0 where it is missing). The recorded
             torque is that of `delay` earlier; one that is held over the coming interval h has the delay -h/2.
         hold: names that keep their value: the user's word. An estimate that is not `estimated` keeps its own, except
@@ -107,7 +90,7 @@ def balanced(
         if why:
             whys.append((record.name, why))
         elif model is not None:
-            axes.append(_OpenLoop(record, model, free_axis))
+            axes.append(_OpenLoop(record, model))
             directions |= _directions(model)
     if not axes:
         sines = bool(whys) and all(why == SINES for _, why in whys)
@@ -154,9 +137,9 @@ def balanced(
 class _OpenLoop:
     """One record: where the model goes under its torque."""
 
-    def __init__(self, record: Record, model: RecordTorque, free_axis: FreeAxis) -> None:
+    def __init__(self, record: Record, model: RecordTorque) -> None:
         assert record.angle is not None
-        self.record, self.model, self.free_axis = record, model, free_axis
+        self.record, self.model = record, model
         self.angle = record.angle
         first, self.n = first_speed(self.angle, record.interval)
         self.origin = float(first)
@@ -168,7 +151,8 @@ class _OpenLoop:
         parameters = {name: values[name] for name in FRICTION}
         z = first_deflection(values, self.n, float(torque[0]) - values["M_0"])
         steps = substeps(values, h)
-        angle, _ = self.free_axis(parameters, values["J"], values["M_0"], torque, h, n=self.n, z=z, substeps=steps)
+        free_axis = self.model.law.free_axis
+        angle, _ = free_axis(parameters, values["J"], values["M_0"], torque, h, n=self.n, z=z, substeps=steps)
         return np.asarray(self.angle - self.origin - angle, dtype=np.float64)
 
     def drift(self, before: Array, after: Array) -> Drift:
@@ -230,7 +214,7 @@ def substeps(values: Mapping[str, float], h: float) -> int:
     return max(1, ceil(h * max(damping, stiffness) / STEP))
 
 
-def _model(record: Record, law: Law) -> RecordTorque | None:
+def _model(record: Record, law: FrictionLaw) -> RecordTorque | None:
     try:
         return RecordTorque(record, law)
     except InputError:  # too short for a motion

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.identify.fit import Fit
-from feedsim.identify.level import level
+from feedsim.identify.parameters import EXCESS, level
 from feedsim.identify.result import Plateau
 
 Array = NDArray[np.float64]
@@ -74,10 +74,10 @@ def too_few(points: Points, free: Sequence[str]) -> dict[str, str]:
     """Curve parameters among `free` that so few speeds do not tell, name -> reason: more than there are speeds."""
     count = len(points.speeds)
     found: dict[str, str] = {}
-    ranks = ["F_C", "rise", "sigma_2", "F_log", "v_s", "v_log", "beta"]
+    ranks = ["F_C", EXCESS, "sigma_2", "F_log", "v_s", "v_log", "beta"]
     if not falls(points) and count < 6:
         reason = f"the torque does not fall with speed at any of {count} speed(s): no Stribeck effect shows"
-        found |= {name: reason for name in ("rise", "v_s", "beta") if name in free}
+        found |= {name: reason for name in (EXCESS, "v_s", "beta") if name in free}
     wanted = [name for name in ranks if name in free and name not in found]
     few = f"{count} speed(s) do not tell {len(wanted)} parameters of the curve"
     found |= {name: few for name in wanted[count:]}
@@ -108,8 +108,8 @@ def unanswered(points: Points, found: Fit, values: dict[str, float]) -> dict[str
             f"no plateau lies within the Stribeck range: the lowest speed is {points.speeds[0]:.3g} rad/s, "
             f"v_s is about {values['v_s']:.2g} rad/s or less"
         )
-        told |= {name: reason for name in ("v_s", "rise", "beta") if name in free}
-    if "v_s" in free and values["rise"] <= 0:
+        told |= {name: reason for name in ("v_s", EXCESS, "beta") if name in free}
+    if "v_s" in free and values[EXCESS] <= 0:
         told |= {name: "no Stribeck effect: F_S is F_C" for name in ("v_s", "beta") if name in free}
     if told:
         return told
@@ -163,7 +163,7 @@ def warnings(points: Points, found: Fit, matrix: Array, names: Sequence[str], I_
             "from well below to well above v_log; the curve itself may be good"
         )
     for name in found.at_bound:
-        shown = "F_S - F_C" if name == "rise" else name
+        shown = "F_S - F_C" if name == EXCESS else name
         said.append(f"{shown} sits at its bound {found[name]:.4g}: the model's shape does not fit, or it is not there")
     for row, first in enumerate(names):
         for column in range(row):

@@ -1,15 +1,16 @@
-"""Which parameters the data do not tell: judged by bound and value, with the reason in words."""
+"""Which parameters the records of stage 2 do not tell: judged by what they hold, by bound and by value."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from feedsim.identify.parameters import KINDS
+from feedsim.identify.parameters import KINDS, NO_EFFECT, inner, outer
 from feedsim.identify.result import NORMAL_95
-from feedsim.identify.search import EXCESS, Solution, outer
+from feedsim.identify.search import Solution
+from feedsim.identify.torque import RecordTorque, deflection
 
 # Of the value: a standard deviation above says that even the order of magnitude is open (95 % interval down to 0).
 VAGUE = 0.5
@@ -46,7 +47,7 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
     for name in free:
         # Those without a scale of their own are told with any bound, large or small.
         lenient = name in kept or name in ("M_0", "asymmetry", "delay")
-        key = EXCESS if name == "F_S" else name
+        key = inner(name)
         if lenient and np.isfinite(solution.sigma(key)) and key not in solution.fit.at_bound:
             continue
         judged = _judge(solution, name)
@@ -66,7 +67,7 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
 
 def _judge(solution: Solution, name: str) -> tuple[float, Verdict] | None:
     """How vague a parameter is and the verdict on it; None: it is told well enough."""
-    key = EXCESS if name == "F_S" else name
+    key = inner(name)
     value = solution.fit[key]
     sigma = solution.sigma(key)
     if name == "gamma" and value > 1 - SIGNIFICANT * min(sigma, 0.25):
@@ -91,10 +92,62 @@ def _complete(judged: Verdict, free: Collection[str], values: Mapping[str, float
     """What goes with it: W and gamma only make sense together, so do F_S and v_s."""
     held = dict(judged.held)
     if {"W", "gamma"} & set(held):
-        held = {name: value for name, value in {"W": 0.0, "gamma": 1.0}.items() if name in free}
+        held = {name: NO_EFFECT[name] for name in ("W", "gamma") if name in free}
     if {"F_S", "v_s"} & set(held):
         held = {name: values["F_C"] if name == "F_S" else values["v_s"] for name in ("F_S", "v_s") if name in free}
     for name in ("sigma_1", "sigma_2", "F_log", "asymmetry"):
         if name in held:
-            held[name] = 0.0
+            held[name] = NO_EFFECT[name]
     return Verdict(held, judged.name, judged.reason)
+
+
+LEAST_EXPLAINED = 0.01  # of the torque's rms: interpolation, ripple and held commands are not modelled to better
+LEAST_ROWS = 5.0  # of the log from a reversal until the bristles have turned over, to tell damping or engaging zone
+LEAST_REVERSALS = 4  # to tell the delay of the torque: at each it could also be the bristles'
+FAST = 0.05  # of the top speed: what a direction of motion must reach to count
+
+
+def has_sines(models: Sequence[RecordTorque]) -> bool:
+    """Whether any of the stretches is a sine."""
+    return any(part.kind == "sine" for model in models for part in model.parts)
+
+
+def explained(models: Sequence[RecordTorque], found: Solution, tried: Solution) -> float:
+    """How much the residual falls from one solution to the other, in squares, as a share of the torque's rms [1]."""
+    squares = torque = 0.0
+    for k, model in enumerate(models):
+        ends = [model.residual(one.values, float(one.states[k, 0]), float(one.states[k, 1])) for one in (found, tried)]
+        squares += float(np.sum(ends[0] ** 2) - np.sum(ends[1] ** 2))
+        torque += float(np.sum(model.measured**2))
+    return float(np.sqrt(max(squares, 0.0) / max(torque, 1e-300)))
+
+
+def turnover_rows(models: Sequence[RecordTorque], solution: Solution) -> float:
+    """Median number of rows from a reversal until the axis has travelled twice the bristles' deflection."""
+    way = 2 * deflection(solution.values)
+    counts = []
+    for model in models:
+        n, h = model.motion.coarse(), model.record.interval
+        travelled = np.concatenate([[0.0], np.cumsum(np.abs(n[1:] + n[:-1]) / 2) * h])
+        for first in _reversals(model):
+            last = int(np.searchsorted(travelled, travelled[first] + way))
+            counts.append(last - first)
+    return float(np.median(counts)) if counts else 0.0
+
+
+def reversals(models: Sequence[RecordTorque]) -> int:
+    """How often the axes turn round, from one direction at speed to the other."""
+    return sum(len(_reversals(model)) for model in models)
+
+
+def _reversals(model: RecordTorque) -> list[int]:
+    """Rows at which the speed changes its sign between two directions that are both driven at speed."""
+    n = model.motion.coarse()
+    fast = np.flatnonzero(np.abs(n) > FAST * np.max(np.abs(n)))
+    sides = np.sign(n[fast])
+    turns = np.flatnonzero(sides[1:] != sides[:-1])
+    found = []
+    for k in turns:
+        between = n[fast[k] : fast[k + 1] + 1] * sides[k]
+        found.append(int(fast[k] + np.argmax(between <= 0)))
+    return found

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from feedsim import cosim, scenario
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.identify import Options, identify
-from feedsim.identify.level import curve
+from feedsim.identify.parameters import curve
 from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate
 from feedsim.scenario import Delay, Level, Machine, Noise

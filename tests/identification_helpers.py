@@ -127,7 +127,7 @@ def balance(applied: bool = True, reason: str = "") -> Balance:
     rms = float(np.sqrt(np.mean(before**2)))
     found = estimates()
     return Balance(
-        found, applied, reason, ("move.csv",), (rms, 0.1 * rms), (0.05, 0.051), I_P,
+        found, applied, reason, ("move.csv",), (rms, 0.1 * rms), (0.05, 0.051),
         {"F_C": (1.6 / 0.96, 1.6), "F_S": (2.1 / 0.96, 2.1), "M_0": (0.24, 0.25)}, (drift,),
     )  # fmt: skip
 

@@ -176,36 +176,3 @@ def test_periodic_refuses() -> None:
     uneven[7] += 1e-4
     with pytest.raises(InputError, match=r"even times; 0\.0071 s lies 0\.0001 s off"):
         estimate.periodic([Trace(uneven, traces[0].columns)], PAIR, reference="r", rows=rows, lines=lines)
-
-
-def test_welch_in_open_and_closed_loop() -> None:
-    """Random signals, no period: a drive's own record."""
-    random = np.random.default_rng(5)
-    count = 400_000
-    r, v = random.normal(size=count), 0.2 * random.normal(size=count)
-    u, y = Loop.closed().run(r, v)
-    open_y = lfilter(*G, r)
-    trace = Trace(np.arange(count, dtype=np.float64) * 1e-3, {"r": r, "u": u, "y": y, "open": open_y})
-    open_loop = estimate.welch(trace, [("open", "r")], segment=2.0)
-    closed = estimate.welch(trace, PAIR, segment=2.0, reference="r").between(5, 450)
-    # The Hann window (3 dB over 1.44 lines of 0.5 Hz) rounds the resonance, 6 Hz wide, by some tenths of a per cent;
-    # what the segments' ends cut off of the ringing is noise of a per cent.
-    expected = at(G, open_loop.frequency)
-    inside = (open_loop.frequency > 5) & (open_loop.frequency < 450)
-    np.testing.assert_allclose(open_loop["open/r"][inside], expected[inside], rtol=0.03)
-    assert open_loop.coherence["open/r"][inside].min() > 0.99
-    expected = at(G, closed.frequency)
-    spread = np.sqrt(0.04 * np.abs(1 + at(C, closed.frequency) * expected) ** 2 / 399) + 0.02 * np.abs(expected)
-    assert np.all(np.abs(closed["y/u"] - expected) < 5 * spread)
-    assert closed.frequency[1] - closed.frequency[0] == pytest.approx(0.5)
-
-
-def test_welch_refuses() -> None:
-    trace = Trace(np.arange(1000, dtype=np.float64) * 1e-3, {"u": np.arange(1000.0) ** 2, "y": np.zeros(1000)})
-    for segment, overlap, message in (
-        (0.8, 0.5, "holds 1 segments of 0.8 s; at least 2"),
-        (1e-3, 0.5, "at least 8 are needed"),
-        (0.1, 1.0, "overlap 1 of segments"),
-    ):
-        with pytest.raises(InputError, match=message):
-            estimate.welch(trace, PAIR, segment=segment, overlap=overlap)

@@ -17,7 +17,8 @@ import pytest
 
 from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Plan, signal_of
-from feedsim.analysis.responses import Responses, frequencies, names, one, read_overlays, unit_of
+from feedsim.analysis.linear.loops import names, response, unit_of
+from feedsim.analysis.responses import Responses, frequencies, read_overlays
 from feedsim.errors import InputError, OutputError
 from feedsim.report import frf as report
 from feedsim.report.bode_plots import speed_controlled_pictures
@@ -284,7 +285,7 @@ def test_names_of_responses() -> None:
     assert unit_of("tool.x_X/tool.F_X") == "m/N"
     assert unit_of("Z.speed_loop") == "1"
     with pytest.raises(InputError, match=r"no frequency response 'Z\.n_a'; there are X\.n_a/X\.M_a"):
-        one(responses_system(), "Z.n_a", np.array([1.0]))
+        response(responses_system(), "Z.n_a", np.array([1.0]))
 
 
 def responses_system() -> Any:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.identify.fit import Parameter, Prior, fit
+from feedsim.identify.fit import Parameter, Prior, correlation, fit
 
 TIME = np.linspace(0.0, 4.0, 41)
 
@@ -27,7 +27,9 @@ def test_a_line_has_the_covariance_of_the_normal_equations() -> None:
     )
     np.testing.assert_allclose(found.values, exact, rtol=1e-8)
     np.testing.assert_allclose(found.covariance, 0.01 * np.linalg.inv(design.T @ design), rtol=1e-5)
-    np.testing.assert_allclose(found.correlation[0, 1], -np.sqrt(0.75), rtol=0.03)  # of a line over 0 .. T: -sqrt(3)/2
+    np.testing.assert_allclose(
+        correlation(found.covariance)[0, 1], -np.sqrt(0.75), rtol=0.03
+    )  # of a line over 0 .. T: -sqrt(3)/2
     loose = fit(
         lambda v: measured - v["c"] - v["m"] * TIME, [Parameter("c", 0.0), Parameter("m", 1.0)], normalised=False
     )

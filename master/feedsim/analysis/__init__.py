@@ -1,4 +1,8 @@
-"""Derived figures from traces: positioning, circularity. Definitions: docs/figures.md."""
+"""Derived figures from traces, responses of the linear system, and what takes several runs: docs/figures.md.
+
+It may use cosim, structure, nc, scenario and trace.
+Start reading in evaluate.py, which finds the figures that a scenario asks for; circularity.py is one of them, whole.
+"""
 
 from feedsim.analysis.circularity import Contour, Glitch, Turn, circularity, contour
 from feedsim.analysis.evaluate import CircleTask, PositioningTask, Result, Task, check, evaluate, tasks

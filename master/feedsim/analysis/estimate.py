@@ -127,55 +127,6 @@ def periodic(
     return _responses(traces[0], pairs, frequency, reference if method == "joint" else None, cross, blocks)
 
 
-def welch(
-    trace: Trace,
-    pairs: Sequence[Pair],
-    *,
-    segment: float,
-    reference: str | None = None,
-    overlap: float = 0.5,
-    window: str = "hann",
-) -> FrequencyResponse:
-    """Responses from a record of any signals by Welch's averaged, windowed segments.
-
-    Args:
-        segment: duration of a segment [s]; the lines are 1/segment apart. Segments are detrended linearly.
-        reference: column of an independent excitation, for the joint estimate; None: H1.
-        overlap: share of a segment that the next one repeats.
-
-    A window has a bias of its own where the response changes within a few lines. The first line is left out: the window
-    spreads over it what detrending leaves of the mean.
-
-    Raises:
-        InputError: a column is missing, time that is not even, fewer than two segments in the record.
-    """
-    step = _step(trace)
-    count = round(segment / step) if np.isfinite(segment) else 0
-    if count < 8:
-        raise InputError(f"segments of {segment:.6g} s have {count} rows of {step:.6g} s; at least 8 are needed")
-    if not 0 <= overlap < 1:
-        raise InputError(f"overlap {overlap:.6g} of segments; 0 to below 1 is allowed")
-    shared = min(int(overlap * count), count - 1)
-    blocks = (len(trace) - shared) // (count - shared)
-    if blocks < 2:
-        raise InputError(
-            f"the record of {len(trace) * step:.6g} s holds {blocks} segments of {segment:.6g} s; at least 2 are needed"
-        )
-    from scipy.signal import csd  # takes a third of a second, which a plain run should not wait for
-
-    frequency = np.fft.rfftfreq(count, step)
-    kept = slice(2, (count + 1) // 2)
-
-    def cross(a: str, b: str) -> Complexes:
-        # scipy's P_xy is the mean of X* Y
-        density = csd(trace[b], trace[a], fs=1 / step, window=window, nperseg=count, noverlap=shared, detrend="linear")[
-            1
-        ]
-        return np.asarray(density[kept], dtype=np.complex128)
-
-    return _responses(trace, pairs, np.asarray(frequency[kept], dtype=np.float64), reference, cross, blocks)
-
-
 def _responses(
     trace: Trace,
     pairs: Sequence[Pair],

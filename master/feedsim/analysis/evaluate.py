@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from feedsim.analysis.circularity import Turn, axis_letters, circularity
+from feedsim.analysis.circularity import Turn, axis_letters, circularity, recorded_circle
 from feedsim.analysis.figures import Figure
-from feedsim.analysis.fitted import recorded_circle
 from feedsim.analysis.positioning import LEAST_REST, Approach, positioning
 from feedsim.errors import InputError
 from feedsim.motions.circular import Circular

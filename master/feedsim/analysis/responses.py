@@ -1,8 +1,6 @@
 """A machine's frequency responses side by side: closed form, measured, laid over, and how they agree.
 
-Names of responses are output/input: "Z.n_a/Z.M_a" speed-controlled system, "Z.x_a/Z.M_a" linear scale over motor
-torque, "Z.n_a/Z.n_s" speed reference, "Z.x_a/Z.x_s" position reference (without feedforward), "tool.x_X/tool.F_X"
-compliance at the tool; "Z.speed_loop" and "Z.position_loop" are open-loop gains. Definitions: docs/figures.md.
+Names of responses: linear/loops.py. Definitions: docs/figures.md.
 """
 
 from __future__ import annotations
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 from feedsim.analysis import linear
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.figures import Figure
+from feedsim.analysis.linear.loops import figure_key, response, unit_of
 from feedsim.analysis.truncation import Truncation
 from feedsim.errors import InputError
 from feedsim.scenario import Machine
@@ -27,22 +26,11 @@ from feedsim.trace.response_files import read_overlay
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-TOOL_DIRECTIONS = ("X", "Y", "Z")
 # Measured responses are held against the closed form where they are known.
 COHERENT, COMPARED = 0.99, (5.0, 500.0)
 # The closed form is drawn up to this multiple of the band: gain margins lie above it.
 BEYOND = 2.0
 BELOW_MIRROR = 0.999  # of half the sampling rate
-
-QUANTITIES = {  # of an axis: response, what it is
-    "n_M": ("{0}.n_a/{0}.M_a", "n/M"),
-    "x_M": ("{0}.x_a/{0}.M_a", "x/M"),
-    "n_n": ("{0}.n_a/{0}.n_s", "n_a/n_s"),
-    "x_x": ("{0}.x_a/{0}.x_s", "x_a/x_s"),
-}
-COMPLIANCE = "tool.x_{0}/tool.F_{0}"
-LOOPS = ("speed_loop", "position_loop")
-UNITS = {"n_M": "(rad/s)/(N.m)", "x_M": "m/(N.m)", "n_n": "1", "x_x": "1"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,21 +71,6 @@ class Responses:
     warnings: tuple[str, ...] = ()
 
 
-def names(axes: Sequence[str], *, tool: bool) -> tuple[str, ...]:
-    """Responses of these axes that have a closed form, and those at the tool."""
-    own = [response.format(axis) for axis in axes for response, _ in QUANTITIES.values()]
-    gains = [f"{axis}.{loop}" for axis in axes for loop in LOOPS]
-    return (*own, *gains, *((COMPLIANCE.format(d) for d in TOOL_DIRECTIONS) if tool else ()))
-
-
-def unit_of(name: str) -> str:
-    """Unit of a response, by its name."""
-    for key, (response, _) in QUANTITIES.items():
-        if name == response.format(name.partition(".")[0]):
-            return UNITS[key]
-    return "m/N" if name.startswith("tool.") else "1"
-
-
 def frequencies(machine: Machine, modes: Modes, band: tuple[float, float]) -> Floats:
     """Frequencies of the closed form [Hz]: fine enough for every resonance, up to BEYOND times the band."""
     highest = 0.5 / machine.cycles.T_c * BELOW_MIRROR
@@ -112,32 +85,10 @@ def frequencies(machine: Machine, modes: Modes, band: tuple[float, float]) -> Fl
 def closed_form(system: linear.LinearSystem, wanted: Sequence[str], frequency: Floats) -> FrequencyResponse:
     """The named responses in closed form at `frequency` (F,) [Hz]."""
     return FrequencyResponse(
-        frequency, {name: one(system, name, frequency) for name in wanted}, {name: unit_of(name) for name in wanted}
+        frequency,
+        {name: response(system, name, frequency) for name in wanted},
+        {name: unit_of(name) for name in wanted},
     )
-
-
-def one(system: linear.LinearSystem, name: str, frequency: Floats) -> Complexes:
-    """A response in closed form, by its name. InputError: no such response."""
-    axis, _, rest = name.partition(".")
-    if name in (COMPLIANCE.format(direction) for direction in TOOL_DIRECTIONS):
-        return linear.compliance(system, name[-1], frequency)
-    if axis in system.axes:
-        s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
-        if rest == "speed_loop":
-            return linear.speed_gain(system, axis, s)
-        if rest == "position_loop":
-            return linear.position_gain(system, axis, s)
-        functions = {
-            "n_M": linear.speed_controlled_system,
-            "x_M": linear.scale_response,
-            "n_n": linear.speed_reference,
-            "x_x": linear.position_reference,
-        }
-        for key, function in functions.items():
-            if name == QUANTITIES[key][0].format(axis):
-                return function(system, axis, frequency)
-    known = ", ".join(names(system.axes, tool=True))
-    raise InputError(f"no frequency response '{name}'; there are {known}")
 
 
 def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[str]]:
@@ -149,17 +100,17 @@ def read_overlays(text: str, known: Sequence[str]) -> tuple[list[Overlay], list[
     Raises:
         InputError: what the reader refuses, a file without any of the known responses, a unit of another dimension.
     """
-    response = read_overlay(text)
+    read = read_overlay(text)
     at = text.find(":", 2)  # a drive's colon is none of ours
-    mine = [name for name in response if name in known]
+    mine = [name for name in read if name in known]
     if not mine:
         raise InputError(
-            f"--overlay {text}: holds none of the responses shown, but {', '.join(response.names)}. Say which it is: "
+            f"--overlay {text}: holds none of the responses shown, but {', '.join(read.names)}. Say which it is: "
             f"FILE:NAME, such as {text[: at if at > 0 else None]}:{known[0]}; shown are {', '.join(known)}"
         )
     overlays, warnings = [], []
     for name in mine:
-        alone = response.select([name])
+        alone = read.select([name])
         wanted = unit_of(name)
         if alone.unit(name):
             alone = alone.converted({name: wanted})
@@ -188,10 +139,10 @@ def agreement(system: linear.LinearSystem, campaign: Campaign) -> dict[str, Figu
         where = f"where the coherence exceeds {COHERENT:g}, {low:g} to {high:g} Hz"
         decibel = degrees = np.nan
         if sure.any():
-            quotient = measured[name][sure] / one(system, name, measured.frequency[sure])
+            quotient = measured[name][sure] / response(system, name, measured.frequency[sure])
             decibel = float(np.max(np.abs(20 * np.log10(np.abs(quotient)))))
             degrees = float(np.max(np.abs(np.degrees(np.angle(quotient)))))
-        key = _key(name)
+        key = figure_key(name)
         found |= {
             f"{key}.measured_magnitude": Figure(
                 decibel, "dB", f"largest deviation of measured {name} from the closed form, {where}"
@@ -206,12 +157,3 @@ def agreement(system: linear.LinearSystem, campaign: Campaign) -> dict[str, Figu
             ),
         }
     return found
-
-
-def _key(name: str) -> str:
-    """First part of a figure's name for a response: "Z.n_M", "tool.compliance_X"."""
-    axis = name.partition(".")[0]
-    for key, (response, _) in QUANTITIES.items():
-        if name == response.format(axis):
-            return f"{axis}.{key}"
-    return f"tool.compliance_{name[-1]}" if axis == "tool" else name

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.figures import Figure
+from feedsim.analysis.linear import loops
 from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, ModalPlant
 from feedsim.errors import InputError
 from feedsim.scenario import Structure
@@ -29,8 +30,7 @@ TRUSTED = 0.9
 FULL, REDUCED, CORRECTED = "full", "reduced", "with static correction"
 # All modes of a model are full matrices: 2000 degrees of freedom take some seconds, which a comparison may cost.
 LARGEST = 2000
-QUANTITIES = {"n_M": "{0}.n_a/{0}.M_a", "x_M": "{0}.x_a/{0}.M_a"}  # of an axis: part of a figure's name -> response
-COMPLIANCE = "tool.x_{0}/tool.F_{0}"
+QUANTITIES = ("n_M", "x_M")  # of an axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +80,9 @@ def figures(
         shown: those of them that are reported; None: all.
         tool: with the compliance at the tool.
     """
-    chosen = [response.format(axis) for axis in shown or axes for response in QUANTITIES.values()]
+    chosen = [loops.QUANTITIES[key][0].format(axis) for axis in shown or axes for key in QUANTITIES]
     if tool:
-        chosen += [COMPLIANCE.format(direction) for direction in TOOL_DIRECTIONS]
+        chosen += [loops.COMPLIANCE.format(direction) for direction in TOOL_DIRECTIONS]
     responses = {
         name: structure_responses(modes, axes, frequency).select(chosen) for name, modes in found.tables.items()
     }
@@ -95,16 +95,13 @@ def structure_responses(modes: Modes, axes: Sequence[str], frequency: Floats) ->
     s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
     ports = ModalPlant.of(modes, axes).ports(s, 1.0, "continuous")  # of a continuous input the cycle does not matter
     count = len(axes)
-    columns, units = {}, {}
+    columns = {}
     for i, axis in enumerate(axes):
         columns[f"{axis}.n_a/{axis}.M_a"] = ports[:, i, i]
-        units[f"{axis}.n_a/{axis}.M_a"] = "(rad/s)/(N.m)"
         columns[f"{axis}.x_a/{axis}.M_a"] = ports[:, count + i, i]
-        units[f"{axis}.x_a/{axis}.M_a"] = "m/(N.m)"
     for i, direction in enumerate(TOOL_DIRECTIONS):
-        columns[f"tool.x_{direction}/tool.F_{direction}"] = ports[:, 2 * count + i, count + i]
-        units[f"tool.x_{direction}/tool.F_{direction}"] = "m/N"
-    return FrequencyResponse(frequency, columns, units)
+        columns[loops.COMPLIANCE.format(direction)] = ports[:, 2 * count + i, count + i]
+    return FrequencyResponse(frequency, columns, {name: loops.unit_of(name) for name in columns})
 
 
 def deviation(response: FrequencyResponse, full: FrequencyResponse, name: str) -> Floats:
@@ -125,19 +122,10 @@ def deviations(responses: Mapping[str, FrequencyResponse], full: FrequencyRespon
             for key, limit in (("truncation_below", TRUSTED * cutoff), ("truncation", cutoff)):
                 within = full.frequency <= limit
                 largest = float(size[within].max()) if within.any() else np.nan
-                found[f"{_key(name)}.{key}{_suffix(model)}"] = Figure(
+                found[f"{loops.figure_key(name)}.{key}{_suffix(model)}"] = Figure(
                     largest, "dB", f"largest deviation of {name}, {model}, from the full model up to {limit:g} Hz"
                 )
     return found
-
-
-def _key(name: str) -> str:
-    """First part of a figure's name for a response: "Z.n_M", "tool.compliance_X"."""
-    axis = name.partition(".")[0]
-    for key, response in QUANTITIES.items():
-        if name == response.format(axis):
-            return f"{axis}.{key}"
-    return f"tool.compliance_{name[-1]}"
 
 
 def _suffix(model: str) -> str:

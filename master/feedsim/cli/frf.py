@@ -50,7 +50,7 @@ def frf(options: Namespace) -> None:
     directory: Path = options.out or Path("results") / f"frf_{named}"
     modes, doubts = plant_modes(machine)
     frequency = responses.frequencies(machine, modes, plan.band)
-    wanted = responses.names(axes, tool=options.tool)
+    wanted = linear.names(axes, tool=options.tool)
     overlays, warnings = _overlays(options.overlays, wanted)
     warnings += doubts
     inputs = [*(file for _, file in subject.files), *(overlay.file for overlay in overlays)]

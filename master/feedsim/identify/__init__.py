@@ -1,4 +1,8 @@
-"""Friction of an axis from recorded traces: records, both stages of identification, and what they find."""
+"""Friction of an axis from recorded traces: records, both stages of identification, what they find, and friction.yaml.
+
+It may use analysis, structure, scenario and trace, and the friction law of cosim.
+Start reading in stages.py: records -> motion -> stage 1 (stribeck.py) -> stage 2 (output_error.py) -> result.py.
+"""
 
 from feedsim.identify.friction_file import Identified
 from feedsim.identify.options import STAGES, Asked, Options

@@ -113,11 +113,10 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """How one start did: half the sum of squares where it ended, evaluations of the model.
+    """How one start did: half the sum of squares where it ended.
     failure: why it was given up; empty where it arrived."""
 
     cost: float
-    evaluations: int
     failure: str = ""
 
 
@@ -157,16 +156,6 @@ class Fit:
     def sigma(self) -> dict[str, float]:
         """Name -> standard deviation."""
         return dict(zip(self.names, map(float, np.sqrt(np.diag(self.covariance))), strict=True))
-
-    @cached_property
-    def correlation(self) -> Array:
-        """(P, P) correlation; 0 beside a silent parameter."""
-        return correlation(self.covariance)
-
-    @property
-    def evaluations(self) -> int:
-        """Of the model, over all starts."""
-        return sum(start.evaluations for start in self.starts)
 
 
 def fit(
@@ -223,7 +212,6 @@ class _Problem:
         self.lower, self.upper = np.array(low), np.array(high)
         self.prior = prior.restricted(self.names) if prior is not None else None
         self.root = self.prior.rows() if self.prior is not None and self.prior.names else np.zeros((0, 0))
-        self.evaluations = 0
         self.last: tuple[Array, Array] | None = None
 
     def values(self, position: Array) -> dict[str, float]:
@@ -234,7 +222,6 @@ class _Problem:
 
     def data(self, position: Array) -> Array:
         """(N,) the model's own residuals."""
-        self.evaluations += 1
         found = np.asarray(self.model(self.values(position)), dtype=np.float64)
         if not np.all(np.isfinite(found)):
             raise InputError("the residuals are not finite at " + _text(self.values(position)))
@@ -275,7 +262,6 @@ class _Problem:
 
 def _run(problem: _Problem, begin: Array, *, tolerance: float, limit: int) -> tuple[Start, Array | None]:
     """One start, and where it ended (None: nowhere)."""
-    problem.evaluations = 0
     first = np.array(
         [p.inward(min(max(x, p.lower), p.upper)) for p, x in zip(problem.parameters, map(float, begin), strict=True)]
     )
@@ -293,10 +279,10 @@ def _run(problem: _Problem, begin: Array, *, tolerance: float, limit: int) -> tu
             max_nfev=limit,
         )
     except InputError as error:
-        return Start(inf, problem.evaluations, str(error)), None
+        return Start(inf, str(error)), None
     position = _onto_bounds(problem, found.x)
     cost = 0.5 * float(np.sum(problem(position) ** 2))
-    return Start(cost, problem.evaluations), position
+    return Start(cost), position
 
 
 def _onto_bounds(problem: _Problem, position: Array) -> Array:

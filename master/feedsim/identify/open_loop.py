@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from math import ceil, inf, isfinite, nan, sqrt
+from math import ceil, inf, isfinite, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,12 +50,7 @@ NEEDED = (*FRICTION, "M_0", "J")
 
 
 def balanced(
-    records: Sequence[Record],
-    law: FrictionLaw,
-    estimates: Mapping[str, Estimate],
-    *,
-    hold: Collection[str] = (),
-    I_P: float | None = None,
+    records: Sequence[Record], law: FrictionLaw, estimates: Mapping[str, Estimate], *, hold: Collection[str] = ()
 ) -> Balance:
     """F_C and M_0 from the position in open loop.
 
@@ -75,10 +70,9 @@ def balanced(
         raise InputError(f"open loop: no value of {', '.join(missing)}")
     values = {name: each.value for name, each in estimates.items()}
     values.setdefault("delay", 0.0)
-    lead = nan if I_P is None else I_P
 
     def refused(reason: str, **seen: Any) -> Balance:
-        return Balance(estimates, False, reason, tuple(each.record.name for each in axes), I_P=lead, **seen)
+        return Balance(estimates, False, reason, tuple(each.record.name for each in axes), **seen)
 
     axes: list[_OpenLoop] = []
     free = [name for name in ("M_0", "F_C") if name not in hold and estimates[name].status == "estimated"]
@@ -131,7 +125,7 @@ def balanced(
         return refused(why, position=position, torque=torque, changes=changes, drifts=drifts)
     changed = {name: _changed(estimates[name], after) for name, (before, after) in changes.items() if after != before}
     names = tuple(axis.record.name for axis in axes)
-    return Balance({**estimates, **changed}, True, "", names, position, torque, lead, changes, drifts)
+    return Balance({**estimates, **changed}, True, "", names, position, torque, changes, drifts)
 
 
 class _OpenLoop:

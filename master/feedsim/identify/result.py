@@ -174,7 +174,6 @@ class Balance:
         records: names of those that it looked at.
         position: rms of the angle in open loop [rad], before and after; torque: rms of the torque residual [N.m] at the
             rows of stage 2, before and after. After is what was tried where it was refused; nan where nothing was.
-        I_P: lead [m/rad], nan where it was not given.
         changes: F_C, F_S and M_0 before and after (what was tried where it was refused); empty where nothing was tried.
         drifts: the records in open loop; empty where nothing was tried.
         applies: False where all records are of sines, which the step is not meant for.
@@ -186,15 +185,9 @@ class Balance:
     records: tuple[str, ...] = ()
     position: tuple[float, float] = (nan, nan)
     torque: tuple[float, float] = (nan, nan)
-    I_P: float = nan
     changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     drifts: tuple[Drift, ...] = ()
     applies: bool = True
-
-    @property
-    def position_at_slide(self) -> tuple[float, float]:
-        """Rms of the position in open loop [m], before and after."""
-        return self.position[0] * self.I_P, self.position[1] * self.I_P
 
 
 @dataclass(frozen=True, eq=False)

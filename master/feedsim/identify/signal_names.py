@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+Place = Literal["scale", "motor"] | None
+
 
 @dataclass(frozen=True)
 class Alias:
@@ -19,7 +21,7 @@ class Alias:
     name: str
     role: str
     source: str
-    at: Literal["scale", "motor"] | None = None
+    at: Place = None
 
 
 _S120 = "SINAMICS list manuals"
@@ -31,89 +33,59 @@ _TWINCAT = "TwinCAT, NCTOPLC_AXIS_REF"
 _SERCOS = "sercos IDN (Rexroth, Beckhoff AX5000)"
 _CIA = "CiA 402 object"
 _HAL = "LinuxCNC, pins of motion"
+_SERVICE = "SINUMERIK, service display of axes"
 
-ALIASES = (
-    # --- position -------------------------------------------------------------------------------------------------
-    Alias("actual position", "position", "plain words"),
-    Alias("position actual value", "position", _CIA),  # 6064h
-    Alias("6064h", "position", _CIA),
-    Alias("0x6064", "position", _CIA),
-    Alias("actual position value", "position", "SINUMERIK, service display of axes"),
-    Alias("actual position value measuring system 1", "position", "SINUMERIK, service display of axes"),
-    Alias("actual position value measuring system 2", "position", "SINUMERIK, service display of axes"),
-    Alias("Lageistwert", "position", _DE),
-    Alias("Lageistwert Messsystem 1", "position", _DE),
-    Alias("Lageistwert Messsystem 2", "position", _DE),
-    Alias("nckServoDataActPos1stEnc", "position", _NCK),
-    Alias("nckServoDataActPos2ndEnc", "position", _NCK),
-    Alias("ENC_POS", "position", _EDGE),  # the active encoder
-    Alias("ENC1_POS", "position", _EDGE),
-    Alias("ENC2_POS", "position", _EDGE),
-    Alias("Actual pos", "position", _TNC),  # TNC 430
-    Alias("S ACTUAL", "position", _TNC, "scale"),  # TNC 407
-    Alias("ActPos", "position", _TWINCAT),
-    Alias("S-0-0051", "position", _SERCOS),  # position feedback value 1
-    Alias("position feedback value 1", "position", _SERCOS),
-    Alias("motor-pos-fb", "position", _HAL),
-    Alias("pos-fb", "position", _HAL),
-    Alias("joint-pos-fb", "position", _HAL),
-    # --- speed ----------------------------------------------------------------------------------------------------
-    Alias("actual speed", "speed", "plain words"),
-    Alias("actual velocity", "speed", "plain words"),
-    Alias("actual speed motor", "speed", _NCK, "motor"),
-    Alias("Drehzahl-/Geschwindigkeitsistwert Motor", "speed", _DE, "motor"),
-    Alias("velocity actual value", "speed", _CIA),  # 606Ch
-    Alias("606Ch", "speed", _CIA),
-    Alias("0x606C", "speed", _CIA),
-    Alias("r0061", "speed", _S120, "motor"),  # actual speed unsmoothed
-    Alias("actual speed unsmoothed", "speed", _S120, "motor"),
-    Alias("r0063", "speed", _S120, "motor"),  # actual speed smoothed
-    Alias("actual speed smoothed", "speed", _S120, "motor"),
-    Alias("Drehzahlistwert", "speed", _DE, "motor"),
-    Alias("nckServoDataActVelMot", "speed", _NCK, "motor"),
-    Alias("Actl. speed", "speed", _TNC, "scale"),  # TNC 430: from the position encoder
-    Alias("V (act rpm)", "speed", _TNC, "motor"),  # iTNC 530, in mm/min from the speed encoder
-    Alias("ActVelo", "speed", _TWINCAT),
-    Alias("S-0-0040", "speed", _SERCOS),  # velocity feedback value
-    Alias("velocity feedback value", "speed", _SERCOS),
-    # --- torque and current ---------------------------------------------------------------------------------------
-    Alias("actual torque", "torque", "plain words"),
-    Alias("torque actual value", "torque", f"{_S120}; {_CIA}"),  # r0080; 6077h
-    Alias("r0080", "torque", _S120),
-    Alias("Drehmomentistwert", "torque", _DE),
-    Alias("TORQUE", "torque", _EDGE),
-    Alias("M actual", "torque", _TNC),  # iTNC 530
-    Alias("ActTorque", "torque", _TWINCAT),
-    Alias("6077h", "torque", _CIA),
-    Alias("0x6077", "torque", _CIA),
-    Alias("S-0-0084", "torque", _SERCOS),  # torque/force feedback value
-    Alias("torque/force feedback value", "torque", _SERCOS),
-    Alias("torque-generating current", "current", _S120),
-    Alias("current actual value torque-generating", "current", _S120),  # r0078
-    Alias("torque-generating current actual value", "current", _S120),
-    Alias("r0078", "current", _S120),
-    Alias("Momentenbildender Stromistwert", "current", _DE),
-    Alias("Stromistwert momentenbildend", "current", _DE),
-    Alias("nckServoDataActCurr", "current", _NCK),
-    Alias("CURRENT", "current", _EDGE),
-    Alias("I nominal", "current", _TNC),  # the nominal current that determines torque
-    Alias("P-0-0459", "current", "Beckhoff AX5000 IDN"),  # actual torque / force generating current
-    Alias("actual torque generating current", "current", "Beckhoff AX5000 IDN"),
-    Alias("Iq_measured", "current", "ODrive"),
-    # --- setpoint of position -------------------------------------------------------------------------------------
-    Alias("DES_POS", "setpoint", _EDGE),
-    Alias("SetPos", "setpoint", _TWINCAT),
-    Alias("motor-pos-cmd", "setpoint", _HAL),
-    Alias("pos-cmd", "setpoint", _HAL),
-    Alias("joint-pos-cmd", "setpoint", _HAL),
-    Alias("Noml. pos", "setpoint", _TNC),
-    Alias("S NOMINAL", "setpoint", _TNC),
-    Alias("position setpoint", "setpoint", "SINUMERIK, service display of axes"),
-    # --- time -----------------------------------------------------------------------------------------------------
-    Alias("time", "time", "plain words"),
-    Alias("t", "time", "plain words"),
-    Alias("Zeit", "time", "plain words"),
-)
+# Role, whose names they are, where it is measured if the name tells, the names.
+_NAMES: tuple[tuple[str, str, Place, str], ...] = (
+    ("position", "plain words", None, "actual position"),
+    ("position", _CIA, None, "position actual value | 6064h | 0x6064"),
+    ("position", _SERVICE, None,
+     "actual position value | actual position value measuring system 1 | actual position value measuring system 2"),
+    ("position", _DE, None, "Lageistwert | Lageistwert Messsystem 1 | Lageistwert Messsystem 2"),
+    ("position", _NCK, None, "nckServoDataActPos1stEnc | nckServoDataActPos2ndEnc"),
+    ("position", _EDGE, None, "ENC_POS | ENC1_POS | ENC2_POS"),  # ENC_POS: the active encoder
+    ("position", _TNC, None, "Actual pos"),  # TNC 430
+    ("position", _TNC, "scale", "S ACTUAL"),  # TNC 407
+    ("position", _TWINCAT, None, "ActPos"),
+    ("position", _SERCOS, None, "S-0-0051 | position feedback value 1"),
+    ("position", _HAL, None, "motor-pos-fb | pos-fb | joint-pos-fb"),
+    ("speed", "plain words", None, "actual speed | actual velocity"),
+    ("speed", _NCK, "motor", "actual speed motor"),
+    ("speed", _DE, "motor", "Drehzahl-/Geschwindigkeitsistwert Motor"),
+    ("speed", _CIA, None, "velocity actual value | 606Ch | 0x606C"),
+    ("speed", _S120, "motor", "r0061 | actual speed unsmoothed | r0063 | actual speed smoothed"),
+    ("speed", _DE, "motor", "Drehzahlistwert"),
+    ("speed", _NCK, "motor", "nckServoDataActVelMot"),
+    ("speed", _TNC, "scale", "Actl. speed"),  # TNC 430: from the position encoder
+    ("speed", _TNC, "motor", "V (act rpm)"),  # iTNC 530, in mm/min from the speed encoder
+    ("speed", _TWINCAT, None, "ActVelo"),
+    ("speed", _SERCOS, None, "S-0-0040 | velocity feedback value"),
+    ("torque", "plain words", None, "actual torque"),
+    ("torque", f"{_S120}; {_CIA}", None, "torque actual value"),  # r0080; 6077h
+    ("torque", _S120, None, "r0080"),
+    ("torque", _DE, None, "Drehmomentistwert"),
+    ("torque", _EDGE, None, "TORQUE"),
+    ("torque", _TNC, None, "M actual"),  # iTNC 530
+    ("torque", _TWINCAT, None, "ActTorque"),
+    ("torque", _CIA, None, "6077h | 0x6077"),
+    ("torque", _SERCOS, None, "S-0-0084 | torque/force feedback value"),
+    ("current", _S120, None, "torque-generating current"),
+    ("current", _S120, None,  # r0078
+     "current actual value torque-generating | torque-generating current actual value | r0078"),
+    ("current", _DE, None, "Momentenbildender Stromistwert | Stromistwert momentenbildend"),
+    ("current", _NCK, None, "nckServoDataActCurr"),
+    ("current", _EDGE, None, "CURRENT"),
+    ("current", _TNC, None, "I nominal"),  # the nominal current that determines torque
+    ("current", "Beckhoff AX5000 IDN", None, "P-0-0459 | actual torque generating current"),
+    ("current", "ODrive", None, "Iq_measured"),
+    ("setpoint", _EDGE, None, "DES_POS"),
+    ("setpoint", _TWINCAT, None, "SetPos"),
+    ("setpoint", _HAL, None, "motor-pos-cmd | pos-cmd | joint-pos-cmd"),
+    ("setpoint", _TNC, None, "Noml. pos | S NOMINAL"),
+    ("setpoint", _SERVICE, None, "position setpoint"),
+    ("time", "plain words", None, "time | t | Zeit"),
+)  # fmt: skip
+ALIASES = tuple(Alias(name, role, source, at) for role, source, at, names in _NAMES for name in names.split(" | "))
 
 # What may stand before the number or the letter of an axis, and letters that axes have.
 _AXIS_WORDS = ("axis", "achse", "joint", "drive", "antrieb")

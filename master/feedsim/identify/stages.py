@@ -186,7 +186,7 @@ class _Run:
         """F_C and M_0 from the position in open loop, where stage 2 was fitted to general motion."""
         self.progress("open loop", 0, 1)
         options = self.options
-        found = balanced(transitions(self.records), self.law, estimates, hold=options.hold, I_P=options.I_P)
+        found = balanced(transitions(self.records), self.law, estimates, hold=options.hold)
         self.progress("open loop", 1, 1)
         return found
 

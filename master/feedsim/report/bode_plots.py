@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from feedsim.analysis.linear.margins import Bandwidth, Margins
-from feedsim.analysis.linear.search import Pair
+from feedsim.analysis.linear.margins import Bandwidth, Margins, Pair
 from feedsim.report.bode import Column, Curve, Ordinate, Panels, at, bode, dot, level, note, phases, size, stretch
 from feedsim.report.labels import keep_inside
 from feedsim.report.style import INK, Picture, drawing, finish

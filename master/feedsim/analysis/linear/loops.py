@@ -1,18 +1,76 @@
-"""The functions of frequency that a drive is judged by, each with its definition.
+"""The functions of frequency that a drive is judged by, each with its definition and its name.
+
+Names are output/input: "Z.n_a/Z.M_a" speed-controlled system, "Z.x_a/Z.M_a" linear scale over motor torque,
+"Z.n_a/Z.n_s" speed reference, "Z.x_a/Z.x_s" position reference (without feedforward), "tool.x_X/tool.F_X" compliance at
+the tool; "Z.speed_loop" and "Z.position_loop" are open-loop gains. Definitions: docs/figures.md.
 
 "Other loops as they are" means: the other axes keep the loops that the given system has closed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.analysis.linear.plant import TOOL_DIRECTIONS
 from feedsim.analysis.linear.system import LinearSystem
+from feedsim.analysis.linear.system import unit_of as unit_of_response
 from feedsim.errors import InputError
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+QUANTITIES = {  # of an axis: part of a figure's name -> response, what it is
+    "n_M": ("{0}.n_a/{0}.M_a", "n/M"),
+    "x_M": ("{0}.x_a/{0}.M_a", "x/M"),
+    "n_n": ("{0}.n_a/{0}.n_s", "n_a/n_s"),
+    "x_x": ("{0}.x_a/{0}.x_s", "x_a/x_s"),
+}
+COMPLIANCE = "tool.x_{0}/tool.F_{0}"
+LOOPS = ("speed_loop", "position_loop")
+
+
+def names(axes: Sequence[str], *, tool: bool) -> tuple[str, ...]:
+    """Responses of these axes that have a closed form, and those at the tool."""
+    own = [name.format(axis) for axis in axes for name, _ in QUANTITIES.values()]
+    gains = [f"{axis}.{loop}" for axis in axes for loop in LOOPS]
+    return (*own, *gains, *((COMPLIANCE.format(d) for d in TOOL_DIRECTIONS) if tool else ()))
+
+
+def unit_of(name: str) -> str:
+    """Unit of a response, by its name."""
+    output, _, source = name.partition("/")
+    return unit_of_response(output, source) if source else "1"
+
+
+def figure_key(name: str) -> str:
+    """First part of a figure's name for a response: "Z.n_M", "tool.compliance_X"."""
+    axis = name.partition(".")[0]
+    for key, (known, _) in QUANTITIES.items():
+        if name == known.format(axis):
+            return f"{axis}.{key}"
+    return f"tool.compliance_{name[-1]}" if axis == "tool" else name
+
+
+def response(system: LinearSystem, name: str, frequency: Floats) -> Complexes:
+    """A response in closed form, by its name. InputError: no such response."""
+    axis, _, rest = name.partition(".")
+    if name in (COMPLIANCE.format(direction) for direction in TOOL_DIRECTIONS):
+        return compliance(system, name[-1], frequency)
+    if axis in system.axes:
+        s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
+        if rest == "speed_loop":
+            return speed_gain(system, axis, s)
+        if rest == "position_loop":
+            return position_gain(system, axis, s)
+        functions = (speed_controlled_system, scale_response, speed_reference, position_reference)
+        for key, function in zip(QUANTITIES, functions, strict=True):
+            if name == QUANTITIES[key][0].format(axis):
+                return function(system, axis, frequency)
+    known = ", ".join(names(system.axes, tool=True))
+    raise InputError(f"no frequency response '{name}'; there are {known}")
 
 
 def speed_controlled_system(system: LinearSystem, axis: str, frequency: Floats) -> Complexes:

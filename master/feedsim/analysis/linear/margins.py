@@ -1,4 +1,8 @@
-"""Margins of an open-loop gain and bandwidths of a closed loop."""
+"""What curves over frequency tell, independent of a grid: crossings, extremes, margins, bandwidths.
+
+A grid finds brackets, which are narrowed together to the resolution of floating-point numbers. The grid's step is a
+share of the least damping ratio: a resonance is some 2 zeta wide on a logarithmic axis, an anti-resonance no less.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +13,109 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.linear.search import crossings
+from feedsim.structure import Modes
 
 Floats = NDArray[np.float64]
+Curve = Callable[[Floats], Floats]
+
+STEP_PER_DAMPING = 1 / 3
+STEPS = (5e-4, 1e-2)  # finest, coarsest relative step of the grid
+INSIDE = 15  # points looked at within every bracket in one call of the curve, which costs little more than a single one
+CROSSING_ROUNDS = 10  # each narrows a bracket to 1/16: a step of the grid to 1e-14 of the frequency
+EXTREME_ROUNDS = 6  # each narrows a bracket to 1/8: two steps to 1e-7; an extreme's place shows to the rounding's root
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """A local extreme of a curve: frequency [Hz] and value there."""
+
+    frequency: float
+    value: float
+
+
+@dataclass(frozen=True)
+class Pair:
+    """An anti-resonance and the resonance that follows it."""
+
+    antiresonance: Extreme
+    resonance: Extreme
+
+
+def grid(modes: Modes, low: float, high: float) -> Floats:
+    """Frequencies [Hz] from low to high, close enough together that no feature of the structure falls between."""
+    damping = modes.damping[~modes.rigid]
+    least = float(damping.min()) if damping.size else 1.0
+    step = min(max(STEP_PER_DAMPING * least, STEPS[0]), STEPS[1])
+    return np.asarray(np.geomspace(low, high, math.ceil(math.log(high / low) / step) + 1))
+
+
+def crossings(curve: Curve, frequency: Floats, values: Floats | None = None) -> Floats:
+    """Frequencies [Hz], ascending, at which a real curve passes through 0; `frequency` (F,) is the grid."""
+    values = curve(frequency) if values is None else values
+    where = np.flatnonzero(np.isfinite(values[:-1]) & np.isfinite(values[1:]) & ((values[:-1] < 0) != (values[1:] < 0)))
+    if not where.size:
+        return np.empty(0)
+    low, high, below = frequency[where], frequency[where + 1], values[where] < 0
+    each = np.arange(len(where))
+    for _ in range(CROSSING_ROUNDS):
+        places = _places(low, high)
+        changed = (curve(places[1:-1].ravel()) < 0).reshape(INSIDE, -1) != below
+        first = np.where(changed.any(axis=0), changed.argmax(axis=0) + 1, INSIDE + 1)
+        low, high = places[first - 1, each], places[first, each]
+    return np.asarray(0.5 * (low + high))
+
+
+def _places(low: Floats, high: Floats) -> Floats:
+    """(INSIDE + 2, n) evenly from the lower to the upper ends of n brackets."""
+    return np.asarray(np.linspace(low, high, INSIDE + 2))
+
+
+def extremes(curve: Curve, frequency: Floats, values: Floats | None = None) -> tuple[list[Extreme], list[Extreme]]:
+    """Local minima and local maxima of a real curve inside the grid `frequency` (F,)."""
+    values = curve(frequency) if values is None else values
+    rise = np.diff(values)
+    found: list[list[Extreme]] = []
+    for sign in (-1.0, 1.0):
+        where = np.flatnonzero((sign * rise[:-1] > 0) & (sign * rise[1:] <= 0)) + 1
+        places = _highest(curve, sign, frequency[where - 1], frequency[where + 1])
+        heights = curve(places) if places.size else places
+        found.append([Extreme(float(f), float(v)) for f, v in zip(places, heights, strict=True)])
+    return found[0], found[1]
+
+
+def peak(curve: Curve, frequency: Floats) -> Extreme | None:
+    """The highest local maximum of a real curve inside the grid `frequency` (F,); None where there is none."""
+    values = curve(frequency)
+    rise = np.diff(values)
+    maxima = np.flatnonzero((rise[:-1] > 0) & (rise[1:] <= 0)) + 1
+    if not maxima.size:
+        return None
+    where = maxima[[values[maxima].argmax()]]
+    place = _highest(curve, 1.0, frequency[where - 1], frequency[where + 1])
+    return Extreme(float(place[0]), float(curve(place)[0]))
+
+
+def _highest(curve: Curve, sign: float, low: Floats, high: Floats) -> Floats:
+    """The maximum of sign * curve in every bracket."""
+    each = np.arange(len(low))
+    for _ in range(EXTREME_ROUNDS if low.size else 0):
+        places = _places(low, high)
+        best = (sign * curve(places[1:-1].ravel())).reshape(INSIDE, -1).argmax(axis=0) + 1
+        low, high = places[best - 1, each], places[best + 1, each]
+    return np.asarray(0.5 * (low + high))
+
+
+def pairs(curve: Curve, frequency: Floats, rise: float) -> list[Pair]:
+    """Every local minimum with the local maximum that follows it at least `rise` higher."""
+    minima, maxima = extremes(curve, frequency)
+    result = []
+    for low in minima:
+        high = next((high for high in maxima if high.frequency > low.frequency), None)
+        if high is not None and high.value - low.value >= rise:
+            result.append(Pair(low, high))
+    return result
+
+
 Complexes = NDArray[np.complex128]
 Gain = Callable[[Floats], Complexes]
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.linear.search import grid
+from feedsim.analysis.linear.margins import grid
 from feedsim.analysis.linear.system import LinearSystem
 from feedsim.errors import InputError
 

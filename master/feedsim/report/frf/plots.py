@@ -6,7 +6,9 @@ import math
 from collections.abc import Sequence
 
 from feedsim.analysis import linear
-from feedsim.analysis.responses import COMPLIANCE, QUANTITIES, TOOL_DIRECTIONS, Responses
+from feedsim.analysis.linear.loops import COMPLIANCE, QUANTITIES
+from feedsim.analysis.linear.plant import TOOL_DIRECTIONS
+from feedsim.analysis.responses import Responses
 from feedsim.report.bode import Curve
 from feedsim.report.bode_plots import (
     compliance_pictures,

@@ -11,7 +11,7 @@ from pydantic import Discriminator, Field, StrictInt, Tag, model_validator
 
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, Model, Quantity, fault
-from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Peaks, Start, check_length, whole_cycles
+from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Peaks, Start, in_turn
 from feedsim.motions.profile import Profile, rest_to_rest
 
 # Time at constant speed [s] below which a stroke says nothing of the stationary friction: the drive settles in it.
@@ -102,36 +102,31 @@ class ConstantSpeed(MotionKind):
         below, above = here - least, most - here
         side = 1.0 if above >= below else -1.0
         profiles = self._profiles(start, max(above, below, 0.0))
-        pause = whole_cycles(self.rest, cycle)
-        check_length(sum(2 * (whole_cycles(profile.duration, cycle) + pause) for profile in profiles), start)
+        strokes = [(profile, sense) for profile in profiles for sense in (side, -side)]
+        turns = in_turn([profile.duration for profile, _ in strokes], self.rest, start)
         parts: list[Array] = []
         done: list[Stroke] = []
-        cycles, reached = 0, 0.0
-        for profile in profiles:
-            for sense in (side, -side):
-                begin = start.time + cycles * cycle
-                count = whole_cycles(profile.duration, cycle)
-                covered = profile.at(np.arange(1, count + 1, dtype=np.float64) * cycle)[0]
-                target = reached + sense * profile.length if sense == side else 0.0
-                points = reached + sense * covered
-                points[-1] = target  # the way back meets the start without a rounding error
-                last = profile is profiles[-1] and sense != side
-                parts += [points, np.full(0 if last else pause, target)]
-                begun, ended = _steady(profile)
-                done.append(
-                    Stroke(
-                        speed=sense * profile.peak_speed,
-                        steady=(begin + begun, begin + ended),
-                        start=begin,
-                        end=begin + profile.duration,
-                    )
+        reached = 0.0
+        for (profile, sense), (begin, count, pause) in zip(strokes, turns, strict=True):
+            covered = profile.at(np.arange(1, count + 1, dtype=np.float64) * cycle)[0]
+            target = reached + sense * profile.length if sense == side else 0.0
+            points = reached + sense * covered
+            points[-1] = target  # the way back meets the start without a rounding error
+            parts += [points, np.full(pause, target)]
+            begun, ended = _steady(profile)
+            done.append(
+                Stroke(
+                    speed=sense * profile.peak_speed,
+                    steady=(begin + begun, begin + ended),
+                    start=begin,
+                    end=begin + profile.duration,
                 )
-                cycles += count + (0 if last else pause)
-                reached = target
+            )
+            reached = target
         longest = max(profile.length for profile in profiles)
         return Course(
             duration=done[-1].end - start.time,
-            cycles=cycles,
+            cycles=sum(map(len, parts)),
             points={self.axis: here + np.concatenate(parts)},
             peaks={
                 self.axis: Peaks(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from pathlib import Path
 from typing import ClassVar, Protocol
 
@@ -150,9 +151,21 @@ def whole_cycles(duration: float, cycle: float) -> int:
     return max(0, math.ceil(duration / cycle - ON_GRID))
 
 
-def check_length(cycles: int, start: Start) -> None:
-    """Raise InputError where the program has no room for ``cycles`` of the interpolator."""
-    if cycles > start.most:
+def in_turn(durations: Sequence[float], rest: float, start: Start) -> list[tuple[float, int, int]]:
+    """Pieces of these ``durations`` [s] one after another, each from the grid on, with ``rest`` [s] in between.
+
+    Of each: its begin [s, program time], its cycles of the interpolator, and those of rest behind it.
+    Raises InputError where the program has no room for them.
+    """
+    pause = whole_cycles(rest, start.T_ipo)
+    counts = [whole_cycles(duration, start.T_ipo) for duration in durations]
+    total = sum(counts) + pause * len(counts)
+    if total > start.most:
         raise InputError(
-            f"lasts {cycles * start.T_ipo:.6g} s; allowed in this program: {max(start.most, 0) * start.T_ipo:.6g} s"
+            f"lasts {total * start.T_ipo:.6g} s; allowed in this program: {max(start.most, 0) * start.T_ipo:.6g} s"
         )
+    begins = accumulate((count + pause for count in counts[:-1]), initial=0)
+    pauses = [pause] * (len(counts) - 1) + [0]
+    return [
+        (start.time + n * start.T_ipo, count, behind) for n, count, behind in zip(begins, counts, pauses, strict=True)
+    ]

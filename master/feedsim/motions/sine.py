@@ -11,7 +11,7 @@ from pydantic import Field, StrictInt
 
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, Model, Quantity
-from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Peaks, Start, check_length, whole_cycles
+from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Peaks, Start, in_turn
 
 # Points of the interpolator per period. With 10 of them the spline's amplitude is (2 pi/10)^4/384 = 4e-4 off.
 FEWEST_POINTS = 10
@@ -59,18 +59,14 @@ class Sine(MotionKind):
         """
         here, cycle = start.position[self.axis], start.T_ipo
         self._check_frequencies(cycle)
-        pause = whole_cycles(self.rest, cycle)
         lasting = [(2 * self.fade + move.periods) / move.frequency for move in self.moves]
-        check_length(sum(whole_cycles(duration, cycle) + pause for duration in lasting), start)
+        turns = in_turn(lasting, self.rest, start)
         parts: list[Array] = []
         done: list[Oscillation] = []
-        cycles = 0
-        for i, (move, duration) in enumerate(zip(self.moves, lasting, strict=True)):
-            begin = start.time + cycles * cycle
+        for move, duration, (begin, count, pause) in zip(self.moves, lasting, turns, strict=True):
             fading = self.fade / move.frequency
-            count = whole_cycles(duration, cycle)
-            rest = 0 if i == len(self.moves) - 1 else pause
-            parts += [faded_sine(move, self.fade, np.arange(1, count + 1, dtype=np.float64) * cycle)[0], np.zeros(rest)]
+            time = np.arange(1, count + 1, dtype=np.float64) * cycle
+            parts += [faded_sine(move, self.fade, time)[0], np.zeros(pause)]
             done.append(
                 Oscillation(
                     amplitude=move.amplitude,
@@ -81,12 +77,11 @@ class Sine(MotionKind):
                     end=begin + duration,
                 )
             )
-            cycles += count + rest
         widest = max(move.amplitude for move in self.moves)
         fastest, hardest = np.max([_peaks(move, self.fade) for move in self.moves], axis=0).tolist()
         return Course(
             duration=done[-1].end - start.time,
-            cycles=cycles,
+            cycles=sum(map(len, parts)),
             points={self.axis: here + np.concatenate(parts)},
             peaks={self.axis: Peaks(here - widest, here + widest, fastest, hardest)},
             moving=(self.axis,),

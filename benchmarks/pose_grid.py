@@ -114,7 +114,7 @@ def drive(plant: Path, machine: Machine, recorded: Recorded, modes_file: Path | 
             unit.exit_initialisation()
             torque, slopes = recorded.torque.T, np.diff(recorded.torque, axis=1).T / h
             rows = get_row(log, When())
-            driven = [set_real(port, torque), set_slopes(port, slopes), do_step(unit, 0.0, h)]
+            driven = [*set_real(port, torque), *set_slopes(port, slopes), do_step(unit, 0.0, h)]
             Interpreter([*rows, *driven], h).run(0, count - 1)
             Interpreter(rows, h).run(count - 1, count)
         finally:

@@ -182,7 +182,7 @@ def test_refused_input_is_told_alike_with_the_time(unit: str, variable: str, aft
         with System(loaded.machine, folder) as system:
             cycle = Cycle(system, SCHEMES["extrapolated"], 125e-6, 2)
             send = set_real(Port(system.units[unit], [variable]), values)
-            loop = Loop(cycle, () if after else (send,), (send,) if after else (), exchange.chosen(native, folder))
+            loop = Loop(cycle, [] if after else send, send if after else [], exchange.chosen(native, folder))
             system.initialise(program, stop=1.0)
             loop.run(1000)
 

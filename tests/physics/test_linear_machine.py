@@ -199,11 +199,13 @@ def measured(
             inputs = {axis: Port(units[axis], ["x_a", "n_a", "x_s", "n_add", "M_add"]) for axis in machine.axes}
             shown = {axis: Port(units[axis], ["M_a", "n_s"]) for axis in machine.axes}
             control = {
-                axis: Interpreter([set_real(inputs[axis]), do_step(units[axis], 0.0, T_C), get_real(shown[axis])], T_C)
+                axis: Interpreter(
+                    [*set_real(inputs[axis]), do_step(units[axis], 0.0, T_C), *get_real(shown[axis])], T_C
+                )
                 for axis in machine.axes
             }
             told = [torques, force] if name == "tool.F_Z" else [torques]
-            turn = [each for port in told for each in (set_real(port), set_slopes(port))]
+            turn = [each for port in told for each in (*set_real(port), *set_slopes(port))]
             structure = Interpreter([*turn, do_step(plant, 0.0, T_C)], T_C)
             for k, value in enumerate(wave[:-1]):
                 out.get()

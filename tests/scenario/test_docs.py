@@ -20,9 +20,13 @@ def test_example_loads(tmp_path: Path, block: str) -> None:
     folder = ROOT / "scenarios" / "machines" / "test_centre"
     (tmp_path / "recordings").mkdir()
     (tmp_path / "recordings" / "z_setpoint.csv").write_text("")
+    for name in ("acme_drive.fmu", "acme_friction.fmu"):
+        (tmp_path / name).write_text("")
     whole: dict[str, Any] = {"name": "s", "motions": [{"kind": "dwell", "duration": "1 s"}]}
-    if data.keys() & MACHINE_KEYS:
-        machine = yaml.safe_load((folder / "machine.yaml").read_text(encoding="utf-8")) | data
+    if data.keys() & (MACHINE_KEYS | {"axes"}):
+        machine = yaml.safe_load((folder / "machine.yaml").read_text(encoding="utf-8"))
+        axes = {name: axis | data.get("axes", {}).get(name, {}) for name, axis in machine["axes"].items()}
+        machine |= data | {"axes": axes}
         whole["machine"] = machine | {key: str(folder / machine[key]) for key in ("modes", "structure")}
     else:
         whole |= data | {"machine": str(folder)}

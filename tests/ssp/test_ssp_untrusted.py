@@ -272,7 +272,8 @@ def test_every_type_in_every_place(exported: Path, monkeypatch: pytest.MonkeyPat
             try:
                 told = rebuilt.annotation(json.dumps(data), kept["files"], "x.ssp")
                 for motions in (True, False):
-                    _load(rebuilt.scenario_data(kept["parts"], told, "x", motions=motions), found.fmus, exported)
+                    found_data = rebuilt.scenario_data(kept["parts"], told, "x", found.fmus, motions=motions)
+                    _load(found_data, found.fmus, exported)
                 outcomes["accepted"] += 1
             except InputError:
                 outcomes["refused"] += 1

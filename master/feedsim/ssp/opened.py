@@ -78,7 +78,7 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
         table = _table(archives[found.setpoint], f"{path}: {found.setpoint}")
         given = values(structure, files, archives, found.foreign, str(path))
         own = rebuilt.annotation(structure.scenario, files, str(path))
-        T_c, T_pos, guessed = rebuilt.cycles(found, archives, given, table, own, structure.step)
+        T_c, T_pos, guessed = rebuilt.cycles(found, archives, given, table, own, structure.step, str(path))
         parts = Parts(found, archives, given, table, T_c, T_pos)
         if problems := rebuilt.faults(parts, str(path)):
             raise InputError.of(str(path), problems)

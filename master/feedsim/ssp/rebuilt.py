@@ -50,6 +50,7 @@ def cycles(
     table: Table,
     own: Mapping[str, Any] | None,
     step: float | None,
+    where: str,
 ) -> tuple[float, float, str]:
     """T_c and T_pos [s], and where T_c comes from if no shipped drive tells it, else nothing.
 
@@ -60,10 +61,11 @@ def cycles(
         known = values[roles.shipped_drives[0]]
         return float(known["T_c"]), float(known["T_pos"]), ""
     told = ((own or {}).get("machine") or {}).get("cycles", {})
-    try:
-        return units.parse(str(told["control"]), "s"), units.parse(str(told["position"]), "s"), ""
-    except KeyError:
-        pass
+    if "control" in told and "position" in told:
+        try:
+            return units.parse(str(told["control"]), "s"), units.parse(str(told["position"]), "s"), ""
+        except InputError as error:
+            raise InputError(f"{where}: the annotation feedsim.scenario: machine.cycles: {error}") from None
     if step is not None:
         return step, table.cycle, "the step size that the file advises"
     for name in roles.drives.values():
@@ -76,7 +78,9 @@ def cycles(
 def faults(parts: Parts, where: str) -> list[str]:
     """What does not fit together although each part is right."""
     roles, values = parts.roles, parts.values
-    found = []
+    lengths = {"control": parts.T_c, "position": parts.T_pos}
+    found = [f"{where}: the {name} cycle is {cycle!r} s; it must be greater than 0"
+             for name, cycle in lengths.items() if not cycle > 0]  # fmt: skip
     for name in ("T_c", "T_pos"):
         given = {control: values[control][name] for control in roles.shipped_drives}
         if len(set(given.values())) > 1:
@@ -148,9 +152,10 @@ def _check_types(data: Any, what: str) -> None:
         raise InputError(f"{what}: its motions are no list of groups")
     if not all(isinstance(motion.get("file", ""), str) for motion in motions):
         raise InputError(f"{what}: a motion's file is no text")
-    groups = [axis.get(role.name, {}) for axis in axes.values() for role in (DRIVE, FRICTION)]
-    if not all(isinstance(group, dict) and isinstance(group.get("outputs", {}), dict) for group in groups):
-        raise InputError(f"{what}: an axis's drive or friction is no group")
+    for role in (DRIVE, FRICTION):
+        groups = [axis.get(role.name, {}) for axis in axes.values()]
+        if not all(isinstance(group, dict) and isinstance(group.get("outputs", {}), dict) for group in groups):
+            raise InputError(f"{what}: an axis's {role.name} is no group")
     if not all(isinstance(place.get("name", ""), str) for place in (data, machine)):
         raise InputError(f"{what}: a name is no text")
 
@@ -243,7 +248,7 @@ def _foreign(parts: Parts, component: str, role: Role, told: Mapping[str, Any], 
     recorded = {
         signal: name
         for signal, name in told.get(role.name, {}).get("outputs", {}).items()
-        if signal not in signals and name in archive.variables
+        if signal not in signals and isinstance(name, str) and name in archive.variables
     }
     return {
         "fmu": str(archive.path.relative_to(folder)),

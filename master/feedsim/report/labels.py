@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -31,6 +31,17 @@ def legend_above(axes: Axes) -> None:
             handles=handles, loc="lower left", bbox_to_anchor=(0, 1), ncols=len(handles), fontsize=8.5,
             handlelength=1.7, handletextpad=0.5, columnspacing=1.2, borderaxespad=0.25, borderpad=0.1,
         )  # fmt: skip
+
+
+def torque_label(sign: int) -> str:
+    """Ordinate of torques that are drawn with a display sign, +-1."""
+    return "torque [N·m]" if sign > 0 else "torque, sign reversed [N·m]"
+
+
+def reversed_note(axes: Iterable[str], signs: Mapping[str, int]) -> str:
+    """The end of a caption: axes whose torques are drawn with the display sign -1; empty without any."""
+    reversed_ones = [axis for axis in axes if signs.get(axis, 1) < 0]
+    return f" Torques of {', '.join(reversed_ones)} are drawn with reversed sign." if reversed_ones else ""
 
 
 def mark_instant(axes: Axes, instant: float, text: str) -> None:

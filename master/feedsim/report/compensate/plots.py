@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,19 @@ from feedsim.analysis import Contour, Turn, contour
 from feedsim.analysis.circularity import quadrant
 from feedsim.analysis.compensation import Compensation, Variation
 from feedsim.report.formatting import minus
-from feedsim.report.labels import heading, legend_above, plain_box
-from feedsim.report.run.circle_plots import NOMINAL, RING_GAPS, ring_step
+from feedsim.report.labels import heading, legend_above, reversed_note, torque_label
+from feedsim.report.run.circle_plots import (
+    NOMINAL,
+    RING_GAPS,
+    polar_curve,
+    polar_ground,
+    ring_step,
+    unrolled_curve,
+    unrolled_ground,
+)
 from feedsim.report.style import (
     BLUE,
     GREEN,
-    GRID,
     MUTED,
     ORANGE,
     VERMILLION,
@@ -27,9 +34,6 @@ from feedsim.report.style import (
     finish,
     thinned,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 BEFORE: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.3, "label": "without"}
 AFTER: dict[str, Any] = {"color": BLUE, "linewidth": 1.6, "label": "with compensation"}
@@ -55,16 +59,11 @@ def _contour_picture(turn: Turn, before: Contour, after: Contour, plane: str) ->
     gap = RING_GAPS[rings]
     with drawing(10.0, 6.0) as figure:
         polar, unrolled = figure.subplots(1, 2, width_ratios=[1.35, 1])
-        _polar(polar, turn, ((before, BEFORE), (after, AFTER)), ring, rings)
+        polar_ground(polar, turn, ring, rings)
         for measured, style in ((before, BEFORE), (after, AFTER)):
-            angle = np.rad2deg(measured.angle % (2 * math.pi))
-            order = np.argsort(angle)
-            unrolled.plot(*thinned(angle[order], measured.deviation[order] * 1e6), **style)
-        unrolled.axhline(0.0, color=MUTED, linewidth=0.8)
-        heading(unrolled, "Over the angle")
-        legend_above(unrolled)
-        unrolled.set(xlabel=f"angle from {turn.axes[0]}+ [°]", ylabel="radius deviation [µm]", xlim=(0, 360))
-        unrolled.set_xticks(range(0, 361, 90))
+            polar_curve(polar, measured, ring, rings, **style)
+            unrolled_curve(unrolled, measured, **style)
+        unrolled_ground(unrolled, turn)
         return finish(
             figure,
             "compensation-contour",
@@ -73,37 +72,6 @@ def _contour_picture(turn: Turn, before: Contour, after: Contour, plane: str) ->
             f"Radius deviation magnified {gap / ring * 1e6 / (NOMINAL / turn.radius):,.0f} times; rings at "
             f"±{ring:g} µm about the programmed circle.",
         )
-
-
-def _polar(axes: Axes, turn: Turn, curves: Sequence[tuple[Contour, dict[str, Any]]], ring: float, rings: int) -> None:
-    gap = RING_GAPS[rings]
-    around = np.linspace(0, 2 * math.pi, 361)
-    axes.set_aspect("equal", anchor="N")
-    axes.set_axis_off()
-    for value in range(-rings, rings + 1):
-        radius = NOMINAL + value * gap
-        style: dict[str, Any] = (
-            {"color": GRID, "linewidth": 0.9} if value else {"color": MUTED, "linewidth": 1.1, "linestyle": (0, (6, 3))}
-        )
-        axes.plot(radius * np.cos(around), radius * np.sin(around), **style)
-        if value:
-            at = radius * math.cos(math.pi / 4)
-            axes.text(
-                at, at, minus(f"{value * ring:+g} µm"), color=MUTED, fontsize=8.5, ha="center", va="center",
-                rotation=-45, bbox=plain_box(),
-            )  # fmt: skip
-    outer = NOMINAL + 1.16 * gap * rings
-    first, second = turn.axes
-    for text, x, y in ((f"{first}+", 1, 0), (f"{second}+", 0, 1), (f"{first}−", -1, 0), (f"{second}−", 0, -1)):
-        axes.plot([0, outer * x], [0, outer * y], color=GRID, linewidth=0.9)
-        axes.text(x * (outer + 0.06), y * (outer + 0.06), text, ha="center", va="center", fontweight="bold")
-    for measured, style in curves:
-        r = NOMINAL + measured.deviation * 1e6 * gap / ring
-        rows = thinned(np.arange(len(r), dtype=float), r)[0].astype(int)
-        axes.plot(r[rows] * np.cos(measured.angle[rows]), r[rows] * np.sin(measured.angle[rows]), **style)
-    axes.set_xlim(-1.12 * outer, 1.12 * outer)
-    axes.set_ylim(-1.12 * outer, 1.12 * outer)
-    heading(axes, f"Contour error, {first}-{second}, R {turn.radius * 1e3:g} mm")
 
 
 def _reversals_picture(turn: Turn, before: Contour, after: Contour, plane: str) -> Picture:
@@ -138,7 +106,6 @@ def _torque_picture(compensation: Compensation) -> Picture:
     signs = {axis: compensation.scenario.machine.axes[axis].display_sign for axis in axes_of}
     torque = feedforward.between(turn.begin, turn.end)
     real = compensation.after.trace.between(turn.begin, turn.end)
-    reversed_ones = [axis for axis in axes_of if signs[axis] < 0]
     with drawing(10.0, 3.4 * max(1, len(axes_of))) as figure:
         rooms = figure.subplots(max(1, len(axes_of)), 2, squeeze=False, width_ratios=[1.5, 1])
         for (whole, near), axis in zip(rooms, axes_of, strict=True):
@@ -158,15 +125,14 @@ def _torque_picture(compensation: Compensation) -> Picture:
             heading(whole, f"Axis {axis}: torque over the turn")
             heading(near, "Around a reversal")
             legend_above(whole)
-            whole.set_ylabel("torque [N·m]" if sign > 0 else "torque, sign reversed [N·m]")
+            whole.set_ylabel(torque_label(sign))
             whole.margins(x=0.01)
         return finish(
             figure,
             "compensation-torque",
             "Torque feedforward of the friction compensation",
             "Feedforward as it is added to the torque setpoint, and the friction torque of the compensated run. The "
-            "feedforward is ahead by the lag of the torque behind its setpoint."
-            + (f" Torques of {', '.join(reversed_ones)} are drawn with reversed sign." if reversed_ones else ""),
+            "feedforward is ahead by the lag of the torque behind its setpoint." + reversed_note(axes_of, signs),
         )
 
 

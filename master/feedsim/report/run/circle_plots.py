@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feedsim.analysis import Contour, Figures, Glitch, Turn, contour
-from feedsim.report.labels import heading, legend_above, plain_box
+from feedsim.report.formatting import minus
+from feedsim.report.labels import heading, legend_above, plain_box, reversed_note, torque_label
 from feedsim.report.style import (
     BLUE,
     GRID,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
 NOMINAL = 1.0  # radius of the nominal circle in the drawing
+TOOL: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (5, 1.5))}
 RING_GAPS = {1: 0.36, 2: 0.24}  # rings to either side -> their distance in the drawing
 
 
@@ -79,14 +81,13 @@ def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str
         rooms = figure.subplots(len(axes), 3, squeeze=False, width_ratios=[1.25, 1, 1])
         for row, axis in zip(rooms, axes, strict=True):
             _torque_row(row, part, axis, signs.get(axis, 1))
-        reversed_ones = [axis for axis in axes if signs.get(axis, 1) < 0]
         return finish(
             figure,
             stem,
             f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: driving torque and friction torque",
             f"Turn from {turn.begin:.4f} to {turn.end:.4f} s. Left: over time. Middle: over the motor speed. Right: "
             "friction torque around the reversal of the motion, where its slope is that of the engaging transmission."
-            + (f" Torques of {', '.join(reversed_ones)} are drawn with reversed sign." if reversed_ones else ""),
+            + reversed_note(axes, signs),
         )
 
 
@@ -98,57 +99,75 @@ def ring_step(largest: float) -> float:
     return next(step for step in (decade, 2 * decade, 5 * decade, 10 * decade) if max(largest, 0.1) <= 1.5 * step)
 
 
-def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, ring: float, rings: int) -> None:
+def polar_ground(axes: Axes, turn: Turn, ring: float, rings: int) -> None:
+    """Rings every ``ring`` [um], ``rings`` to either side of the programmed circle, and the directions of the plane."""
     gap = RING_GAPS[rings]
-    per_um = gap / ring
-    around = np.linspace(0, 2 * math.pi, 361)
-
-    def circle(radius: float, **style: Any) -> None:
-        axes.plot(radius * np.cos(around), radius * np.sin(around), **style)
-
-    def trail(measured: Contour, **style: Any) -> None:
-        r = NOMINAL + measured.deviation * 1e6 * per_um
-        rows = thinned(np.arange(len(r), dtype=float), r)[0].astype(int)
-        closes = abs(r[-1] - r[0]) < 0.02 * gap  # a turn with the machine's start or stop in it does not
-        closed = np.append(rows, rows[0]) if closes else rows
-        axes.plot(r[closed] * np.cos(measured.angle[closed]), r[closed] * np.sin(measured.angle[closed]), **style)
-
     axes.set_aspect("equal", anchor="N")
     axes.set_axis_off()
     for value in (*range(-rings, 0), *range(1, rings + 1)):
-        circle(NOMINAL + value * gap, color=GRID, linewidth=0.9)
-        _ring_label(axes, NOMINAL + value * gap, f"{value * ring:+g} µm".replace("-", "−"), MUTED)
+        _circle(axes, NOMINAL + value * gap, color=GRID, linewidth=0.9)
+        _ring_label(axes, NOMINAL + value * gap, minus(f"{value * ring:+g} µm"))
     outer = NOMINAL + 1.16 * gap * rings
-    for angle in (0.0, math.pi / 2):
-        ends = np.array([-outer, outer])
-        axes.plot(ends * math.cos(angle), ends * math.sin(angle), color=GRID, linewidth=0.9)
-    circle(NOMINAL, color=MUTED, linewidth=1.1, linestyle=(0, (6, 3)), label="programmed circle")
-    _ring_label(axes, _beside_the_curves(per_um, gap, by_scale, by_tool), "0", MUTED)
-    if by_tool is not None:
-        trail(by_tool, color=ORANGE, linewidth=1.2, linestyle=(0, (5, 1.5)), label="tool point")
-    trail(by_scale, color=BLUE, linewidth=1.6, label="linear scales")
     first, second = turn.axes
-    names = (f"{first}+", f"{second}+", f"{first}−", f"{second}−")
-    for text, (x, y) in zip(names, ((1, 0), (0, 1), (-1, 0), (0, -1)), strict=True):
-        axes.text(
-            x * (outer + 0.055), y * (outer + 0.055), text, ha="center", va="center", fontweight="bold", fontsize=11
-        )
+    for text, x, y in ((f"{first}+", 1, 0), (f"{second}+", 0, 1), (f"{first}−", -1, 0), (f"{second}−", 0, -1)):
+        axes.plot([0, outer * x], [0, outer * y], color=GRID, linewidth=0.9)
+        at = outer + 0.055
+        axes.text(x * at, y * at, text, ha="center", va="center", fontweight="bold", fontsize=11)
+    _circle(axes, NOMINAL, color=MUTED, linewidth=1.1, linestyle=(0, (6, 3)), label="programmed circle")
+    axes.set_xlim(-1.12 * outer, 1.12 * outer)
+    axes.set_ylim(-1.12 * outer, 1.12 * outer)
+    heading(axes, f"Contour error, {first}-{second}, R {turn.radius * 1e3:g} mm")
+
+
+def polar_curve(axes: Axes, measured: Contour, ring: float, rings: int, **style: Any) -> None:
+    """The contour over such a ground, closed where the turn is."""
+    gap = RING_GAPS[rings]
+    r = NOMINAL + measured.deviation * 1e6 * gap / ring
+    rows = thinned(np.arange(len(r), dtype=float), r)[0].astype(int)
+    closes = abs(r[-1] - r[0]) < 0.02 * gap  # a turn with the machine's start or stop in it does not
+    closed = np.append(rows, rows[0]) if closes else rows
+    axes.plot(r[closed] * np.cos(measured.angle[closed]), r[closed] * np.sin(measured.angle[closed]), **style)
+
+
+def unrolled_curve(axes: Axes, measured: Contour, **style: Any) -> None:
+    """The contour over the angle."""
+    angle = np.rad2deg(measured.angle % (2 * math.pi))
+    order = np.argsort(angle)
+    axes.plot(*thinned(angle[order], measured.deviation[order] * 1e6), **style)
+
+
+def unrolled_ground(axes: Axes, turn: Turn) -> None:
+    """What such axes need; call when the curves are there."""
+    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    heading(axes, "Over the angle")
+    legend_above(axes)
+    axes.set(xlabel=f"angle from {turn.axes[0]}+ [°]", ylabel="radius deviation [µm]", xlim=(0, 360))
+    axes.set_xticks(range(0, 361, 90))
+
+
+def _polar(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None, ring: float, rings: int) -> None:
+    gap = RING_GAPS[rings]
+    per_um = gap / ring
+    polar_ground(axes, turn, ring, rings)
+    _ring_label(axes, _beside_the_curves(per_um, gap, by_scale, by_tool), "0")
+    if by_tool is not None:
+        polar_curve(axes, by_tool, ring, rings, **TOOL, linewidth=1.2, label="tool point")
+    polar_curve(axes, by_scale, ring, rings, color=BLUE, linewidth=1.6, label="linear scales")
     for glitch in by_scale.glitches:
         _mark(axes, glitch, gap, per_um)
     axes.text(0, 0.22, "quadrant glitches\n(less the median)", color=MUTED, ha="center", va="center", fontsize=8.5)
     _sense(axes, turn)
-    axes.set_xlim(-1.12 * outer, 1.12 * outer)
-    axes.set_ylim(-1.12 * outer, 1.12 * outer)
-    heading(axes, f"Contour error, {first}-{second}, R {turn.radius * 1e3:g} mm")
     axes.legend(loc="lower left", bbox_to_anchor=(-0.02, -0.02))
 
 
-def _ring_label(axes: Axes, radius: float, text: str, colour: str) -> None:
+def _circle(axes: Axes, radius: float, **style: Any) -> None:
+    around = np.linspace(0, 2 * math.pi, 361)
+    axes.plot(radius * np.cos(around), radius * np.sin(around), **style)
+
+
+def _ring_label(axes: Axes, radius: float, text: str) -> None:
     at = radius * math.cos(math.pi / 4)
-    axes.text(
-        at, at, text, color=colour, fontsize=8.5, ha="center", va="center", rotation=-45,
-        bbox=plain_box(),
-    )  # fmt: skip
+    axes.text(at, at, text, color=MUTED, fontsize=8.5, ha="center", va="center", rotation=-45, bbox=plain_box())
 
 
 def _beside_the_curves(per_um: float, gap: float, *curves: Contour | None) -> float:
@@ -168,7 +187,7 @@ def _mark(axes: Axes, glitch: Glitch, gap: float, per_um: float) -> None:
     across, up = round(math.cos(glitch.crossing)), round(math.sin(glitch.crossing))
     inside = NOMINAL - 1.16 * gap
     axes.annotate(
-        f"{glitch.name.replace('-', '−')}: {glitch.height * 1e6:.2f} µm",
+        f"{minus(glitch.name)}: {glitch.height * 1e6:.2f} µm",
         (x, y),
         xytext=(inside * across, inside * up),
         ha={1: "right", 0: "center", -1: "left"}[across],
@@ -193,25 +212,14 @@ def _sense(axes: Axes, turn: Turn) -> None:
 
 
 def _unrolled(axes: Axes, turn: Turn, by_scale: Contour, by_tool: Contour | None) -> None:
-    styles: list[tuple[Contour, dict[str, Any]]] = [(by_scale, {"color": BLUE, "label": "scales"})]
     if by_tool is not None:
-        dashes = (0, (5, 1.5))
-        styles.insert(0, (by_tool, {"color": ORANGE, "linestyle": dashes, "linewidth": 1.1, "label": "tool point"}))
-    for measured, style in styles:
-        angle = np.rad2deg(measured.angle % (2 * math.pi))
-        order = np.argsort(angle)
-        a, e = thinned(angle[order], measured.deviation[order] * 1e6)
-        axes.plot(a, e, **style)
+        unrolled_curve(axes, by_tool, **TOOL, linewidth=1.1, label="tool point")
+    unrolled_curve(axes, by_scale, color=BLUE, label="scales")
     for glitch in by_scale.glitches:
         at = np.rad2deg(glitch.angle % (2 * math.pi))
         axes.plot([at], [glitch.deviation * 1e6], "o", color=VERMILLION, markersize=4)
     axes.axhline(by_scale.median * 1e6, color=MUTED, linewidth=1.1, linestyle=(0, (1, 2)), label="median (scales)")
-    axes.axhline(0.0, color=MUTED, linewidth=0.8)
-    heading(axes, "Over the angle")
-    legend_above(axes)
-    axes.set(xlabel=f"angle from {turn.axes[0]}+ [°]", ylabel="radius deviation [µm]")
-    axes.set_xlim(0, 360)
-    axes.set_xticks(range(0, 361, 90))
+    unrolled_ground(axes, turn)
 
 
 def _table(axes: Axes, turn: Turn, figures: Figures) -> None:
@@ -234,7 +242,7 @@ def _table(axes: Axes, turn: Turn, figures: Figures) -> None:
         axes.text(0.0, y, label, va="top", fontsize=9)
         for (x, _), prefix in zip(heads, ("", "tool."), strict=False):
             value = figures[prefix + key].value
-            axes.text(x, y, f"{value:.2f}".replace("-", "−"), ha="right", va="top", fontsize=9)
+            axes.text(x, y, minus(f"{value:.2f}"), ha="right", va="top", fontsize=9)
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
 
@@ -255,7 +263,7 @@ def _torque_row(row: Sequence[Axes], part: Trace, axis: str, sign: int) -> None:
         friction_room.set_xlim(*(0.12 * np.array([-1, 1]) * float(np.abs(speed).max() or 1.0)))
     else:
         friction_room.set_visible(False)
-    ordinate = "torque [N·m]" if sign > 0 else "torque, sign reversed [N·m]"
+    ordinate = torque_label(sign)
     heading(time_room, f"Axis {axis}: torque over time")
     heading(speed_room, "Torque over speed")
     heading(friction_room, "Friction around the reversal")

@@ -22,8 +22,9 @@ from feedsim.cosim.archive import Archive
 from feedsim.cosim.interpreter import Interpreter
 from feedsim.cosim.operations import When, do_step, get_row, set_real, set_slopes
 from feedsim.cosim.unit import Log, Port, Unit
-from feedsim.scenario import Machine, Scenario, load_structure
+from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.modes import TOOL_PORTS, Modes, read_modes
 from feedsim.structure.pack import pack
 from feedsim.structure.poses import grid_axis, pose_grid

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
+from feedsim.files.columns import Columns, load_columns
 from feedsim.identify.read import Recorded, read_records
-from feedsim.scenario import Columns, load_columns
 
 PITCH = 0.02
 LEAD = PITCH / (2 * pi)

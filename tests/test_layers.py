@@ -25,6 +25,7 @@ ORDER = [
     "scenario",
     "motions",
     "trace",
+    "files",
     "fields",
     "variables",
     "units",
@@ -33,7 +34,7 @@ ORDER = [
 SOLE_USERS = {
     "fmpy": {"cosim/archive.py", "cosim/unit.py"},
     "ctypes": {"cosim/unit.py", "cosim/friction_law.py", "cosim/exchange.py"},
-    "yaml": {"scenario"},
+    "yaml": {"files", "scenario/friction_file.py"},
     "matplotlib": {"report"},
     "ruckig": {"motions"},
     "jinja2": {"report/page.py"},

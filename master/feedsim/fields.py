@@ -13,7 +13,7 @@ from functools import cache, lru_cache
 from math import inf, isfinite
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, ClassVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.fields import FieldInfo
@@ -45,6 +45,9 @@ class Model(BaseModel):
     """Base of all scenario models: values that do not change, no unknown keys."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", validate_default=False)
+
+    IN_FOLDER: ClassVar[str] = ""  # name of the file, where its folder may be named in its place
+    TOLD_BY: ClassVar[str | None] = None  # the key that tells it from another model that may stand at its place
 
 
 def fault(message: str, beside: tuple[str, ...] = ()) -> PydanticCustomError:

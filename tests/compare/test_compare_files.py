@@ -10,7 +10,8 @@ import pytest
 from compare_helpers import wave, written
 from feedsim.compare import Tolerances, compare_files, pairs_of, tolerances_of
 from feedsim.errors import InputError
-from feedsim.scenario import json_schema, load_tolerances
+from feedsim.files.tolerances import load_tolerances
+from feedsim.scenario.schema import json_schema
 from feedsim.trace import read_series
 
 

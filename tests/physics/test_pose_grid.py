@@ -17,8 +17,9 @@ import pytest
 from numpy.typing import NDArray
 
 from feedsim import cosim
-from feedsim.scenario import Machine, load_structure
+from feedsim.scenario import Machine
 from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.poses import grid_axis, pose_grid
 from fmi_helpers import Archive, Instance
 

@@ -21,7 +21,8 @@ from feedsim.report.machine.animation import FRAMES
 from feedsim.report.machine.model import LARGEST, Model, model, motion, solids, turned
 from feedsim.report.machine.pictures import telling_view
 from feedsim.report.machine.projection import FRONT, OBLIQUE, SIDE, TOP, view
-from feedsim.scenario import Structure, load_structure
+from feedsim.scenario.structure import Structure
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.build import Built, build
 from feedsim.structure.geometry.outline import node_motion
 

@@ -18,7 +18,8 @@ from feedsim.report import run as report
 from feedsim.report.page import html
 from feedsim.report.run.report import report_of
 from feedsim.report.run.summary import summary
-from feedsim.scenario import Machine, load_structure
+from feedsim.scenario import Machine
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.geometry.assemble import assemble
 from feedsim.structure.pose_change import LARGE, LOOKED_AT, PoseChange, pose_change, warnings
 from report_helpers import positioning_run

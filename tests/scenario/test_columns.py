@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from feedsim.errors import InputError
-from feedsim.scenario import json_schema, load_columns
-from feedsim.scenario.columns import Columns, Signal, is_rms, spelled
+from feedsim.files.columns import Columns, Signal, is_rms, load_columns, spelled
+from feedsim.scenario.schema import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]
 # Six lines that are right; what a test adds begins in line 7.

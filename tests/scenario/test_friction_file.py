@@ -13,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feedsim.errors import InputError, OutputError
-from feedsim.scenario import Friction, json_schema, load, load_machine
+from feedsim.scenario import Friction, load, load_machine
 from feedsim.scenario.friction_file import Line, friction_text, read_friction
+from feedsim.scenario.schema import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIO = ROOT / "scenarios" / "xz_circle.yaml"

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import pytest
 import yaml
 
-from feedsim.scenario import json_schema
+from feedsim.scenario.schema import json_schema
 
 jsonschema = pytest.importorskip("jsonschema")
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.scenario import source
-from feedsim.scenario.source import LARGEST, Place, parse, read
+from feedsim.files import source
+from feedsim.files.source import LARGEST, Place, parse, read
 
 
 def values(text: str) -> object:

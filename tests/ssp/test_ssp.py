@@ -13,6 +13,7 @@ import pytest
 import ssp_helpers
 from feedsim import analysis, cosim, nc, scenario, ssp
 from feedsim.cosim import Run
+from feedsim.scenario.structure.load import load_structure
 from ssp_helpers import ROOT, STRUCTURE, edited, short_scenario
 
 
@@ -130,7 +131,7 @@ def test_the_structure_travels_along(exported: Path, fmus: Path, tmp_path: Path)
         here, there = loaded.machine.structure, found.scenario.machine.structure
         assert here is not None
         assert there is not None
-        assert scenario.load_structure(here) == scenario.load_structure(there)
+        assert load_structure(here) == load_structure(there)
     assert "resources/structure.yaml" not in ssp_helpers.contents(exported)
 
 

@@ -15,7 +15,8 @@ from feedsim import cli, cosim, scenario
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.plant import axes_of, open_plant
 from feedsim.errors import InputError, OutputError
-from feedsim.scenario import load_machine, load_structure
+from feedsim.scenario import load_machine
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure import read_modes
 from feedsim.structure.build import build
 from feedsim.structure.pack import pack

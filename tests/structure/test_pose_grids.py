@@ -12,7 +12,7 @@ import pytest
 from scipy import sparse
 
 from feedsim.errors import InputError, OutputError
-from feedsim.scenario import load_structure
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.geometry.assemble import Assembler
 from feedsim.structure.modes import read_modes
 from feedsim.structure.poses import check_common, grid_axis, pose_grid

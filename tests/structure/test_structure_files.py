@@ -11,7 +11,8 @@ import pytest
 import yaml
 
 from feedsim.errors import InputError
-from feedsim.scenario import json_schema, load_structure
+from feedsim.scenario.schema import json_schema
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.geometry.assemble import Assembler
 from structure_helpers import MACHINES, default_structure, geometry, one_axis_data, one_axis_text
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from feedsim.scenario import Distribution, load_study
+from feedsim.scenario.study import Distribution, load_study
 from feedsim.sweep import design
 from feedsim.sweep.design import quantile
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feedsim import analysis, cosim
-from feedsim.scenario import load_study
+from feedsim.scenario.study import load_study
 from feedsim.sweep.design import Design, design
 
 ROOT = Path(__file__).resolve().parents[2]

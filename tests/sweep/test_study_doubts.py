@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.scenario import load, load_study
+from feedsim.scenario import load
+from feedsim.scenario.study import load_study
 from feedsim.scenario.study.distribution import outside
 from feedsim.scenario.study.study import Distribution
 from feedsim.sweep.design import quantile

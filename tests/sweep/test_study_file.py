@@ -13,7 +13,8 @@ import yaml
 
 from feedsim.cli import main
 from feedsim.errors import InputError
-from feedsim.scenario import json_schema, load_study
+from feedsim.scenario.schema import json_schema
+from feedsim.scenario.study import load_study
 from feedsim.sweep import design
 
 Write = Callable[..., Path]

@@ -22,7 +22,8 @@ import pytest
 from feedsim import analysis, cosim, units
 from feedsim.cli import main
 from feedsim.errors import InputError, OutputError, SimulationError
-from feedsim.scenario import load, load_study
+from feedsim.scenario import load
+from feedsim.scenario.study import load_study
 from feedsim.sweep import read_table
 from feedsim.sweep.study import Progress, run
 

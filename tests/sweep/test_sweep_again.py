@@ -12,7 +12,7 @@ import pytest
 
 from feedsim.cli import main
 from feedsim.errors import InputError
-from feedsim.scenario import load_study
+from feedsim.scenario.study import load_study
 from feedsim.sweep import design, read_table
 from feedsim.sweep.study import Progress, run
 

@@ -12,7 +12,7 @@ import pytest
 from feedsim.report.sweep.account import Account
 from feedsim.report.sweep.figure_plots import scatter_picture
 from feedsim.report.sweep.measures import measures
-from feedsim.scenario import load_study
+from feedsim.scenario.study import load_study
 from feedsim.sweep.design import design
 from feedsim.sweep.failures import LEVEL, end_chance, span_chance
 from feedsim.sweep.table import FAILED, OK, table_of

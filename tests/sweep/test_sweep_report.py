@@ -21,7 +21,7 @@ from feedsim.report.sweep.figure_plots import running_median
 from feedsim.report.sweep.plots import pictures_of
 from feedsim.report.sweep.report import report_of
 from feedsim.report.sweep.summary import summary
-from feedsim.scenario import Study, load_study
+from feedsim.scenario.study import Study, load_study
 from feedsim.sweep.design import Design, design
 from feedsim.sweep.table import Table
 from feedsim.sweep.table import table_of as made

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError, OutputError
-from feedsim.scenario import load_study
+from feedsim.scenario.study import load_study
 from feedsim.sweep import Design, Outcome, Table, design, read_table, write_table
 from feedsim.sweep.table import table_of
 

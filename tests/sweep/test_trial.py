@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from feedsim.cli import main
-from feedsim.scenario import load_study
+from feedsim.scenario.study import load_study
 from feedsim.sweep import design
 from feedsim.sweep.study import run
 from feedsim.sweep.trial import ENOUGH, spread, trial

@@ -16,7 +16,7 @@ from feedsim.analysis.figures import Figure
 from feedsim.analysis.linear import loops
 from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, ModalPlant
 from feedsim.errors import InputError
-from feedsim.scenario import Structure
+from feedsim.scenario.structure import Structure
 from feedsim.structure import Modes
 from feedsim.structure.build import assemble
 from feedsim.structure.solve import solve

@@ -179,8 +179,9 @@ def _read_record(path: Path, mapping: Path, axis: str | None, machine: Path | No
     import numpy as np
 
     from feedsim.errors import InputError
+    from feedsim.files.columns import load_columns
     from feedsim.identify.read import read_records
-    from feedsim.scenario import load_columns, load_subject
+    from feedsim.scenario import load_subject
     from feedsim.trace import Series
 
     subject = load_subject(machine) if machine is not None else None

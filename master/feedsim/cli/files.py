@@ -13,9 +13,9 @@ from feedsim.errors import InputError
 
 def schema(options: Namespace) -> None:
     """feedsim schema."""
-    from feedsim import scenario
+    from feedsim.scenario.schema import json_schema
 
-    json.dump(scenario.json_schema(options.kind), sys.stdout, indent=2)
+    json.dump(json_schema(options.kind), sys.stdout, indent=2)
     print()
 
 

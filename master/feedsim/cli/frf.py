@@ -105,7 +105,7 @@ def _full_model(machine: Machine, progress: Progress, warnings: list[str]) -> Tr
     """
     from feedsim.analysis.truncation import truncation
     from feedsim.errors import FeedsimError
-    from feedsim.scenario import load_structure
+    from feedsim.scenario.structure.load import load_structure
 
     if machine.structure is None:
         return None

@@ -33,10 +33,11 @@ ESTIMATE = "estimate"  # of --inertia and --delay: whatever mapping and machine 
 def identify(options: Namespace) -> None:
     """Read, identify, write."""
     from feedsim.cosim.friction_law import FrictionLaw
+    from feedsim.files.columns import load_columns
     from feedsim.identify import Identified, named_apart, read_traces
     from feedsim.identify import identify as identified_from
     from feedsim.report import identify as report
-    from feedsim.scenario import load_columns, load_subject
+    from feedsim.scenario import load_subject
 
     asked = _asked(options)
     subject = load_subject(options.machine) if options.machine is not None else None

@@ -69,7 +69,7 @@ def validate(options: Namespace) -> None:
     """feedsim validate."""
     from feedsim import analysis, cosim
     from feedsim.cli import sweep
-    from feedsim.scenario import is_study
+    from feedsim.files.kind import is_study
 
     if is_study(options.scenario):
         sweep.validate(options)
@@ -84,10 +84,11 @@ def validate(options: Namespace) -> None:
 def write_ssp(options: Namespace) -> None:
     """feedsim ssp."""
     from feedsim import scenario, ssp
+    from feedsim.files.kind import is_ssp
 
-    if not scenario.is_ssp(options.out):
+    if not is_ssp(options.out):
         raise InputError(f"--out {options.out}: an SSP file ends in .ssp; simulators tell it by that")
-    if scenario.is_ssp(options.scenario):
+    if is_ssp(options.scenario):
         raise InputError(f"{options.scenario}: is an SSP file already; a scenario is expected")
     if not options.out.absolute().parent.is_dir():
         raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
@@ -109,9 +110,10 @@ def _subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | Non
     Scenario, program, folder of archives, and what makes a run's warnings all that is to be said.
     """
     from feedsim import nc, scenario
+    from feedsim.files.kind import is_ssp, is_study
 
-    if not scenario.is_ssp(options.scenario):
-        if scenario.is_study(options.scenario):
+    if not is_ssp(options.scenario):
+        if is_study(options.scenario):
             raise InputError(f"{options.scenario}: is a study of many runs: feedsim sweep {options.scenario}")
         loaded = scenario.load(options.scenario, options.overrides)
         announce(loaded.machine)

@@ -15,7 +15,7 @@ from feedsim.cli.terminal import announce, finish, progress_bar, warn
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from feedsim.scenario import Study
+    from feedsim.scenario.study import Study
     from feedsim.sweep import Design
     from feedsim.sweep.study import Progress
 
@@ -39,7 +39,7 @@ examples:
 def sweep(options: Namespace) -> int:
     """feedsim sweep."""
     from feedsim.report import sweep as report
-    from feedsim.scenario import load_study
+    from feedsim.scenario.study import load_study
     from feedsim.sweep import design
     from feedsim.sweep.study import AllFailed, run
 
@@ -143,7 +143,7 @@ def _range(least: float, most: float, shown: Callable[[float], str]) -> str:
 
 def validate(options: Namespace) -> None:
     """feedsim validate of a study: it, its scenario, and a run from the middle, without a step."""
-    from feedsim.scenario import load_study
+    from feedsim.scenario.study import load_study
     from feedsim.sweep import design
     from feedsim.sweep.trial import check
 

@@ -10,7 +10,7 @@ from feedsim.compare.options import Options
 from feedsim.compare.tolerance import Tolerances
 from feedsim.compare.verdict import Comparison
 from feedsim.errors import InputError
-from feedsim.scenario import load_tolerances
+from feedsim.files.tolerances import load_tolerances
 from feedsim.trace import Series, read_series
 
 TOLERANCES = "tolerances.yaml"

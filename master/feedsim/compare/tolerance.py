@@ -10,7 +10,7 @@ from math import isfinite
 from feedsim import units
 from feedsim.compare.options import conversion
 from feedsim.errors import InputError
-from feedsim.scenario.tolerances import ToleranceFile
+from feedsim.files.tolerances import ToleranceFile
 from feedsim.trace import matches
 
 DEFAULT = 1e-3  # of the range of the reference

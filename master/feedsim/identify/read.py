@@ -13,10 +13,11 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.fields import no_axis
+from feedsim.files.columns import Columns
 from feedsim.identify.record import Array, Record, even_pieces
 from feedsim.identify.signals import Channel, Chosen, choose
 from feedsim.identify.signs import checked
-from feedsim.scenario import Columns, Drive, Machine
+from feedsim.scenario import Drive, Machine
 from feedsim.trace import Recording, read_recording
 
 # Values given twice are the same up to the rounding of what people write.

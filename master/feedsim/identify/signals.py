@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.identify.signal_names import alias_of
-from feedsim.scenario.columns import (
+from feedsim.files.columns import (
     DIMENSIONS,
     DRIVING,
     Columns,
@@ -20,6 +19,7 @@ from feedsim.scenario.columns import (
     resulting,
     target_of,
 )
+from feedsim.identify.signal_names import alias_of
 from feedsim.trace import Recording
 
 # feedsim's own signals of an axis -> role. The torque is taken before the current: it needs no torque constant.

@@ -14,10 +14,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from feedsim.scenario import shape
-from feedsim.scenario.load import Draft, Setting, drafted, fetch
+from feedsim.files import shape
+from feedsim.files.checked import fetch
+from feedsim.files.source import Mark, Place, Source, at, places
+from feedsim.scenario.load import Draft, Setting, drafted
 from feedsim.scenario.model import Scenario
-from feedsim.scenario.source import Mark, Place, Source, at, places
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,14 @@ from pydantic import ConfigDict, Field, StrictStr
 
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, File, Model, Quantity
-from feedsim.scenario.load import MACHINE_FILE, STRUCTURE_FILE, check, fetch, load, load_structure, read_group
+from feedsim.files.checked import check, fetch, read_group
+from feedsim.files.problems import dotted, in_order
+from feedsim.files.source import Place, Source
+from feedsim.scenario.load import load
 from feedsim.scenario.machine import Machine
-from feedsim.scenario.problems import dotted, in_order
-from feedsim.scenario.source import Place, Source
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.load import STRUCTURE_FILE, load_structure
 from feedsim.scenario.structure.matrices import FiniteElements
 
 # Lengths that are typed twice are the same where they differ by less [m].
@@ -69,9 +71,9 @@ def load_described(path: str | Path) -> Described:
     """
     path = Path(path)
     if path.is_dir():
-        found = [path / name for name in (MACHINE_FILE, STRUCTURE_FILE) if (path / name).is_file()]
+        found = [path / name for name in (Machine.IN_FOLDER, STRUCTURE_FILE) if (path / name).is_file()]
         if not found:
-            raise InputError(f"{path}: no {MACHINE_FILE} and no {STRUCTURE_FILE} in this folder")
+            raise InputError(f"{path}: no {Machine.IN_FOLDER} and no {STRUCTURE_FILE} in this folder")
         path = found[0]
     source = read_group(path)
     if "kind" in source.data or path.name == STRUCTURE_FILE:

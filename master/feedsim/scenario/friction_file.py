@@ -17,7 +17,7 @@ import yaml
 from feedsim import units
 from feedsim.errors import OutputError
 from feedsim.fields import Quantity
-from feedsim.scenario.load import read_checked
+from feedsim.files.checked import read_checked
 from feedsim.scenario.machine import Friction
 
 # Relative 5e-8 at most: what is calculated from the file is that of the fit to 1e-6, and a person can still read it.

@@ -4,29 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import BaseModel, ValidationError
-from pydantic_core import PydanticCustomError
+from typing import Any
 
 from feedsim.errors import InputError
-from feedsim.fields import Quantity, Reading, brief, did_you_mean, is_multiple
-from feedsim.scenario import overrides as changes
-from feedsim.scenario import shape
-from feedsim.scenario.checks import contradictions
-from feedsim.scenario.machine import Cycles, Machine
-from feedsim.scenario.model import Scenario
-from feedsim.scenario.problems import describe, explain, in_order
-from feedsim.scenario.source import Place, Source, read
-from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.kinds import KINDS, contradictions_of
+from feedsim.fields import brief
+from feedsim.files import changes
+from feedsim.files.checked import check, fetch, read_group
+from feedsim.files.problems import describe, in_order
+from feedsim.files.source import Place, Source
+from feedsim.scenario.machine import Machine
+from feedsim.scenario.model import Scenario, contradictions
 
-MACHINE_FILE = "machine.yaml"
-STRUCTURE_FILE = "structure.yaml"
-M = TypeVar("M", bound=BaseModel)
 Setting = tuple[str, Source]  # dotted key, value
 
 
@@ -128,7 +119,7 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
     InputError like load().
     """
     path = Path(path)
-    path = path / MACHINE_FILE if path.is_dir() else path
+    path = path / Machine.IN_FOLDER if path.is_dir() else path
     source = read_group(path)
     faults: list[str] = []
     fetch(source, Machine, (), faults)
@@ -143,29 +134,6 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
     machine._files = tuple(_files(source, path))
     machine._directory = path.parent
     return machine
-
-
-def load_structure(path: str | Path) -> Structure:
-    """Read and check a structure: a structure file, or a folder with a structure.yaml, as the model its `kind` names.
-
-    Raises InputError like load().
-    """
-    path = Path(path)
-    path = path / STRUCTURE_FILE if path.is_dir() else path
-    source = read_group(path)
-    kind = source.data.get("kind")
-    if kind is None:
-        raise InputError(describe(source, ("kind",), f"missing key 'kind'; allowed: {', '.join(KINDS)}"))
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise InputError(describe(source, ("kind",), f"unknown kind {brief(kind)}{did_you_mean(str(kind), [*KINDS])}"))
-    model, faults = KINDS[kind], list[str]()
-    fetch(source, model, (), faults)
-    structure = check(source, model, faults)
-    if structure is not None:
-        faults += [describe(source, place, message) for place, message in contradictions_of(structure)]
-    if faults or structure is None:
-        raise InputError.of(str(path), in_order(faults))
-    return structure
 
 
 def _text(value: Any) -> str:
@@ -184,24 +152,6 @@ def _files(source: Source, path: Path) -> Iterator[tuple[str, Path]]:
             yield ".".join(str(key) for key in place), Path(file)
 
 
-def read_group(path: Path) -> Source:
-    source = read(path)
-    if not isinstance(source.data, dict):
-        raise InputError(f"{source.mark(()).where}: a file of 'key: value' lines is expected, not {brief(source.data)}")
-    return source
-
-
-def read_checked(path: str | Path, model: type[M]) -> M:
-    """A file as a model that needs no more than its own checks. InputError lists every problem with file and line."""
-    source = read_group(Path(path))
-    faults: list[str] = []
-    fetch(source, model, (), faults)
-    found = check(source, model, faults)
-    if faults or found is None:
-        raise InputError.of(str(path), in_order(faults))
-    return found
-
-
 def _own_settings(source: Source, faults: list[str]) -> Iterator[tuple[str, Source]]:
     """Take the `set` group out of the tree."""
     settings = source.data.pop("set", None)
@@ -213,71 +163,6 @@ def _own_settings(source: Source, faults: list[str]) -> Iterator[tuple[str, Sour
             inner = {at[2:]: mark for at, mark in source.marks.items() if at[:2] == ("set", key)}
             yield key, Source(value, inner)
     source.forget(place)
-
-
-def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
-    """Replace names of YAML files, where a group of keys is expected, by what the files hold; make other file names
-    relative to the file that names them."""
-    data: Any = source.data
-    for key in place:
-        data = data[key]
-    annotation = shape.expected(model, source.data, place)
-    if annotation is None:
-        return
-    if isinstance(data, str):
-        folder = source.mark(place).folder
-        if shape.is_file(annotation) and data:
-            parent: Any = source.data
-            for key in place[:-1]:
-                parent = parent[key]
-            parent[place[-1]] = str(folder / data)
-        elif shape.is_model(annotation) and (annotation is Machine or data.endswith((".yaml", ".yml"))):
-            named = folder / data
-            file = named / MACHINE_FILE if annotation is Machine and named.is_dir() else named
-            try:
-                source.put(place, read_group(file))
-            except InputError as error:
-                inside = f"{file}:" in error.problems[0]
-                faults += error.problems if inside else [describe(source, place, str(error))]
-                source.put(place, Source(UNREAD, {(): source.mark(place)}))
-                return
-            fetch(source, model, place, faults)
-    elif isinstance(data, dict):
-        for key in data:
-            fetch(source, model, (*place, key), faults)
-    elif isinstance(data, list):
-        for i in range(len(data)):
-            fetch(source, model, (*place, i), faults)
-
-
-UNREAD = "(not read)"  # stands for the content of a file whose problem is reported already
-
-
-def check(source: Source, model: type[M], faults: list[str]) -> M | None:
-    try:
-        return model.model_validate(source.data, context=reading(source.data))
-    except ValidationError as error:
-        faults += [text for detail in error.errors() if (text := explain(source, model, detail, UNREAD))]
-        return None
-
-
-def reading(data: dict[str, Any]) -> Reading:
-    """What single values can be checked against, as far as the machine can be read."""
-    machine = data.get("machine", data)
-    machine = machine if isinstance(machine, dict) else {}
-    axes, cycles = machine.get("axes"), machine.get("cycles")
-    control, position = (_cycle(cycles, name) if isinstance(cycles, dict) else None for name in ("control", "position"))
-    if control and position and not is_multiple(position, control):
-        position = None
-    return Reading(tuple(axes) if isinstance(axes, dict) and axes else None, control, position)
-
-
-def _cycle(cycles: dict[str, Any], name: str) -> float | None:
-    """A cycle [s]; None where it cannot be read, which is reported where it stands."""
-    quantity = Quantity.of(Cycles.model_fields[name])
-    with suppress(PydanticCustomError):
-        return quantity.read(cycles.get(name)) if quantity else None
-    return None
 
 
 @contextmanager

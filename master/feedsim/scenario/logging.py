@@ -18,13 +18,19 @@ from pydantic_core import core_schema
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.fields import AxisName, Model, Quantity, Reading, fault
-from feedsim.scenario.checks import interval_fault
+from feedsim.fields import AxisName, Model, Quantity, Reading, fault, is_multiple
 
 Signal = Literal[
     "x_s", "n_ffw", "x_a", "n_a", "M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q",
     "torque_limited", "voltage_limited", "M_fr", "z", "c", "k", "lambda",
 ]  # fmt: skip
+
+
+def interval_fault(interval: float, control_cycle: float) -> str | None:
+    """Why a recording interval [s] does not fit the control cycle [s]; None if it does."""
+    if is_multiple(interval, control_cycle):
+        return None
+    return f"{interval:.9g} s is no whole multiple of the control cycle, {control_cycle:.9g} s"
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import (
     Discriminator,
@@ -307,6 +307,8 @@ class PathLimits(Model):
 
 class Machine(Model):
     """A machine: structure data, pose, cycles, path limits and axes."""
+
+    IN_FOLDER: ClassVar[str] = "machine.yaml"
 
     name: StrictStr = Field(description="Name in reports")
     note: StrictStr = Field(default="", description="Remark shown wherever the machine's numbers are shown")

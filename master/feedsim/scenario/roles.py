@@ -91,7 +91,7 @@ ForeignValue = Annotated[StrictBool | StrictInt | StrictFloat | StrictStr, Befor
 class ForeignUnit(Model):
     """Another maker's unit in a role."""
 
-    told_by: ClassVar[str] = "fmu"  # the key that tells it from the shipped unit's parameters
+    TOLD_BY = "fmu"
     role: ClassVar[Role]
     shipped: ClassVar[type[Model]]
 
@@ -145,12 +145,7 @@ def _described(signal: Signal) -> str:
     return f"variable of the archive for: {signal.text}{unit}"
 
 
-def told_by(model: Any) -> str | None:
-    """The key by whose presence a model is told from the other one that may stand at its place."""
-    return getattr(model, "told_by", None)
-
-
 def filled(data: Any) -> str:
     """Which of the two stands there, as the tag of a pydantic union; in brackets, being no key."""
-    foreign = isinstance(data, ForeignUnit) or (isinstance(data, Mapping) and ForeignUnit.told_by in data)
+    foreign = isinstance(data, ForeignUnit) or (isinstance(data, Mapping) and ForeignUnit.TOLD_BY in data)
     return FOREIGN if foreign else SHIPPED

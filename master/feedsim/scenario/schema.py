@@ -20,11 +20,11 @@ def json_schema(kind: Kind = "scenario") -> dict[str, Any]:
     It knows keys, words and the spelling of quantities; it cannot know limits of quantities nor what needs two places
     to be seen together. What it refuses, load() refuses too.
     """
-    from feedsim.scenario.columns import Columns
+    from feedsim.files.columns import Columns
+    from feedsim.files.tolerances import ToleranceFile
     from feedsim.scenario.machine import Machine
     from feedsim.scenario.model import Scenario
     from feedsim.scenario.study.file import StudyFile
-    from feedsim.scenario.tolerances import ToleranceFile
 
     if kind == "structure":
         schema = _structure_schema()
@@ -64,7 +64,7 @@ def _structure_schema() -> dict[str, Any]:
     """One of the kinds; which is for `kind` to say."""
     from pydantic.json_schema import models_json_schema
 
-    from feedsim.scenario.structure.kinds import KINDS
+    from feedsim.scenario.structure.load import KINDS
 
     references, schema = models_json_schema([(model, "validation") for model in KINDS.values()])
     options = [references[model, "validation"] for model in KINDS.values()]

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feedsim.scenario.load import MACHINE_FILE, load, load_machine
+from feedsim.files.source import read
+from feedsim.scenario.load import load, load_machine
 from feedsim.scenario.machine import Machine
-from feedsim.scenario.source import read
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
     settings: tuple[str, ...]
     if path.is_dir() or _is_machine(path):
         machine = load_machine(path, overrides)
-        file = path / MACHINE_FILE if path.is_dir() else path
+        file = path / Machine.IN_FOLDER if path.is_dir() else path
         files = tuple((place or "machine", named) for place, named in machine.files)
         name, kind, notes, settings = machine.name, "machine", [machine.note], ()
     else:

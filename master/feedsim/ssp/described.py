@@ -15,8 +15,9 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from feedsim.fields import Quantity
-from feedsim.scenario import Drive, Scenario, load_structure
+from feedsim.scenario import Drive, Scenario
 from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.load import load_structure
 
 RECORDINGS = "resources/recordings"
 STRUCTURE = "resources/structure.yaml"

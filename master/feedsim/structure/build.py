@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.scenario import Structure
+from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.scenario.structure.matrices import FiniteElements
 from feedsim.structure.assembly import Assembly

@@ -21,7 +21,7 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.scenario import Structure
+from feedsim.scenario.structure import Structure
 from feedsim.structure.assembly import Assembly, Floats
 from feedsim.structure.geometry.assemble import movable
 from feedsim.structure.poses_file import Cell, GridAxis, PoseGrid

@@ -10,7 +10,8 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import FeedsimError, InputError
-from feedsim.scenario import Machine, Structure
+from feedsim.scenario import Machine
+from feedsim.scenario.structure import Structure
 from feedsim.structure.geometry.assemble import State, assembler_of, movable, state_of, structure_axes, structure_of
 from feedsim.structure.modes import Modes, read_modes
 

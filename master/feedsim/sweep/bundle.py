@@ -23,7 +23,8 @@ from typing import Any
 from feedsim import analysis, cosim, units
 from feedsim.errors import FeedsimError, InputError
 from feedsim.nc import Program, plan
-from feedsim.scenario import Base, Scenario, Study
+from feedsim.scenario import Base, Scenario
+from feedsim.scenario.study import Study
 from feedsim.sweep.provenance import UNITS, read
 from feedsim.sweep.task import Outcome, Task
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.scenario import Change, Distribution, Parameter, Study
+from feedsim.scenario import Change
+from feedsim.scenario.study import Distribution, Parameter, Study
 from feedsim.scenario.study.changes import changes_of
 from feedsim.sweep.task import Task
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.errors import InputError
-from feedsim.scenario import Study
+from feedsim.scenario.study import Study
 from feedsim.sweep.design import Design
 
 # What a worker is asked, in words that every Python knows, whatever is installed there.

@@ -15,7 +15,7 @@ from typing import Any, get_args
 
 from feedsim.cosim import fmus_directory
 from feedsim.errors import FeedsimError, OutputError, SimulationError
-from feedsim.scenario import Study
+from feedsim.scenario.study import Study
 from feedsim.sweep import provenance
 from feedsim.sweep.bundle import Bundle
 from feedsim.sweep.design import design

@@ -10,7 +10,8 @@ from time import perf_counter
 
 from feedsim import analysis, cosim, nc
 from feedsim.errors import InputError, SimulationError
-from feedsim.scenario import Scenario, Study
+from feedsim.scenario import Scenario
+from feedsim.scenario.study import Study
 from feedsim.sweep.bundle import Bundle
 from feedsim.sweep.design import Design
 from feedsim.sweep.task import Outcome

@@ -13,7 +13,8 @@ from feedsim.cli.terminal import finish, warn
 from feedsim.errors import InputError
 
 if TYPE_CHECKING:
-    from feedsim.scenario import Described, Structure
+    from feedsim.scenario.described import Described
+    from feedsim.scenario.structure import Structure
     from feedsim.structure.info import MachineInfo
 
 # Exchange step where no machine file says what the control cycle is [s].
@@ -27,7 +28,7 @@ def build(options: Namespace) -> None:
     from feedsim.report import results
     from feedsim.report.machine import record as machine_record
     from feedsim.report.summary import to_json
-    from feedsim.scenario import load_described
+    from feedsim.scenario.described import load_described
     from feedsim.structure.modes import write_modes
 
     described = load_described(options.machine)
@@ -66,7 +67,7 @@ def info(options: Namespace) -> None:
     """feedsim machine info: print the figures."""
     from feedsim.report.machine import record as machine_record
     from feedsim.report.summary import to_json
-    from feedsim.scenario import load_described
+    from feedsim.scenario.described import load_described
 
     most = _count(options.modes)
     described = load_described(options.machine)

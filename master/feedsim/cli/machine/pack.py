@@ -89,7 +89,7 @@ def _modes_at(machine: Machine, pose: Mapping[str, float], out: Path) -> Path:
     Raises:
         InputError: the machine has no structure, its kind is known at one pose only, or it is faulty.
     """
-    from feedsim.scenario import load_structure
+    from feedsim.scenario.structure.load import load_structure
     from feedsim.structure.build import build
     from feedsim.structure.modes import write_modes
 
@@ -110,7 +110,7 @@ def _write_grid(machine: Machine, pose: Mapping[str, float], modes: Path, option
     Raises:
         InputError: no such axis, no such cells, or a machine whose structure is known at one pose only.
     """
-    from feedsim.scenario import load_structure
+    from feedsim.scenario.structure.load import load_structure
     from feedsim.structure.geometry.assemble import movable
     from feedsim.structure.modes import read_modes
     from feedsim.structure.poses import pose_grid

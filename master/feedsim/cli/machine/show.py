@@ -22,7 +22,7 @@ NEAR = 0.1
 def show(options: Namespace) -> None:
     """feedsim machine show: compute, draw, write."""
     from feedsim.report import machine as report
-    from feedsim.scenario import load_described
+    from feedsim.scenario.described import load_described
 
     scale = _scale(options.scale)
     if options.animate and not options.mode:

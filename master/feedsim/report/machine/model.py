@@ -10,7 +10,7 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.report.machine.projection import Faces, tube
 from feedsim.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, Array
-from feedsim.scenario import Structure
+from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.structure.assembly import Assembly, Geometry
 from feedsim.structure.build import Built

@@ -18,7 +18,7 @@ from feedsim.report.provenance import hashed
 from feedsim.report.results import FIGURES, REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.sections import provenance_section
 from feedsim.report.style import PALETTE, PAPER, Picture
-from feedsim.scenario import Structure
+from feedsim.scenario.structure import Structure
 from feedsim.structure.info import MachineInfo
 
 

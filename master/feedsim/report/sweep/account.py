@@ -17,7 +17,7 @@ from feedsim.sweep.failures import Failure, Where, failures, kinds, levels
 from feedsim.sweep.sensitivity import Sensitivities, sensitivities
 
 if TYPE_CHECKING:
-    from feedsim.scenario import Parameter, Study
+    from feedsim.scenario.study import Parameter, Study
     from feedsim.sweep.design import Design
     from feedsim.sweep.table import Table
 

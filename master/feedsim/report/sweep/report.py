@@ -22,7 +22,7 @@ from feedsim.sweep.table import RECORD
 
 if TYPE_CHECKING:
     from feedsim import sweep
-    from feedsim.scenario import Study
+    from feedsim.scenario.study import Study
 
 REMARK_WIDTH, REMARK_LINES = 95, 2  # fits the narrowest figure
 METHODS = {

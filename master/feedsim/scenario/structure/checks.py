@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from feedsim.errors import InputError
 from feedsim.fields import did_you_mean, no_axis
-from feedsim.scenario.source import Place
+from feedsim.files.source import Place
 from feedsim.scenario.structure.fields import FRAME
 from feedsim.scenario.structure.geometry import Body, GeometryStructure
 from feedsim.scenario.structure.names import Node, held, nodes, position, rail

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import erfc, inf, log, log1p, sqrt
 
-from feedsim.scenario.source import Place
+from feedsim.files.source import Place
 from feedsim.scenario.study.file import Kind
 from feedsim.scenario.study.study import Distribution
 

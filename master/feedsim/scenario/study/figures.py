@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from feedsim.errors import InputError
 from feedsim.fields import did_you_mean
+from feedsim.files.problems import describe
+from feedsim.files.source import Source
 from feedsim.motions import Circle, MeasuredSetpoints
 from feedsim.scenario.base import Base
 from feedsim.scenario.model import Positioning, Scenario
-from feedsim.scenario.problems import describe
-from feedsim.scenario.source import Source
 from feedsim.scenario.study.changes import changes_of
 from feedsim.scenario.study.file import StudyFile
 from feedsim.scenario.study.study import Parameter

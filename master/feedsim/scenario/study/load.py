@@ -8,10 +8,11 @@ from math import prod
 from pathlib import Path
 
 from feedsim.errors import InputError
+from feedsim.files.checked import check, fetch, read_group
+from feedsim.files.problems import describe, dotted, in_order
+from feedsim.files.source import Source, at
 from feedsim.scenario.base import Base
-from feedsim.scenario.load import Setting, check, fetch, read_group
-from feedsim.scenario.problems import describe, dotted, in_order
-from feedsim.scenario.source import Source, at
+from feedsim.scenario.load import Setting
 from feedsim.scenario.study.changes import changes_of
 from feedsim.scenario.study.figures import pattern_faults
 from feedsim.scenario.study.file import MOST_RUNS, StudyFile

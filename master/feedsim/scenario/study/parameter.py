@@ -13,13 +13,12 @@ from pydantic_core import PydanticCustomError
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.fields import Quantity
-from feedsim.scenario import overrides as changes
-from feedsim.scenario import shape
+from feedsim.files import changes, shape
+from feedsim.files.checked import reading
+from feedsim.files.problems import describe, dotted, quantity_of
+from feedsim.files.source import Mark, Place, Source, at
 from feedsim.scenario.base import Base, Change, data_files
-from feedsim.scenario.load import reading
 from feedsim.scenario.model import Scenario
-from feedsim.scenario.problems import describe, dotted, quantity_of
-from feedsim.scenario.source import Mark, Place, Source, at
 from feedsim.scenario.study.distribution import Numbers, numbers, outside
 from feedsim.scenario.study.file import ParameterEntry
 from feedsim.scenario.study.study import Choice, Distribution, Parameter
@@ -286,7 +285,7 @@ class _Told(Exception):
 def _fits(target: Target, data: Any, source: Source) -> bool:
     """Whether a value can stand at a place, whatever stands beside it."""
     try:
-        TypeAdapter(target.annotation).validate_python(data, context=reading(source.data))
+        TypeAdapter(target.annotation).validate_python(data, context=reading(Scenario, source.data))
     except ValidationError:
         return False
     return True

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.errors import InputError
-from feedsim.scenario.source import Source, parse
+from feedsim.files.source import Source, parse
 
 
 def as_text(written: Source, meant: Any) -> str:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
-from feedsim.scenario import Structure, load_structure
+from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.checks import contradictions, pose_faults
 from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.assembly import Assembly, Geometry
 from feedsim.structure.geometry.mesh import Mesh, symmetric, weighted
 from feedsim.structure.geometry.springs import body_springs, drive_springs, ports

@@ -13,9 +13,9 @@ from pydantic import model_validator as whole
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, Model, Quantity, fault
-from feedsim.scenario.load import check, fetch, read_group
-from feedsim.scenario.problems import describe, in_order
-from feedsim.scenario.source import Place
+from feedsim.files.checked import check, fetch, read_group
+from feedsim.files.problems import describe, in_order
+from feedsim.files.source import Place
 
 # What drives write that is no unit of its own: a whole unit -> the unit, and what to know about it.
 SPELLINGS: dict[str, str] = {

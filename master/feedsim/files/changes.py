@@ -8,8 +8,8 @@ from typing import Any
 
 from feedsim.errors import InputError
 from feedsim.fields import brief, did_you_mean
-from feedsim.scenario import shape
-from feedsim.scenario.source import Mark, Place, Source, at, copied, parse
+from feedsim.files import shape
+from feedsim.files.source import Mark, Place, Source, at, copied, parse
 
 
 def option(text: str, folder: Path) -> tuple[str, Source]:

@@ -9,8 +9,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from feedsim.fields import ExistingFile
-from feedsim.scenario.roles import told_by
-from feedsim.scenario.source import Place
+from feedsim.files.source import Place
 
 
 def expected(model: Any, data: Any, place: Place) -> Any:
@@ -56,7 +55,9 @@ def resolve(annotation: Any, data: Any) -> Any:
                     options = [option for option in options if kind_of(option) == kind]
                 elif all(is_group(resolve(part, None)) for part in options):  # a key tells them apart
                     given = data if isinstance(data, dict) else {}
-                    options = [part for part in options if told_by(resolve(part, None)) in given] or options
+                    options = [
+                        part for part in options if getattr(resolve(part, None), "TOLD_BY", None) in given
+                    ] or options
                 else:  # a group or something else, as the data is
                     options = [part for part in options if is_group(resolve(part, None)) == isinstance(data, dict)]
                 if not options:

@@ -14,7 +14,7 @@ from pydantic_core import core_schema
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.fields import Model, Quantity, brief, fault
-from feedsim.scenario.load import read_checked
+from feedsim.files.checked import read_checked
 
 Time = Annotated[float, Quantity("s", minimum=0, example="1 ms")]
 EXAMPLE = "2 nm, or 1e-3 for a thousandth of the reference's range"

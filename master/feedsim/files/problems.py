@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from feedsim import units
 from feedsim.fields import Quantity, brief, did_you_mean
-from feedsim.scenario import shape
-from feedsim.scenario.source import Place, Source
+from feedsim.files import shape
+from feedsim.files.source import Place, Source
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails

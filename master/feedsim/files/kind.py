@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from feedsim.errors import InputError
-from feedsim.scenario.source import read
+from feedsim.files.source import read
 
 SSP = ".ssp"
 

@@ -1,0 +1,5 @@
+"""Files that people write: YAML read with the line of every value, checked as models; and those of them that need no
+machine, mappings of columns and tolerances.
+
+May use: fields, units. Start reading at checked.py; rooms above import its modules directly.
+"""

@@ -1,0 +1,105 @@
+"""A file -> the model it is read as: the files that it names are fetched, every problem is told with its line."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import PydanticCustomError
+
+from feedsim.errors import InputError
+from feedsim.fields import Reading, brief, is_multiple
+from feedsim.files import shape
+from feedsim.files.problems import describe, explain, in_order, quantity_of
+from feedsim.files.source import Place, Source, at, read
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def read_group(path: Path) -> Source:
+    source = read(path)
+    if not isinstance(source.data, dict):
+        raise InputError(f"{source.mark(()).where}: a file of 'key: value' lines is expected, not {brief(source.data)}")
+    return source
+
+
+def read_checked(path: str | Path, model: type[M]) -> M:
+    """A file as a model that needs no more than its own checks. InputError lists every problem with file and line."""
+    source = read_group(Path(path))
+    faults: list[str] = []
+    fetch(source, model, (), faults)
+    found = check(source, model, faults)
+    if faults or found is None:
+        raise InputError.of(str(path), in_order(faults))
+    return found
+
+
+def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
+    """Replace names of YAML files, where a group of keys is expected, by what the files hold; make other file names
+    relative to the file that names them."""
+    data: Any = source.data
+    for key in place:
+        data = data[key]
+    annotation = shape.expected(model, source.data, place)
+    if annotation is None:
+        return
+    if isinstance(data, str):
+        folder = source.mark(place).folder
+        if shape.is_file(annotation) and data:
+            parent: Any = source.data
+            for key in place[:-1]:
+                parent = parent[key]
+            parent[place[-1]] = str(folder / data)
+        elif shape.is_model(annotation) and (annotation.IN_FOLDER or data.endswith((".yaml", ".yml"))):
+            named = folder / data
+            file = named / annotation.IN_FOLDER if annotation.IN_FOLDER and named.is_dir() else named
+            try:
+                source.put(place, read_group(file))
+            except InputError as error:
+                inside = f"{file}:" in error.problems[0]
+                faults += error.problems if inside else [describe(source, place, str(error))]
+                source.put(place, Source(UNREAD, {(): source.mark(place)}))
+                return
+            fetch(source, model, place, faults)
+    elif isinstance(data, dict):
+        for key in data:
+            fetch(source, model, (*place, key), faults)
+    elif isinstance(data, list):
+        for i in range(len(data)):
+            fetch(source, model, (*place, i), faults)
+
+
+UNREAD = "(not read)"  # stands for the content of a file whose problem is reported already
+
+
+def check(source: Source, model: type[M], faults: list[str]) -> M | None:
+    try:
+        return model.model_validate(source.data, context=reading(model, source.data))
+    except ValidationError as error:
+        faults += [text for detail in error.errors() if (text := explain(source, model, detail, UNREAD))]
+        return None
+
+
+def reading(model: Any, data: dict[str, Any]) -> Reading:
+    """What single values of a file read as `model` can be checked against, as far as its machine can be read."""
+    place: Place = ("machine",) if "machine" in data else ()
+    machine = data.get("machine", data)
+    machine = machine if isinstance(machine, dict) else {}
+    axes, cycles = machine.get("axes"), machine.get("cycles")
+    control, position = (
+        _cycle(model, data, (*place, "cycles", name)) if isinstance(cycles, dict) else None
+        for name in ("control", "position")
+    )
+    if control and position and not is_multiple(position, control):
+        position = None
+    return Reading(tuple(axes) if isinstance(axes, dict) and axes else None, control, position)
+
+
+def _cycle(model: Any, data: dict[str, Any], place: Place) -> float | None:
+    """A cycle [s]; None where it cannot be read, which is reported where it stands."""
+    quantity = quantity_of(shape.child(shape.expected(model, data, place[:-1]), place[-1]))
+    with suppress(PydanticCustomError):
+        return quantity.read(at(data, place[:-1]).get(place[-1])) if quantity else None
+    return None

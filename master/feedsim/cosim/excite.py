@@ -265,11 +265,8 @@ class _Record:
         self.tool = Log(system.plant, TOOL_SIGNALS, rows)
         self.drives = [Log(control.unit, DRIVE_SIGNALS, rows) for control in system.controllers]
 
-        self.before = [
-            copy(self.measured, system.measured, when),
-            copy(self.M_fr, system.M_fr, when),
-            *get_row(self.tool, when),
-        ]
+        self.before = [copy(self.measured, system.measured, when), copy(self.M_fr, system.M_fr, when)]
+        self.before += get_row(self.tool, when)
         self.after = [copy(self.M_a, system.M_a_start, when)]
         self.after += [operation for log in self.drives for operation in get_row(log, when)]
 

@@ -148,20 +148,15 @@ class Unit:
         Raises:
             InputError: the unit has no such variable, or refuses the value.
         """
+        real, integer, flag = (self._fmu.setReal, float), (self._fmu.setInteger, int), (self._fmu.setBoolean, bool)
+        kinds: dict[str, Any] = {"Real": real, "Integer": integer, "Enumeration": integer, "Boolean": flag}
         for name, value in parameters.items():
             variable = self.archive.variables.get(name)
             if variable is None:
                 raise InputError(f"{self.archive.path.name}: no variable '{name}'")
-            reference = [variable.valueReference]
+            setter, of_type = kinds.get(variable.type, (self._fmu.setString, str))
             try:
-                if variable.type == "Real":
-                    self._fmu.setReal(reference, [float(value)])
-                elif variable.type in ("Integer", "Enumeration"):
-                    self._fmu.setInteger(reference, [int(value)])
-                elif variable.type == "Boolean":
-                    self._fmu.setBoolean(reference, [bool(value)])
-                else:
-                    self._fmu.setString(reference, [str(value)])
+                setter([variable.valueReference], [of_type(value)])
             except Exception:
                 raise InputError(
                     f"unit {self.name} refuses {name} = {value!r}: {self._said() or 'no message'}"

@@ -19,7 +19,6 @@ from feedsim.trace.csv import write_csv
 from feedsim.trace.trace import Array, Trace, suggest
 
 MAT = ".mat"
-ONLY_MATLAB = "which only MATLAB reads: save its columns as vectors"
 
 
 @dataclass(frozen=True, eq=False)

@@ -330,8 +330,10 @@ def inverse(jacobian: Array) -> tuple[Array, NDArray[np.bool_]]:
         quiet = strength <= SILENT * strength[0]
         if not np.any(quiet) and len(strength) == len(kept):
             break
-        # The parameter that leads the quietest direction is given up, then the rest is looked at anew.
-        silent[kept[np.argmax(np.abs(directions[-1]))]] = True
+        # The parameter that leads the quietest direction is given up, then the rest is looked at anew. Of those that
+        # lead alike it is the first: rounding, and with it the processor, does not choose.
+        lead = np.abs(directions[-1])
+        silent[kept[np.argmax(lead >= (1 - 1e-6) * lead.max())]] = True
     covariance = np.zeros((size, size))
     covariance[silent, silent] = inf
     if not np.all(silent):

@@ -96,7 +96,21 @@ class FrictionLaw:
         substeps: int = 1,
         every: int = 1,
     ) -> Floats:
-        """M_fr (N // every + 1,) [N.m] at the instants 0, every, 2 every .. of the N + 1 instants of `n`.
+        """M_fr (N // every + 1,) [N.m]: the first of what :meth:`states` returns."""
+        return self.states(parameters, n, h, z=z, c=c, substeps=substeps, every=every)[0]
+
+    def states(
+        self,
+        parameters: Mapping[str, float],
+        n: ArrayLike,
+        h: float,
+        *,
+        z: float = 0.0,
+        c: float = 0.0,
+        substeps: int = 1,
+        every: int = 1,
+    ) -> tuple[Floats, Floats, Floats]:
+        """M_fr [N.m], z and c [rad], each (N // every + 1,), at the instants 0, every, 2 every .. of the N + 1 of `n`.
 
         Args:
             parameters: by the unit's names and in its units; those left out have their start values.
@@ -110,23 +124,21 @@ class FrictionLaw:
             InputError: parameters that the unit refuses, with its own words, or arguments out of range.
             SimulationError: M_fr would be no finite number.
         """
-        (M_fr,) = self._respond(parameters, n, h, z, c, substeps, every, states=False)
-        return M_fr
-
-    def states(
-        self,
-        parameters: Mapping[str, float],
-        n: ArrayLike,
-        h: float,
-        *,
-        z: float = 0.0,
-        c: float = 0.0,
-        substeps: int = 1,
-        every: int = 1,
-    ) -> tuple[Floats, Floats, Floats]:
-        """M_fr [N.m], z and c [rad], each (N // every + 1,): as the call itself, with the states."""
-        M_fr, z_out, c_out = self._respond(parameters, n, h, z, c, substeps, every, states=True)
-        return M_fr, z_out, c_out
+        speeds = self._row(n, "speeds", 1)
+        self._check_steps(h, "speeds", substeps=substeps, every=every)
+        values = self._ordered(parameters)
+        rows = (speeds.size - 1) // every + 1
+        table = np.empty((3, rows))
+        outputs = (row.ctypes.data for row in table)
+        done = self._response(values, speeds.ctypes.data, speeds.size - 1, h, substeps, every, z, c, *outputs)
+        if done == rows:
+            return table[0], table[1], table[2]
+        if done == 0:
+            self._let_unit_refuse(parameters)
+        raise SimulationError(
+            f"{self._archive.path.name}: M_fr would be no finite number at {done * every * h:.9g} s; speeds are "
+            f"{speeds.min():.6g} to {speeds.max():.6g} rad/s, z and c at the start {z:.6g} and {c:.6g} rad"
+        )
 
     def free_axis(
         self,
@@ -190,36 +202,6 @@ class FrictionLaw:
         if min(counts.values()) < 1:
             listed = ", ".join(f"{name} = {count}" for name, count in counts.items())
             raise InputError(f"{listed}; {'both' if len(counts) > 1 else 'it'} must be at least 1")
-
-    def _respond(
-        self,
-        parameters: Mapping[str, float],
-        n: ArrayLike,
-        h: float,
-        z: float,
-        c: float,
-        substeps: int,
-        every: int,
-        *,
-        states: bool,
-    ) -> tuple[Floats, ...]:
-        """M_fr and, with `states`, z and c."""
-        speeds = self._row(n, "speeds", 1)
-        self._check_steps(h, "speeds", substeps=substeps, every=every)
-        values = self._ordered(parameters)
-        rows = (speeds.size - 1) // every + 1
-        table = np.empty((3 if states else 1, rows))
-        first, width = table.ctypes.data, table.strides[0]
-        others = (first + width, first + 2 * width) if states else (None, None)
-        done = self._response(values, speeds.ctypes.data, speeds.size - 1, h, substeps, every, z, c, first, *others)
-        if done == rows:
-            return tuple(table)
-        if done == 0:
-            self._let_unit_refuse(parameters)
-        raise SimulationError(
-            f"{self._archive.path.name}: M_fr would be no finite number at {done * every * h:.9g} s; speeds are "
-            f"{speeds.min():.6g} to {speeds.max():.6g} rad/s, z and c at the start {z:.6g} and {c:.6g} rad"
-        )
 
     def _ordered(self, parameters: Mapping[str, float]) -> ctypes.Array[ctypes.c_double]:
         if not parameters.keys() <= self.start_values.keys():

@@ -1,7 +1,7 @@
 """Derived figures from traces, responses of the linear system, and what takes several runs: docs/figures.md.
 
-It may use cosim, structure, nc, scenario and trace.
-Start reading in evaluate.py, which finds the figures that a scenario asks for; circularity.py is one of them, whole.
+May use cosim, structure, nc, scenario and trace.
+Start with evaluate.py, which finds the figures that a scenario asks for; circularity.py is one of them, whole.
 """
 
 from feedsim.analysis.circularity import Contour, Glitch, Turn, circularity, contour

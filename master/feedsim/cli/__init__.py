@@ -1,5 +1,8 @@
 """Command line: ``feedsim COMMAND``. Commands, messages, progress, exit codes; all else is in the rooms below.
 
+May use every room; sole user of tqdm.
+Start with options.py, what a command is, and run.py for one of them.
+
 Exit codes: 0 done; 1 an error of feedsim itself (please report it); 2 bad input or usage; 3 a unit failed during the
 simulation; 4 the results could not be written; 130 interrupted (143 and 129: by SIGTERM and SIGHUP). `feedsim compare`
 has codes of its own: 0 same, 1 different, 2 unusable for whatever reason.

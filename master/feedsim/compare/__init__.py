@@ -1,6 +1,7 @@
 """Results against references: a tube of tolerance in value and in time around every variable.
 
-May use: scenario (tolerance files, spellings of units), trace. Start reading at `compare`; `tube` is the method.
+May use files (tolerances) and trace.
+Start with compare.py; tube.py is the method.
 """
 
 from feedsim.compare.compare import compare

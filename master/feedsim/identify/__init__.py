@@ -1,7 +1,7 @@
 """Friction of an axis from recorded traces: records, both stages of identification, what they find, and friction.yaml.
 
-It may use analysis, structure, scenario and trace, and the friction law of cosim.
-Start reading in stages.py: records -> motion -> stage 1 (stribeck.py) -> stage 2 (output_error.py) -> result.py.
+May use analysis, structure, scenario and trace, and the friction law of cosim.
+Start with stages.py: records -> motion -> stage 1 (stribeck.py) -> stage 2 (output_error.py) -> result.py.
 """
 
 from feedsim.identify.friction_file import Identified

@@ -1,6 +1,7 @@
 """Scenario and machine files as objects in SI. structure, study and described read what lies beside a scenario.
 
-May use: files, fields, motions, variables, trace. Start reading at load().
+May use files, fields, motions, variables and trace.
+Start with load.py: ``load``.
 """
 
 from feedsim.scenario.base import Base, Change

@@ -1,4 +1,8 @@
-"""The system of Fig. 2 as one SSP file for other people's simulators, and such a file run by feedsim."""
+"""The system of Fig. 2 as one SSP file for other people's simulators, and such a file run by feedsim.
+
+May use cosim, structure, nc, scenario and trace.
+Start with export.py and, the other way, opened.py.
+"""
 
 from feedsim.ssp.export import Exported, export
 from feedsim.ssp.opened import Opened, opened

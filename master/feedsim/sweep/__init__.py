@@ -1,6 +1,7 @@
 """Studies of many runs: designs, the engine that makes the runs, the journal, the table, what moves the figures.
 
-It uses analysis and all below it; Dask and pyarrow are its own. Begin with `study`, which makes the runs of a study.
+May use analysis and all below it; Dask and pyarrow are its own.
+Start with study.py, which makes the runs of a study.
 """
 
 from feedsim.sweep.design import Design, Matrices, design

@@ -1,7 +1,8 @@
 """Time series and frequency responses with names and units: their files, and the import of recorded data.
 
-May use: units, errors. Start reading at `trace` (the Trace), then `cells` and `csv` (how a file becomes one); frequency
-responses are in `response` and `response_files`.
+May use units and errors.
+Start with trace.py (the Trace), then cells.py and csv.py (how a file becomes one); frequency responses are in
+response.py and response_files.py.
 """
 
 from feedsim.trace.csv import read_csv, read_setpoints, write_csv

@@ -1,7 +1,7 @@
 """Frequency responses of structure and drives in closed form: exact for the sampled system, friction off.
 
-It may use structure, scenario and trace.
-Start reading in system.py, which couples drive.py and plant.py; loops.py has the responses by their names.
+May use structure, scenario and trace.
+Start with system.py, which couples drive.py and plant.py; loops.py has the responses by their names.
 """
 
 from feedsim.analysis.linear.drive import OperatingPoint

@@ -1,4 +1,8 @@
-"""``feedsim machine``: build, info, show, pack: what is done with a machine rather than with a scenario."""
+"""``feedsim machine``: build, info, show, pack: what is done with a machine rather than with a scenario.
+
+May use what every command may.
+Start with show.py, the smallest one; its neighbours share its grammar.
+"""
 
 from feedsim.cli.machine.figures import BUILD, INFO
 from feedsim.cli.machine.pack import PACK

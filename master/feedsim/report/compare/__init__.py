@@ -1,6 +1,7 @@
 """What comparisons of results leave: a page of HTML, JUnit XML and JSON.
 
-It uses the report's core and what `feedsim.compare` found. Begin with `report`.
+May use the report's core and what `feedsim.compare` found.
+Start with report.py.
 """
 
 from feedsim.report.compare.report import check_writable, write

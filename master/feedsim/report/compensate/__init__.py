@@ -1,6 +1,7 @@
 """What a friction compensation leaves: curves and table as CSV, summary.json, report.html and figures/*.png.
 
-It uses the report's core, the run's report and the analyses. Begin with `report`.
+May use the report's core, the run's report and the analyses.
+Start with report.py.
 """
 
 from feedsim.report.compensate.report import check_writable, write

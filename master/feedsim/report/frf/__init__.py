@@ -1,6 +1,7 @@
 """What a look at frequency responses leaves: curves as CSV, summary.json, report.html and figures/*.png.
 
-It uses the report's core and the analyses. Begin with `report`.
+May use the report's core and the analyses.
+Start with report.py.
 """
 
 from feedsim.report.frf.report import check_writable, write

@@ -1,6 +1,7 @@
 """The report of an identification of friction: friction.yaml, tables as CSV, summary.json, report.html and figures.
 
-It uses the report's core and what `feedsim.identify` found. Begin with `report`.
+May use the report's core and what `feedsim.identify` found.
+Start with report.py.
 """
 
 from feedsim.report.identify.report import check_writable, write

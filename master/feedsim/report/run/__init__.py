@@ -1,6 +1,7 @@
 """What a run leaves: curves as CSV, summary.json, report.html and figures/*.png.
 
-It uses the report's core, the analyses and the recorded traces. Begin with `report`; `pose` has the plant's pose.
+May use the report's core, the analyses and the recorded traces.
+Start with report.py; pose.py has the plant's pose.
 """
 
 from feedsim.report.provenance import input_paths

@@ -1,6 +1,7 @@
 """The report of a study of many runs: summary.json, report.html and figures beside the study's table.
 
-It uses the report's core and what `feedsim.sweep` found. Begin with `report`.
+May use the report's core and what `feedsim.sweep` found.
+Start with report.py.
 """
 
 from feedsim.report.results import discard

@@ -1,5 +1,8 @@
 """Structure files: what a machine's structure is made of, as geometry or as finite-element matrices. Here what every
-kind gives; load.py reads them.
+kind gives.
+
+May use files, fields and the scenario's base.
+Start with load.py, which reads them.
 """
 
 from __future__ import annotations

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from feedsim.analysis import Figure
 from feedsim.report.formatting import minus, shown
 from feedsim.report.style import Picture
+
+if TYPE_CHECKING:
+    from feedsim.analysis import Figure
 
 # Significant digits of a tile; the table has more.
 TILE_DIGITS = 4

@@ -6,11 +6,14 @@ import math
 import re
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feedsim.analysis import Figure
 from feedsim.report.style import Array
+
+if TYPE_CHECKING:
+    from feedsim.analysis import Figure
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SMALL = Decimal("1e-4")  # below which a number is written with a power of ten

@@ -5,12 +5,11 @@ Start with load.py: ``load``.
 """
 
 from feedsim.scenario.base import Base, Change
-from feedsim.scenario.load import load, load_machine
+from feedsim.scenario.load import Subject, load, load_machine, load_subject
 from feedsim.scenario.logging import Delay, Level, Logging, Noise, Quantisation
 from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine, PathLimits
 from feedsim.scenario.model import CircleTest, Coupling, Evaluation, Positioning, Recording, Scenario
 from feedsim.scenario.roles import ForeignUnit
-from feedsim.scenario.subject import Subject, load_subject
 
 __all__ = [
     "Axis",

@@ -8,7 +8,6 @@ from pydantic import Field, StrictInt, field_validator, model_validator
 
 from feedsim.fields import AxisName, Model, Quantity, fault
 from feedsim.scenario.structure import Structure
-from feedsim.scenario.structure.drive import Drive, Scale, Tool
 from feedsim.scenario.structure.fields import (
     Direction,
     Inertia,
@@ -21,7 +20,7 @@ from feedsim.scenario.structure.fields import (
     Rail,
     Stiffness,
 )
-from feedsim.scenario.structure.sections import Material, Section
+from feedsim.scenario.structure.parts import Drive, Material, Scale, Section, Tool
 
 MOST_NODES = 10_000
 

@@ -13,12 +13,11 @@ from feedsim.files.problems import describe, dotted, in_order
 from feedsim.files.source import Source, at
 from feedsim.scenario.base import Base
 from feedsim.scenario.load import Setting
-from feedsim.scenario.study.changes import changes_of
+from feedsim.scenario.study.changes import as_text, changes_of
 from feedsim.scenario.study.figures import pattern_faults
 from feedsim.scenario.study.file import MOST_RUNS, StudyFile
 from feedsim.scenario.study.parameter import Reader
 from feedsim.scenario.study.study import Parameter, Sampling, Study
-from feedsim.scenario.study.values import as_text
 
 SEED = 1
 

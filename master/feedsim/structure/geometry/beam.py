@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from feedsim.scenario.structure.sections import Material, Section
+    from feedsim.scenario.structure.parts import Material, Section
 
 
 @dataclass(frozen=True)

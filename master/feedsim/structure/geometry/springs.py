@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from feedsim.scenario.structure.drive import Drive
 from feedsim.scenario.structure.names import held, node, nodes, rail
+from feedsim.scenario.structure.parts import Drive
 from feedsim.structure.assembly import Floats
 from feedsim.structure.geometry.mesh import FRAME, Mesh
 from feedsim.structure.geometry.points import Row, rigid

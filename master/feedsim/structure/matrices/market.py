@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy import io, sparse
+from scipy import sparse
 
 from feedsim.errors import InputError
 from feedsim.scenario.structure.matrices import MatrixMarketStructure
@@ -42,6 +42,8 @@ def read_matrix(file: Path, what: str) -> sparse.csc_array:
     Raises:
         InputError: not a Matrix Market file of a square real matrix; an entry occurs twice.
     """
+    from scipy import io  # readers of many formats, which a run need not wait for
+
     try:
         rows, columns, _, form, field, symmetry = io.mminfo(file)
         if rows != columns:

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim.report.sweep.account import Account
+from feedsim.report.sweep.account import Account, measures
 from feedsim.report.sweep.figure_plots import scatter_picture
-from feedsim.report.sweep.measures import measures
 from feedsim.scenario.study import load_study
 from feedsim.sweep.design import design
 from feedsim.sweep.failures import LEVEL, end_chance, span_chance

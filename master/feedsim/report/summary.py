@@ -12,16 +12,19 @@ from feedsim.report.provenance import InputFile, Parameter, axis_parameters, fri
 from feedsim.scenario import Machine
 
 
+def finite(value: float) -> float | None:
+    """A number as JSON can hold it: null where it is not known."""
+    return value if math.isfinite(value) else None
+
+
+def quantity(value: float, unit: str, **more: str) -> dict[str, Any]:
+    """A value with its unit and what more is to be said of it; null where it is not known."""
+    return {"value": finite(value), "unit": unit, **more}
+
+
 def figures_part(figures: Mapping[str, Figure]) -> dict[str, Any]:
     """Figures by name; one that could not be determined has the value null."""
-    return {
-        name: {
-            "value": figure.value if math.isfinite(figure.value) else None,
-            "unit": figure.unit,
-            "meaning": figure.meaning,
-        }
-        for name, figure in figures.items()
-    }
+    return {name: quantity(each.value, each.unit, meaning=each.meaning) for name, each in figures.items()}
 
 
 def machine_part(machine: Machine) -> dict[str, Any]:

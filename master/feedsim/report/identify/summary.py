@@ -33,7 +33,7 @@ from feedsim.report.identify.quantities import (
     speeds_of,
 )
 from feedsim.report.provenance import software
-from feedsim.report.summary import inputs_part, machine_part
+from feedsim.report.summary import finite, inputs_part, machine_part, quantity
 from feedsim.trace.csv import quoted, shortest
 
 FORMAT = 1
@@ -49,7 +49,7 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
         "advice": list(found.advice),
         "axis": found.axis,
         "date": identified.date,
-        "lead": {"value": found.I_P, "unit": "m/rad"},
+        "lead": quantity(found.I_P, "m/rad"),
         "parameters": {name: _estimate(estimate, found.I_P) for name, estimate in found.estimates.items()},
         "rigid_axis": {name: _estimate(estimate, found.I_P) for name, estimate in found.rigid.items()},
         "correlation": {"names": list(found.correlation.names), "matrix": _matrix(found.correlation.matrix)},
@@ -70,11 +70,11 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
             for name, source in zip(identified.traces, identified.sources, strict=True)
         ],
         "records": [
-            {"name": r.name, "rows": len(r), "interval": {"value": r.interval, "unit": "s"}} for r in identified.records
+            {"name": r.name, "rows": len(r), "interval": quantity(r.interval, "s")} for r in identified.records
         ],
         "inputs": inputs_part(input_files(identified)),
         "software": software(),
-        "performance": {f"{step}": {"value": taken, "unit": "s"} for step, taken in found.seconds.items()},
+        "performance": {step: quantity(taken, "s") for step, taken in found.seconds.items()},
         "files": list(files),
     }
 
@@ -162,9 +162,7 @@ def plateaus_csv(found: Identification) -> str:
 def residuals_csv(found: Identification) -> str:
     """Time, measured and model torque of every stretch, one after another; the stretch is numbered from 1."""
     assert found.dynamic is not None
-    lines = [
-        "stretch,record,time [s],angle [rad],speed [rad/s],measured [N.m],model [N.m],residual [N.m]",
-    ]
+    lines = ["stretch,record,time [s],angle [rad],speed [rad/s],measured [N.m],model [N.m],residual [N.m]"]
     for number, stretch in enumerate(found.dynamic.stretches, 1):
         columns = (stretch.time, stretch.angle, stretch.speed, stretch.measured, stretch.model)
         texts = [shortest(np.asarray(values)) for values in (*columns, stretch.measured - stretch.model)]
@@ -188,14 +186,13 @@ def _estimate(estimate: Estimate, I_P: float) -> dict[str, Any]:
     slide = at_slide(estimate.name, I_P)
     low, high = estimate.interval
     return {
-        "value": _finite(estimate.value),
-        "unit": estimate.unit,
-        "sigma": _finite(estimate.sigma),
+        **quantity(estimate.value, estimate.unit),
+        "sigma": finite(estimate.sigma),
         "interval": [low, high] if math.isfinite(low) and math.isfinite(high) else None,
         "status": estimate.status,
         "reason": estimate.reason,
         "meaning": estimate.meaning,
-        "at_slide": {"value": _finite(slide[0] * estimate.value), "unit": slide[1]} if slide else None,
+        "at_slide": quantity(slide[0] * estimate.value, slide[1]) if slide else None,
     }
 
 
@@ -204,22 +201,17 @@ def _curve(found: Identification) -> dict[str, Any] | None:
     if stage is None:
         return None
     return {
-        "error": {
-            "value": _finite(curve_error(stage)) if is_curve(stage) else None,
-            "unit": "1",
-            "meaning": "largest half width of its 95 % band",
-        },
-        "worst_plateau": {"value": _finite(stage.worst_curve), "unit": "1", "meaning": "largest relative deviation"},
-        "rms": {"value": _finite(stage.rms), "unit": "N.m", "meaning": "residual of the plateaus"},
+        "error": quantity(
+            curve_error(stage) if is_curve(stage) else math.nan, "1", meaning="largest half width of its 95 % band"
+        ),
+        "worst_plateau": quantity(stage.worst_curve, "1", meaning="largest relative deviation"),
+        "rms": quantity(stage.rms, "N.m", meaning="residual of the plateaus"),
         "used": found.prior,
         "warnings": list(stage.warnings),
         "plateaus": len(stage.plateaus),
         "distinct_speeds": speeds_of(stage),
         "speeds": {"value": list(stage.range), "unit": "rad/s"},
-        "correlation": {
-            "names": list(stage.correlation.names),
-            "matrix": _matrix(stage.correlation.matrix),
-        },
+        "correlation": {"names": list(stage.correlation.names), "matrix": _matrix(stage.correlation.matrix)},
     }
 
 
@@ -228,20 +220,20 @@ def _pre_sliding(found: Identification) -> dict[str, Any] | None:
     if stage is None:
         return None
     return {
-        "rms": {"value": _finite(stage.rms), "unit": "N.m"},
+        "rms": quantity(stage.rms, "N.m"),
         "stretches": [
             {
                 "record": stretch.record,
                 "kind": stretch.kind,
-                "begin": {"value": float(stretch.time[0]), "unit": "s"},
-                "end": {"value": float(stretch.time[-1]), "unit": "s"},
-                "amplitude": {"value": _finite(stretch.amplitude), "unit": "rad"},
-                "frequency": {"value": _finite(stretch.frequency), "unit": "Hz"},
-                "rms": {"value": _finite(stretch.rms), "unit": "N.m"},
+                "begin": quantity(float(stretch.time[0]), "s"),
+                "end": quantity(float(stretch.time[-1]), "s"),
+                "amplitude": quantity(stretch.amplitude, "rad"),
+                "frequency": quantity(stretch.frequency, "Hz"),
+                "rms": quantity(stretch.rms, "N.m"),
             }
             for stretch in stage.stretches
         ],
-        "sigma_were_the_delay_known": {name: _finite(sigma) for name, sigma in stage.without_delay.items()},
+        "sigma_were_the_delay_known": {name: finite(sigma) for name, sigma in stage.without_delay.items()},
     }
 
 
@@ -266,16 +258,11 @@ def _open_loop(found: Identification) -> dict[str, Any] | None:
 
 
 def _pair(pair: tuple[float, float], unit: str) -> dict[str, Any]:
-    before, after = (float(value) if math.isfinite(value) else None for value in pair)
-    return {"before": before, "after": after, "unit": unit}
+    return {"before": finite(pair[0]), "after": finite(pair[1]), "unit": unit}
 
 
 def _matrix(matrix: Any) -> list[list[float | None]]:
-    return [[_finite(float(value)) for value in row] for row in matrix]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+    return [[finite(float(value)) for value in row] for row in matrix]
 
 
 def rigid_line(identified: Identified) -> str:

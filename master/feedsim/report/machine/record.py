@@ -9,6 +9,7 @@ from typing import Any
 
 from feedsim.cosim import SCHEMES
 from feedsim.report.provenance import hashed, software
+from feedsim.report.summary import inputs_part, quantity
 from feedsim.scenario import Coupling
 from feedsim.structure.info import MachineInfo
 
@@ -36,16 +37,15 @@ def record(info: MachineInfo, files: Sequence[tuple[str, Path]]) -> dict[str, An
         "warnings": list(info.warnings),
         "pose": {axis: {"value": position, "unit": "m"} for axis, position in info.pose.items()},
         "step": {"value": info.step, "unit": "s"},
-        "total_mass": _quantity(info.total_mass, "kg"),
+        "total_mass": quantity(info.total_mass, "kg"),
         "axes": {
             axis.name: {
-                key: _quantity(getattr(axis, key), unit) | {"meaning": meaning}
-                for key, (unit, meaning) in MEANINGS.items()
+                key: quantity(getattr(axis, key), unit, meaning=meaning) for key, (unit, meaning) in MEANINGS.items()
             }
             for axis in info.axes
         },
         "modes": [
-            {"mode": k, "frequency": _quantity(f, "Hz"), "damping": _quantity(d, "1"), "moves": info.moving[k]}
+            {"mode": k, "frequency": quantity(f, "Hz"), "damping": quantity(d, "1"), "moves": info.moving[k]}
             for k, (f, d) in enumerate(zip(modes.frequency.tolist(), modes.damping.tolist(), strict=True))
         ],
         "solution": None
@@ -54,19 +54,15 @@ def record(info: MachineInfo, files: Sequence[tuple[str, Path]]) -> dict[str, An
             "degrees_of_freedom": int(solution.shapes.shape[0]),
             "method": solution.method,
             "verification": solution.verification,
-            "cutoff": _quantity(solution.cutoff / (2 * math.pi), "Hz"),
+            "cutoff": quantity(solution.cutoff / (2 * math.pi), "Hz"),
             "dropped_modes": solution.dropped,
-            "next_frequencies_above": [_quantity(f, "Hz") for f in solution.above[:5].tolist()],
+            "next_frequencies_above": [quantity(f, "Hz") for f in solution.above[:5].tolist()],
             "pseudo_modes": solution.corrections,
-            "J_inf_of_all_modes": {axis: _quantity(J, "kg.m2") for axis, J in solution.J_inf_full.items()},
+            "J_inf_of_all_modes": {axis: quantity(J, "kg.m2") for axis, J in solution.J_inf_full.items()},
         },
-        "inputs": [{"role": f.role, "name": f.name, "sha256": f.sha256} for f in hashed(list(files))],
+        "inputs": inputs_part(hashed(list(files))),
         "software": software(),
     }
-
-
-def _quantity(value: float, unit: str) -> dict[str, Any]:
-    return {"value": value if math.isfinite(value) else None, "unit": unit}
 
 
 def text(info: MachineInfo, most: int | None = None) -> str:

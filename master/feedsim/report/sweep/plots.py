@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING
 from feedsim.report.formatting import plain
 from feedsim.report.run.summary import HEADER, is_leading
 from feedsim.report.style import BLUE, GRID, VERMILLION, Picture, drawing, finish
-from feedsim.report.sweep.account import Account, Output
-from feedsim.report.sweep.figure_plots import of_account
-from feedsim.report.sweep.grid_plots import grid_picture
-from feedsim.report.sweep.measures import NOTHING, Measure, measures
+from feedsim.report.sweep.account import NOTHING, Account, Measure, Output, measures
+from feedsim.report.sweep.figure_plots import grid_picture, of_account
 from feedsim.sweep.sensitivity import is_constant
 
 if TYPE_CHECKING:

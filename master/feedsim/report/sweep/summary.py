@@ -10,7 +10,7 @@ import numpy as np
 
 from feedsim.report.provenance import InputFile, hashed, software
 from feedsim.report.style import Array
-from feedsim.report.summary import inputs_part
+from feedsim.report.summary import finite, inputs_part
 from feedsim.report.sweep.account import Account
 from feedsim.sweep.sensitivity import CONFIDENCE, Indices, Trends
 
@@ -52,8 +52,8 @@ def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
                 "unit": account.table.unit(each.name),
                 "runs": len(each.known),
                 "missing": int((account.ok & ~np.isfinite(each.values)).sum()),
-                "nominal": _finite(each.nominal / each.scale.factor),
-                **{key: _finite(value / each.scale.factor) for key, value in each.statistics.items()},
+                "nominal": finite(each.nominal / each.scale.factor),
+                **{key: finite(value / each.scale.factor) for key, value in each.statistics.items()},
                 **{
                     f"{key}_interval": _interval(np.asarray(ends) / each.scale.factor)
                     for key, ends in each.quantile_intervals.items()
@@ -87,9 +87,9 @@ def _indices(names: Sequence[str], found: Indices) -> dict[str, Any]:
         "confidence": CONFIDENCE,
         "parameters": {
             name: {
-                "first": _finite(found.first[k]),
+                "first": finite(found.first[k]),
                 "first_interval": _interval(found.first_interval[k]),
-                "total": _finite(found.total[k]),
+                "total": finite(found.total[k]),
                 "total_interval": _interval(found.total_interval[k]),
             }
             for k, name in enumerate(names)
@@ -102,13 +102,13 @@ def _trends(names: Sequence[str], found: Trends) -> dict[str, Any]:
         "reason": found.reason,
         "runs": found.used,
         "left_out": found.left_out,
-        "explained": _finite(found.explained),
-        "noise": _finite(found.noise),
+        "explained": finite(found.explained),
+        "noise": finite(found.noise),
         "parameters": {
             name: {
-                "rank_correlation": _finite(found.rank_correlation[k]),
-                "regression": _finite(found.regression[k]),
-                "share": _finite(found.share[k]),
+                "rank_correlation": finite(found.rank_correlation[k]),
+                "regression": finite(found.regression[k]),
+                "share": finite(found.share[k]),
             }
             for k, name in enumerate(names)
         },
@@ -117,7 +117,3 @@ def _trends(names: Sequence[str], found: Trends) -> dict[str, Any]:
 
 def _interval(ends: Array) -> list[float] | None:
     return [float(end) for end in ends] if all(map(math.isfinite, ends)) else None
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -167,6 +167,20 @@ def test_an_input_that_no_signal_is_given_to_can_be_held(units: Path, fmus: Path
     )
 
 
+def test_a_study_varies_what_another_archive_calls_its_parameter(units: Path) -> None:
+    text = (units / "s.yaml").read_text(encoding="utf-8")
+    settings = "".join(f"  {each.replace('=', ': ', 1)}\n" for each in mapped(units))
+    (units / "s.yaml").write_text(f"{text}set:\n{settings}", encoding="utf-8")
+    key = "machine.axes.X.friction.parameters.Coulomb"
+    (units / "study.yaml").write_text(
+        "name: s\nscenario: s.yaml\nsampling: {method: grid}\n"
+        f"parameters:\n  coulomb: {{key: {key}, values: [8, 9 N.mm]}}\n",
+        encoding="utf-8",
+    )
+    (parameter,) = scenario.load_study(units / "study.yaml").parameters
+    assert [choice.label for choice in parameter.choices] == ["8", "9 N.mm"]
+
+
 # --- the shipped units under other names
 
 

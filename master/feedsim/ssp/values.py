@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import dataclass
 
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.unit_definition import unit_definitions
@@ -12,8 +13,23 @@ from feedsim.ssp import parameter_set
 from feedsim.ssp.parameter_set import Parameter, ParameterSet, Value
 from feedsim.ssp.system_structure import Binding, Structure
 
-# Inputs that sets give a start value: component and name -> place of the set that counts, what it says, its set.
-Inputs = dict[tuple[str, str], tuple[str, Parameter, ParameterSet]]
+
+@dataclass(frozen=True)
+class _Said:
+    """What a parameter set (`place`, `given`) says of a variable of a component."""
+
+    component: str
+    name: str
+    parameter: Parameter
+    place: str
+    given: ParameterSet
+
+    def value(self, archive: Archive, structure: Structure) -> Value:
+        """In the variable's unit."""
+        variable = archive.variables[self.name]
+        kind = "Integer" if variable.type == "Enumeration" else variable.type
+        definitions = (self.given.units, structure.units, unit_definitions(archive))
+        return parameter_set.value(self.parameter, kind, archive.unit_of(self.name), definitions)
 
 
 def values(
@@ -35,32 +51,32 @@ def values(
             the first of them where there are many.
     """
     problems: list[str] = []
-    found: dict[str, dict[str, Value]] = {}
-    inputs: Inputs = {}
-    for component in structure.components:
-        archive = archives[component.name]
-        found[component.name] = {
-            name: start_value(archive, name)
-            for name, each in archive.variables.items()
-            if each.causality == "parameter" and component.name not in foreign
-        }
-        for place, given, prefix in _sets(component.bindings, files, where, problems):
-            for parameter in given.parameters:
-                if len(problems) > parameter_set.MOST_PROBLEMS:
-                    break
-                _set(found, inputs, archives, component.name, prefix + parameter.name, parameter, given, structure,
-                     place, problems)  # fmt: skip
-    for place, given, prefix in _sets(structure.bindings, files, where, problems):
-        for parameter in given.parameters:
-            if len(problems) > parameter_set.MOST_PROBLEMS:
-                break
-            name = prefix + parameter.name
-            owner = next((each for each in archives if name.startswith(f"{each}.")), None)
-            if owner is None:
-                problems.append(f"{place}: {name}: is no parameter of a component")
-                continue
-            _set(found, inputs, archives, owner, name.removeprefix(f"{owner}."), parameter, given, structure, place,
-                 problems)  # fmt: skip
+    parameters = {
+        component: [name for name, each in archive.variables.items() if each.causality == "parameter"]
+        for component, archive in archives.items()
+    }
+    found: dict[str, dict[str, Value]] = {
+        component: {} if component in foreign else {name: start_value(archives[component], name) for name in names}
+        for component, names in parameters.items()
+    }
+    inputs: dict[tuple[str, str], _Said] = {}  # the set that counts
+    for said in _all_said(structure, files, archives, where, problems):
+        if len(problems) > parameter_set.MOST_PROBLEMS:
+            break
+        component, name, archive = said.component, said.name, archives[said.component]
+        variable = archive.variables.get(name)
+        if variable is not None and variable.causality == "input":
+            inputs[component, name] = said
+        elif variable is None or variable.causality != "parameter":
+            known = parameters[component]
+            what = f"is {variable.causality}, no parameter," if variable else "is no parameter"
+            hint = did_you_mean(name, known) if known else "; it has none"
+            problems.append(f"{said.place}: {name}: {what} of {component}{hint}")
+        else:
+            try:
+                found[component][name] = said.value(archive, structure)
+            except InputError as error:
+                problems.append(f"{said.place}: {name}: {error}")
     problems += _held_inputs(inputs, structure, archives, found, foreign)
     if len(problems) > parameter_set.MOST_PROBLEMS:
         problems[parameter_set.MOST_PROBLEMS :] = [f"{where}: and more like these; the first are listed"]
@@ -75,6 +91,24 @@ def start_value(archive: Archive, name: str) -> Value:
     kind = "Integer" if variable.type == "Enumeration" else variable.type
     declared = Parameter(name, kind, str(variable.start if variable.start is not None else ""))
     return parameter_set.value(declared, kind, "")
+
+
+def _all_said(
+    structure: Structure, files: Mapping[str, bytes], archives: Mapping[str, Archive], where: str, problems: list[str]
+) -> Iterator[_Said]:
+    """Of the components' own sets, then of the system's, in the order in which they count."""
+    for component in structure.components:
+        for place, given, prefix in _sets(component.bindings, files, where, problems):
+            for parameter in given.parameters:
+                yield _Said(component.name, prefix + parameter.name, parameter, place, given)
+    for place, given, prefix in _sets(structure.bindings, files, where, problems):
+        for parameter in given.parameters:
+            name = prefix + parameter.name
+            owner = next((each for each in archives if name.startswith(f"{each}.")), None)
+            if owner is None:
+                problems.append(f"{place}: {name}: is no parameter of a component")
+            else:
+                yield _Said(owner, name.removeprefix(f"{owner}."), parameter, place, given)
 
 
 def _sets(
@@ -95,45 +129,8 @@ def _sets(
     return found
 
 
-def _set(
-    found: dict[str, dict[str, Value]],
-    inputs: Inputs,
-    archives: Mapping[str, Archive],
-    component: str,
-    name: str,
-    parameter: Parameter,
-    given: ParameterSet,
-    structure: Structure,
-    place: str,
-    problems: list[str],
-) -> None:
-    archive = archives[component]
-    variable = archive.variables.get(name)
-    if variable is not None and variable.causality == "input":
-        inputs[component, name] = place, parameter, given
-        return
-    if variable is None or variable.causality != "parameter":
-        known = [each for each, other in archive.variables.items() if other.causality == "parameter"]
-        what = f"is {variable.causality}, no parameter," if variable else "is no parameter"
-        hint = did_you_mean(name, known) if known else "; it has none"
-        problems.append(f"{place}: {name}: {what} of {component}{hint}")
-        return
-    try:
-        found[component][name] = _value(parameter, archive, name, given, structure)
-    except InputError as error:
-        problems.append(f"{place}: {name}: {error}")
-
-
-def _value(parameter: Parameter, archive: Archive, name: str, given: ParameterSet, structure: Structure) -> Value:
-    """What a set says of the variable `name`, in the variable's unit."""
-    variable = archive.variables[name]
-    kind = "Integer" if variable.type == "Enumeration" else variable.type
-    definitions = (given.units, structure.units, unit_definitions(archive))
-    return parameter_set.value(parameter, kind, archive.unit_of(name), definitions)
-
-
 def _held_inputs(
-    inputs: Inputs,
+    inputs: Mapping[tuple[str, str], _Said],
     structure: Structure,
     archives: Mapping[str, Archive],
     found: dict[str, dict[str, Value]],
@@ -146,25 +143,25 @@ def _held_inputs(
     """
     connected = {end for link in structure.links for end in (link.start, link.end)}
     faults = []
-    for (component, name), (place, parameter, given) in inputs.items():
+    for (component, name), said in inputs.items():
         if (component, name) in connected:
             continue
-        archive = archives[component]
+        archive, place = archives[component], f"{said.place}: {component}.{name}"
         try:
-            asked_for = _value(parameter, archive, name, given, structure)
+            asked_for = said.value(archive, structure)
             if component in foreign:
                 found[component][name] = asked_for
                 continue
             start = start_value(archive, name)
-            if asked_for == start:
-                continue
         except InputError as error:
-            faults.append(f"{place}: {component}.{name}: {error}")
+            faults.append(f"{place}: {error}")
+            continue
+        if asked_for == start:
             continue
         kept = str(start).lower() if isinstance(start, bool) else f"{start:g} {archive.unit_of(name)}"
-        asked = " ".join(filter(None, (parameter.text, parameter.unit)))
+        asked = " ".join(filter(None, (said.parameter.text, said.parameter.unit)))
         faults.append(
-            f"{place}: {component}.{name}: {asked} is asked of an input that is not connected; feedsim cannot hold it "
-            f"there, it keeps such an input at {kept}: leave the value out, or run the file in another simulator"
+            f"{place}: {asked} is asked of an input that is not connected; feedsim cannot hold it there, it keeps such "
+            f"an input at {kept}: leave the value out, or run the file in another simulator"
         )
     return faults

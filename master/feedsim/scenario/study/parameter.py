@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from types import NoneType
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
@@ -292,9 +293,10 @@ def _fits(target: Target, data: Any, source: Source) -> bool:
 
 
 def _is_whole(annotation: Any) -> bool:
-    if annotation is int:
-        return True
-    return any(_is_whole(part) for part in get_args(annotation)) if annotation is not None else False
+    if get_origin(annotation) is Annotated:
+        return _is_whole(get_args(annotation)[0])
+    options = [part for part in get_args(annotation) if part is not NoneType]
+    return annotation is int or (len(options) == 1 and _is_whole(options[0]))
 
 
 def _value(model: Any, place: Place) -> float | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
@@ -108,13 +108,13 @@ class Peaks:
     acceleration: float
 
 
-class Geometry:
+class Geometry(ABC):
     """What figures and reports know of the way of a motion."""
 
     @property
+    @abstractmethod
     def text(self) -> str:
         """It in a cell of a table."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,26 +96,14 @@ _TRIANGLE = ((0, 1), (1, 2), (2, 0))
 _LINE = ((0, 1),)
 # Element type (without letters behind the number of nodes) -> its nodes in all, and its edges between corners.
 ELEMENTS = {
-    "C3D4": (4, _TET),
-    "C3D6": (6, _WEDGE),
-    "C3D8": (8, _HEX),
-    "C3D10": (10, _TET),
-    "C3D15": (15, _WEDGE),
-    "C3D20": (20, _HEX),
-    "S3": (3, _TRIANGLE),
-    "S4": (4, _QUAD),
-    "S6": (6, _TRIANGLE),
-    "S8": (8, _QUAD),
-    "B31": (2, _LINE),
-    "B32": (3, ((0, 2),)),
-    "T3D2": (2, _LINE),
-    "T3D3": (3, ((0, 2),)),
-    "SPRINGA": (2, _LINE),
-    "SPRING2": (2, _LINE),
-    "SPRING1": (1, ()),
-    "DASHPOTA": (2, _LINE),
-    "MASS": (1, ()),
-}
+    "C3D4": (4, _TET), "C3D10": (10, _TET),
+    "C3D6": (6, _WEDGE), "C3D15": (15, _WEDGE),
+    "C3D8": (8, _HEX), "C3D20": (20, _HEX),
+    "S3": (3, _TRIANGLE), "S6": (6, _TRIANGLE), "S4": (4, _QUAD), "S8": (8, _QUAD),
+    "B31": (2, _LINE), "B32": (3, ((0, 2),)), "T3D2": (2, _LINE), "T3D3": (3, ((0, 2),)),
+    "SPRINGA": (2, _LINE), "SPRING2": (2, _LINE), "DASHPOTA": (2, _LINE),
+    "SPRING1": (1, ()), "MASS": (1, ()),
+}  # fmt: skip
 DEEPEST = 8  # files that include files
 
 

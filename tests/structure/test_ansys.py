@@ -17,7 +17,7 @@ from scipy import sparse
 
 from feedsim.cli import main
 from feedsim.errors import InputError
-from feedsim.scenario.load import load_structure
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.checks.model import check
 from feedsim.structure.matrices import ansys
 from feedsim.structure.matrices.build import Imported, import_model

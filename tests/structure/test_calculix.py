@@ -15,7 +15,7 @@ import yaml
 from fe_models import STRUCTURES, dense_modes
 
 from feedsim.errors import InputError
-from feedsim.scenario.load import load_structure
+from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.checks.model import check
 from feedsim.structure.matrices.build import Imported, import_model
 

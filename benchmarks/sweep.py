@@ -21,7 +21,7 @@ import psutil
 
 from feedsim.cosim import fmus_directory
 from feedsim.scenario import Base, Change
-from feedsim.sweep.bundle import Bundle, Place
+from feedsim.sweep.bundle import Bundle, Workplace
 from feedsim.sweep.engine import Engine, open_engine
 from feedsim.sweep.task import Outcome, Task
 
@@ -143,7 +143,7 @@ def by_engine(engine: Engine, case: Case, runs: int | None = None) -> float:
     return checked(case, outcomes, runs or case.runs, time.perf_counter() - begun)
 
 
-def in_place(place: Place, case: Case, runs: int | None = None) -> float:
+def in_place(place: Workplace, case: Case, runs: int | None = None) -> float:
     """The same, one after the other in this process."""
     begun = time.perf_counter()
     outcomes = [place.run(task) for task in case.tasks(runs=runs)]

@@ -15,6 +15,8 @@ HEAVY = {"numpy", "scipy", "matplotlib", "fmpy", "pydantic", "yaml", "ruckig", "
 NOT_FOR_A_RUN = {"scipy.signal", "scipy.stats", "distributed", "dask", "pyarrow", "matplotlib.pyplot"}
 # Nor what reads files of other kinds.
 NOT_FOR_A_RUN |= {"feedsim.scenario.study", "feedsim.files.tolerances", "feedsim.ssp"}
+# Nor what makes modes of other programs' matrices, or of a grid of poses.
+NOT_FOR_A_RUN |= {"feedsim.structure.build", "feedsim.structure.matrices", "feedsim.structure.poses"}
 
 
 def loaded(code: str) -> set[str]:

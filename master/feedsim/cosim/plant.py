@@ -16,7 +16,7 @@ from feedsim import units
 from feedsim.cosim.archive import Archive
 from feedsim.errors import FeedsimError, InputError
 from feedsim.scenario import Machine
-from feedsim.structure.build import SAME_POSITION
+from feedsim.structure.assembly import SAME_POSITION
 from feedsim.structure.modes import Modes, checked_modes
 from feedsim.structure.pack import AXES_IN_ARCHIVE, MODES_IN_ARCHIVE, POSES_IN_ARCHIVE, pack
 from feedsim.structure.poses_file import read_cell

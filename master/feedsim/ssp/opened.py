@@ -29,7 +29,7 @@ from feedsim.ssp.roles import roles
 from feedsim.ssp.setpoints import SETPOINTS_IN_ARCHIVE, Table, read_setpoints
 from feedsim.ssp.system_structure import Structure
 from feedsim.ssp.values import values
-from feedsim.structure.build import SAME_POSITION
+from feedsim.structure.assembly import SAME_POSITION
 from feedsim.structure.pack import MODES_IN_ARCHIVE
 
 WHOLE = 1e-6  # of a position cycle: a stop time this little behind an instant of the grid lies on it

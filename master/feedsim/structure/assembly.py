@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+# Positions that are typed twice are the same where they differ by less [m].
+SAME_POSITION = 1e-9
 SHOWN = 5  # labels in a message
 DEGREES = ("degree of freedom", "degrees of freedom")
 

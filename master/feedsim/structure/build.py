@@ -11,14 +11,11 @@ from feedsim.errors import InputError
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.scenario.structure.matrices import FiniteElements
-from feedsim.structure.assembly import Assembly
+from feedsim.structure.assembly import SAME_POSITION, Assembly
 from feedsim.structure.checks.model import check, frequency_warnings
 from feedsim.structure.geometry.assemble import assemble as assemble_geometry
 from feedsim.structure.matrices.build import import_model
 from feedsim.structure.solve import Solution, solve
-
-# Positions that are typed twice are the same where they differ by less [m].
-SAME_POSITION = 1e-9
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,9 @@ enum { SPEED, TORQUE, COULOMB, VISCOUS, KNEE };
 
 static const double STARTS[REALS] = {[COULOMB] = 8, [VISCOUS] = 0.003, [KNEE] = 20};
 
-static void advance(Unit *unit, double h) {
+static fmi2Status advance(Unit *unit, double h) {
     (void)h;
     double *v = unit->real;
     v[TORQUE] = v[COULOMB] * tanh(v[SPEED] / v[KNEE]) + v[VISCOUS] * v[SPEED];
+    return fmi2OK;
 }

@@ -9,10 +9,11 @@ typedef struct Unit {
     double real[REALS];
     fmi2Boolean boolean[BOOLEANS];
     double state;
+    const fmi2CallbackFunctions *callbacks;
 } Unit;
 
 static const double STARTS[REALS];
-static void advance(Unit *unit, double h);
+static fmi2Status advance(Unit *unit, double h);
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }
@@ -22,12 +23,14 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 }
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
-    (void)name, (void)resources, (void)callbacks, (void)visible, (void)logging;
+    (void)name, (void)resources, (void)visible, (void)logging;
     if (type != fmi2CoSimulation || strcmp(guid, GUID) != 0)
         return NULL;
     Unit *unit = calloc(1, sizeof *unit);
-    if (unit != NULL)
-        memcpy(unit->real, STARTS, sizeof STARTS);
+    if (unit == NULL)
+        return NULL;
+    unit->callbacks = callbacks;
+    memcpy(unit->real, STARTS, sizeof STARTS);
     return unit;
 }
 void fmi2FreeInstance(fmi2Component c) { free(c); }
@@ -74,8 +77,7 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 }
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_return) {
     (void)t, (void)no_return;
-    advance(c, h);
-    return fmi2OK;
+    return advance(c, h);
 }
 
 /* What it cannot do. */

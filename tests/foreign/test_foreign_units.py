@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 
 from feedsim import cosim, scenario
 from feedsim.cosim import Run
-from feedsim.errors import InputError
+from feedsim.errors import InputError, SimulationError
+from feedsim.scenario.study import load_study
 from foreign import acme
 from foreign.conftest import Libraries
 from ssp_helpers import SHORT, short_scenario
@@ -154,6 +155,13 @@ def test_a_limit_of_another_drive_is_told(units: Path, fmus: Path) -> None:
     assert any("axis X: torque limited in" in warning for warning in done.warnings)
 
 
+def test_its_own_words_are_told_where_it_fails(units: Path, fmus: Path) -> None:
+    """With the numbers that it leaves to the importer's logger to print."""
+    loaded = scenario.load(units / "s.yaml", [*mapped(units), "machine.axes.X.drive.parameters.Override=-5"])
+    with pytest.raises(SimulationError, match=r"unit controller_X, t = 0 s: step .* failed: an override of -5 % is"):
+        cosim.run(loaded, fmus=fmus)
+
+
 def test_an_input_that_no_signal_is_given_to_can_be_held(units: Path, fmus: Path) -> None:
     """Override is in percent: a text is converted, a number is in the unit of the archive."""
     by = {}
@@ -177,7 +185,7 @@ def test_a_study_varies_what_another_archive_calls_its_parameter(units: Path) ->
         f"parameters:\n  coulomb: {{key: {key}, values: [8, 9 N.mm]}}\n",
         encoding="utf-8",
     )
-    (parameter,) = scenario.load_study(units / "study.yaml").parameters
+    (parameter,) = load_study(units / "study.yaml").parameters
     assert [choice.label for choice in parameter.choices] == ["8", "9 N.mm"]
 
 

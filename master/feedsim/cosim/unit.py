@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import re
+import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -83,6 +84,11 @@ class Unit:
         self._fmu = archive.slave(name)
         callbacks = fmi2CallbackFunctions()
         callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
+        if signals is not None:
+            _UNITS[id(self)] = self
+            callbacks.componentEnvironment = id(self)
+            callbacks.logger = _TELL
+            _print_messages(callbacks)
         callbacks.allocateMemory = defaultCallbacks.allocateMemory
         callbacks.freeMemory = defaultCallbacks.freeMemory
         try:
@@ -233,6 +239,27 @@ def setting(names: Sequence[str], slopes: bool = False) -> str:
 
 def reading(names: Sequence[str], slopes: bool = False) -> str:
     return f"reading {'slopes of ' if slopes else ''}{', '.join(names)}"
+
+
+# Another maker's unit leaves it to the importer's logger to print numbers into its messages, as in C. FMPy's library
+# does, and hands over to a logger that is the same for all units: which unit it is tells the environment.
+_UNITS: weakref.WeakValueDictionary[int, Unit] = weakref.WeakValueDictionary()
+
+
+def _tell(environment: int | None, *message: Any) -> None:
+    if (unit := _UNITS.get(environment or 0)) is not None:
+        unit._log(environment, *message)
+
+
+_TELL = fmi2CallbackLoggerTYPE(_tell)
+
+
+def _print_messages(callbacks: fmi2CallbackFunctions) -> None:
+    try:
+        from fmpy.logging import addLoggerProxy
+    except OSError:  # FMPy has none for this platform: messages come as they are
+        return
+    addLoggerProxy(ctypes.byref(callbacks))
 
 
 class Port:

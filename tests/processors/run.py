@@ -20,7 +20,8 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 TESTS = HERE.parent
-# What has an iteration, an order or pinned digits in it. The rest of the three rooms, minutes each: --all.
+# What has an iteration, an order or pinned digits in it. The rest of the three rooms, many minutes: --all.
+REFERENCES = ("reference/test_reference.py", "identify/test_fit.py", "identify/test_stribeck.py")
 CORE = (
     "reference/test_reference.py",
     "identify",
@@ -28,7 +29,6 @@ CORE = (
     "physics/test_linear_machine.py", "physics/test_output_error.py", "physics/test_stationary.py",
 )  # fmt: skip
 ALL = ("reference", "identify", "physics")
-# The references made anew are the longest test; every setting makes those of the units (test_reference.py).
 PROBE = """
 import json, math, numpy, scipy.linalg
 x = [0.001 * i for i in range(1, 20000)]
@@ -47,7 +47,7 @@ class Setting:
     Attributes:
         name: as it is told. kernel: of OpenBLAS, by the name it is asked for with; None: the machine's.
         old: numpy's functions and the C library's as without AVX2 and FMA. flag: of /proc/cpuinfo that it needs.
-        last_bit: numpy's functions off by their last bit, as with AVX-512 (last_bit.py).
+        last_bit: numpy's functions off by their last bit, as with AVX-512 (last_bit.py). tests: what it tries.
     """
 
     name: str
@@ -55,6 +55,7 @@ class Setting:
     old: bool = False
     last_bit: bool = False
     flag: str = ""
+    tests: tuple[str, ...] = CORE
 
     def environment(self, extensions: list[str]) -> dict[str, str]:
         """The environment of a process; `extensions`: those that numpy finds here."""
@@ -70,8 +71,8 @@ class Setting:
 SETTINGS = (
     Setting("neither AVX2 nor FMA", "Nehalem", old=True),
     Setting("SSE3 alone in linear algebra", "Prescott", last_bit=True),
-    Setting("AVX without FMA", "Sandybridge", flag="avx"),
-    Setting("AVX2", "Haswell", flag="avx2"),
+    Setting("AVX without FMA", "Sandybridge", flag="avx", tests=REFERENCES),
+    Setting("AVX2", "Haswell", flag="avx2", tests=REFERENCES),
     Setting("AVX-512", "SkylakeX", flag="avx512bw"),
 )
 
@@ -104,7 +105,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--all", action="store_true", help=f"all of {', '.join(ALL)}, not only what iterates")
     parser.add_argument("pytest", nargs="*", help="what pytest is given in place of the tests; after --")
     given = parser.parse_args(arguments)
-    tests = given.pytest or [str(TESTS / place) for place in (ALL if given.all else CORE)]
     kernels, here = probed(os.environ)
     extensions, able = here["numpy"], flags()
     print(f"this machine: OpenBLAS {', '.join(kernels)}; numpy {', '.join(map(str, extensions))}", flush=True)
@@ -124,8 +124,10 @@ def main(arguments: list[str] | None = None) -> int:
         )
         plugin = ["-p", "last_bit"] if setting.last_bit else []
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(HERE), os.environ.get("PYTHONPATH", "")]))
+        tests = given.pytest or [str(TESTS / place) for place in (ALL if given.all else setting.tests)]
         begun = time.perf_counter()
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *plugin, *tests]
+        spread = ["-n", "auto", "--dist", "loadfile", "-p", "no:cacheprovider"]
+        command = [sys.executable, "-m", "pytest", "-q", *spread, *plugin, *tests]
         done = subprocess.run(command, env=environment, check=False)
         print(f"{setting.name}: {time.perf_counter() - begun:.0f} s", flush=True)
         if done.returncode:

@@ -21,8 +21,8 @@ from feedsim.analysis.linear.loops import names, response, unit_of
 from feedsim.analysis.responses import Responses, frequencies, read_overlays
 from feedsim.errors import InputError, OutputError
 from feedsim.report import frf as report
-from feedsim.report.bode_plots import speed_controlled_pictures
 from feedsim.report.frf import report as report_module
+from feedsim.report.frf.bode_plots import speed_controlled_pictures
 from feedsim.report.frf.plots import curves_of
 from feedsim.report.frf.report import report_of
 from feedsim.report.page import html

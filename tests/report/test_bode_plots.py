@@ -13,12 +13,12 @@ import pytest
 from feedsim.analysis.linear import Bandwidth, Extreme, GainCrossing, Margins, Pair, PhaseCrossing, grid
 from feedsim.analysis.responses import Overlay
 from feedsim.analysis.truncation import deviations, structure_responses
-from feedsim.report import bode_plots, truncation_plots
-from feedsim.report.bode import Column, Curve, Ordinate, at, bode, phases, size
-from feedsim.report.bode_plots import loop_pictures, scale_pictures, speed_reference_pictures
+from feedsim.report.frf import bode_plots, truncation_plots
+from feedsim.report.frf.bode import Column, Curve, Ordinate, at, bode, phases, size
+from feedsim.report.frf.bode_plots import loop_pictures, scale_pictures, speed_reference_pictures
 from feedsim.report.frf.plots import curves_of, most_marked, pictures_of
+from feedsim.report.frf.truncation_plots import truncation_pictures
 from feedsim.report.style import drawing, finish
-from feedsim.report.truncation_plots import truncation_pictures
 from feedsim.structure import Modes, checked_modes
 from feedsim.trace.response import FrequencyResponse
 from frf_helpers import responses

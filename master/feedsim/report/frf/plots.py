@@ -9,8 +9,8 @@ from feedsim.analysis import linear
 from feedsim.analysis.linear.loops import COMPLIANCE, QUANTITIES
 from feedsim.analysis.linear.plant import TOOL_DIRECTIONS
 from feedsim.analysis.responses import Responses
-from feedsim.report.bode import Curve
-from feedsim.report.bode_plots import (
+from feedsim.report.frf.bode import Curve
+from feedsim.report.frf.bode_plots import (
     compliance_pictures,
     inertia_pictures,
     loop_pictures,

@@ -15,6 +15,7 @@ from feedsim.report.content import Report, Section, Table, Text, Tile, code, til
 from feedsim.report.formatting import display_unit, minus, number, typeset
 from feedsim.report.frf.plots import pictures_of
 from feedsim.report.frf.summary import input_files, summary
+from feedsim.report.frf.truncation_plots import truncation_pictures
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.sections import (
     archives_table,
@@ -24,7 +25,6 @@ from feedsim.report.sections import (
     provenance_section,
 )
 from feedsim.report.style import Picture, remarked
-from feedsim.report.truncation_plots import truncation_pictures
 from feedsim.scenario import Subject
 from feedsim.trace.response_files import write_response
 

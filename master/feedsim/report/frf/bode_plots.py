@@ -7,13 +7,13 @@ frequency response of the speed controller; besides these the loops around them,
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from feedsim.analysis.linear.margins import Bandwidth, Margins, Pair
-from feedsim.report.bode import Column, Curve, Ordinate, Panels, at, bode, dot, level, note, phases, size, stretch
+from feedsim.report.frf.bode import Column, Curve, Ordinate, Panels, at, bode, dot, level, note, phases, size, stretch
 from feedsim.report.labels import keep_inside
 from feedsim.report.style import INK, Picture, drawing, finish
 
@@ -24,7 +24,7 @@ Columns = Mapping[str, Sequence[Curve]]  # by axis or direction
 Span = tuple[float, float] | None  # frequencies shown [Hz]; None: all
 
 MOST_COLUMNS = 3
-LABEL_ROOM = 0.4  # above the curves, in shares of their height
+LABEL_ROOM, LABEL_INCHES = 0.4, 0.9  # above the curves, in shares of their height; of the drawing
 LOWEST_GAIN_DB = -40.0  # of a loop: what is below says nothing about it
 LOWEST_CLOSED_DB = -45.0  # of a closed loop
 ALIKE = 1.01  # crossings closer than this ratio are one
@@ -36,21 +36,12 @@ KINDS = (
 
 def speed_controlled_pictures(columns: Columns, span: Span) -> list[Picture]:
     """n_a/M_a per axis, magnitude and phase (the paper's Fig. 4). Values [(rad/s)/(N.m)]."""
-    pictures = []
-    for part, stem in _parts(columns, "speed-controlled-system"):
-        shown = [Column(f"Axis {axis}", curves) for axis, curves in part.items()]
-        with drawing(*size(shown)) as figure:
-            bode(figure, shown, Ordinate("$|n_a/M_a|$ [dB re 1 (rad/s)/(N·m)]"), span=span)
-            pictures.append(
-                finish(
-                    figure,
-                    stem,
-                    f"Speed-controlled system n/M of {_axes(part)}",
-                    "Motor speed over motor torque, the position loop left out. At low frequencies the line falls as "
-                    f"1/(J ω) with the total inertia J; above, the structure shows. {_kinds(part)}",
-                )
-            )
-    return pictures
+    return _pictures(
+        columns, "speed-controlled-system", Ordinate("$|n_a/M_a|$ [dB re 1 (rad/s)/(N·m)]"), span,
+        "Speed-controlled system n/M of {}",
+        "Motor speed over motor torque, the position loop left out. At low frequencies the line falls as 1/(J ω) with "
+        "the total inertia J; above, the structure shows. ",
+    )  # fmt: skip
 
 
 def inertia_pictures(
@@ -60,44 +51,32 @@ def inertia_pictures(
 
     J_tot: [kg.m2]; pairs: anti-resonances and resonances to be annotated.
     """
-    pictures = []
-    for part, stem in _parts(columns, "inertia-view"):
-        shown = [
-            Column(f"Axis {axis}", [c.scaled(2 * np.pi * c.frequency * J_tot[axis]) for c in curves])
-            for axis, curves in part.items()
-        ]
-        width, height = size(shown, phase=False)
-        with drawing(width, height + 0.9) as figure:
-            ordinate = Ordinate("$|n_a/M_a| \\; J_{tot}\\, \\omega$ [dB]")
-            drawn = bode(figure, shown, ordinate, phase=False, span=span)
-            low, high = drawn[0].magnitude.get_ylim()  # shared by all columns
-            drawn[0].magnitude.set_ylim(low, high + LABEL_ROOM * (high - low))
-            for axis, panels, column in zip(part, drawn, shown, strict=True):
-                level(panels.magnitude, 0.0)
-                _annotate(panels.magnitude, column.curves[0], pairs.get(axis, ()))
-            pictures.append(
-                finish(
-                    figure,
-                    stem,
-                    f"Speed-controlled system of {_axes(part)} against a rigid inertia",
-                    "The speed-controlled system multiplied by the total inertia and the angular frequency: 0 dB where "
-                    "the machine moves as one rigid mass, more where the motor feels less inertia. Annotated: the most "
-                    f"marked pairs of anti-resonance (hollow) and resonance (full), in Hz. {_kinds(part)}",
-                )
-            )
-    return pictures
+
+    def mark(axis: str, panels: Panels, curve: Curve) -> None:
+        level(panels.magnitude, 0.0)
+        _annotate(panels.magnitude, curve, pairs.get(axis, ()))
+
+    return _pictures(
+        {axis: [c.scaled(2 * np.pi * c.frequency * J_tot[axis]) for c in curves] for axis, curves in columns.items()},
+        "inertia-view", Ordinate("$|n_a/M_a| \\; J_{tot}\\, \\omega$ [dB]"), span,
+        "Speed-controlled system of {} against a rigid inertia",
+        "The speed-controlled system multiplied by the total inertia and the angular frequency: 0 dB where the machine "
+        "moves as one rigid mass, more where the motor feels less inertia. Annotated: the most marked pairs of "
+        "anti-resonance (hollow) and resonance (full), in Hz. ",
+        mark=mark, phase=False, labelled_above=True,
+    )  # fmt: skip
 
 
 def speed_reference_pictures(columns: Columns, bandwidths: Mapping[str, Bandwidth], span: Span) -> list[Picture]:
     """n_a/n_s per axis with its -3 dB line and crossings (the paper's Fig. 5)."""
-    what = "Reference frequency response of the speed controller n_a/n_s"
+    what = "Reference frequency response of the speed controller n_a/n_s of {}"
     about = "Motor speed over speed setpoint, the position loop open. "
     return _closed_loops(columns, bandwidths, "speed-reference", "$|n_a/n_s|$ [dB]", what, about, span)
 
 
 def position_reference_pictures(columns: Columns, bandwidths: Mapping[str, Bandwidth], span: Span) -> list[Picture]:
     """x_a/x_s per axis with its -3 dB line and crossings."""
-    what = "Reference frequency response of the position controller x_a/x_s"
+    what = "Reference frequency response of the position controller x_a/x_s of {}"
     about = "Position at the linear scale over position setpoint, the speed feedforward left out. "
     return _closed_loops(columns, bandwidths, "position-reference", "$|x_a/x_s|$ [dB]", what, about, span)
 
@@ -111,92 +90,86 @@ def loop_pictures(
         "position": "cut at the scale's position as the controller samples it; the gain margin is the factor that K_v "
         "stands",
     }[loop]
-    pictures = []
-    for part, stem in _parts(columns, f"{loop}-loop"):
-        shown = [Column(f"Axis {axis}", curves) for axis, curves in part.items()]
-        with drawing(*size(shown)) as figure:
-            drawn = bode(figure, shown, Ordinate("open-loop gain [dB]"), floor=LOWEST_GAIN_DB, span=span)
-            for axis, panels, column in zip(part, drawn, shown, strict=True):
-                if axis in margins:
-                    _margins(panels, column.curves[0], margins[axis])
-            pictures.append(
-                finish(
-                    figure,
-                    stem,
-                    f"Open-loop gain of the {loop} loop of {_axes(part)}",
-                    f"Loop gain {cut}. Marked: the gain margin (vertical line from the curve to 0 dB) and the phase "
-                    f"margin (from the curve to ±180°, where a loop of gain 1 would be at its limit). {_kinds(part)}",
-                )
-            )
-    return pictures
+
+    def mark(axis: str, panels: Panels, curve: Curve) -> None:
+        if axis in margins:
+            _margins(panels, curve, margins[axis])
+
+    return _pictures(
+        columns, f"{loop}-loop", Ordinate("open-loop gain [dB]"), span, f"Open-loop gain of the {loop} loop of {{}}",
+        f"Loop gain {cut}. Marked: the gain margin (vertical line from the curve to 0 dB) and the phase margin (from "
+        "the curve to ±180°, where a loop of gain 1 would be at its limit). ",
+        mark=mark, floor=LOWEST_GAIN_DB,
+    )  # fmt: skip
 
 
 def scale_pictures(columns: Columns, span: Span) -> list[Picture]:
     """x_a/M_a per axis. Values [m/(N.m)], shown in um/(N.m)."""
-    pictures = []
-    for part, stem in _parts(columns, "scale-response"):
-        shown = [Column(f"Axis {axis}", curves) for axis, curves in part.items()]
-        with drawing(*size(shown)) as figure:
-            bode(figure, shown, Ordinate("$|x_a/M_a|$ [µm/(N·m)]", decibel=False, scale=1e6), span=span)
-            pictures.append(
-                finish(
-                    figure,
-                    stem,
-                    f"From motor torque to linear scale, x/M of {_axes(part)}",
-                    "Position at the linear scale over motor torque, the position loop left out: what the drive train "
-                    f"and the structure put between motor and scale. {_kinds(part)}",
-                )
-            )
-    return pictures
+    return _pictures(
+        columns, "scale-response", Ordinate("$|x_a/M_a|$ [µm/(N·m)]", decibel=False, scale=1e6), span,
+        "From motor torque to linear scale, x/M of {}",
+        "Position at the linear scale over motor torque, the position loop left out: what the drive train and the "
+        "structure put between motor and scale. ",
+    )  # fmt: skip
 
 
 def compliance_pictures(columns: Columns, span: Span) -> list[Picture]:
     """Tool compliance per direction. Values [m/N], shown in um/N."""
-    pictures = []
-    for part, stem in _parts(columns, "tool-compliance"):
-        shown = [Column(f"Direction {direction}", curves) for direction, curves in part.items()]
-        with drawing(*size(shown)) as figure:
-            bode(figure, shown, Ordinate("$|x_{tool}/F|$ [µm/N]", decibel=False, scale=1e6), span=span)
-            pictures.append(
-                finish(
-                    figure,
-                    stem,
-                    "Dynamic compliance at the tool",
-                    "Displacement of the tool against the workpiece over the force between them, all loops closed. "
-                    f"{_kinds(part)}",
-                )
-            )
-    return pictures
+    return _pictures(
+        columns, "tool-compliance", Ordinate("$|x_{tool}/F|$ [µm/N]", decibel=False, scale=1e6), span,
+        "Dynamic compliance at the tool",
+        "Displacement of the tool against the workpiece over the force between them, all loops closed. ",
+        of="Direction",
+    )  # fmt: skip
 
 
 def _closed_loops(
-    columns: Columns,
-    bandwidths: Mapping[str, Bandwidth],
-    stem: str,
-    ordinate: str,
-    what: str,
-    about: str,
-    span: Span,
+    columns: Columns, bandwidths: Mapping[str, Bandwidth], stem: str, ordinate: str, title: str, about: str, span: Span
 ) -> list[Picture]:
+    def mark(axis: str, panels: Panels, curve: Curve) -> None:
+        level(panels.magnitude, -3.0)
+        if axis in bandwidths:
+            _bandwidth(panels.magnitude, bandwidths[axis])
+
+    caption = (
+        f"{about}Dashed line: −3 dB. A curve with an anti-resonance can fall through it, return and fall again: full "
+        "marker, first crossing; hollow marker, last crossing. "
+    )
+    return _pictures(columns, stem, Ordinate(ordinate), span, title, caption, mark=mark, floor=LOWEST_CLOSED_DB)
+
+
+def _pictures(
+    columns: Columns,
+    stem: str,
+    ordinate: Ordinate,
+    span: Span,
+    title: str,
+    caption: str,
+    *,
+    mark: Callable[[str, Panels, Curve], None] | None = None,
+    phase: bool = True,
+    floor: float | None = None,
+    labelled_above: bool = False,
+    of: str = "Axis",
+) -> list[Picture]:
+    """A picture per group of columns.
+
+    title: {} in it are the names of the columns. mark: called for each column with its name, its panels and its first
+    curve. labelled_above: with room above the curves. of: what the columns are.
+    """
     pictures = []
     for part, name in _parts(columns, stem):
-        shown = [Column(f"Axis {axis}", curves) for axis, curves in part.items()]
-        with drawing(*size(shown)) as figure:
-            drawn = bode(figure, shown, Ordinate(ordinate), floor=LOWEST_CLOSED_DB, span=span)
-            for axis, panels in zip(part, drawn, strict=True):
-                level(panels.magnitude, -3.0)
-                if axis in bandwidths:
-                    _bandwidth(panels.magnitude, bandwidths[axis])
-            pictures.append(
-                finish(
-                    figure,
-                    name,
-                    f"{what} of {_axes(part)}",
-                    f"{about}Dashed line: -3 dB. A curve with an anti-resonance can fall through it, return and fall "
-                    "again: full marker, first crossing; hollow marker, last crossing. ".replace("-3", "−3")
-                    + _kinds(part),
-                )
-            )
+        shown = [Column(f"{of} {each}", curves) for each, curves in part.items()]
+        width, height = size(shown, phase=phase)
+        with drawing(width, height + (LABEL_INCHES if labelled_above else 0.0)) as figure:
+            drawn = bode(figure, shown, ordinate, phase=phase, span=span, floor=floor)
+            if labelled_above:
+                low, high = drawn[0].magnitude.get_ylim()  # shared by all columns
+                drawn[0].magnitude.set_ylim(low, high + LABEL_ROOM * (high - low))
+            if mark is not None:
+                for each, panels, column in zip(part, drawn, shown, strict=True):
+                    mark(each, panels, column.curves[0])
+            pictures.append(finish(figure, name, title.format(_axes(part)), caption + _kinds(part)))
     return pictures
 
 

@@ -12,13 +12,13 @@ from feedsim.report.provenance import InputFile, Parameter, axis_parameters, fri
 from feedsim.scenario import Machine
 
 
-def finite(value: float) -> float | None:
-    """A number as JSON can hold it: null where it is not known."""
-    return value if math.isfinite(value) else None
+def finite(value: Any) -> Any:
+    """A value as JSON can hold it: null in place of a number that is not known."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def quantity(value: float, unit: str, **more: str) -> dict[str, Any]:
-    """A value with its unit and what more is to be said of it; null where it is not known."""
+def quantity(value: Any, unit: str, **more: str) -> dict[str, Any]:
+    """A value, or a list of them, with its unit and what more is to be said of it; null where it is not known."""
     return {"value": finite(value), "unit": unit, **more}
 
 
@@ -32,7 +32,7 @@ def machine_part(machine: Machine) -> dict[str, Any]:
     return {
         "name": machine.name,
         "note": machine.note,
-        "pose": {a: {"value": x, "unit": "m"} for a, x in machine.pose.items()},
+        "pose": {a: quantity(x, "m") for a, x in machine.pose.items()},
         "axes": {name: _axis(axis_parameters(axis)) for name, axis in machine.axes.items()},
         "friction_origins": friction_origins(machine),
     }
@@ -51,7 +51,7 @@ def to_json(content: Mapping[str, Any]) -> str:
 def _axis(groups: Mapping[str, Mapping[str, tuple[Parameter, str]]]) -> dict[str, Any]:
     """pitch and M_0 of an axis, and its parameters by unit; words and switches stand alone, without a unit."""
     plain = {
-        group: {name: {"value": value, "unit": unit} if unit else value for name, (value, unit) in values.items()}
+        group: {name: quantity(value, unit) if unit else value for name, (value, unit) in values.items()}
         for group, values in groups.items()
     }
     return plain.pop("axis") | plain

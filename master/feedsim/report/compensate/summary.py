@@ -11,7 +11,7 @@ from typing import Any
 from feedsim.analysis.compensation import Compensation, Quality
 from feedsim.report.provenance import InputFile, axis_parameters, hashed
 from feedsim.report.run.summary import summary as summary_of_run
-from feedsim.report.summary import inputs_part
+from feedsim.report.summary import inputs_part, quantity
 
 Row = tuple[str, float, str, Quality]
 
@@ -52,16 +52,16 @@ def summary(compensation: Compensation, files: Mapping[str, Path], written: Sequ
     content["compensation"] = {
         "turn": {
             "plane": list(compensation.turn.axes),
-            "begin": {"value": compensation.turn.begin, "unit": "s"},
-            "end": {"value": compensation.turn.end, "unit": "s"},
+            "begin": quantity(compensation.turn.begin, "s"),
+            "end": quantity(compensation.turn.end, "s"),
         },
         "axes": {
             axis: {
-                "delay": {"value": compensation.delays[axis], "unit": "s"},
+                "delay": quantity(compensation.delays[axis], "s"),
                 "delay_from": "the drive's parameters" if axis in compensation.lags else "given",
                 "friction_from": files[axis].name if axis in files else "the machine",
                 "friction": {
-                    name: {"value": value, "unit": unit}
+                    name: quantity(value, unit)
                     for name, (value, unit) in axis_parameters(
                         machine.axes[axis].model_copy(update={"friction": friction})
                     )["friction"].items()
@@ -72,10 +72,10 @@ def summary(compensation: Compensation, files: Mapping[str, Path], written: Sequ
         "errors": [
             {
                 "of": what,
-                "change": {"value": change, "unit": unit},
-                "G": {"value": 1e6 * left.G, "unit": "um"},
+                "change": quantity(change, unit),
+                "G": quantity(1e6 * left.G, "um"),
                 **{
-                    f"{kind}_{axis}": {"value": 1e6 * value, "unit": "um"}
+                    f"{kind}_{axis}": quantity(1e6 * value, "um")
                     for kind, values in (("peak", left.peak), ("dip", left.dip))
                     for axis, value in values.items()
                 },

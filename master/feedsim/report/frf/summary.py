@@ -10,7 +10,7 @@ from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.responses import Responses
 from feedsim.report.provenance import InputFile, hashed, software
-from feedsim.report.summary import figures_part, inputs_part, machine_part
+from feedsim.report.summary import figures_part, inputs_part, machine_part, quantity
 from feedsim.scenario import Subject
 
 FORMAT = 1
@@ -36,7 +36,7 @@ def summary(subject: Subject, responses: Responses, files: Sequence[str]) -> dic
             "overrides": list(subject.overrides),
         },
         "closed_form": {
-            "band": {"value": list(responses.band), "unit": "Hz"},
+            "band": quantity(list(responses.band), "Hz"),
             "frequencies": len(responses.closed),
             "responses": {name: {"unit": responses.closed.unit(name)} for name in responses.closed},
         },
@@ -92,24 +92,24 @@ def _measurement(campaign: Campaign) -> dict[str, Any]:
     return {
         "signal": plan.signal,
         "inject": plan.inject,
-        "band": {"value": list(plan.band), "unit": "Hz"},
+        "band": quantity(list(plan.band), "Hz"),
         "periods": plan.periods,
         "periods_to_settle": plan.settle,
         "realisations": plan.realisations,
         "seed": plan.seed,
         "friction": plan.friction,
-        "offset_speed": {"value": plan.offset_speed, "unit": "rad/s"},
+        "offset_speed": quantity(plan.offset_speed, "rad/s"),
         "frequencies": len(campaign.response),
         "responses": {name: {"unit": campaign.response.unit(name)} for name in campaign.response},
         "excited": {
             each.reference: {
-                "rms": {"value": each.rms, "unit": each.unit},
-                "peak": {"value": each.peak, "unit": each.unit},
+                "rms": quantity(each.rms, each.unit),
+                "peak": quantity(each.peak, each.unit),
                 "lines": each.lines,
-                "period": {"value": each.period, "unit": "s"},
+                "period": quantity(each.period, "s"),
             }
             for each in campaign.excited
         },
-        "simulated": {"value": campaign.simulated, "unit": "s"},
-        "wall_time": {"value": campaign.wall_time, "unit": "s"},
+        "simulated": quantity(campaign.simulated, "s"),
+        "wall_time": quantity(campaign.wall_time, "s"),
     }

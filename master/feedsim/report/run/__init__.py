@@ -6,6 +6,6 @@ Start with report.py; pose.py has the plant's pose.
 
 from feedsim.report.provenance import input_paths
 from feedsim.report.run.report import check_writable, growing, write
-from feedsim.report.run.summary import Run, summary_line
+from feedsim.report.run.summary import summary_line
 
-__all__ = ["Run", "check_writable", "growing", "input_paths", "summary_line", "write"]
+__all__ = ["check_writable", "growing", "input_paths", "summary_line", "write"]

@@ -9,6 +9,7 @@ from feedsim.cosim import PoseUse
 from feedsim.report.content import Paragraph, Part, Section, Table
 from feedsim.report.formatting import counted, minus
 from feedsim.report.sections import pairs_table
+from feedsim.report.summary import quantity
 from feedsim.structure.pose_change import LOOKED_AT, NEAR, SEEN, AxisChange, Compliance, ModeChange, PoseChange
 
 
@@ -31,9 +32,9 @@ def pose_part(pose: PoseUse | None) -> dict[str, Any] | None:
             {
                 "axis": axis.axis,
                 "cells": len(axis.centres),
-                "first": _value(axis.limits[0], "m"),
-                "last": _value(axis.limits[1], "m"),
-                "hysteresis": _value(axis.hysteresis, "m"),
+                "first": quantity(axis.limits[0], "m"),
+                "last": quantity(axis.limits[1], "m"),
+                "hysteresis": quantity(axis.hysteresis, "m"),
             }
             for axis in pose.grid
         ],
@@ -41,28 +42,24 @@ def pose_part(pose: PoseUse | None) -> dict[str, Any] | None:
         if crossings is None
         else {
             "count": crossings.count,
-            "E_kin_lost": _value(crossings.kinetic_lost, "J"),
-            "E_el_lost": _value(crossings.elastic_lost, "J"),
-            "held": _value(crossings.held, "m"),
-            "jump_x_a": _value(crossings.jump_x_a, "m"),
-            "jump_n_a": _value(crossings.jump_n_a, "rad/s"),
-            "jump_tool": _value(crossings.jump_tool, "m"),
+            "E_kin_lost": quantity(crossings.kinetic_lost, "J"),
+            "E_el_lost": quantity(crossings.elastic_lost, "J"),
+            "held": quantity(crossings.held, "m"),
+            "jump_x_a": quantity(crossings.jump_x_a, "m"),
+            "jump_n_a": quantity(crossings.jump_n_a, "rad/s"),
+            "jump_tool": quantity(crossings.jump_tool, "m"),
         },
         "one_pose": {axis.axis: _axis_part(axis) for axis in pose.change.axes},
         "unknown": pose.change.unknown,
     }
 
 
-def _value(value: float, unit: str) -> dict[str, float | str]:
-    return {"value": value, "unit": unit}
-
-
 def _axis_part(axis: AxisChange) -> dict[str, Any]:
     return {
-        "pose": _value(axis.pose, "m"),
-        "lowest": _value(axis.low, "m"),
-        "highest": _value(axis.high, "m"),
-        "distance": _value(axis.distance, "m"),
+        "pose": quantity(axis.pose, "m"),
+        "lowest": quantity(axis.low, "m"),
+        "highest": quantity(axis.high, "m"),
+        "distance": quantity(axis.distance, "m"),
         "modes": [_mode_part(mode) for mode in axis.modes],
         "static_compliance": [_compliance_part(item) for item in axis.compliances],
     }
@@ -70,9 +67,9 @@ def _axis_part(axis: AxisChange) -> dict[str, Any]:
 
 def _mode_part(mode: ModeChange) -> Mapping[str, Any]:
     return {
-        "at_pose": _value(mode.frequency, "Hz"),
-        "at_lowest": _value(mode.ends[0], "Hz"),
-        "at_highest": _value(mode.ends[1], "Hz"),
+        "at_pose": quantity(mode.frequency, "Hz"),
+        "at_lowest": quantity(mode.ends[0], "Hz"),
+        "at_highest": quantity(mode.ends[1], "Hz"),
         "change": mode.change,
         "MAC": mode.mac,
         "moving": mode.moving,

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from feedsim.analysis import Figure, PositioningTask, tasks
+from feedsim.cosim import Run
 from feedsim.report.content import Report, Section, Table, Tile, tile_value
 from feedsim.report.formatting import duration, number, typeset
 from feedsim.report.partial import PARTIAL, Partial
@@ -16,7 +17,7 @@ from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.pose import pose_section
-from feedsim.report.run.summary import HEADER, Run, is_leading, log_text, real_time_factor, summary
+from feedsim.report.run.summary import HEADER, is_leading, log_text, real_time_factor, summary
 from feedsim.report.sections import (
     archives_table,
     figures_footer,

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
-from feedsim.analysis import Figure, Result
-from feedsim.cosim import PoseUse
+from feedsim.analysis import Figure
+from feedsim.cosim import Run
 from feedsim.report.formatting import duration
 from feedsim.report.provenance import input_files, software
 from feedsim.report.run.pose import pose_part
-from feedsim.report.summary import figures_part, inputs_part, machine_part
+from feedsim.report.summary import figures_part, inputs_part, machine_part, quantity
 from feedsim.scenario import Level, Logging
 from feedsim.trace import Trace
 from feedsim.units import show
@@ -21,23 +21,6 @@ COUPLING = {
     "residual_peak": "largest magnitude of the interface energy residual during the run",
     "friction_work": "work of the friction torque, to hold the residual against",
 }
-
-
-class Run(Result, Protocol):
-    """What a report needs of a run (feedsim.cosim.Run is one)."""
-
-    @property
-    def coupling(self) -> Mapping[str, float]: ...
-    @property
-    def wall_time(self) -> float: ...
-    @property
-    def units(self) -> Mapping[str, Mapping[str, str]]: ...
-    @property
-    def pose(self) -> PoseUse | None: ...
-    @property
-    def log(self) -> Trace | None: ...
-    @property
-    def warnings(self) -> tuple[str, ...]: ...
 
 
 def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> dict[str, Any]:
@@ -53,15 +36,15 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
             "note": scenario.note,
             "set": list(scenario.settings),
             "overrides": list(scenario.overrides),
-            "duration": {"value": run.program.duration, "unit": "s"},
+            "duration": quantity(run.program.duration, "s"),
             "coupling": {"scheme": scenario.coupling.scheme, "substeps": scenario.coupling.substeps},
-            "recording_interval": {"value": scenario.recording.interval, "unit": "s"},
+            "recording_interval": quantity(scenario.recording.interval, "s"),
             "logging": logging_part(scenario.logging, run.log),
             "motions": [
                 {
                     "description": segment.description,
-                    "start": {"value": segment.start, "unit": "s"},
-                    "end": {"value": segment.end, "unit": "s"},
+                    "start": quantity(segment.start, "s"),
+                    "end": quantity(segment.end, "s"),
                 }
                 for segment in run.program.segments
             ],
@@ -76,8 +59,8 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
         },
         "software": software(),
         "performance": {
-            "wall_time": {"value": run.wall_time, "unit": "s"},
-            "real_time_factor": {"value": real_time_factor(run), "unit": "1"},
+            "wall_time": quantity(run.wall_time, "s"),
+            "real_time_factor": quantity(real_time_factor(run), "1"),
         },
         "files": list(files),
     }
@@ -112,7 +95,7 @@ def logging_part(logging: Logging | None, log: Trace | None) -> dict[str, Any] |
     if logging is None:
         return None
     return {
-        "interval": {"value": logging.interval, "unit": "s"},
+        "interval": quantity(logging.interval, "s"),
         "columns": list(log) if log is not None else [],
         "noise": {
             signal: {"value": level.value, "unit": "of the RMS" if level.relative else _unit(signal, log)}
@@ -121,7 +104,7 @@ def logging_part(logging: Logging | None, log: Trace | None) -> dict[str, Any] |
         "quantisation": {
             signal: {"value": step, "unit": _unit(signal, log)} for signal, step in logging.quantisation.given().items()
         },
-        "delay": {signal: {"value": delay, "unit": "s"} for signal, delay in logging.delay.given().items()},
+        "delay": {signal: quantity(delay, "s") for signal, delay in logging.delay.given().items()},
         "seed": logging.seed,
     }
 

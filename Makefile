@@ -146,7 +146,7 @@ $(SANITIZED)/%.fmu: fmus/%.fmu
 $(SANITIZED)/$(EXCHANGE): fmus/$(EXCHANGE)
 	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) src/exchange/build.py --out $(@D)
 
-test-sanitize-scenario: $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu) $(SANITIZED)/$(EXCHANGE)) ## a scenario on units with sanitisers
+test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu) $(SANITIZED)/$(EXCHANGE)) ## a scenario on units with sanitisers
 	@if [ -z "$(ASAN_RUNTIME)" ]; then echo "the compiler has no AddressSanitizer runtime: scenario under sanitisers left out"; else \
 	    LD_PRELOAD=$(ASAN_RUNTIME) ASAN_OPTIONS=detect_leaks=0 FEEDSIM_FMUS=$(SANITIZED) \
 	    $(PY) -c 'import feedsim, sys; result = feedsim.run(feedsim.load_scenario(sys.argv[1])); print(sys.argv[1], "under sanitisers: clean,", len(result.trace), "rows")' \
@@ -159,7 +159,7 @@ test-python: fmus $(VENV)/.importers
 test-processors: fmus $(VENV)/.dev ## references, physics, identification as other processors round (ARGS=--all: all of them)
 	$(PY) tests/processors/run.py $(ARGS)
 
-test-platforms: $(ALL_FMUS) $(VENV)/.dev ## the FMUs of all platforms: Windows under Wine, ARM under qemu, files for macOS
+test-platforms: $(ALL_FMUS) $(VARIABLES) $(VENV)/.dev ## the FMUs of all platforms: Windows under Wine, ARM under qemu, files for macOS
 	ZIG='$(ZIG)' FEEDSIM_PLATFORM_FMUS=$(BUILD)/fmus-all $(PY) -m pytest -s tests/platforms
 
 # Other people's simulators and validators. What cannot be installed is skipped; the summary at the end says what and why.

@@ -69,7 +69,7 @@ def validate(options: Namespace) -> None:
     """feedsim validate."""
     from feedsim import analysis, cosim
     from feedsim.cli import sweep
-    from feedsim.files.kind import is_study
+    from feedsim.files.source import is_study
 
     if is_study(options.scenario):
         sweep.validate(options)
@@ -84,7 +84,7 @@ def validate(options: Namespace) -> None:
 def write_ssp(options: Namespace) -> None:
     """feedsim ssp."""
     from feedsim import scenario, ssp
-    from feedsim.files.kind import is_ssp
+    from feedsim.files.source import is_ssp
 
     if not is_ssp(options.out):
         raise InputError(f"--out {options.out}: an SSP file ends in .ssp; simulators tell it by that")
@@ -110,7 +110,7 @@ def _subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | Non
     Scenario, program, folder of archives, and what makes a run's warnings all that is to be said.
     """
     from feedsim import nc, scenario
-    from feedsim.files.kind import is_ssp, is_study
+    from feedsim.files.source import is_ssp, is_study
 
     if not is_ssp(options.scenario):
         if is_study(options.scenario):

@@ -29,7 +29,7 @@ from feedsim.motions.kind import Peaks
 from feedsim.motions.profile import speed_change
 from feedsim.nc import Program
 from feedsim.nc.excitation import Excitation
-from feedsim.nc.limits import violations
+from feedsim.nc.program import violations
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
 from feedsim.trace import Trace

@@ -291,3 +291,17 @@ def _control_character(error: yaml.YAMLError, text: str) -> str:
         line = text.count("\n", 0, error.position) + 1
         return f"line {line} holds the control character U+{ord(text[error.position]):04X}"
     return str(error)
+
+
+def is_ssp(path: Path) -> bool:
+    """Whether a file is meant as an SSP, by its name."""
+    return path.suffix.lower() == ".ssp"
+
+
+def is_study(path: Path) -> bool:
+    """Whether a file that can be read is a study, by its keys."""
+    try:
+        data = read(path).data
+    except InputError:
+        return False
+    return isinstance(data, dict) and "sampling" in data and "parameters" in data and "machine" not in data

@@ -125,11 +125,7 @@ def faded_sine(move: SineMove, fade: float, time: Array) -> tuple[Array, Array, 
 def _window(s: Array) -> tuple[Array, Array, Array]:
     """The rise from 0 to 1 over s = 0 to 1, and its first and second derivative."""
     s = np.clip(s, 0.0, 1.0)
-    return (
-        s**3 * (10 + s * (6 * s - 15)),
-        30 * s**2 * (1 - s) ** 2,
-        60 * s * (1 - s) * (1 - 2 * s),
-    )
+    return s**3 * (10 + s * (6 * s - 15)), 30 * s**2 * (1 - s) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
 
 
 def _peaks(move: SineMove, fade: float) -> tuple[float, float]:
@@ -138,10 +134,7 @@ def _peaks(move: SineMove, fade: float) -> tuple[float, float]:
     t = np.linspace(0, periods / move.frequency, math.ceil(periods * LOOKED_AT) + 1)
     _, v, a = faded_sine(move, fade, t)
     omega = 2 * math.pi * move.frequency
-    return (
-        max(move.amplitude * omega, float(np.abs(v).max())),
-        max(move.amplitude * omega**2, float(np.abs(a).max())),
-    )
+    return max(move.amplitude * omega, float(np.abs(v).max())), max(move.amplitude * omega**2, float(np.abs(a).max()))
 
 
 @dataclass(frozen=True)

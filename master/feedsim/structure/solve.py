@@ -10,24 +10,16 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from feedsim.errors import InputError
 from feedsim.scenario.structure import Damping
 from feedsim.structure.assembly import Assembly, Floats
-from feedsim.structure.eigenpairs import Eigenpairs, dense, error_bounds, lanczos
+from feedsim.structure.eigenpairs import MASSLESS, Eigenpairs, dense, error_bounds, lanczos
 from feedsim.structure.modes import TOOL_PORTS, Modes
 from feedsim.structure.moving import Motion, what_moves
-from feedsim.structure.residual import pseudo_modes
-from feedsim.structure.rigid import (
-    check_count,
-    cleaned,
-    definite_basis,
-    definite_signs,
-    rigid_count,
-    rotor_rows,
-)
+from feedsim.structure.rigid import check_count, cleaned, definite_basis, definite_signs, rigid_count, rotor_rows
 
 # Full matrices up to here: 800 degrees of freedom take a second. Beyond, the sparse way is faster by far.
 DENSE = 800
@@ -40,6 +32,11 @@ USUAL = 2 * math.pi * 1000
 # Eigenvalues closer than this, relative, are one multiple eigenvalue: rounding would choose the shapes.
 EQUAL = 1e-9
 CG_TOLERANCE = 1e-10
+# The iteration for pseudo-modes shrinks its error by shift/(lambda + shift) < 1/101 a step for every dropped mode.
+CORRECTION_STEPS = 8
+# Directions that hold less than this part of the residual energy of a port are combinations of the others. They
+# could change its static compliance by that part at most.
+DEPENDENT = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +93,7 @@ def solve(
     Rigid modes have frequency and damping exactly 0 and no strain but rounding; their basis is the one in which the
     first axis's rotor turns in the first mode only, the second's in the first two, and so on.
 
-    Static correction appends pseudo-modes (feedsim.structure.residual) for the torques and tool forces: displacements
+    Static correction appends pseudo-modes (:func:`pseudo_modes`) for the torques and tool forces: displacements
     under them are then exact at rest, and better towards the cut-off. They take part in J_inf like modes: it falls
     towards the full model's, and with it the coupling limit 2 J_inf/h.
 
@@ -229,3 +226,43 @@ def _peak_memory() -> int | None:
         return None
     used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return used if sys.platform == "darwin" else 1024 * used
+
+
+def pseudo_modes(assembly: Assembly, pairs: Eigenpairs, kept: Floats, loads: Floats) -> tuple[Floats, Floats]:
+    """Values (m,) [rad2/s2] and mass-normalised shapes (N, m) of pseudo-modes, m <= number of loads.
+
+    For each load b the residual attachment mode is what the dropped modes do under it at rest,
+    psi = sum over the dropped modes of phi (phi^T b)/lambda (R. R. Craig, A. J. Kurdila, Fundamentals of Structural
+    Dynamics, 2006, sec. 17.3). It is orthogonal to all kept modes in M and K. The eigenproblem in the space of all
+    psi gives pseudo-modes that join the table like modes: with them the static displacement under each of the loads
+    is exact in every degree of freedom. Their frequencies lie above the first dropped mode's and are no frequencies
+    of the machine.
+
+    Args:
+        kept: (N, n) mass-normalised shapes of all kept modes, the rigid ones included.
+        loads: (N, p) port vectors that forces act along.
+    """
+    mass_kept = assembly.mass @ kept
+
+    def dropped_part(shapes: Floats) -> Floats:
+        return np.asarray(shapes - kept @ (mass_kept.T @ shapes))
+
+    target = loads - mass_kept @ (kept.T @ loads)
+    shapes = np.zeros_like(loads)
+    # K alone is singular (rigid modes); K + shift M is factorised already and in the space of the dropped modes near K.
+    for _ in range(CORRECTION_STEPS):
+        shapes = dropped_part(shapes + pairs.factor.solve(target - assembly.stiffness @ shapes))
+    energy = np.einsum("ij,ij->j", shapes, assembly.stiffness @ shapes)
+    # A port that the kept modes describe in full, or to rounding, has nothing to correct.
+    whole = np.einsum("ij,ij->j", loads, pairs.factor.solve(loads))
+    shapes = shapes[:, energy > DEPENDENT * whole] / np.sqrt(energy[energy > DEPENDENT * whole])
+    if not shapes.shape[1]:
+        return np.empty(0), np.empty((len(loads), 0))
+    part, rotation = linalg.eigh(shapes.T @ (assembly.stiffness @ shapes))
+    independent = part > DEPENDENT * part[-1]
+    shapes = dropped_part(shapes @ (rotation[:, independent] / np.sqrt(part[independent])))
+    stiffness, mass = shapes.T @ (assembly.stiffness @ shapes), shapes.T @ (assembly.mass @ shapes)
+    theta, rotation = linalg.eigh(mass, stiffness)
+    heavy = theta > MASSLESS / pairs.shift  # without mass it could not be written as a mode
+    values, shapes = 1 / theta[heavy][::-1], (shapes @ (rotation[:, heavy] / np.sqrt(theta[heavy])))[:, ::-1]
+    return np.asarray(values), np.asarray(shapes)

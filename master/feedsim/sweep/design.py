@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from feedsim.scenario import Change
 from feedsim.scenario.study import Distribution, Parameter, Study
-from feedsim.scenario.study.changes import changes_of
+from feedsim.scenario.study.study import changes_of
 from feedsim.sweep.task import Task
 
 Array = NDArray[np.float64]

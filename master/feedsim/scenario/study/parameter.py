@@ -20,10 +20,9 @@ from feedsim.files.problems import describe, dotted, quantity_of
 from feedsim.files.source import Mark, Place, Source, at
 from feedsim.scenario.base import Base, Change, data_files
 from feedsim.scenario.model import Scenario
-from feedsim.scenario.study.changes import as_text, number_text
 from feedsim.scenario.study.distribution import Numbers, numbers, outside
 from feedsim.scenario.study.file import ParameterEntry
-from feedsim.scenario.study.study import Choice, Distribution, Parameter
+from feedsim.scenario.study.study import Choice, Distribution, Parameter, as_text, number_text
 
 
 @dataclass(frozen=True)

@@ -30,11 +30,7 @@ def check(assembly: Assembly) -> list[str]:
         _refuse(assembly, faults)  # what follows needs each of these
     faults, warnings = _empty(assembly), []
     _refuse(assembly, faults)
-    for more_faults, more_warnings in (
-        mass_faults(assembly),
-        stiffness_faults(assembly),
-        _ports(assembly),
-    ):
+    for more_faults, more_warnings in (mass_faults(assembly), stiffness_faults(assembly), _ports(assembly)):
         faults += more_faults
         warnings += more_warnings
     if not faults:

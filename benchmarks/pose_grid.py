@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from feedsim import cosim, scenario
 from feedsim.cosim.archive import Archive
-from feedsim.cosim.interpreter import Interpreter
-from feedsim.cosim.operations import When, do_step, get_row, set_real, set_slopes
+from feedsim.cosim.operations import Interpreter, When, do_step, get_row, set_real, set_slopes
 from feedsim.cosim.unit import Log, Port, Unit
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.structure.geometry import GeometryStructure

@@ -11,8 +11,7 @@ import pytest
 
 from feedsim import cosim, nc, scenario
 from feedsim.cosim import Run
-from feedsim.cosim.interpreter import Interpreter
-from feedsim.cosim.operations import do_step
+from feedsim.cosim.operations import Interpreter, do_step
 from feedsim.cosim.system import System
 from feedsim.cosim.unpacked import STORE
 from feedsim.errors import InputError, SimulationError

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from feedsim.cosim.archive import Archive
-from feedsim.cosim.interpreter import Interpreter
-from feedsim.cosim.operations import do_step
+from feedsim.cosim.operations import Interpreter, do_step
 from feedsim.cosim.unit import Port, Unit
 from importers.system import Experiment, Result, System
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from feedsim.analysis import linear
 from feedsim.analysis.linear import LinearSystem
 from feedsim.cosim.archive import Archive
-from feedsim.cosim.interpreter import Interpreter
-from feedsim.cosim.operations import do_step, get_real, set_real, set_slopes
+from feedsim.cosim.operations import Interpreter, do_step, get_real, set_real, set_slopes
 from feedsim.cosim.roles import controller_parameters
 from feedsim.cosim.unit import Port, Unit
 from feedsim.scenario import Filter, Machine

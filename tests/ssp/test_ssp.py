@@ -346,8 +346,7 @@ def test_an_experiment_that_starts_late(exported: Path, tmp_path: Path) -> None:
 def test_rows_are_those_that_the_unit_plays(exported: Path, tmp_path: Path) -> None:
     """At instants just ahead of rows, for steps of several lengths: with the unit's own slack."""
     from feedsim.cosim.archive import Archive
-    from feedsim.cosim.interpreter import Interpreter
-    from feedsim.cosim.operations import do_step
+    from feedsim.cosim.operations import Interpreter, do_step
     from feedsim.cosim.unit import Unit
     from feedsim.ssp.setpoints import SETPOINTS_IN_ARCHIVE, read_setpoints
 

@@ -5,8 +5,8 @@ Start with run.py: ``run``; then schedule.py, which says once what a control cyc
 """
 
 from feedsim.cosim.loop import Progress
-from feedsim.cosim.pose import Crossings, PoseUse
 from feedsim.cosim.run import Run, check, fmus_directory, logged, run
 from feedsim.cosim.schedule import SCHEMES, Scheme
+from feedsim.cosim.trust import Crossings, PoseUse
 
 __all__ = ["SCHEMES", "Crossings", "PoseUse", "Progress", "Run", "Scheme", "check", "fmus_directory", "logged", "run"]

@@ -8,7 +8,8 @@ import platform
 import re
 import sys
 import zipfile
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import IO, Any, Self
@@ -21,9 +22,27 @@ from feedsim.cosim.unpacked import STORE, Content, Description, check_there
 from feedsim.errors import InputError
 
 _DESCRIPTION = "modelDescription.xml"
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # units of FMI 2.0
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _SUFFIXES = {"windows": ".dll", "darwin": ".dylib"}  # elsewhere .so
 _FMI_2 = {"windows": "win", "darwin": "darwin", "linux": "linux"}
+
+
+@dataclass(frozen=True)
+class UnitDefinition:
+    """A unit as modelDescription.xml defines it: value in base units = factor * value + offset.
+
+    exponents: base unit -> power, without zeros.
+    """
+
+    exponents: Mapping[str, int]
+    factor: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def text(self) -> str:
+        """The base units as an expression, e.g. "m^2.kg.s^-2"; "1" for none."""
+        return ".".join(f"{name}^{power}" for name, power in self.exponents.items()) or "1"
 
 
 class Archive:
@@ -82,6 +101,15 @@ class Archive:
         """The same, "1" where it declares none."""
         return self.declared_unit(name) or "1"
 
+    @property
+    def unit_definitions(self) -> dict[str, UnitDefinition]:
+        found = {}
+        for each in self.description.unitDefinitions:
+            if each.baseUnit is not None and float(each.baseUnit.factor):
+                exponents = {key: int(getattr(each.baseUnit, key)) for key in BASE if int(getattr(each.baseUnit, key))}
+                found[each.name] = UnitDefinition(exponents, float(each.baseUnit.factor), float(each.baseUnit.offset))
+        return found
+
     def slave(self, name: str) -> FMU2Slave:
         """FMPy's wrapper for an instance `name`, around a library that is loaded once.
 
@@ -104,10 +132,7 @@ class Archive:
         before = Path.cwd()
         try:
             return FMU2Slave(
-                guid=self.guid,
-                unzipDirectory=str(self.directory),
-                modelIdentifier=identifier,
-                libraryPath=str(path),
+                guid=self.guid, unzipDirectory=str(self.directory), modelIdentifier=identifier, libraryPath=str(path)
             )
         except Exception as error:
             os.chdir(before)  # fmpy goes to the library's folder and does not come back when it fails

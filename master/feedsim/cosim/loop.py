@@ -11,8 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from feedsim.cosim.exchange import Exchange, Native
-from feedsim.cosim.interpreter import Interpreter
-from feedsim.cosim.operations import Operation, When, set_real
+from feedsim.cosim.operations import Interpreter, Operation, When, set_real
 from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.system import System
 from feedsim.nc import Program

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.cosim import wiring
-from feedsim.cosim.interpreter import Interpreter
 from feedsim.cosim.loop import REPORTED_EVERY, RING
-from feedsim.cosim.operations import Operation, When, copy, get_row
+from feedsim.cosim.operations import Interpreter, Operation, When, copy, get_row
 from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.signals import held
 from feedsim.cosim.unit import Floats, Log

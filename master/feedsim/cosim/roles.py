@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from feedsim.cosim import unit_definition
+from feedsim import units
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.unit import Alias
 from feedsim.errors import InputError
@@ -142,7 +142,35 @@ def _alias(signal: Signal, is_input: bool, name: str, archive: Archive) -> Alias
     wanted = "Boolean" if signal.unit == BOOLEAN else "Real"
     if variable.type != wanted:
         raise InputError(f"is {variable.type}, {wanted} is needed")
-    return Alias(name, "1") if signal.unit == BOOLEAN else unit_definition.alias(archive, name, signal.unit)
+    return Alias(name, "1") if signal.unit == BOOLEAN else _converted(archive, name, signal.unit)
+
+
+def _converted(archive: Archive, name: str, unit: str) -> Alias:
+    """The variable `name` for a signal in the SI unit `unit`; one without a unit is taken to be in SI.
+
+    Raises:
+        InputError: its unit is of another dimension, or neither the archive defines it nor feedsim knows it.
+    """
+    declared = archive.declared_unit(name)
+    if declared is None:
+        return Alias(name, unit)
+    definition = archive.unit_definitions.get(declared)
+    if definition is None:
+        try:
+            return Alias(name, unit, float(units.factor(declared, unit)))
+        except InputError as error:
+            raise InputError(f"is in {declared}, which modelDescription.xml does not define: {error}") from None
+    wanted = units.unit(unit)
+    try:
+        given = units.unit(definition.text)
+    except InputError:  # base units of which no quantity here is made
+        given = None
+    if given is None or given.dimension != wanted.dimension:
+        what = "" if given is None else f", {units.article(given.kind)}"
+        raise InputError(
+            f"is in {declared} ({definition.text}){what}; {units.article(wanted.kind)} is expected, such as {unit}"
+        )
+    return Alias(name, unit, definition.factor, definition.offset)
 
 
 def start_value(archive: Archive, name: str, given: Parameter, driven: Mapping[str, str]) -> Parameter:
@@ -174,7 +202,7 @@ def _typed(archive: Archive, variable: Any, given: Parameter) -> Parameter:
     if kind == "Real" and not isinstance(given, bool):
         if isinstance(given, str):
             try:
-                return unit_definition.parse(given, archive, variable.name)
+                return _parsed(given, archive, variable.name)
             except InputError as error:
                 raise InputError(f"cannot be that: {error}") from None
         return float(given)
@@ -190,6 +218,19 @@ def _typed(archive: Archive, variable: Any, given: Parameter) -> Parameter:
         return given
     shown = str(given).lower() if isinstance(given, bool) else repr(given)
     raise InputError(f"is {kind}, {shown} is no value of that type")
+
+
+def _parsed(text: str, archive: Archive, name: str) -> float:
+    """A quantity such as "12 ms" in the unit that the variable `name` declares.
+
+    Raises:
+        InputError: no number with a unit, a unit unknown or of another dimension.
+    """
+    declared = archive.declared_unit(name)
+    definition = archive.unit_definitions.get(declared or "")
+    if definition is None:
+        return units.parse(text, declared or units.DIMENSIONLESS)
+    return (units.parse(text, definition.text) - definition.offset) / definition.factor
 
 
 def _limit(variable: Any, end: str) -> float | None:

@@ -13,10 +13,10 @@ from feedsim.cosim.exchange import chosen
 from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
 from feedsim.cosim.loop import Loop, Progress, Setpoints
-from feedsim.cosim.pose import PoseUse, pose_use
 from feedsim.cosim.recording import Recording, Sink, recorded_columns
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
+from feedsim.cosim.trust import PoseUse, pose_use
 from feedsim.errors import InputError
 from feedsim.nc import Program, plan
 from feedsim.scenario import Logging, Scenario

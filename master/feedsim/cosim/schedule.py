@@ -26,10 +26,10 @@ class Scheme:
     """How the units see each other within a step."""
 
     name: str
-    torque_ramp: bool  # plant: M_a runs linearly from M_a(t_k) to M_a(t_k+1); else M_a(t_k) is held
-    friction_ramp: bool  # plant: M_fr is extrapolated with the slope of its last step; else held
     stable_share: float  # of 2 J_inf/h that the friction's slope sigma_1 + sigma_2 may reach; docs/theory.md derives it
     speed: str  # friction: n_fr linear "within" the step, held at its "end" or its "start", or "extrapolated"
+    torque_ramp: bool = True  # plant: M_a runs linearly from M_a(t_k) to M_a(t_k+1); else M_a(t_k) is held
+    friction_ramp: bool = False  # plant: M_fr is extrapolated with the slope of its last step; else held
     passes: int = 1  # plant and friction go back and take the step again, with the slope of M_fr that they have found
     friction_first: bool = False  # friction steps ahead of the plant, which holds the torque found; else the plant does
 
@@ -42,20 +42,13 @@ class Scheme:
 SCHEMES = {
     scheme.name: scheme
     for scheme in (
-        Scheme("extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.25, speed="within"),
-        Scheme("iterated", torque_ramp=True, friction_ramp=True, stable_share=0.5, speed="within", passes=2),
-        Scheme("gauss_seidel", torque_ramp=True, friction_ramp=False, stable_share=0.5, speed="end"),
-        Scheme(
-            "gauss_seidel_friction_first",
-            torque_ramp=True,
-            friction_ramp=False,
-            stable_share=0.5,
-            speed="start",
-            friction_first=True,
-        ),
-        Scheme("jacobi", torque_ramp=True, friction_ramp=False, stable_share=0.25, speed="start"),
-        Scheme("jacobi_extrapolated", torque_ramp=True, friction_ramp=True, stable_share=0.1, speed="extrapolated"),
-        Scheme("parallel", torque_ramp=False, friction_ramp=False, stable_share=0.25, speed="start"),
+        Scheme("extrapolated", friction_ramp=True, stable_share=0.25, speed="within"),
+        Scheme("iterated", friction_ramp=True, stable_share=0.5, speed="within", passes=2),
+        Scheme("gauss_seidel", stable_share=0.5, speed="end"),
+        Scheme("gauss_seidel_friction_first", stable_share=0.5, speed="start", friction_first=True),
+        Scheme("jacobi", stable_share=0.25, speed="start"),
+        Scheme("jacobi_extrapolated", friction_ramp=True, stable_share=0.1, speed="extrapolated"),
+        Scheme("parallel", stable_share=0.25, speed="start", torque_ramp=False),
     )
 }
 

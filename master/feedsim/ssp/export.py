@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from feedsim.cosim import check, fmus_directory, wiring
-from feedsim.cosim.archive import Archive
+from feedsim.cosim.archive import Archive, UnitDefinition
 from feedsim.cosim.roles import RoleUnit, archive_path, filled
 from feedsim.cosim.system import plant_parameters
-from feedsim.cosim.unit_definition import UnitDefinition, unit_definitions
 from feedsim.errors import InputError
 from feedsim.nc import Program, plan
 from feedsim.scenario import Machine, Scenario
@@ -208,5 +207,5 @@ def _parameters(unit: Archive, values: Mapping[str, Value], note: str) -> bytes:
 
 def _definitions(archives: Iterable[Archive], used: Iterable[str]) -> dict[str, UnitDefinition]:
     """Definitions of the units that are used, as the archives have them."""
-    known = {name: each for unit in archives for name, each in unit_definitions(unit).items()}
+    known = {name: each for unit in archives for name, each in unit.unit_definitions.items()}
     return {name: known.get(name, UnitDefinition({})) for name in dict.fromkeys(used)}

@@ -9,7 +9,7 @@ from fractions import Fraction
 from math import inf, isfinite
 
 from feedsim import units
-from feedsim.cosim.unit_definition import UnitDefinition
+from feedsim.cosim.archive import UnitDefinition
 from feedsim.errors import InputError
 from feedsim.ssp import xml
 from feedsim.ssp.xml import append_units, read_units

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from feedsim.cosim import wiring
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.plant import axes_of
-from feedsim.cosim.unit_definition import unit_definitions
 from feedsim.errors import InputError
 from feedsim.scenario.roles import DRIVE, FRICTION, Role
 from feedsim.ssp.system_structure import Component, Link, Structure
@@ -141,7 +140,7 @@ def _drive(
 def _unit(archive: Archive, variable: str) -> tuple[str, Mapping[str, int] | None]:
     """The unit of a variable and its base units, where the archive defines it. Without a unit it is SI."""
     unit = archive.unit_of(variable)
-    definition = unit_definitions(archive).get(unit)
+    definition = archive.unit_definitions.get(unit)
     return unit, None if definition is None else definition.exponents
 
 

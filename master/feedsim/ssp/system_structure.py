@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from feedsim.cosim.unit_definition import UnitDefinition
+from feedsim.cosim.archive import UnitDefinition
 from feedsim.errors import InputError
 from feedsim.ssp import xml
 from feedsim.ssp.parameter_set import ParameterSet, from_element, number

@@ -6,7 +6,6 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 
 from feedsim.cosim.archive import Archive
-from feedsim.cosim.unit_definition import unit_definitions
 from feedsim.errors import InputError
 from feedsim.fields import did_you_mean
 from feedsim.ssp import parameter_set
@@ -28,7 +27,7 @@ class _Said:
         """In the variable's unit."""
         variable = archive.variables[self.name]
         kind = "Integer" if variable.type == "Enumeration" else variable.type
-        definitions = (self.given.units, structure.units, unit_definitions(archive))
+        definitions = (self.given.units, structure.units, archive.unit_definitions)
         return parameter_set.value(self.parameter, kind, archive.unit_of(self.name), definitions)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from math import isfinite
 from xml.etree import ElementTree as ET
 
-from feedsim.cosim.unit_definition import BASE, UnitDefinition
+from feedsim.cosim.archive import BASE, UnitDefinition
 from feedsim.cosim.untrusted import refuse_document_type
 from feedsim.errors import InputError
 

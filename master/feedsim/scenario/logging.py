@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import (
     Field,
@@ -11,6 +12,7 @@ from pydantic import (
     GetJsonSchemaHandler,
     StrictInt,
     ValidationInfo,
+    create_model,
     field_validator,
     model_validator,
 )
@@ -19,6 +21,7 @@ from pydantic_core import core_schema
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, Model, Quantity, Reading, fault, is_multiple
+from feedsim.scenario.roles import DRIVE, FRICTION
 
 Signal = Literal[
     "x_s", "n_ffw", "x_a", "n_a", "M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q",
@@ -80,18 +83,6 @@ class _Level:
         return {"anyOf": [share, absolute]} if self.share else absolute
 
 
-_NOISE = "Standard deviation of white noise: absolute, or a share of the signal's RMS while the axis moves"
-_PLACE = "Standard deviation of white noise"
-_STEP = "Resolution"
-_DELAY = "Delay: what is logged at t is the signal at t less this"
-_Time = Annotated[float, Quantity("s", minimum=0, example="0.5 ms")] | None
-_Metre = Annotated[float, Quantity("m", above=0, example="1 nm")] | None
-_Speed = Annotated[float, Quantity("rad/s", above=0, example="0.001 rad/s")] | None
-_Torque = Annotated[float, Quantity("N.m", above=0, example="0.01 N.m")] | None
-_Ampere = Annotated[float, Quantity("A", above=0, example="1 mA")] | None
-_Volt = Annotated[float, Quantity("V", above=0, example="0.1 V")] | None
-
-
 class _PerSignal(Model):
     """A value for some of the signals that a drive can measure."""
 
@@ -100,61 +91,44 @@ class _PerSignal(Model):
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
 
 
-class Noise(_PerSignal):
-    """White Gaussian noise of each signal."""
-
-    x_s: Annotated[Level, _Level("m", share=False)] | None = Field(default=None, description=_PLACE)
-    n_ffw: Annotated[Level, _Level("rad/s")] | None = Field(default=None, description=_NOISE)
-    x_a: Annotated[Level, _Level("m", share=False)] | None = Field(default=None, description=_PLACE)
-    n_a: Annotated[Level, _Level("rad/s")] | None = Field(default=None, description=_NOISE)
-    M_a: Annotated[Level, _Level("N.m")] | None = Field(default=None, description=_NOISE)
-    x_e: Annotated[Level, _Level("m")] | None = Field(default=None, description=_NOISE)
-    n_s: Annotated[Level, _Level("rad/s")] | None = Field(default=None, description=_NOISE)
-    n_ref: Annotated[Level, _Level("rad/s")] | None = Field(default=None, description=_NOISE)
-    M_s: Annotated[Level, _Level("N.m")] | None = Field(default=None, description=_NOISE)
-    i_d: Annotated[Level, _Level("A")] | None = Field(default=None, description=_NOISE)
-    i_q: Annotated[Level, _Level("A")] | None = Field(default=None, description=_NOISE)
-    u_d: Annotated[Level, _Level("V")] | None = Field(default=None, description=_NOISE)
-    u_q: Annotated[Level, _Level("V")] | None = Field(default=None, description=_NOISE)
-    M_fr: Annotated[Level, _Level("N.m")] | None = Field(default=None, description=_NOISE)
+_MEASURED = (
+    "x_s", "n_ffw", "x_a", "n_a", "M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q", "M_fr",
+)  # fmt: skip
+_RESOLUTIONS = {"m": "1 nm", "rad/s": "0.001 rad/s", "N.m": "0.01 N.m", "A": "1 mA", "V": "0.1 V"}  # examples
 
 
-class Quantisation(_PerSignal):
-    """Step to whose multiples each signal is rounded."""
-
-    x_s: _Metre = Field(default=None, description=_STEP)
-    n_ffw: _Speed = Field(default=None, description=_STEP)
-    x_a: _Metre = Field(default=None, description=_STEP)
-    n_a: _Speed = Field(default=None, description=_STEP)
-    M_a: _Torque = Field(default=None, description=_STEP)
-    x_e: _Metre = Field(default=None, description=_STEP)
-    n_s: _Speed = Field(default=None, description=_STEP)
-    n_ref: _Speed = Field(default=None, description=_STEP)
-    M_s: _Torque = Field(default=None, description=_STEP)
-    i_d: _Ampere = Field(default=None, description=_STEP)
-    i_q: _Ampere = Field(default=None, description=_STEP)
-    u_d: _Volt = Field(default=None, description=_STEP)
-    u_q: _Volt = Field(default=None, description=_STEP)
-    M_fr: _Torque = Field(default=None, description=_STEP)
+def _per_signal(name: str, text: str, value: Callable[[str, str], tuple[Any, str]]) -> Any:
+    """A group with a key per measured signal; `value`: signal and its unit -> what the key takes, its description."""
+    units_of = {name: signal.unit for role in (DRIVE, FRICTION) for name, signal in role.signals.items()}
+    found = {signal: value(signal, units_of[signal]) for signal in _MEASURED}
+    fields: Any = {name: (kind | None, Field(default=None, description=said)) for name, (kind, said) in found.items()}
+    return create_model(name, __base__=_PerSignal, __module__=__name__, __doc__=text, **fields)
 
 
-class Delay(_PerSignal):
-    """Delay of each signal, not necessarily a multiple of any cycle."""
+def _noise(signal: str, unit: str) -> tuple[Any, str]:
+    text = "Standard deviation of white noise"
+    if signal in ("x_s", "x_a"):
+        return Annotated[Level, _Level(unit, share=False)], text
+    return Annotated[Level, _Level(unit)], f"{text}: absolute, or a share of the signal's RMS while the axis moves"
 
-    x_s: _Time = Field(default=None, description=_DELAY)
-    n_ffw: _Time = Field(default=None, description=_DELAY)
-    x_a: _Time = Field(default=None, description=_DELAY)
-    n_a: _Time = Field(default=None, description=_DELAY)
-    M_a: _Time = Field(default=None, description=_DELAY)
-    x_e: _Time = Field(default=None, description=_DELAY)
-    n_s: _Time = Field(default=None, description=_DELAY)
-    n_ref: _Time = Field(default=None, description=_DELAY)
-    M_s: _Time = Field(default=None, description=_DELAY)
-    i_d: _Time = Field(default=None, description=_DELAY)
-    i_q: _Time = Field(default=None, description=_DELAY)
-    u_d: _Time = Field(default=None, description=_DELAY)
-    u_q: _Time = Field(default=None, description=_DELAY)
-    M_fr: _Time = Field(default=None, description=_DELAY)
+
+def _step(signal: str, unit: str) -> tuple[Any, str]:
+    return Annotated[float, Quantity(unit, above=0, example=_RESOLUTIONS[unit])], "Resolution"
+
+
+def _delay(signal: str, unit: str) -> tuple[Any, str]:
+    text = "Delay: what is logged at t is the signal at t less this"
+    return Annotated[float, Quantity("s", minimum=0, example="0.5 ms")], text
+
+
+if TYPE_CHECKING:
+    Noise = _PerSignal
+    Quantisation = _PerSignal
+    Delay = _PerSignal
+else:
+    Noise = _per_signal("Noise", "White Gaussian noise of each signal.", _noise)
+    Quantisation = _per_signal("Quantisation", "Step to whose multiples each signal is rounded.", _step)
+    Delay = _per_signal("Delay", "Delay of each signal, not necessarily a multiple of any cycle.", _delay)
 
 
 class Logging(Model):

@@ -19,8 +19,7 @@ import yaml
 from feedsim.analysis import Figure, compensation
 from feedsim.cli import main
 from feedsim.errors import SimulationError
-from feedsim.report.compensate.report import _um
-from feedsim.report.compensate.summary import table_csv
+from feedsim.report.compensate.report import _um, table_csv
 from feedsim.trace import read_csv
 from report_helpers import Page, contents
 

@@ -22,8 +22,7 @@ from feedsim.analysis.responses import Responses, frequencies, read_overlays
 from feedsim.errors import InputError, OutputError
 from feedsim.report import frf as report
 from feedsim.report.frf import report as report_module
-from feedsim.report.frf.bode_plots import speed_controlled_pictures
-from feedsim.report.frf.plots import curves_of
+from feedsim.report.frf.bode_plots import curves_of, speed_controlled_pictures
 from feedsim.report.frf.report import report_of
 from feedsim.report.page import html
 from feedsim.report.style import Picture

@@ -18,7 +18,7 @@ from feedsim.cosim.feedforward import friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.report import compensate as report
-from feedsim.report.compensate.summary import rows_of
+from feedsim.report.compensate.report import rows_of
 from feedsim.scenario import Axis, Machine, Scenario
 from scenario_helpers import default_machine
 

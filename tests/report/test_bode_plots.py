@@ -15,8 +15,14 @@ from feedsim.analysis.responses import Overlay
 from feedsim.analysis.truncation import deviations, structure_responses
 from feedsim.report.frf import bode_plots, truncation_plots
 from feedsim.report.frf.bode import Column, Curve, Ordinate, at, bode, phases, size
-from feedsim.report.frf.bode_plots import loop_pictures, scale_pictures, speed_reference_pictures
-from feedsim.report.frf.plots import curves_of, most_marked, pictures_of
+from feedsim.report.frf.bode_plots import (
+    curves_of,
+    loop_pictures,
+    most_marked,
+    pictures_of,
+    scale_pictures,
+    speed_reference_pictures,
+)
 from feedsim.report.frf.truncation_plots import truncation_pictures
 from feedsim.report.style import drawing, finish
 from feedsim.structure import Modes, checked_modes

@@ -16,8 +16,7 @@ from feedsim.errors import InputError
 from feedsim.motions import Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.page import html
-from feedsim.report.run.report import report_of
-from feedsim.report.run.summary import summary
+from feedsim.report.run.report import report_of, summary
 from feedsim.scenario import Machine
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.geometry.assemble import assemble

@@ -22,8 +22,7 @@ from feedsim.report.content import Tile
 from feedsim.report.formatting import duration
 from feedsim.report.page import html
 from feedsim.report.provenance import archives, input_files
-from feedsim.report.run.report import report_of, tile
-from feedsim.report.run.summary import HEADER, real_time_factor, summary
+from feedsim.report.run.report import HEADER, real_time_factor, report_of, summary, tile
 from feedsim.report.style import PALETTE
 from feedsim.scenario import load
 from feedsim.trace import Trace, read_csv

@@ -13,8 +13,8 @@ from typing import Any
 from feedsim.errors import OutputError
 from feedsim.report.content import Report
 from feedsim.report.page import html
+from feedsim.report.provenance import to_json
 from feedsim.report.style import Picture
-from feedsim.report.summary import to_json
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
 # What a report of any kind leaves besides report.html and summary.json, which every one replaces; the next one takes

@@ -27,7 +27,7 @@ def build(options: Namespace) -> None:
     """feedsim machine build: write modes.csv and build.json."""
     from feedsim.report import results
     from feedsim.report.machine import record as machine_record
-    from feedsim.report.summary import to_json
+    from feedsim.report.provenance import to_json
     from feedsim.scenario.described import load_described
     from feedsim.structure.modes import write_modes
 
@@ -66,7 +66,7 @@ def _built(found: MachineInfo) -> str:
 def info(options: Namespace) -> None:
     """feedsim machine info: print the figures."""
     from feedsim.report.machine import record as machine_record
-    from feedsim.report.summary import to_json
+    from feedsim.report.provenance import to_json
     from feedsim.scenario.described import load_described
 
     most = _count(options.modes)

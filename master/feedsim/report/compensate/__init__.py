@@ -4,7 +4,6 @@ May use the report's core, the run's report and the analyses.
 Start with report.py.
 """
 
-from feedsim.report.compensate.report import check_writable, write
-from feedsim.report.compensate.summary import summary_line
+from feedsim.report.compensate.report import check_writable, summary_line, write
 
 __all__ = ["check_writable", "summary_line", "write"]

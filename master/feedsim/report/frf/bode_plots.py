@@ -2,6 +2,7 @@
 
 Like Figs. 4 and 5 of Wiesauer, Bleicher, 18th CIRP CMMO (2021): the speed-controlled system n/M and the reference
 frequency response of the speed controller; besides these the loops around them, and what the structure does.
+Start with pictures_of: which quantity is drawn, with which curves.
 """
 
 from __future__ import annotations
@@ -12,7 +13,11 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from feedsim.analysis import linear
+from feedsim.analysis.linear.loops import COMPLIANCE, QUANTITIES
 from feedsim.analysis.linear.margins import Bandwidth, Margins, Pair
+from feedsim.analysis.linear.plant import TOOL_DIRECTIONS
+from feedsim.analysis.responses import Responses
 from feedsim.report.frf.bode import Column, Curve, Ordinate, Panels, at, bode, dot, level, note, phases, size, stretch
 from feedsim.report.labels import keep_inside
 from feedsim.report.style import INK, Picture, drawing, finish
@@ -32,6 +37,9 @@ ALIKE = 1.01  # crossings closer than this ratio are one
 KINDS = (
     "Lines: closed form. Points: measured on the units, faded where the coherence is below 0.99. Dashed: laid over. "
 )
+
+MOST_PAIRS = 3  # annotated per axis, besides the first one
+APART = 0.24  # of the logarithm of their frequencies: labels of two resonances do not touch
 
 
 def speed_controlled_pictures(columns: Columns, span: Span) -> list[Picture]:
@@ -243,3 +251,67 @@ def _kinds(part: Columns) -> str:
 
 def _hertz(frequency: float) -> str:
     return f"{frequency:.3g} Hz" if frequency < 100 else f"{frequency:.0f} Hz"
+
+
+def pictures_of(responses: Responses) -> list[Picture]:
+    """All pictures, the paper's Figs. 4 and 5 first."""
+    machine, band, axes = responses.machine, responses.band, responses.axes
+    of_axis = {axis: responses.result.axes[axis] for axis in axes}
+    slow = 0.5 / machine.cycles.T_pos  # the position controller knows no frequencies above
+
+    def columns(quantity: str) -> dict[str, list[Curve]]:
+        return {axis: curves_of(responses, QUANTITIES[quantity][0].format(axis)) for axis in axes}
+
+    def loops(name: str) -> dict[str, list[Curve]]:
+        return {axis: curves_of(responses, f"{axis}.{name}") for axis in axes}
+
+    tool = {direction: curves_of(responses, COMPLIANCE.format(direction)) for direction in TOOL_DIRECTIONS}
+    speed = {axis: result.speed for axis, result in of_axis.items() if result.speed is not None}
+    position = {axis: result.position for axis, result in of_axis.items() if result.position is not None}
+    below = (band[0], min(band[1], slow))
+    return [
+        *speed_controlled_pictures(columns("n_M"), band),
+        *inertia_pictures(
+            columns("n_M"),
+            {axis: result.J_tot for axis, result in of_axis.items()},
+            {axis: most_marked(result.pairs, band) for axis, result in of_axis.items()},
+            band,
+        ),
+        *speed_reference_pictures(columns("n_n"), {axis: loop.bandwidth for axis, loop in speed.items()}, band),
+        *loop_pictures(loops("speed_loop"), {axis: loop.margins for axis, loop in speed.items()}, "speed", None),
+        *position_reference_pictures(columns("x_x"), {axis: loop.bandwidth for axis, loop in position.items()}, below),
+        *loop_pictures(
+            loops("position_loop"), {axis: loop.margins for axis, loop in position.items()}, "position", below
+        ),
+        *scale_pictures(columns("x_M"), band),
+        *compliance_pictures(tool, band),
+    ]
+
+
+def curves_of(responses: Responses, name: str) -> list[Curve]:
+    """The curves of a response: closed form, measured, laid over; empty where there is none."""
+    closed = responses.closed
+    curves = [Curve("closed form", "closed form", closed.frequency, closed[name])] if name in closed else []
+    if responses.campaign is not None and name in responses.campaign.response:
+        measured = responses.campaign.response
+        curves.append(Curve("measured", "measured", measured.frequency, measured[name], measured.coherence.get(name)))
+    for overlay in responses.overlays:
+        if overlay.name == name:
+            found = overlay.response
+            curves.append(Curve("overlaid", overlay.file.name, found.frequency, found[name], found.coherence.get(name)))
+    return curves
+
+
+def most_marked(pairs: Sequence[linear.Pair], band: tuple[float, float]) -> list[linear.Pair]:
+    """The first pair within the band, and the MOST_PAIRS that rise most, each APART from the others."""
+    inside = [pair for pair in pairs if band[0] <= pair.antiresonance.frequency and pair.resonance.frequency <= band[1]]
+
+    def rise(pair: linear.Pair) -> float:
+        return pair.resonance.value - pair.antiresonance.value
+
+    chosen = inside[:1]
+    for pair in sorted(inside[1:], key=rise, reverse=True):
+        peaks = (each.resonance.frequency for each in chosen)
+        if len(chosen) <= MOST_PAIRS and all(abs(math.log(pair.resonance.frequency / f)) > APART for f in peaks):
+            chosen.append(pair)
+    return chosen

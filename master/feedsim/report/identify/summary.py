@@ -32,8 +32,7 @@ from feedsim.report.identify.quantities import (
     shown_unit,
     speeds_of,
 )
-from feedsim.report.provenance import software
-from feedsim.report.summary import finite, inputs_part, machine_part, quantity
+from feedsim.report.provenance import finite, inputs_part, machine_part, quantity, software
 from feedsim.trace.csv import quoted, shortest
 
 FORMAT = 1

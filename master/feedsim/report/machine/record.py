@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.cosim import SCHEMES
-from feedsim.report.provenance import hashed, software
-from feedsim.report.summary import inputs_part, quantity
+from feedsim.report.provenance import hashed, inputs_part, quantity, software
 from feedsim.scenario import Coupling
 from feedsim.structure.info import MachineInfo
 

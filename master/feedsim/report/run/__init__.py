@@ -5,7 +5,6 @@ Start with report.py; pose.py has the plant's pose.
 """
 
 from feedsim.report.provenance import input_paths
-from feedsim.report.run.report import check_writable, growing, write
-from feedsim.report.run.summary import summary_line
+from feedsim.report.run.report import check_writable, growing, summary_line, write
 
 __all__ = ["check_writable", "growing", "input_paths", "summary_line", "write"]

@@ -8,8 +8,8 @@ from typing import Any
 from feedsim.cosim import PoseUse
 from feedsim.report.content import Paragraph, Part, Section, Table
 from feedsim.report.formatting import counted, minus
+from feedsim.report.provenance import quantity
 from feedsim.report.sections import pairs_table
-from feedsim.report.summary import quantity
 from feedsim.structure.pose_change import LOOKED_AT, NEAR, SEEN, AxisChange, Compliance, ModeChange, PoseChange
 
 

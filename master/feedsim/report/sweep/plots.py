@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from feedsim.report.formatting import plain
-from feedsim.report.run.summary import HEADER, is_leading
+from feedsim.report.run.report import HEADER, is_leading
 from feedsim.report.style import BLUE, GRID, VERMILLION, Picture, drawing, finish
 from feedsim.report.sweep.account import NOTHING, Account, Measure, Output, measures
 from feedsim.report.sweep.figure_plots import grid_picture, of_account

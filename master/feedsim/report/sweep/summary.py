@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.report.provenance import InputFile, hashed, software
+from feedsim.report.provenance import InputFile, finite, hashed, inputs_part, software
 from feedsim.report.style import Array
-from feedsim.report.summary import finite, inputs_part
 from feedsim.report.sweep.account import Account
 from feedsim.sweep.sensitivity import CONFIDENCE, Indices, Trends
 

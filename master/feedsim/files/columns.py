@@ -7,7 +7,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, StrictFloat, StrictInt, StrictStr, ValidationInfo, field_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    PrivateAttr,
+    StrictFloat,
+    StrictInt,
+    StrictStr,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic import model_validator as whole
 
 from feedsim import units
@@ -76,6 +85,17 @@ def target_of(role: str, given: units.Unit) -> str:
     )
 
 
+def _checked(unit: str) -> str:
+    try:
+        units.unit(spelled(unit))
+    except InputError as error:
+        raise fault(str(error)) from None
+    return unit
+
+
+UnitText = Annotated[StrictStr, AfterValidator(_checked)]
+
+
 class Factor(Model):
     """What a column is multiplied with: a number with a unit, or a number of the file; in short "35.15 N/V"."""
 
@@ -83,7 +103,7 @@ class Factor(Model):
     variable: StrictStr | None = Field(
         default=None, min_length=1, description="Variable of the file (MAT) that holds the number"
     )
-    unit: StrictStr = Field(default="1", description="Unit of the factor")
+    unit: UnitText = Field(default="1", description="Unit of the factor")
 
     @whole(mode="before")
     @classmethod
@@ -114,11 +134,6 @@ class Factor(Model):
             raise fault(f"{value} is outside the allowed range: any number but 0")
         return value
 
-    @field_validator("unit")
-    @classmethod
-    def _known(cls, unit: str) -> str:
-        return _checked(unit)
-
     model_config = Model.model_config | {"validate_default": True}
 
 
@@ -126,7 +141,7 @@ class Signal(Model):
     """A column of the trace."""
 
     column: StrictStr = Field(min_length=1, description="Name in the header without the unit, or variable of the file")
-    unit: StrictStr | None = Field(
+    unit: UnitText | None = Field(
         default=None, description="Unit of the column, where the header does not tell it; increments for plain counts"
     )
     factor: Factor | None = Field(
@@ -135,11 +150,6 @@ class Signal(Model):
     sign: Literal[1, -1] = Field(
         default=1, description="-1 where the column counts against the positive direction of the axis"
     )
-
-    @field_validator("unit")
-    @classmethod
-    def _known(cls, unit: str | None) -> str | None:
-        return None if unit is None else _checked(unit)
 
 
 class MotionSignal(Signal):
@@ -154,16 +164,11 @@ class Clock(Model):
     """The time: a column, or the interval of a trace without one."""
 
     column: StrictStr | None = Field(default=None, min_length=1, description="Name of the time's column")
-    unit: StrictStr | None = Field(default=None, description="Unit of the column, where the header does not tell it")
+    unit: UnitText | None = Field(default=None, description="Unit of the column, where the header does not tell it")
     factor: Factor | None = Field(default=None, description="What a counter of cycles is multiplied with: 2 ms")
     interval: Annotated[float, Quantity("s", above=0, example="2 ms")] | None = Field(
         default=None, description="Time between rows, where the trace has no column of time"
     )
-
-    @field_validator("unit")
-    @classmethod
-    def _known(cls, unit: str | None) -> str | None:
-        return None if unit is None else _checked(unit)
 
 
 class Delay(Model):
@@ -286,11 +291,3 @@ def _of_signal(role: str, signal: Signal | Clock | None) -> Iterator[tuple[Place
         return
     if getattr(signal, "at", None) == "scale" and target.startswith("rad"):
         yield (role, "at"), "the values are angles, which are the motor's; a scale measures lengths"
-
-
-def _checked(unit: str) -> str:
-    try:
-        units.unit(spelled(unit))
-    except InputError as error:
-        raise fault(str(error)) from None
-    return unit

@@ -7,9 +7,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, StrictBool, StrictStr
+from pydantic import Field, PlainValidator, StrictBool, StrictStr, WithJsonSchema
 from pydantic import model_validator as whole
-from pydantic_core import core_schema
 
 from feedsim import units
 from feedsim.errors import InputError
@@ -20,43 +19,37 @@ Time = Annotated[float, Quantity("s", minimum=0, example="1 ms")]
 EXAMPLE = "2 nm, or 1e-3 for a thousandth of the reference's range"
 
 
-class _Amount:
-    """A number (share of the range), or a number with any unit; becomes (value, unit), unit "" for a share."""
+def _amount(value: Any) -> tuple[float, str]:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise fault(f"{brief(value)} is no tolerance; write for example {EXAMPLE}")
+    if not isinstance(value, str):
+        number, unit = float(value), ""
+    else:
+        match = re.fullmatch(rf"\s*({units.NUMBER})\s*(.*)", value, re.DOTALL)
+        if not match:
+            raise fault(f"{value!r} is no tolerance; write for example {EXAMPLE}")
+        number, unit = float(match[1]), match[2].strip()
+        if unit == "%":
+            number, unit = number / 100, ""
+        try:
+            units.unit(unit or "1")
+        except InputError as error:
+            raise fault(f"{value!r}: {error}") from None
+    if not (isfinite(number) and number >= 0):
+        raise fault(f"{value} is outside the allowed range: 0 or more")
+    return number, unit
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        def validate(value: Any) -> tuple[float, str]:
-            if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-                raise fault(f"{brief(value)} is no tolerance; write for example {EXAMPLE}")
-            if not isinstance(value, str):
-                number, unit = float(value), ""
-            else:
-                match = re.fullmatch(rf"\s*({units.NUMBER})\s*(.*)", value, re.DOTALL)
-                if not match:
-                    raise fault(f"{value!r} is no tolerance; write for example {EXAMPLE}")
-                number, unit = float(match[1]), match[2].strip()
-                if unit == "%":
-                    number, unit = number / 100, ""
-                try:
-                    units.unit(unit or "1")
-                except InputError as error:
-                    raise fault(f"{value!r}: {error}") from None
-            if not (isfinite(number) and number >= 0):
-                raise fault(f"{value} is outside the allowed range: 0 or more")
-            return number, unit
 
-        return core_schema.no_info_plain_validator_function(validate)
-
-    def __get_pydantic_json_schema__(
-        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        text = {"type": "string", "pattern": rf"^\s*{units.NUMBER}", "examples": ["2 nm", "0.1 %"]}
-        return {"anyOf": [{"type": "number", "minimum": 0}, text]}
+# A number (share of the range), or a number with any unit; becomes (value, unit), unit "" for a share.
+_TEXT = {"type": "string", "pattern": rf"^\s*{units.NUMBER}", "examples": ["2 nm", "0.1 %"]}
+_NUMBER = {"type": "number", "minimum": 0}
+Amount = Annotated[tuple[float, str], PlainValidator(_amount), WithJsonSchema({"anyOf": [_NUMBER, _TEXT]})]
 
 
 class VariableTolerance(Model):
     """Tolerance of the variables of a pattern; what is left out is that of an earlier pattern, else of the file."""
 
-    value: Annotated[tuple[float, str], _Amount()] | None = Field(
+    value: Amount | None = Field(
         default=None, description="In value: 2 nm; a bare number is a share of the reference's range"
     )
     time: Time | None = Field(default=None, description="In time: 1 ms")
@@ -82,7 +75,7 @@ class ToleranceFile(Model):
 
     name: StrictStr = Field(default="", description="Name in reports")
     note: StrictStr = Field(default="", description="Why the tolerances are what they are")
-    value: Annotated[tuple[float, str], _Amount()] | None = Field(
+    value: Amount | None = Field(
         default=None, description="In value, of all variables: a share of the reference's range"
     )
     time: Time | None = Field(default=None, description="In time, of all variables")

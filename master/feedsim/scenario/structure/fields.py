@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from functools import partial
 from math import hypot, isfinite
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import core_schema
+from pydantic import PlainValidator, WithJsonSchema
 
 from feedsim.fields import Quantity, brief, fault
 
@@ -25,96 +24,71 @@ Mass = Annotated[float, Quantity("kg", above=0)]
 Inertia = Annotated[float, Quantity("kg.m^2", minimum=0)]
 
 
-@dataclass(frozen=True)
-class _Text:
-    """Text of a pattern; `what` says what it is in messages and editors."""
-
-    pattern: str
-    what: str
-
-    def read(self, value: Any) -> str:
-        if not isinstance(value, str) or not re.fullmatch(self.pattern, value):
-            raise fault(f"{brief(value)} is no {self.what}")
-        return value
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
-
-    def __get_pydantic_json_schema__(
-        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        return {"type": "string", "pattern": f"^(?:{self.pattern})$"}
+def _text(pattern: str, what: str) -> tuple[PlainValidator, WithJsonSchema]:
+    """Text of a pattern; `what` says what it is in messages."""
+    return PlainValidator(partial(_read, pattern, what)), WithJsonSchema(_schema(pattern))
 
 
-@dataclass(frozen=True)
-class _Texts(_Text):
+def _texts(pattern: str, what: str) -> tuple[PlainValidator, WithJsonSchema]:
     """One text of the pattern or a list of them; kept as a tuple."""
 
-    def read_all(self, value: Any) -> tuple[str, ...]:
+    def read(value: Any) -> tuple[str, ...]:
         if isinstance(value, (list, tuple)):
             if not value:
-                raise fault(f"an empty list; a {self.what} is needed")
-            return tuple(self.read(item) for item in value)
-        return (self.read(value),)
+                raise fault(f"an empty list; a {what} is needed")
+            return tuple(_read(pattern, what, item) for item in value)
+        return (_read(pattern, what, value),)
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read_all)
-
-    def __get_pydantic_json_schema__(
-        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        one = super().__get_pydantic_json_schema__(core, handler)
-        return {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
+    one = _schema(pattern)
+    return PlainValidator(read), WithJsonSchema({"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]})
 
 
-class _Direction:
-    """A direction in the machine's frame: X, -X, ... or a list of three numbers; kept as a unit vector."""
+def _read(pattern: str, what: str, value: Any) -> str:
+    if not isinstance(value, str) or not re.fullmatch(pattern, value):
+        raise fault(f"{brief(value)} is no {what}")
+    return value
 
-    def read(self, value: Any) -> tuple[float, float, float]:
-        shown = "a direction is expected: X, Y or Z of the frame, -X, -Y, -Z, or a list of three numbers"
-        if isinstance(value, str):
-            sign, letter = (-1.0, value[1:]) if value.startswith("-") else (1.0, value.removeprefix("+"))
-            if letter not in FRAME:
-                raise fault(f"{brief(value)}; {shown}")
-            x, y, z = (sign * part + 0.0 for part in FRAME[letter])
-            return x, y, z
-        if not isinstance(value, (list, tuple)) or len(value) != 3:
+
+def _schema(pattern: str) -> dict[str, Any]:
+    return {"type": "string", "pattern": f"^(?:{pattern})$"}
+
+
+def _direction(value: Any) -> tuple[float, float, float]:
+    shown = "a direction is expected: X, Y or Z of the frame, -X, -Y, -Z, or a list of three numbers"
+    if isinstance(value, str):
+        sign, letter = (-1.0, value[1:]) if value.startswith("-") else (1.0, value.removeprefix("+"))
+        if letter not in FRAME:
             raise fault(f"{brief(value)}; {shown}")
-        if any(isinstance(part, bool) or not isinstance(part, (int, float)) for part in value):
-            raise fault(f"a direction takes plain numbers, for example [0, 0.6, 0.8]; {shown}")
-        length = hypot(*value)
-        if not isfinite(length) or length < 1e-12:
-            raise fault(f"[{', '.join(str(part) for part in value)}] points nowhere; {shown}")
-        x, y, z = (float(part) / length for part in value)
+        x, y, z = (sign * part + 0.0 for part in FRAME[letter])
         return x, y, z
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
-
-    def __get_pydantic_json_schema__(
-        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        vector = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
-        return {
-            "anyOf": [
-                {"type": "string", "enum": [sign + letter for sign in ("", "-", "+") for letter in FRAME]},
-                vector,
-            ]
-        }
+    if not isinstance(value, (list, tuple)) or len(value) != 3:
+        raise fault(f"{brief(value)}; {shown}")
+    if any(isinstance(part, bool) or not isinstance(part, (int, float)) for part in value):
+        raise fault(f"a direction takes plain numbers, for example [0, 0.6, 0.8]; {shown}")
+    length = hypot(*value)
+    if not isfinite(length) or length < 1e-12:
+        raise fault(f"[{', '.join(str(part) for part in value)}] points nowhere; {shown}")
+    x, y, z = (float(part) / length for part in value)
+    return x, y, z
 
 
-Direction = Annotated[tuple[float, float, float], _Direction()]
-Name = Annotated[str, _Text(NAME, "name: a letter, then letters, digits and _")]
+# A direction in the machine's frame: X, -X, ... or a list of three numbers; kept as a unit vector.
+_LETTERS = {"type": "string", "enum": [sign + letter for sign in ("", "-", "+") for letter in FRAME]}
+_VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+Direction = Annotated[
+    tuple[float, float, float], PlainValidator(_direction), WithJsonSchema({"anyOf": [_LETTERS, _VECTOR]})
+]
+Name = Annotated[str, *_text(NAME, "name: a letter, then letters, digits and _")]
 # Inside a body: one node; a node, a node of a line, some of its nodes, all of them.
-OwnNode = Annotated[str, _Text(NODE, "node of this body, such as top or post.3")]
-Nodes = Annotated[tuple[str, ...], _Texts(NODES, "node of this body, such as top, post.3, post.2..6 or post (all)")]
-NodeList = tuple[Annotated[str, _Text(NODES, "node of this body, such as top, post.3, post.2..6 or post (all)")], ...]
+OwnNode = Annotated[str, *_text(NODE, "node of this body, such as top or post.3")]
+Nodes = Annotated[tuple[str, ...], *_texts(NODES, "node of this body, such as top, post.3, post.2..6 or post (all)")]
+NodeList = tuple[Annotated[str, *_text(NODES, "node of this body, such as top, post.3, post.2..6 or post (all)")], ...]
 # Anywhere: the body first.
-BodyNode = Annotated[str, _Text(rf"{NAME}\.{NODE}", "node, such as column.top or bed.rail.3")]
-Rail = Annotated[str, _Text(rf"{NAME}\.{NAME}", "line of nodes, such as bed.rail")]
+BodyNode = Annotated[str, *_text(rf"{NAME}\.{NODE}", "node, such as column.top or bed.rail.3")]
+Rail = Annotated[str, *_text(rf"{NAME}\.{NAME}", "line of nodes, such as bed.rail")]
 Hold = Annotated[
     tuple[str, ...],
-    _Texts(
+    *_texts(
         rf"{NAME}\.{NODE}|rail {NAME}\.{NAME}",
         "place to hold on to: a node such as column.top or bed.rail.3, a list of nodes, or 'rail bed.rail'",
     ),

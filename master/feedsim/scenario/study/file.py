@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    StrictBool,
-    StrictInt,
-    StrictStr,
-    field_validator,
-)
-from pydantic_core import core_schema
+from pydantic import Field, PlainValidator, StrictBool, StrictInt, StrictStr, WithJsonSchema, field_validator
 
 from feedsim import units
 from feedsim.fields import File, Model, brief, fault
@@ -27,46 +18,28 @@ MOST_RUNS = 1_000_000
 TAKEN = ("run", "status", "message", "warnings", "seconds")
 
 
-class _Written:
-    """A quantity as it is written: a text or a number."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        def validate(value: Any) -> Any:
-            if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-                raise fault(f"{brief(value)} is no number and no quantity")
-            return value
-
-        return core_schema.no_info_plain_validator_function(validate)
-
-    def __get_pydantic_json_schema__(
-        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        text = {"type": "string", "pattern": rf"^\s*{units.NUMBER}", "examples": ["2.5 N.m", "5000 mm/min"]}
-        return {"anyOf": [{"type": "number"}, text]}
+def _written(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise fault(f"{brief(value)} is no number and no quantity")
+    return value
 
 
-class _Keys:
-    """One dotted key or a list of them; becomes a tuple."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        def validate(value: Any) -> tuple[str, ...]:
-            keys = value if isinstance(value, list) else [value]
-            if not keys or not all(isinstance(key, str) and key for key in keys):
-                raise fault(f"{brief(value)}; a dotted key is expected, such as motions.0.feed, or a list of them")
-            if len(set(keys)) < len(keys):
-                raise fault("a key stands twice in the list")
-            return tuple(keys)
-
-        return core_schema.no_info_plain_validator_function(validate)
-
-    def __get_pydantic_json_schema__(
-        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        key = {"type": "string", "minLength": 1, "examples": ["machine.axes.*.friction.F_C"]}
-        return {"anyOf": [key, {"type": "array", "items": key, "minItems": 1, "uniqueItems": True}]}
+def _keys(value: Any) -> tuple[str, ...]:
+    keys = value if isinstance(value, list) else [value]
+    if not keys or not all(isinstance(key, str) and key for key in keys):
+        raise fault(f"{brief(value)}; a dotted key is expected, such as motions.0.feed, or a list of them")
+    if len(set(keys)) < len(keys):
+        raise fault("a key stands twice in the list")
+    return tuple(keys)
 
 
-Written = Annotated[Any, _Written()]
+# A quantity as it is written: a text or a number.
+_TEXT = {"type": "string", "pattern": rf"^\s*{units.NUMBER}", "examples": ["2.5 N.m", "5000 mm/min"]}
+Written = Annotated[Any, PlainValidator(_written), WithJsonSchema({"anyOf": [{"type": "number"}, _TEXT]})]
+# One dotted key or a list of them; becomes a tuple.
+_KEY = {"type": "string", "minLength": 1, "examples": ["machine.axes.*.friction.F_C"]}
+_LIST = {"type": "array", "items": _KEY, "minItems": 1, "uniqueItems": True}
+Keys = Annotated[Any, PlainValidator(_keys), WithJsonSchema({"anyOf": [_KEY, _LIST]})]
 Key = Annotated[StrictStr, Field(min_length=1)]
 
 
@@ -88,7 +61,7 @@ class Sampling(Model):
 class ParameterEntry(Model):
     """One parameter: the key that it sets, and a distribution, a range or a list of values."""
 
-    keys: Annotated[Any, _Keys()] = Field(
+    keys: Keys = Field(
         alias="key",
         description="Dotted key as for --set, of the scenario or its machine (machine. ...); * for all; or a list",
     )

@@ -10,21 +10,6 @@ from feedsim.analysis.figures import Figure, Figures
 from feedsim.analysis.positioning import Approach, deviation, positioning
 
 __all__ = [
-    "Approach",
-    "CircleTask",
-    "Contour",
-    "Figure",
-    "Figures",
-    "Glitch",
-    "PositioningTask",
-    "Result",
-    "Task",
-    "Turn",
-    "check",
-    "circularity",
-    "contour",
-    "deviation",
-    "evaluate",
-    "positioning",
-    "tasks",
-]
+    "Approach", "CircleTask", "Contour", "Figure", "Figures", "Glitch", "PositioningTask", "Result", "Task", "Turn",
+    "check", "circularity", "contour", "deviation", "evaluate", "positioning", "tasks",
+]  # fmt: skip

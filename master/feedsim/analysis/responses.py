@@ -10,21 +10,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.analysis import linear
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.figures import Figure
 from feedsim.analysis.linear.loops import figure_key, response, unit_of
+from feedsim.analysis.linear.plant import Floats
 from feedsim.analysis.truncation import Truncation
 from feedsim.errors import InputError
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
 from feedsim.trace.response import FrequencyResponse
 from feedsim.trace.response_files import read_overlay
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Measured responses are held against the closed form where they are known.
 COHERENT, COMPARED = 0.99, (5.0, 500.0)

@@ -10,19 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.analysis.figures import Figure
 from feedsim.analysis.linear import loops
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, ModalPlant
+from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Floats, ModalPlant
 from feedsim.errors import InputError
 from feedsim.scenario.structure import Structure
 from feedsim.structure import Modes
 from feedsim.structure.build import assemble
 from feedsim.structure.solve import solve
 from feedsim.trace.response import FrequencyResponse
-
-Floats = NDArray[np.float64]
 
 # What lies within this share of the cut-off is the reduced model's own; next to it, the dropped modes show.
 TRUSTED = 0.9

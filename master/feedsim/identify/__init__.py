@@ -12,18 +12,6 @@ from feedsim.identify.result import Estimate, Identification
 from feedsim.identify.stages import Progress, identify
 
 __all__ = [
-    "STAGES",
-    "Asked",
-    "Estimate",
-    "Identification",
-    "Identified",
-    "Options",
-    "Progress",
-    "Provenance",
-    "Record",
-    "Recorded",
-    "identify",
-    "named_apart",
-    "read_records",
-    "read_traces",
-]
+    "STAGES", "Asked", "Estimate", "Identification", "Identified", "Options", "Progress", "Provenance", "Record",
+    "Recorded", "identify", "named_apart", "read_records", "read_traces",
+]  # fmt: skip

@@ -5,9 +5,8 @@ from __future__ import annotations
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from feedsim.identify.record import Array
 
 LAGS_PER_TIME = 5.0  # lags that are summed, in correlation times (Sokal's automatic window)
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from feedsim.errors import InputError
+from feedsim.identify.record import Array
 
-Array = NDArray[np.float64]
 Residuals = Callable[[Mapping[str, float]], Array]
 
 # A direction of the scaled parameters that the residuals answer to this much less than to the strongest one tells

@@ -15,16 +15,13 @@ from itertools import pairwise
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.identify.averages import white
 from feedsim.identify.fit import correlation
 from feedsim.identify.parameters import RIGID, estimate
-from feedsim.identify.record import Record, runs
+from feedsim.identify.record import Array, Record, runs
 from feedsim.identify.result import Correlation, Estimate
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

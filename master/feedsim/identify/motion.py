@@ -14,9 +14,8 @@ from scipy.optimize import least_squares
 from scipy.signal import butter, sosfiltfilt
 
 from feedsim.errors import InputError
-from feedsim.identify.record import Record, runs
+from feedsim.identify.record import Array, Record, runs
 
-Array = NDArray[np.float64]
 Source = Literal["speed", "angle"]
 
 # Longest step of the friction law between samples.

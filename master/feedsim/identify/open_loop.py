@@ -20,19 +20,17 @@ from math import ceil, inf, isfinite, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.errors import InputError, SimulationError
 from feedsim.identify.fit import Fit, Parameter, Residuals, fit
 from feedsim.identify.parameters import FRICTION, level
-from feedsim.identify.record import Record
+from feedsim.identify.record import Array, Record
 from feedsim.identify.result import NORMAL_95, Balance, Drift, Estimate
 from feedsim.identify.torque import RecordTorque, deflection
 
 if TYPE_CHECKING:
     from feedsim.cosim.friction_law import FrictionLaw
 
-Array = NDArray[np.float64]
 
 SHORTEST = 3.0  # [s]: in less the drift of a wrong torque hardly shows beside the error of the first speed
 SLIDING = 20.0  # times the way of pre-sliding (bristles and engaging zone) that a move must be long

@@ -8,7 +8,6 @@ from math import isfinite, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.identify.advice import advice
@@ -27,7 +26,7 @@ from feedsim.identify.identifiability import (
 )
 from feedsim.identify.motion import noise_of
 from feedsim.identify.parameters import KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
-from feedsim.identify.record import Record
+from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
 from feedsim.identify.search import Search, Solution, grid, joined, motion_covariance, sliding, spread
 from feedsim.identify.torque import RecordTorque, deflection, models
@@ -35,7 +34,6 @@ from feedsim.identify.torque import RecordTorque, deflection, models
 if TYPE_CHECKING:
     from feedsim.cosim.friction_law import FrictionLaw
 
-Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 # Of the record's RMS torque: what the model itself is not better than (interpolation between the samples, modes of the

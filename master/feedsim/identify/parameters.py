@@ -12,14 +12,12 @@ from math import inf, isfinite, nan
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim import units, variables
 from feedsim.errors import InputError
+from feedsim.identify.record import Array
 from feedsim.identify.result import Estimate, Status
 from feedsim.scenario import Friction
-
-Array = NDArray[np.float64]
 
 _TABLE = variables.parameters("friction")
 FRICTION = tuple(_TABLE)

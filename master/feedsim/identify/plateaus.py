@@ -8,14 +8,11 @@ from math import ceil, hypot, inf, sqrt
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from feedsim.identify.averages import derivative, mean, resolution, white, window
-from feedsim.identify.record import Record, runs
+from feedsim.identify.record import Array, Record, runs
 from feedsim.identify.result import Plateau
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,8 @@ from math import nan
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from feedsim.identify.record import Array
 
 Status = Literal["estimated", "held", "given", "undetermined"]
 NORMAL_95 = 1.959964  # standard deviations on either side that hold 95 % of a normal distribution

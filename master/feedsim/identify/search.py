@@ -6,13 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.identify.fit import Fit, Parameter, Prior, fit
 from feedsim.identify.parameters import EXCESS, inner, inner_to_outer, reversal_ranges
+from feedsim.identify.record import Array
 from feedsim.identify.torque import START_PRIOR, STARTS, RecordTorque
-
-Array = NDArray[np.float64]
 
 DRAWS = 8  # their mean square is known to within a half, their root to a quarter: an order of magnitude is wanted
 REACH = {"z": 1.0, "c": 0.5}

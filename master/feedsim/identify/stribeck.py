@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from math import nan
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
 from feedsim.errors import InputError
@@ -26,10 +25,9 @@ from feedsim.identify.parameters import (
     plateau_ranges,
     torque,
 )
+from feedsim.identify.record import Array
 from feedsim.identify.result import Correlation, Plateau, Stationary, Status
 from feedsim.identify.stribeck_identifiability import Points
-
-Array = NDArray[np.float64]
 
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.identify.fit import Fit
 from feedsim.identify.parameters import EXCESS, level
+from feedsim.identify.record import Array
 from feedsim.identify.result import Plateau
-
-Array = NDArray[np.float64]
 
 SAME_SPEED = 0.05  # relative difference up to which plateaus count as one speed
 FEW_SPEEDS = 8

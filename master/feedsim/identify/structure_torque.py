@@ -20,10 +20,8 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.identify.motion import motion
-from feedsim.identify.record import Record
+from feedsim.identify.record import Array, Record
 from feedsim.structure import Modes
-
-Array = NDArray[np.float64]
 
 # [Hz] Friction's harmonics above are small, noise of the speed is not; and there the structure has modes enough for
 # the difference to be anything. It fades out over the upper half.

@@ -8,16 +8,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.identify.motion import Motion, Part, motion, noise_of, parts
 from feedsim.identify.parameters import FRICTION
-from feedsim.identify.record import Record
+from feedsim.identify.record import Array, Record
 
 if TYPE_CHECKING:
     from feedsim.cosim.friction_law import FrictionLaw
 
-Array = NDArray[np.float64]
 
 STARTS = ("z", "c")  # state at a record's begin, as shares
 START_PRIOR = {"z": 3**-0.5, "c": 12**-0.5}  # standard deviation of what may lie anywhere within its range

@@ -22,11 +22,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.sweep.design import Array
+
 if TYPE_CHECKING:
     from feedsim.sweep.design import Design
     from feedsim.sweep.table import Table
 
-Array = NDArray[np.float64]
 
 RESAMPLES = 1000
 CONFIDENCE = 0.95

@@ -18,12 +18,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from feedsim.analysis.linear.plant import Complexes, Floats
 from feedsim.scenario import Cycles, Drive, Filter
-
-Complexes = NDArray[np.complex128]
 
 WHOLE = 1e-9  # a delay this close to a whole number of samples is one: quotients of times are off by some 1e-16
 
@@ -147,12 +145,12 @@ class _CurrentLoop:
     Controller, stored for the next cycle:  u = K (i_s - i) + W i - L v n, the EMF term.
     """
 
-    Phi: NDArray[np.float64]  # (2, 2)
-    Gamma: NDArray[np.float64]  # (2, 2) [s]
-    L: NDArray[np.float64]  # (2,) [H]
-    W: NDArray[np.float64]  # (2, 2) decoupling [V/A]
-    v: NDArray[np.float64]  # (2,) current slope per speed [A/rad]
-    per_current: NDArray[np.float64]  # (2,) torque per current [N.m/A]
+    Phi: Floats  # (2, 2)
+    Gamma: Floats  # (2, 2) [s]
+    L: Floats  # (2,) [H]
+    W: Floats  # (2, 2) decoupling [V/A]
+    v: Floats  # (2,) current slope per speed [A/rad]
+    per_current: Floats  # (2,) torque per current [N.m/A]
     K_t: float
     K_p: float
     K_i: float

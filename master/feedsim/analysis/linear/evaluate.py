@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.analysis.figures import Figure
 from feedsim.analysis.linear import loops
@@ -23,12 +22,9 @@ from feedsim.analysis.linear.margins import (
     pairs,
     peak,
 )
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS
+from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
 from feedsim.analysis.linear.stability import unstable_poles
 from feedsim.analysis.linear.system import Closed, LinearSystem
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 LOWEST = 1.0  # [Hz]
 LOW_BAND = 5.0  # [Hz] up to here the axis is its inertia

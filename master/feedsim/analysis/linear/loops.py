@@ -12,15 +12,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS
+from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
 from feedsim.analysis.linear.system import LinearSystem
 from feedsim.analysis.linear.system import unit_of as unit_of_response
 from feedsim.errors import InputError
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 QUANTITIES = {  # of an axis: part of a figure's name -> response, what it is
     "n_M": ("{0}.n_a/{0}.M_a", "n/M"),

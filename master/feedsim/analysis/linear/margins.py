@@ -11,11 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedsim.analysis.linear.plant import Complexes, Floats
 from feedsim.structure import Modes
 
-Floats = NDArray[np.float64]
 Curve = Callable[[Floats], Floats]
 
 STEP_PER_DAMPING = 1 / 3
@@ -116,7 +115,6 @@ def pairs(curve: Curve, frequency: Floats, rise: float) -> list[Pair]:
     return result
 
 
-Complexes = NDArray[np.complex128]
 Gain = Callable[[Floats], Complexes]
 
 THREE_DB = 10 ** (-3 / 20)

@@ -11,14 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedsim.analysis.linear.margins import grid
+from feedsim.analysis.linear.plant import Complexes
 from feedsim.analysis.linear.system import LinearSystem
 from feedsim.errors import InputError
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 GROWTH = 1e-2  # [1/s] what grows more slowly counts as stable: the contour passes integrators at this distance
 TURN = 0.6  # [rad] and

@@ -21,14 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.linear.drive import LinearDrive, OperatingPoint
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Hold, ModalPlant
+from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, Hold, ModalPlant
 from feedsim.errors import InputError
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
 from feedsim.trace.response import FrequencyResponse
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Which loops of an axis are closed: position and speed; speed alone (K_v = k_ffw = 0); none (the torque is an input).
 Closed = Literal["position", "speed", "none"]

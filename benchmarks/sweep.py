@@ -22,8 +22,8 @@ import psutil
 from feedsim.cosim import fmus_directory
 from feedsim.scenario import Base, Change
 from feedsim.sweep.bundle import Bundle, Workplace
+from feedsim.sweep.design import Outcome, Task
 from feedsim.sweep.engine import Engine, open_engine
-from feedsim.sweep.task import Outcome, Task
 
 WORKERS = 2
 MANY = 10_000

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from feedsim.scenario import Change
-from feedsim.sweep.task import Outcome, Task
+from feedsim.sweep.design import Outcome, Task
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from feedsim.sweep.batches import AIM, DEATHS, DEEP, Batch, Batches
-from feedsim.sweep.task import Outcome, Task
+from feedsim.sweep.design import Outcome, Task
 
 
 def outcomes(batch: Batch, seconds: float, count: int | None = None) -> list[Outcome]:

@@ -16,8 +16,8 @@ import pytest
 
 from engine_helpers import Chore, Chores, chore
 from feedsim.errors import InputError
+from feedsim.sweep.design import Outcome
 from feedsim.sweep.engine import Engine, open_engine
-from feedsim.sweep.task import Outcome
 
 ROOT = Path(__file__).resolve().parents[2]
 

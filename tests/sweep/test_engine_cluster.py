@@ -18,8 +18,8 @@ from cluster_helpers import Cluster, scheduler
 from engine_helpers import Chores, chore
 from feedsim.errors import InputError, SimulationError
 from feedsim.sweep import cluster, engine, provenance, worker
+from feedsim.sweep.design import Outcome, Task
 from feedsim.sweep.engine import open_engine
-from feedsim.sweep.task import Outcome, Task
 
 
 @pytest.fixture

@@ -16,8 +16,8 @@ from cluster_helpers import scheduler
 from feedsim import analysis, cosim, units
 from feedsim.scenario import Base, Change, load
 from feedsim.sweep.bundle import Bundle
+from feedsim.sweep.design import Outcome, Task
 from feedsim.sweep.engine import open_engine
-from feedsim.sweep.task import Outcome, Task
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / "scenarios"

@@ -16,8 +16,8 @@ from random import Random
 import pytest
 
 from feedsim.errors import InputError
+from feedsim.sweep.design import Outcome
 from feedsim.sweep.journal import LOCK, NAME, Journal
-from feedsim.sweep.task import Outcome
 
 HEAD = {"study": "S", "fingerprint": "abc", "parts": {"plant.fmu": "1", "parameters": "2"}}
 RUNS = 50

@@ -12,10 +12,9 @@ import pytest
 from feedsim.report.sweep.account import Account, measures
 from feedsim.report.sweep.figure_plots import scatter_picture
 from feedsim.scenario.study import load_study
-from feedsim.sweep.design import design
+from feedsim.sweep.design import Outcome, design
 from feedsim.sweep.failures import LEVEL, end_chance, span_chance
 from feedsim.sweep.table import FAILED, OK, table_of
-from feedsim.sweep.task import Outcome
 
 ROOT = Path(__file__).resolve().parents[2]
 PARAMETERS = """

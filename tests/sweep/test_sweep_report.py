@@ -22,10 +22,9 @@ from feedsim.report.sweep.plots import pictures_of
 from feedsim.report.sweep.report import report_of
 from feedsim.report.sweep.summary import summary
 from feedsim.scenario.study import Study, load_study
-from feedsim.sweep.design import Design, design
+from feedsim.sweep.design import Design, Outcome, design
 from feedsim.sweep.table import Table
 from feedsim.sweep.table import table_of as made
-from feedsim.sweep.task import Outcome
 
 ROOT = Path(__file__).resolve().parents[2]
 

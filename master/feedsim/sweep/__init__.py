@@ -4,8 +4,7 @@ May use analysis and all below it; Dask and pyarrow are its own.
 Start with study.py, which makes the runs of a study.
 """
 
-from feedsim.sweep.design import Design, Matrices, design
+from feedsim.sweep.design import Design, Matrices, Outcome, Task, design
 from feedsim.sweep.table import Table, read_table, write_table
-from feedsim.sweep.task import Outcome, Task
 
 __all__ = ["Design", "Matrices", "Outcome", "Table", "Task", "design", "read_table", "write_table"]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from math import ceil
 
-from feedsim.sweep.task import Outcome, Task
+from feedsim.sweep.design import Outcome, Task
 
 AIM = 0.5  # s of work in a batch: handing one over costs some 10 ms, and as much progress as this may be lost
 LONGEST = 2.0  # a batch that takes so many times longer than meant is handed back unfinished

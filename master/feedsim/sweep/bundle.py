@@ -25,8 +25,8 @@ from feedsim.errors import FeedsimError, InputError
 from feedsim.nc import Program, plan
 from feedsim.scenario import Base, Scenario
 from feedsim.scenario.study import Study
+from feedsim.sweep.design import Outcome, Task
 from feedsim.sweep.provenance import UNITS, read
-from feedsim.sweep.task import Outcome, Task
 
 # Figures come in units for people; tables hold these instead, where the dimension is the same.
 _TABLE_UNITS = ("m", "s")

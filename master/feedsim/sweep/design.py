@@ -1,9 +1,12 @@
-"""The runs of a study: which value every parameter has in every run. The study alone decides that."""
+"""The runs of a study: which value every parameter has in every run, which the study alone decides.
+
+Also a run as it is given to a worker, and what comes back.
+"""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import log1p, sqrt
 from typing import Any
@@ -14,12 +17,43 @@ from numpy.typing import NDArray
 from feedsim.scenario import Change
 from feedsim.scenario.study import Distribution, Parameter, Study
 from feedsim.scenario.study.study import changes_of
-from feedsim.sweep.task import Task
 
 Array = NDArray[np.float64]
 
 # Shares of a distribution are kept off 0 and 1, where unbounded ones have no value.
 LEAST_SHARE = 2.0**-53
+
+
+@dataclass(frozen=True)
+class Task:
+    """A run to be made.
+
+    Attributes:
+        run: its number in the study, from 0.
+        changes: what is set in the study's scenario.
+    """
+
+    run: int
+    changes: tuple[Change, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a run.
+
+    Attributes:
+        run: number of its :class:`Task`.
+        figures: name -> (SI value, unit); NaN where a figure could not be determined. None where the run failed.
+        error: why it failed; None where it did not.
+        seconds: time that it took the worker [s].
+        warnings: what a user should know before believing the figures.
+    """
+
+    run: int
+    figures: Mapping[str, tuple[float, str]] | None
+    error: str | None = None
+    seconds: float = 0.0
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from feedsim.errors import InputError, SimulationError
 from feedsim.sweep import cluster, provenance
 from feedsim.sweep.batches import AIM, LONGEST, Batch, Batches
 from feedsim.sweep.bundle import Bundle, Workplace
-from feedsim.sweep.task import Outcome, Task
+from feedsim.sweep.design import Outcome, Task
 
 LOST = 20.0  # s without the scheduler, after which a study is given up
 ALONE = 60.0  # s without any worker that can take part, likewise

@@ -19,7 +19,7 @@ from typing import IO, Any, Self
 
 from feedsim.cosim.signals import held
 from feedsim.errors import InputError, OutputError
-from feedsim.sweep.task import Outcome
+from feedsim.sweep.design import Outcome
 
 NAME = "runs.jsonl"
 LOCK = "runs.lock"

@@ -18,11 +18,10 @@ from feedsim.errors import FeedsimError, OutputError, SimulationError
 from feedsim.scenario.study import Study
 from feedsim.sweep import provenance
 from feedsim.sweep.bundle import Bundle
-from feedsim.sweep.design import design
+from feedsim.sweep.design import Task, design
 from feedsim.sweep.engine import Engine, open_engine
 from feedsim.sweep.journal import Journal
 from feedsim.sweep.table import RECORD, STEM, Format, Table, chosen, parquet, table_of, write_table
-from feedsim.sweep.task import Task
 from feedsim.trace.files import written_whole
 
 _log = logging.getLogger(__name__)

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError, OutputError
 from feedsim.fields import did_you_mean
 from feedsim.scenario.study import Parameter
-from feedsim.sweep.design import Design
-from feedsim.sweep.task import Outcome
+from feedsim.sweep.design import Design, Outcome
 from feedsim.trace import matches
 from feedsim.trace.files import written_whole
 

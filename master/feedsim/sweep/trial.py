@@ -13,8 +13,7 @@ from feedsim.errors import InputError, SimulationError
 from feedsim.scenario import Scenario
 from feedsim.scenario.study import Study
 from feedsim.sweep.bundle import Bundle
-from feedsim.sweep.design import Design
-from feedsim.sweep.task import Outcome
+from feedsim.sweep.design import Design, Outcome
 
 ENOUGH = 6  # runs that work, the first of which does not count for the time
 TRIES = 16

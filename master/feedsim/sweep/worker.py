@@ -15,7 +15,7 @@ from distributed import WorkerPlugin, get_worker
 from feedsim.cosim.unpacked import STORE
 from feedsim.sweep import provenance
 from feedsim.sweep.bundle import Bundle, Workplace
-from feedsim.sweep.task import Outcome, Task
+from feedsim.sweep.design import Outcome, Task
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,16 @@ from pathlib import Path
 from types import NoneType
 from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    PlainValidator,
+    ValidationInfo,
+    WithJsonSchema,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -185,25 +194,17 @@ def _symbols() -> dict[str, str]:
     return {symbol: units.unit(symbol).dimension for symbol in (*units.SYMBOLS, *units.ALIASES)}
 
 
-class _AxisName:
-    """An axis of the machine."""
+def _axis(value: Any, info: ValidationInfo) -> str:
+    if not isinstance(value, str) or not re.fullmatch(_NAME, value) or value in RESERVED:
+        raise fault(f"{brief(value)} is no axis name: a letter, then letters, digits and _ (not {', '.join(RESERVED)})")
+    if isinstance(info.context, Reading) and info.context.axes is not None and value not in info.context.axes:
+        raise fault(no_axis(value, info.context.axes))
+    return value
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        def validate(value: Any, info: ValidationInfo) -> str:
-            if not isinstance(value, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", value) or value in RESERVED:
-                raise fault(
-                    f"{brief(value)} is no axis name: a letter, then letters, digits and _ (not {', '.join(RESERVED)})"
-                )
-            if isinstance(info.context, Reading) and info.context.axes is not None and value not in info.context.axes:
-                raise fault(no_axis(value, info.context.axes))
-            return value
 
-        return core_schema.with_info_plain_validator_function(validate)
-
-    def __get_pydantic_json_schema__(
-        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        return {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "description": "Axis of the machine."}
+_NAME = "[A-Za-z][A-Za-z0-9_]*"
+_AXIS = {"type": "string", "pattern": f"^{_NAME}$", "description": "Axis of the machine."}
+AxisName = Annotated[str, PlainValidator(_axis), WithJsonSchema(_AXIS)]
 
 
 class ExistingFile:
@@ -228,7 +229,6 @@ class ExistingFile:
         return {"type": "string", "minLength": 1}
 
 
-AxisName = Annotated[str, _AxisName()]
 File = Annotated[Path, ExistingFile()]
 
 

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from feedsim.errors import InputError
 from feedsim.structure.assembly import Assembly
-from feedsim.structure.checks.model import check, frequency_warnings
+from feedsim.structure.model_check import check, frequency_warnings
 
 MASS, STIFFNESS = chain([100.0, 200.0, 300.0], [4e6, 9e6])
 ZEROS = np.zeros(3)

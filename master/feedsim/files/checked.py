@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,6 +17,7 @@ from feedsim.files.problems import describe, explain, in_order, quantity_of
 from feedsim.files.source import Place, Source, at, read
 
 M = TypeVar("M", bound=BaseModel)
+Faults = Iterable[tuple[Place, str]]
 
 
 def read_group(path: Path) -> Source:
@@ -27,10 +29,21 @@ def read_group(path: Path) -> Source:
 
 def read_checked(path: str | Path, model: type[M]) -> M:
     """A file as a model that needs no more than its own checks. InputError lists every problem with file and line."""
-    source = read_group(Path(path))
+    return checked(read_group(Path(path)), model, path)
+
+
+def checked(
+    source: Source, model: type[M], path: str | Path, contradictions: Callable[[M], Faults] = lambda _: ()
+) -> M:
+    """The tree of the file `path` as a model; `contradictions`: place and message of what cannot go together in it.
+
+    InputError lists every problem with file and line.
+    """
     faults: list[str] = []
     fetch(source, model, (), faults)
     found = check(source, model, faults)
+    if found is not None:
+        faults += [describe(source, place, message) for place, message in contradictions(found)]
     if faults or found is None:
         raise InputError.of(str(path), in_order(faults))
     return found

@@ -22,8 +22,7 @@ from pydantic import model_validator as whole
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, Model, Quantity, fault
-from feedsim.files.checked import check, fetch, read_group
-from feedsim.files.problems import describe, in_order
+from feedsim.files.checked import checked, read_group
 from feedsim.files.source import Place
 
 # What drives write that is no unit of its own: a whole unit -> the unit, and what to know about it.
@@ -238,13 +237,7 @@ def load_columns(path: str | Path) -> Columns:
     """Read and check a mapping file. InputError lists every problem with file and line."""
     path = Path(path)
     source = read_group(path)
-    faults: list[str] = []
-    fetch(source, Columns, (), faults)
-    columns = check(source, Columns, faults)
-    if columns is not None:
-        faults += [describe(source, place, message) for place, message in contradictions(columns)]
-    if faults or columns is None:
-        raise InputError.of(str(path), in_order(faults))
+    columns = checked(source, Columns, path, contradictions)
     columns._file = path
     columns._origins = {place: mark.where for place, mark in source.marks.items()}
     return columns

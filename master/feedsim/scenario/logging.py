@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import (
+    AfterValidator,
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     StrictInt,
     ValidationInfo,
     create_model,
-    field_validator,
     model_validator,
 )
 from pydantic_core import core_schema
@@ -34,6 +34,14 @@ def interval_fault(interval: float, control_cycle: float) -> str | None:
     if is_multiple(interval, control_cycle):
         return None
     return f"{interval:.9g} s is no whole multiple of the control cycle, {control_cycle:.9g} s"
+
+
+def on_the_grid(interval: float, info: ValidationInfo) -> float:
+    """A recording interval [s] of a file that is read, checked against its control cycle as far as that is known."""
+    cycle = info.context.control_cycle if isinstance(info.context, Reading) else None
+    if cycle and (message := interval_fault(interval, cycle)):
+        raise fault(message)
+    return interval
 
 
 @dataclass(frozen=True)
@@ -134,7 +142,7 @@ else:
 class Logging(Model):
     """A log as a control records it, log.csv: sampled at instants, delayed, disturbed and rounded, in this order."""
 
-    interval: Annotated[float, Quantity("s", minimum=1e-6, example="2 ms")] = Field(
+    interval: Annotated[float, Quantity("s", minimum=1e-6, example="2 ms"), AfterValidator(on_the_grid)] = Field(
         default=2e-3, description="Time between rows, a whole multiple of the control cycle"
     )
     axes: Annotated[tuple[AxisName, ...], Field(min_length=1)] | None = Field(
@@ -147,14 +155,6 @@ class Logging(Model):
     quantisation: Quantisation = Quantisation()
     delay: Delay = Delay()
     seed: Annotated[StrictInt, Field(ge=0, le=2**63 - 1)] = Field(default=1, description="Of the noise")
-
-    @field_validator("interval")
-    @classmethod
-    def _on_the_grid(cls, interval: float, info: ValidationInfo) -> float:
-        cycle = info.context.control_cycle if isinstance(info.context, Reading) else None
-        if cycle and (message := interval_fault(interval, cycle)):
-            raise fault(message)
-        return interval
 
     @model_validator(mode="after")
     def _once(self) -> Self:

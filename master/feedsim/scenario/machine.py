@@ -18,7 +18,7 @@ from pydantic import (
     ValidationInfo,
     create_model,
     field_validator,
-)  # fmt: skip
+)
 
 from feedsim import variables
 from feedsim.errors import InputError

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, StrictInt, StrictStr, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, StrictInt, StrictStr, ValidationInfo, model_validator
 
 from feedsim.fields import AxisName, Model, Quantity, Reading, fault, no_axis
 from feedsim.files.source import Place
 from feedsim.motions import Circle, MeasuredSetpoints, Motion
-from feedsim.scenario.logging import Logging, interval_fault
+from feedsim.scenario.logging import Logging, interval_fault, on_the_grid
 from feedsim.scenario.machine import Machine
 
 Scheme = Literal[
@@ -34,20 +34,12 @@ class Coupling(Model):
 class Recording(Model):
     """What goes into result.csv."""
 
-    interval: Annotated[float, Quantity("s", minimum=1e-6, example="1 ms")] = Field(
+    interval: Annotated[float, Quantity("s", minimum=1e-6, example="1 ms"), AfterValidator(on_the_grid)] = Field(
         description="Time between rows, a whole multiple of the control cycle (default: the position cycle)"
     )
     variables: Annotated[tuple[Annotated[StrictStr, Field(min_length=1)], ...], Field(min_length=1)] | None = Field(
         default=None, description='Names or patterns such as "Z.*" (default: everything)'
     )
-
-    @field_validator("interval")
-    @classmethod
-    def _on_the_grid(cls, interval: float, info: ValidationInfo) -> float:
-        cycle = info.context.control_cycle if isinstance(info.context, Reading) else None
-        if cycle and (message := interval_fault(interval, cycle)):
-            raise fault(message)
-        return interval
 
 
 MotionIndex = Annotated[StrictInt, Field(ge=0)]

@@ -16,7 +16,7 @@ from pydantic import (
     StrictStr,
     create_model,
     model_validator,
-)  # fmt: skip
+)
 
 from feedsim import variables
 from feedsim.fields import File, Model, brief, fault

@@ -12,9 +12,9 @@ from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.scenario.structure.matrices import FiniteElements
 from feedsim.structure.assembly import SAME_POSITION, Assembly
-from feedsim.structure.checks.model import check, frequency_warnings
 from feedsim.structure.geometry.assemble import assemble as assemble_geometry
 from feedsim.structure.matrices.build import import_model
+from feedsim.structure.model_check import check, frequency_warnings
 from feedsim.structure.solve import Solution, solve
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from feedsim.errors import InputError
 from feedsim.fields import brief, did_you_mean
-from feedsim.files.checked import check, fetch, read_group
-from feedsim.files.problems import describe, in_order
+from feedsim.files.checked import checked, read_group
+from feedsim.files.problems import describe
 from feedsim.files.source import Place
 from feedsim.scenario.structure import Structure
 from feedsim.scenario.structure import checks as structure_checks
@@ -43,11 +43,4 @@ def load_structure(path: str | Path) -> Structure:
         raise InputError(describe(source, ("kind",), f"missing key 'kind'; allowed: {', '.join(KINDS)}"))
     if not isinstance(kind, str) or kind not in KINDS:
         raise InputError(describe(source, ("kind",), f"unknown kind {brief(kind)}{did_you_mean(str(kind), [*KINDS])}"))
-    model, faults = KINDS[kind], list[str]()
-    fetch(source, model, (), faults)
-    structure = check(source, model, faults)
-    if structure is not None:
-        faults += [describe(source, place, message) for place, message in contradictions_of(structure)]
-    if faults or structure is None:
-        raise InputError.of(str(path), in_order(faults))
-    return structure
+    return checked(source, KINDS[kind], path, contradictions_of)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import erfc, inf, log, log1p, sqrt
 
 from feedsim.files.source import Place
-from feedsim.scenario.study.file import Kind
+from feedsim.scenario.study.file import Kind, ParameterEntry
 from feedsim.scenario.study.study import Distribution
 
 # Kind -> what it needs, what it may have.
@@ -24,24 +23,17 @@ FARTHEST = 8.0
 Problem = tuple[Place, str]
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """What an entry gives: the kind, SI values by key, and the kind of study and key that they are for."""
+def numbers(
+    entry: ParameterEntry, values: Mapping[str, float], grid: bool, whole: bool
+) -> tuple[Distribution | None, list[Problem]]:
+    """The distribution, or what is wrong: the key of the entry and a message.
 
-    kind: Kind | None
-    values: Mapping[str, float]
-    count: int | None
-    grid: bool
-    whole: bool
-
-
-def numbers(given: Numbers) -> tuple[Distribution | None, list[Problem]]:
-    """The distribution, or what is wrong: the key of the entry and a message."""
-    values = given.values
-    if given.kind is None and not values:
-        what = "values, or from, to and count" if given.grid else "values, or a distribution, or from and to"
+    values: SI values of the entry's numbers, by key. grid, whole: the kind of study and of key that they are for.
+    """
+    if entry.distribution is None and not values:
+        what = "values, or from, to and count" if grid else "values, or a distribution, or from and to"
         return None, [((), f"nothing is said of its values: {what}")]
-    kind: Kind = given.kind or ("uniform" if not {"mean", "deviation"} & set(values) else "normal")
+    kind: Kind = entry.distribution or ("uniform" if not {"mean", "deviation"} & set(values) else "normal")
     needed, optional = NEEDS[kind]
     problems: list[Problem] = [((), f"{kind}: missing key {key!r}") for key in needed if key not in values]
     problems += [
@@ -49,37 +41,34 @@ def numbers(given: Numbers) -> tuple[Distribution | None, list[Problem]]:
         for key in values
         if key not in needed and key not in optional
     ]
-    problems += [*_for_the_study(given, kind)]
+    problems += [*_for_the_study(kind, entry.count, grid, whole)]
     if problems:
         return None, problems
+    count = entry.count
+    if grid and whole and count is None:
+        count = max(2, round(values["to"] - values["from"]) + 1)
     found = Distribution(
         kind, values.get("from"), values.get("to"), values.get("mean"), values.get("deviation"), values.get("mode"),
-        _count(given),
+        count,
     )  # fmt: skip
     problems = _contradictions(found)
-    if given.whole and not problems:
+    if whole and not problems:
         problems = _not_whole(found)
     return (None, problems) if problems else (found, [])
 
 
-def _for_the_study(given: Numbers, kind: Kind) -> list[Problem]:
-    if given.whole and kind != "uniform":
+def _for_the_study(kind: Kind, count: int | None, grid: bool, whole: bool) -> list[Problem]:
+    if whole and kind != "uniform":
         return [(("distribution",), "of whole numbers only uniform")]
-    if not given.grid:
-        return [(("count",), "only in a grid; elsewhere sampling.runs tells how many")] if given.count else []
+    if not grid:
+        return [(("count",), "only in a grid; elsewhere sampling.runs tells how many")] if count else []
     if kind not in ("uniform", "loguniform"):
         return [(("distribution",), "in a grid: uniform (even steps) or loguniform (even ratios), or values: [...]")]
-    if given.count is None and not given.whole:
+    if count is None and not whole:
         return [((), "missing key 'count': how many values a grid takes from from to to")]
-    if given.count == 1:
+    if count == 1:
         return [(("count",), "1 value between two limits; at least 2, or values: [...]")]
     return []
-
-
-def _count(given: Numbers) -> int | None:
-    if given.grid and given.whole and given.count is None:
-        return max(2, round(given.values["to"] - given.values["from"]) + 1)
-    return given.count
 
 
 def _contradictions(found: Distribution) -> list[Problem]:

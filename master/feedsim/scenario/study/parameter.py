@@ -20,7 +20,7 @@ from feedsim.files.problems import describe, dotted, quantity_of
 from feedsim.files.source import Mark, Place, Source, at
 from feedsim.scenario.base import Base, Change, data_files
 from feedsim.scenario.model import Scenario
-from feedsim.scenario.study.distribution import Numbers, numbers, outside
+from feedsim.scenario.study.distribution import numbers, outside
 from feedsim.scenario.study.file import ParameterEntry
 from feedsim.scenario.study.study import Choice, Distribution, Parameter, as_text, number_text
 
@@ -131,7 +131,7 @@ class Reader:
                     self.faults += error.problems
         if len(values) < sum(value is not None for value in written.values()):
             raise _Told
-        found, problems = numbers(Numbers(entry.distribution, values, entry.count, self.grid, whole))
+        found, problems = numbers(entry, values, self.grid, whole)
         self.faults += [describe(self.source, self._at(name, *key), message) for key, message in problems]
         if found is None:
             raise _Told

@@ -42,14 +42,13 @@ def picture_of(comparison: Comparison, number: int) -> Picture | None:
             axes.set_xlabel("time [s]")
         outside = len(comparison.those("different"))
         shown = f"the {len(variables)} worst of {outside} variables outside" if outside > len(variables) else ""
-        return finish(
-            figure,
-            f"comparison-{number}",
-            f"{comparison.result} against {comparison.reference}",
+        title = f"{comparison.result} against {comparison.reference}"
+        caption = (
             "Left the compared time; right, around the worst instant, what is left of result and band when the "
             "reference is taken off. The band is the tolerance around the reference; where the result leaves it, the "
-            "ground is shaded." + (f" Drawn are {shown}." if shown else ""),
+            "ground is shaded." + (f" Drawn are {shown}." if shown else "")
         )
+        return finish(figure, f"comparison-{number}", title, caption)
 
 
 def _whole(axes: Axes, variable: Variable, curves: Curves) -> None:

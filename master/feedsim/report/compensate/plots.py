@@ -22,18 +22,7 @@ from feedsim.report.run.circle_plots import (
     unrolled_curve,
     unrolled_ground,
 )
-from feedsim.report.style import (
-    BLUE,
-    GREEN,
-    MUTED,
-    ORANGE,
-    VERMILLION,
-    Array,
-    Picture,
-    drawing,
-    finish,
-    thinned,
-)
+from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, VERMILLION, Array, Picture, drawing, finish, thinned
 
 BEFORE: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.3, "label": "without"}
 AFTER: dict[str, Any] = {"color": BLUE, "linewidth": 1.6, "label": "with compensation"}
@@ -64,14 +53,13 @@ def _contour_picture(turn: Turn, before: Contour, after: Contour, plane: str) ->
             polar_curve(polar, measured, ring, rings, **style)
             unrolled_curve(unrolled, measured, **style)
         unrolled_ground(unrolled, turn)
-        return finish(
-            figure,
-            "compensation-contour",
-            f"Circular test in the plane {plane}, without and with friction compensation",
+        title = f"Circular test in the plane {plane}, without and with friction compensation"
+        caption = (
             f"Radius {turn.radius * 1e3:.6g} mm, turn from {turn.begin:.4f} to {turn.end:.4f} s, by the linear scales. "
             f"Radius deviation magnified {gap / ring * 1e6 / (NOMINAL / turn.radius):,.0f} times; rings at "
-            f"±{ring:g} µm about the programmed circle.",
+            f"±{ring:g} µm about the programmed circle."
         )
+        return finish(figure, "compensation-contour", title, caption)
 
 
 def _reversals_picture(turn: Turn, before: Contour, after: Contour, plane: str) -> Picture:
@@ -91,13 +79,12 @@ def _reversals_picture(turn: Turn, before: Contour, after: Contour, plane: str) 
         legend_above(rooms[0, 0])
         rooms[0, 0].set_ylabel("radius deviation [µm]")
         rooms[1, 0].set_ylabel("with compensation [µm]")
-        return finish(
-            figure,
-            "compensation-reversals",
-            f"Circular test in the plane {plane}: the contour around the reversals",
+        title = f"Circular test in the plane {plane}: the contour around the reversals"
+        caption = (
             "Radius deviation by the linear scales within ±45° of every crossing. Below: the compensated contour "
-            "alone, on a scale of its own.",
+            "alone, on a scale of its own."
         )
+        return finish(figure, "compensation-reversals", title, caption)
 
 
 def _torque_picture(compensation: Compensation) -> Picture:
@@ -127,13 +114,12 @@ def _torque_picture(compensation: Compensation) -> Picture:
             legend_above(whole)
             whole.set_ylabel(torque_label(sign))
             whole.margins(x=0.01)
-        return finish(
-            figure,
-            "compensation-torque",
-            "Torque feedforward of the friction compensation",
+        title = "Torque feedforward of the friction compensation"
+        caption = (
             "Feedforward as it is added to the torque setpoint, and the friction torque of the compensated run. The "
-            "feedforward is ahead by the lag of the torque behind its setpoint." + reversed_note(axes_of, signs),
+            "feedforward is ahead by the lag of the torque behind its setpoint." + reversed_note(axes_of, signs)
         )
+        return finish(figure, "compensation-torque", title, caption)
 
 
 def _reversal(time: Array, n: Array) -> float:
@@ -167,14 +153,13 @@ def _errors_picture(compensation: Compensation) -> Picture:
         right.set(xlabel="circular deviation G [µm]")
         heading(right, "Parameters")
         legend_above(right)
-        return finish(
-            figure,
-            "compensation-errors",
-            "What errors of the compensation cost",
+        title = "What errors of the compensation cost"
+        caption = (
             "Circular deviation G of the compensated circle when the delay or a parameter of all axes is wrong. "
             "Dotted: without the error. Without compensation G is "
-            f"{compensation.figures['before.G'].value:.3g} µm.",
+            f"{compensation.figures['before.G'].value:.3g} µm."
         )
+        return finish(figure, "compensation-errors", title, caption)
 
 
 def _by_change(variations: Sequence[Variation], without_error: float) -> tuple[list[float], list[float]]:

@@ -148,20 +148,8 @@ def note(axes: Axes, text: str, *, corner: Literal["lower left", "upper right"] 
     """A few lines in a corner of the panel."""
     x, y, ha, va = (0.02, 0.04, "left", "bottom") if corner == "lower left" else (0.98, 0.96, "right", "top")
     box = plain_box() | {"alpha": 0.85}
-    label = axes.text(
-        x,
-        y,
-        text,
-        transform=axes.transAxes,
-        ha=ha,
-        va=va,
-        fontsize=8.5,
-        color=INK,
-        linespacing=1.35,
-        bbox=box,
-        zorder=8,
-    )
-    keep_inside(label)
+    look: dict[str, Any] = {"fontsize": 8.5, "color": INK, "linespacing": 1.35, "bbox": box, "zorder": 8}
+    keep_inside(axes.text(x, y, text, transform=axes.transAxes, ha=ha, va=va, **look))
 
 
 def level(axes: Axes, value: float, text: str = "") -> None:
@@ -265,12 +253,7 @@ def _visible(phase: Array, magnitude: Array, floor: float | None) -> Array:
     return np.where(np.arange(len(phase)) <= above[-1], phase, np.nan)
 
 
-def _finish_rows(
-    panels: Sequence[Panels],
-    columns: Sequence[Column],
-    ordinate: Ordinate,
-    floor: float | None,
-) -> None:
+def _finish_rows(panels: Sequence[Panels], columns: Sequence[Column], ordinate: Ordinate, floor: float | None) -> None:
     curves = [curve for column in columns for curve in column.curves]
     heights = np.concatenate([ordinate.of(curve.value)[curve.sure] for curve in curves] or [np.zeros(0)])
     heights = heights[np.isfinite(heights) & ((heights > 0) | ordinate.decibel)]

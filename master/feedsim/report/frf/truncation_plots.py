@@ -59,11 +59,8 @@ def truncation_pictures(
         for k in range(0, len(names), MOST_COLUMNS):
             part = names[k : k + MOST_COLUMNS]
             suffix = "" if len(names) <= MOST_COLUMNS else f"-{'-'.join(part)}"
-            pictures.append(
-                _picture(
-                    responses, {name: response.format(name) for name in part}, ordinate, cutoff, stem + suffix, what
-                )
-            )
+            columns = {name: response.format(name) for name in part}
+            pictures.append(_picture(responses, columns, ordinate, cutoff, stem + suffix, what))
     return pictures
 
 
@@ -94,14 +91,12 @@ def _picture(
         _axes(rooms[0, 0], rooms[1, 0], full, ordinate)
         for room in rooms[0]:
             frequency_axis(room)
-        return finish(
-            figure,
-            stem,
-            f"Reduced models against the full finite-element model: {what}",
+        caption = (
             "The structure alone, motors giving torque whatever the speed. Below: deviation of the magnitude from the "
             f"full model; dashed 0.1 dB, dotted the cut-off at {cutoff:g} Hz, above which modes were dropped. "
-            "Dropped modes still yield statically: that is what the static correction returns.",
+            "Dropped modes still yield statically: that is what the static correction returns."
         )
+        return finish(figure, stem, f"Reduced models against the full finite-element model: {what}", caption)
 
 
 def _axes(above: Axes, below: Axes, full: FrequencyResponse, ordinate: Ordinate) -> None:

@@ -10,30 +10,17 @@ import numpy as np
 
 from feedsim.identify import Identified
 from feedsim.identify.result import NORMAL_95, Balance, Correlation, Dynamic, Identification, Stretch
+from feedsim.report import style
 from feedsim.report.formatting import counted
 from feedsim.report.identify.quantities import symbol
 from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_picture
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import (
-    BLUE,
-    GREEN,
-    GRID,
-    INK,
-    MUTED,
-    ORANGE,
-    PURPLE,
-    VERMILLION,
-    Array,
-    Picture,
-    drawing,
-    finish,
-    thinned,
-)
+from feedsim.report.style import Array, Picture, drawing, finish, thinned
 
 MOST_LOOPS = 6
 COLUMNS = 3
 LONG = 2e-3  # [m] of travel from which positions are shown in mm
-COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, MUTED)
+COLOURS = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.MUTED)
 MOST_RECORDS = 3  # in open loop, side by side
 STRONG = 0.9  # correlation that is printed bold
 Over = Literal["speed", "position"]
@@ -68,10 +55,12 @@ def loops_picture(found: Identification, stage: Dynamic, over: Over) -> Picture 
         for k, (room, stretch) in enumerate(zip(rooms, shown, strict=False)):
             scale, unit = _length([stretch], found.I_P)
             abscissa = stretch.speed if over == "speed" else _position(stretch, scale)
-            room.plot(abscissa, stretch.measured, ".", color=BLUE, markersize=2.2, label="measured", rasterized=True)
-            room.plot(abscissa, stretch.model, color=VERMILLION, linewidth=1.0, label="model")
-            room.axhline(0.0, color=MUTED, linewidth=0.8)
-            room.axvline(0.0, color=MUTED, linewidth=0.8)
+            room.plot(
+                abscissa, stretch.measured, ".", color=style.BLUE, markersize=2.2, label="measured", rasterized=True
+            )
+            room.plot(abscissa, stretch.model, color=style.VERMILLION, linewidth=1.0, label="model")
+            room.axhline(0.0, color=style.MUTED, linewidth=0.8)
+            room.axvline(0.0, color=style.MUTED, linewidth=0.8)
             heading(room, describe(stretch, found.I_P))
             room.set_xlabel("motor speed [rad/s]" if over == "speed" else f"position [{unit}]")
             if k % columns == 0:
@@ -107,16 +96,16 @@ def residuals_picture(found: Identification, stage: Dynamic) -> Picture | None:
             ends = [begin, begin + stretch.time[-1] - stretch.time[0]]
             for sign in (1, -1):
                 level = sign * NORMAL_95 * stretch.weight
-                time.plot(ends, [level, level], color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
+                time.plot(ends, [level, level], color=style.MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
             dots: dict[str, Any] = {"color": colour, "markersize": 2.0, "rasterized": True}
             speed.plot(stretch.speed, left, ".", **dots)
             position.plot(_position(stretch, scale), left, ".", **dots)
             begin = ends[1]
             borders.append(begin)
         for border in borders[:-1]:
-            time.axvline(border, color=MUTED, linewidth=0.6)
+            time.axvline(border, color=style.MUTED, linewidth=0.6)
         for room in (time, speed, position):
-            room.axhline(0.0, color=MUTED, linewidth=0.8)
+            room.axhline(0.0, color=style.MUTED, linewidth=0.8)
             room.set_ylabel("residual [N·m]")
         time.margins(x=0.01)
         heading(time, f"Axis {found.axis}: measured less model, {stage.rms:.2g} N·m rms")
@@ -146,13 +135,13 @@ def open_loop_picture(found: Identification, balance: Balance) -> Picture | None
         for k, drift in enumerate(drifts):
             position, error = rooms[:, k]
             time, angle, first, last = thinned(drift.time, drift.angle, drift.before, drift.after)
-            position.plot(time, mm * angle, color=INK, linewidth=1.6, label="recorded")
-            position.plot(time, mm * (angle - first), color=BLUE, linewidth=1.0, label="open loop, before")
-            dashed = {"color": VERMILLION, "linewidth": 1.1, "linestyle": (0, (4, 2))}
+            position.plot(time, mm * angle, color=style.INK, linewidth=1.6, label="recorded")
+            position.plot(time, mm * (angle - first), color=style.BLUE, linewidth=1.0, label="open loop, before")
+            dashed = {"color": style.VERMILLION, "linewidth": 1.1, "linestyle": (0, (4, 2))}
             position.plot(time, mm * (angle - last), label=f"open loop, {after}", **dashed)
-            error.plot(time, mm * first, color=BLUE, linewidth=1.0, label="before")
-            error.plot(time, mm * last, color=VERMILLION, linewidth=1.1, label=after)
-            error.axhline(0.0, color=MUTED, linewidth=0.8)
+            error.plot(time, mm * first, color=style.BLUE, linewidth=1.0, label="before")
+            error.plot(time, mm * last, color=style.VERMILLION, linewidth=1.1, label=after)
+            error.axhline(0.0, color=style.MUTED, linewidth=0.8)
             heading(position, drift.record)
             legend_above(position)
             legend_above(error)
@@ -189,15 +178,19 @@ def correlation_picture(axis: str, correlation: Correlation) -> Picture | None:
                 value = float(correlation.matrix[i, j])
                 if not math.isfinite(value):
                     continue
-                colour, depth = (MUTED, 0.25) if i == j else (BLUE if value > 0 else VERMILLION, 0.75 * abs(value))
+                colour, depth = (
+                    (style.MUTED, 0.25)
+                    if i == j
+                    else (style.BLUE if value > 0 else style.VERMILLION, 0.75 * abs(value))
+                )
                 room.add_patch(Rectangle((j, i), 1, 1, facecolor=colour, alpha=depth, linewidth=0))
                 if i != j:
                     text = f"{value:.2f}".replace("-", "−").replace("0.", ".")
                     weight = "bold" if abs(value) >= STRONG else "normal"
                     room.text(j + 0.5, i + 0.5, text, ha="center", va="center", fontsize=8.5, fontweight=weight)
         for k in range(size + 1):
-            room.axhline(k, color=GRID, linewidth=0.6)
-            room.axvline(k, color=GRID, linewidth=0.6)
+            room.axhline(k, color=style.GRID, linewidth=0.6)
+            room.axvline(k, color=style.GRID, linewidth=0.6)
         ticks = [k + 0.5 for k in range(size)]
         labels = [symbol(name) for name in names]
         room.set_xticks(ticks, labels)

@@ -15,21 +15,8 @@ MM_PER_MIN = 60e3  # per m/s
 LEAST_SPEEDS = 3  # that make a curve
 LONGEST_WORD = 6  # that stands beside a symbol
 _GREEK = (
-    "alpha",
-    "beta",
-    "gamma",
-    "delta",
-    "zeta",
-    "eta",
-    "kappa",
-    "lambda",
-    "mu",
-    "rho",
-    "sigma",
-    "tau",
-    "psi",
-    "omega",
-)
+    "alpha", "beta", "gamma", "delta", "zeta", "eta", "kappa", "lambda", "mu", "rho", "sigma", "tau", "psi", "omega",
+)  # fmt: skip
 SAME_SPEED = 1.05  # ratio up to which two speeds are one: that of a direction and of the other, or of a repetition
 
 

@@ -10,28 +10,17 @@ import numpy as np
 
 from feedsim.identify.parameters import torque as motor_torque
 from feedsim.identify.record import Record
-from feedsim.identify.result import NORMAL_95, Identification, Plateau, Stationary
+from feedsim.identify.result import NORMAL_95, Identification, Stationary
+from feedsim.report import style
 from feedsim.report.formatting import counted
 from feedsim.report.identify.quantities import MM_PER_MIN, curve_error, is_curve, speeds_of
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import (
-    BLUE,
-    GREEN,
-    MUTED,
-    ORANGE,
-    PURPLE,
-    VERMILLION,
-    Array,
-    Picture,
-    drawing,
-    finish,
-    thinned,
-)
+from feedsim.report.style import Array, Picture, drawing, finish, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DIRECTIONS = ((1, BLUE, "^", "positive"), (-1, VERMILLION, "v", "negative"))
+DIRECTIONS = ((1, style.BLUE, "^", "positive"), (-1, style.VERMILLION, "v", "negative"))
 TITLE_PAD, LEGEND_PAD = 58.0, 37.0  # points above the axes, clear of the scale at the top
 FEW_DECADES = 20  # ratio of speeds below which an axis is labelled between the decades too, or is linear
 MOST_RECORDS = 3  # with plateaus, that are shown over time
@@ -49,11 +38,13 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
         main, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [2.6, 1]})
         half = NORMAL_95 * stage.sigma
         if curve:
-            band: dict[str, Any] = {"color": GREEN, "alpha": 0.25, "linewidth": 0}
+            band: dict[str, Any] = {"color": style.GREEN, "alpha": 0.25, "linewidth": 0}
             main.fill_between(stage.speeds, stage.torque - half, stage.torque + half, label="95 % band", **band)
             below.fill_between(stage.speeds, -100 * half / stage.torque, 100 * half / stage.torque, **band)
-        main.plot(stage.speeds, stage.torque, color=GREEN, label="curve" if found.prior else "stage 1 alone", zorder=3)
-        below.axhline(0.0, color=GREEN, linewidth=1.4)
+        main.plot(
+            stage.speeds, stage.torque, color=style.GREEN, label="curve" if found.prior else "stage 1 alone", zorder=3
+        )
+        below.axhline(0.0, color=style.GREEN, linewidth=1.4)
         for sign, colour, marker, word in DIRECTIONS:
             chosen = [p for p in stage.plateaus if p.speed * sign > 0]
             if not chosen:
@@ -61,19 +52,14 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
             speed = np.array([abs(p.speed) for p in chosen])
             friction = np.array([sign * (p.torque - load) for p in chosen])
             spread = NORMAL_95 * np.array([p.sigma for p in chosen])
-            style = {"fmt": marker, "color": colour, "markersize": 5.5, "elinewidth": 0.9, "capsize": 2, "zorder": 4}
-            main.errorbar(
-                speed,
-                friction,
-                spread,
-                label=f"plateaus, {word} direction" if found.prior else f"plateaus, {'+' if sign > 0 else '−'}",
-                **style,
-            )
+            look = {"fmt": marker, "color": colour, "markersize": 5.5, "elinewidth": 0.9, "capsize": 2, "zorder": 4}
+            label = f"plateaus, {word} direction" if found.prior else f"plateaus, {'+' if sign > 0 else '−'}"
+            main.errorbar(speed, friction, spread, label=label, **look)
             expected = _of_direction(values, sign, speed)
             if asymmetry:
                 dashes = {"color": colour, "linewidth": 0.9, "linestyle": (0, (4, 2)), "zorder": 2}
                 main.plot(stage.speeds, _of_direction(values, sign, stage.speeds), **dashes)
-            below.errorbar(speed, 100 * (friction / expected - 1), 100 * spread / expected, **style)
+            below.errorbar(speed, 100 * (friction / expected - 1), 100 * spread / expected, **look)
         if not found.prior:
             _delivered(main, found, stage.speeds)
         main.set_xscale("log")
@@ -86,18 +72,17 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
         _legend(main)
         slide = main.secondary_yaxis("right", functions=(lambda M: M / found.I_P, lambda F: F * found.I_P))
         slide.set_ylabel("at the slide [N]")
+        delivered = (
+            " Identified set: the friction that is delivered, which stage 1 did not enter, with its constant load less "
+            "stage 1's."
+        )
         caption = (
             "Motor torque of every plateau less the constant load, over the amount of its speed; bars: 95 % of the "
             "mean's scatter. Below: deviation from the curve"
             + (" of its direction (dashed), which the direction dependence shifts" if asymmetry else "")
             + (f"; shaded: 95 % band of the curve{alone}" if curve else "")
             + f". Largest deviation of a plateau {100 * stage.worst_curve:.2g} %."
-            + (
-                ""
-                if found.prior
-                else " Identified set: the friction that is delivered, which stage 1 did not enter, with its constant "
-                "load less stage 1's."
-            )
+            + ("" if found.prior else delivered)
         )
         return finish(figure, "stribeck", "Stribeck curve", caption)
 
@@ -122,9 +107,9 @@ def _delivered(axes: Axes, found: Identification, speeds: Array) -> None:
     first = found.stationary.estimates.get("M_0") if found.stationary is not None else None
     more = values["M_0"] - first.value if first is not None else 0.0
     for sign, mark, dashes in ((1, "+", "solid"), (-1, "−", (0, (1.5, 1.5)))):
-        style: dict[str, Any] = {"color": PURPLE, "linewidth": 1.3, "linestyle": dashes, "zorder": 3}
+        look: dict[str, Any] = {"color": style.PURPLE, "linewidth": 1.3, "linestyle": dashes, "zorder": 3}
         shown = _of_direction(values, sign, speeds) + sign * more
-        axes.plot(speeds, shown, label=f"identified set, {mark}", **style)
+        axes.plot(speeds, shown, label=f"identified set, {mark}", **look)
 
 
 def plateaus_picture(found: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:
@@ -142,18 +127,21 @@ def plateaus_picture(found: Identification, stage: Stationary, records: Sequence
             _over_time(speed, record.time, _speed(record) * found.I_P * MM_PER_MIN, "")
             for room in (torque, speed):
                 for p in own:
-                    room.axvspan(p.begin, p.end, color=ORANGE, alpha=0.2, linewidth=0)
-                room.axhline(0.0, color=MUTED, linewidth=0.8)
+                    room.axvspan(p.begin, p.end, color=style.ORANGE, alpha=0.2, linewidth=0)
+                room.axhline(0.0, color=style.MUTED, linewidth=0.8)
                 room.margins(x=0.01)
-            _levels(torque, own)
+            for k, p in enumerate(own):
+                label = "mean of a plateau" if k == 0 else None
+                torque.plot([p.begin, p.end], [p.torque, p.torque], color=style.VERMILLION, linewidth=2.0, label=label)
             heading(torque, f"{record.name}: {counted(len(own), 'plateau')}")
             torque.set_ylabel("torque [N·m]")
             speed.set_ylabel("speed [mm/min]")
-            _decades(speed, _smallest(own, found.I_P))
+            _decades(speed, min(abs(p.speed) for p in own) * found.I_P * MM_PER_MIN)
             speed.set_xlabel("time [s]")
             legend_above(torque)
         left = sum(1 for number in count.values() if number) - len(shown)
-        more = _not_shown(left)
+        fate = "is not shown" if left == 1 else "are not shown"
+        more = f" {counted(left, 'more record')} with plateaus {fate}." if left else ""
         caption = (
             "Shaded: stretches at constant speed whose mean torque (line) counts as friction. Speeds of several "
             f"decades are drawn logarithmically in both directions.{more}"
@@ -161,21 +149,9 @@ def plateaus_picture(found: Identification, stage: Stationary, records: Sequence
         return finish(figure, "plateaus", "Plateaus found in the traces", caption)
 
 
-def _not_shown(left: int) -> str:
-    if left <= 0:
-        return ""
-    return f" {counted(left, 'more record')} with plateaus {'is' if left == 1 else 'are'} not shown."
-
-
-def _levels(axes: Axes, plateaus: Sequence[Plateau]) -> None:
-    for k, p in enumerate(plateaus):
-        label = "mean of a plateau" if k == 0 else None
-        axes.plot([p.begin, p.end], [p.torque, p.torque], color=VERMILLION, linewidth=2.0, label=label)
-
-
 def _over_time(axes: Axes, time: Array, values: Array, label: str) -> None:
     t, y = thinned(time, values)
-    axes.plot(t, y, color=BLUE, linewidth=0.8, label=label)
+    axes.plot(t, y, color=style.BLUE, linewidth=0.8, label=label)
 
 
 def _decades(axes: Axes, smallest: float) -> None:
@@ -190,10 +166,6 @@ def _decades(axes: Axes, smallest: float) -> None:
     axes.set_yticks([*(-v for v in reversed(decades)), 0.0, *decades])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))
     axes.minorticks_off()
-
-
-def _smallest(plateaus: Sequence[Plateau], I_P: float) -> float:
-    return min(abs(p.speed) for p in plateaus) * I_P * MM_PER_MIN
 
 
 def _speed(record: Record) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ from feedsim.report.identify.quantities import (
     speeds_of,
 )
 from feedsim.report.provenance import finite, inputs_part, machine_part, quantity, software
+from feedsim.report.style import Array
 from feedsim.trace.csv import quoted, shortest
 
 FORMAT = 1
@@ -63,8 +64,8 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
                 "sha256": source.sha256,
                 "columns": dict(source.columns),
                 "note": source.note,
-                "pitch": {"value": source.pitch, "unit": "m"},
-                "torque_constant": {"value": source.torque_constant, "unit": "N.m/A"},
+                "pitch": quantity(source.pitch, "m"),
+                "torque_constant": quantity(source.torque_constant, "N.m/A"),
             }
             for name, source in zip(identified.traces, identified.sources, strict=True)
         ],
@@ -100,20 +101,14 @@ def table_lines(identified: Identified) -> list[str]:
     for estimate in found.estimates.values():
         factor, unit = shown_unit(estimate)
         value = f"{value_text(estimate, factor)} {unit}".removesuffix(" 1")
-        rows.append(
-            (estimate.name, value, interval_text(estimate, factor), relative_text(estimate), remark_text(estimate))
-        )
+        texts = (interval_text(estimate, factor), relative_text(estimate), remark_text(estimate))
+        rows.append((estimate.name, value, *texts))
     widths = [max(len(row[i]) for row in rows) for i in range(4)]
     room = max(20, WIDTH - sum(widths) - 10)
     lines = []
     for name, value, interval, relative, note in rows:
         note = textwrap.shorten(note, room, placeholder=" ...")
-        cells = (
-            f"{name:<{widths[0]}}",
-            f"{value:<{widths[1]}}",
-            f"{interval:<{widths[2]}}",
-            f"{relative:>{widths[3]}}",
-        )
+        cells = (name.ljust(widths[0]), value.ljust(widths[1]), interval.ljust(widths[2]), relative.rjust(widths[3]))
         lines.append("  ".join(("", *cells, note)).rstrip())
     return lines
 
@@ -163,10 +158,8 @@ def residuals_csv(found: Identification) -> str:
     assert found.dynamic is not None
     lines = ["stretch,record,time [s],angle [rad],speed [rad/s],measured [N.m],model [N.m],residual [N.m]"]
     for number, stretch in enumerate(found.dynamic.stretches, 1):
-        columns = (stretch.time, stretch.angle, stretch.speed, stretch.measured, stretch.model)
-        texts = [shortest(np.asarray(values)) for values in (*columns, stretch.measured - stretch.model)]
-        head = f"{number},{quoted(stretch.record)}"
-        lines += [f"{head},{','.join(row)}" for row in zip(*texts, strict=True)]
+        torques = (stretch.measured, stretch.model, stretch.measured - stretch.model)
+        lines += _rows(f"{number},{quoted(stretch.record)}", stretch.time, stretch.angle, stretch.speed, *torques)
     return "\n".join(lines) + "\n"
 
 
@@ -174,11 +167,14 @@ def open_loop_csv(balance: Balance) -> str:
     """Recorded angle from the start on, and its error in open loop before and after, record after record."""
     lines = ["record,time [s],angle [rad],error before [rad],error after [rad]"]
     for drift in balance.drifts:
-        columns: Sequence[Any] = (drift.time, drift.angle, drift.before, drift.after)
-        texts = [shortest(np.asarray(values)) for values in columns]
-        head = quoted(drift.record)
-        lines += [f"{head},{','.join(row)}" for row in zip(*texts, strict=True)]
+        lines += _rows(quoted(drift.record), drift.time, drift.angle, drift.before, drift.after)
     return "\n".join(lines) + "\n"
+
+
+def _rows(head: str, *columns: Array) -> Iterator[str]:
+    """Lines of a CSV file: head, and the columns' values."""
+    texts = [shortest(np.asarray(values)) for values in columns]
+    return (f"{head},{','.join(row)}" for row in zip(*texts, strict=True))
 
 
 def _estimate(estimate: Estimate, I_P: float) -> dict[str, Any]:
@@ -266,8 +262,6 @@ def _matrix(matrix: Any) -> list[list[float | None]]:
 
 def rigid_line(identified: Identified) -> str:
     """The simple model in one line; empty where there is none."""
-    parts = []
-    for estimate in identified.found.rigid.values():
-        if estimate.status == "estimated":
-            parts.append(f"{estimate.name} {value_text(estimate)} {estimate.unit}")
+    estimated = [each for each in identified.found.rigid.values() if each.status == "estimated"]
+    parts = [f"{each.name} {value_text(each)} {each.unit}" for each in estimated]
     return f"rigid axis with simple friction: {', '.join(parts)}" if parts else ""

@@ -8,20 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from feedsim.analysis import Approach, Figures, deviation
 from feedsim.analysis.positioning import PLATEAU
+from feedsim.report import style
 from feedsim.report.labels import beside, heading, keep_inside, legend_above, mark_instant, place_beside_level
-from feedsim.report.style import (
-    BLUE,
-    GREEN,
-    INK,
-    MUTED,
-    ORANGE,
-    SETPOINT,
-    VERMILLION,
-    Picture,
-    drawing,
-    finish,
-    thinned,
-)
+from feedsim.report.style import Picture, drawing, finish, thinned
 from feedsim.trace import Trace, release
 
 if TYPE_CHECKING:
@@ -74,15 +63,17 @@ def overview_picture(trace: Trace, axes: Iterable[str], signs: Mapping[str, int]
     with drawing(10.0, 0.5 + 2.7 * len(shown)) as figure:
         rooms = figure.subplots(len(shown), 3, squeeze=False, sharex=True)
         for (position, error, torque), axis in zip(rooms, shown, strict=True):
-            for name, scale, style, label in (
-                ("x_s", 1e3, {"color": SETPOINT, "linestyle": (0, (4, 2))}, "setpoint $x_s$"),
-                ("x_a", 1e3, {"color": BLUE}, "linear scale $x_a$"),
+            for name, scale, look, label in (
+                ("x_s", 1e3, {"color": style.SETPOINT, "linestyle": (0, (4, 2))}, "setpoint $x_s$"),
+                ("x_a", 1e3, {"color": style.BLUE}, "linear scale $x_a$"),
             ):
-                _curve(position, trace, f"{axis}.{name}", scale, label, style)
-            _curve(error, trace, f"{axis}.x_e", 1e6, "", {"color": BLUE})
+                _curve(position, trace, f"{axis}.{name}", scale, label, look)
+            _curve(error, trace, f"{axis}.x_e", 1e6, "", {"color": style.BLUE})
             sign = signs.get(axis, 1)
-            _curve(torque, trace, f"{axis}.M_a", sign, "motor $M_a$", {"color": BLUE})
-            _curve(torque, trace, f"{axis}.M_fr", sign, r"friction $M_{fr}$", {"color": VERMILLION, "linewidth": 1.1})
+            _curve(torque, trace, f"{axis}.M_a", sign, "motor $M_a$", {"color": style.BLUE})
+            _curve(
+                torque, trace, f"{axis}.M_fr", sign, r"friction $M_{fr}$", {"color": style.VERMILLION, "linewidth": 1.1}
+            )
             note = " (sign reversed)" if sign < 0 else ""
             heading(position, f"Axis {axis}: position")
             heading(error, "Following error")
@@ -95,18 +86,15 @@ def overview_picture(trace: Trace, axes: Iterable[str], signs: Mapping[str, int]
                 if not room.lines:
                     room.set_visible(False)
             for room in (error, torque):
-                room.axhline(0.0, color=MUTED, linewidth=0.8)
+                room.axhline(0.0, color=style.MUTED, linewidth=0.8)
             for room in (position, torque):
                 if room.get_visible():
                     legend_above(room)
         for room in rooms[-1]:
             room.set_xlabel("time [s]")
-        return finish(
-            figure,
-            stem,
-            "Overview of the axes that move",
-            "Position, following error (delayed setpoint less measured position) and torque over the whole run.",
-        )
+        title = "Overview of the axes that move"
+        caption = "Position, following error (delayed setpoint less measured position) and torque over the whole run."
+        return finish(figure, stem, title, caption)
 
 
 def _overview(axes: Axes, trace: Trace, approach: Approach) -> None:
@@ -114,9 +102,9 @@ def _overview(axes: Axes, trace: Trace, approach: Approach) -> None:
     part = trace.between(approach.start, approach.until)
     if f"{axis}.x_s" in part.columns:
         t, x = thinned(part.time, part[f"{axis}.x_s"] * 1e3)
-        axes.plot(t, x, color=SETPOINT, linestyle=(0, (4, 2)), linewidth=1.6, label="setpoint $x_s$")
+        axes.plot(t, x, color=style.SETPOINT, linestyle=(0, (4, 2)), linewidth=1.6, label="setpoint $x_s$")
     t, x = thinned(part.time, part[f"{axis}.x_a"] * 1e3)
-    axes.plot(t, x, color=BLUE, label="linear scale $x_a$")
+    axes.plot(t, x, color=style.BLUE, label="linear scale $x_a$")
     heading(axes, f"Position of axis {axis}")
     axes.set(xlabel="time [s]", ylabel="position [mm]")
     axes.margins(x=0.01)
@@ -126,17 +114,17 @@ def _overview(axes: Axes, trace: Trace, approach: Approach) -> None:
 
 def _zoom(axes: Axes, trace: Trace, approach: Approach, figures: Figures, band: float) -> None:
     after_end = 1e3
-    series: list[tuple[str, str, Any, str]] = [(f"{approach.axis}.x_a", BLUE, "-", "linear scale $x_a$")]
+    series: list[tuple[str, str, Any, str]] = [(f"{approach.axis}.x_a", style.BLUE, "-", "linear scale $x_a$")]
     if f"tcp.x_{approach.axis}" in trace.columns:
-        series.insert(0, (f"tcp.x_{approach.axis}", ORANGE, (0, (5, 1.5)), "tool point"))
+        series.insert(0, (f"tcp.x_{approach.axis}", style.ORANGE, (0, (5, 1.5)), "tool point"))
     for name, colour, dashes, label in series:
         time, beyond = deviation(trace, approach, name)
         near = (time >= approach.end - ZOOM_BEFORE) & (time <= approach.end + ZOOM_AFTER)
         t, e = thinned((time[near] - approach.end) * after_end, beyond[near] * 1e6)
         axes.plot(t, e, color=colour, linestyle=dashes, label=label, zorder=3)
-    axes.axhspan(-band * 1e6, band * 1e6, color=GREEN, alpha=0.16, linewidth=0)
-    axes.axhline(0.0, color=MUTED, linewidth=0.9)
-    axes.axvline(0.0, color=MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
+    axes.axhspan(-band * 1e6, band * 1e6, color=style.GREEN, alpha=0.16, linewidth=0)
+    axes.axhline(0.0, color=style.MUTED, linewidth=0.9)
+    axes.axvline(0.0, color=style.MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
 
     overshoot, settled = figures["overshoot"].value, figures["settling_time"].value
     by_tool = figures["tool.overshoot"].value if "tool.overshoot" in figures else 0.0
@@ -147,7 +135,7 @@ def _zoom(axes: Axes, trace: Trace, approach: Approach, figures: Figures, band: 
     time, beyond = deviation(trace, approach, f"{approach.axis}.x_a")
     if overshoot > 0:
         peak = (float(time[beyond.argmax()]) - approach.end) * 1e3
-        axes.plot([peak], [overshoot], "o", color=BLUE, markersize=4.5, zorder=4)
+        axes.plot([peak], [overshoot], "o", color=style.BLUE, markersize=4.5, zorder=4)
         note = axes.annotate(
             f"overshoot {overshoot:.2f} µm", (peak, overshoot), xytext=(10, 5), textcoords="offset points", va="bottom"
         )
@@ -169,32 +157,28 @@ def _settling(axes: Axes, settled: float, band: float, side: float) -> None:
     if 0 < settled <= end:
         right = settled > begin + 0.6 * (end - begin)
         label = axes.annotate(
-            f"last outside {within}:\n{settled:.1f} ms",
-            (settled, side * band),
+            f"last outside {within}:\n{settled:.1f} ms", (settled, side * band),
             xytext=(settled + (-0.03 if right else 0.03) * (end - begin), 0.62 * low),
-            ha="right" if right else "left",
-            va="center",
-            color=INK,
-            arrowprops={"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 1.1},
-            zorder=5,
-        )
+            ha="right" if right else "left", va="center", color=style.INK, zorder=5,
+            arrowprops={"arrowstyle": "-|>", "color": style.VERMILLION, "linewidth": 1.1},
+        )  # fmt: skip
         keep_inside(label)
-        axes.plot([settled], [side * band], "o", color=VERMILLION, markersize=5, zorder=5)
+        axes.plot([settled], [side * band], "o", color=style.VERMILLION, markersize=5, zorder=5)
     elif settled > end or math.isnan(settled):
         undetermined = "settling time\nnot determined"
         text = undetermined if math.isnan(settled) else f"still outside {within}\nuntil {settled:.1f} ms"
-        keep_inside(axes.text(0.98, 0.06, text, transform=axes.transAxes, ha="right", va="bottom", color=INK))
+        keep_inside(axes.text(0.98, 0.06, text, transform=axes.transAxes, ha="right", va="bottom", color=style.INK))
 
 
 def _torque(axes: Axes, trace: Trace, approach: Approach, figures: Figures, sign: int) -> None:
     axis = approach.axis
     part = trace.between(approach.start, approach.until)
     t, torque = thinned(part.time, sign * part[f"{axis}.M_a"])
-    axes.plot(t, torque, color=BLUE, label="motor torque $M_a$")
+    axes.plot(t, torque, color=style.BLUE, label="motor torque $M_a$")
     if f"{axis}.M_fr" in part.columns:
         t, friction = thinned(part.time, sign * part[f"{axis}.M_fr"])
-        axes.plot(t, friction, color=VERMILLION, linewidth=1.2, label=r"friction torque $M_{fr}$")
-    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        axes.plot(t, friction, color=style.VERMILLION, linewidth=1.2, label=r"friction torque $M_{fr}$")
+    axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
     heading(axes, f"Driving torque of axis {axis}" + (" (sign reversed for display)" if sign < 0 else ""))
     axes.set(xlabel="time [s]", ylabel="torque [N·m]")
     axes.margins(x=0.01)
@@ -208,14 +192,14 @@ def _torque(axes: Axes, trace: Trace, approach: Approach, figures: Figures, sign
 def _plateau(axes: Axes, steady: tuple[float, float], level: float) -> None:
     """Mean torque [N.m] at constant speed, with a label close to its line where no curve is."""
     averaged = [steady[0] + share * (steady[1] - steady[0]) for share in PLATEAU]
-    axes.plot(averaged, [level, level], color=INK, linewidth=1.0, linestyle=(0, (1, 1.5)), zorder=4)
+    axes.plot(averaged, [level, level], color=style.INK, linewidth=1.0, linestyle=(0, (1, 1.5)), zorder=4)
     text = f"mean at constant speed {level:.2f} N·m".replace("-", "−")
     label = axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center")
     place_beside_level(axes, label, sum(averaged) / 2, level)
 
 
-def _curve(axes: Axes, trace: Trace, name: str, scale: float, label: str, style: Mapping[str, Any]) -> None:
+def _curve(axes: Axes, trace: Trace, name: str, scale: float, label: str, look: Mapping[str, Any]) -> None:
     if name in trace.columns:
         t, y = thinned(trace.time, trace[name])
         release(trace.time, trace[name])
-        axes.plot(t, scale * y, label=label, **style)
+        axes.plot(t, scale * y, label=label, **look)

@@ -190,11 +190,7 @@ def provenance(run: Run) -> Section:
         ("Coupling", f"{coupling.scheme}, {coupling.substeps} exchange step(s) per control cycle"),
     ]
     return provenance_section(
-        rows,
-        input_files(scenario),
-        archives_table(run.units),
-        _coupling(run.coupling),
-        parameters_section(machine),
+        rows, input_files(scenario), archives_table(run.units), _coupling(run.coupling), parameters_section(machine)
     )
 
 

@@ -7,24 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from feedsim.report import style
 from feedsim.report.formatting import number, plain
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import (
-    BLUE,
-    GREEN,
-    GRID,
-    INK,
-    MUTED,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILLION,
-    Array,
-    Picture,
-    drawing,
-    finish,
-    thinned,
-)  # fmt: skip
+from feedsim.report.style import Array, Picture, drawing, finish, thinned
 from feedsim.report.sweep.account import QUANTILES, RANK, TOTAL, Account, Input, Measure, Output
 
 if TYPE_CHECKING:
@@ -37,7 +23,7 @@ FEW_BINS, MANY_BINS = 8, 50
 VECTORS = 200  # points of a panel up to which they are drawn as vectors; beyond, as an image
 LEAST_OF_BIN = 25  # rows behind a point of the running median
 MEDIANS = 24  # points of it at most
-LINES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)  # over a grid
+LINES = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)  # over a grid
 MOST_WRITTEN = 12  # columns up to which the cells of a map show their numbers
 PALE = 0.55  # share of the map's range above which the ground is light
 GOLDEN = 0.6180339887498949  # spreads points evenly beside a level
@@ -106,7 +92,7 @@ def _histogram(axes: Axes, output: Output, exceedance: bool) -> None:
     known = output.known
     edges = _edges(known)
     counts, edges = np.histogram(known, edges)
-    axes.bar(edges[:-1], counts, np.diff(edges), align="edge", color=SKY, alpha=0.55, linewidth=0)
+    axes.bar(edges[:-1], counts, np.diff(edges), align="edge", color=style.SKY, alpha=0.55, linewidth=0)
     axes.set_ylim(0, 1.14 * counts.max())
     axes.set_xlabel(plain(output.label))
     axes.set_ylabel("runs")
@@ -114,13 +100,18 @@ def _histogram(axes: Axes, output: Output, exceedance: bool) -> None:
     statistics = output.statistics
     for share in QUANTILES:
         value = statistics[f"q{share}"]
-        axes.axvline(value, color=INK if share == 50 else MUTED, linewidth=1.1, linestyle="-" if share == 50 else "--")
+        axes.axvline(
+            value,
+            color=style.INK if share == 50 else style.MUTED,
+            linewidth=1.1,
+            linestyle="-" if share == 50 else "--",
+        )
     ends = {5: ("right", -3), 50: ("center", 0), 95: ("left", 3)}
     if np.ptp(known) > 0:
         for share, (side, shift) in ends.items():
             axes.annotate(
                 f"{share} %", (statistics[f"q{share}"], 1.0), xycoords=top, xytext=(shift, 2),
-                textcoords="offset points", ha=side, va="bottom", fontsize=8, color=MUTED, annotation_clip=False,
+                textcoords="offset points", ha=side, va="bottom", fontsize=8, color=style.MUTED, annotation_clip=False,
             ).set_in_layout(False)  # fmt: skip
     text = (
         f"mean {number(statistics['mean'], 3)}, std {number(statistics['std'], 3)} {output.scale.shown_unit}".rstrip()
@@ -136,10 +127,10 @@ def _exceedance(axes: Axes, known: Array) -> None:
     share = 100 * (1 - np.arange(1, len(limits) + 1) / len(limits))
     limits, share = thinned(np.concatenate([limits[:1], limits]), np.concatenate([[100.0], share]))
     beside = axes.twinx()
-    beside.plot(limits, share, color=VERMILLION, linewidth=1.3, drawstyle="steps-post")
+    beside.plot(limits, share, color=style.VERMILLION, linewidth=1.3, drawstyle="steps-post")
     beside.set_ylim(0, 114)  # the histogram leaves as much above its highest bar
     beside.set_yticks(range(0, 101, 25))
-    beside.set_ylabel("runs above [%]", color=VERMILLION)
+    beside.set_ylabel("runs above [%]", color=style.VERMILLION)
     beside.grid(visible=False)
 
 
@@ -163,8 +154,10 @@ def _bars(axes: Axes, inputs: Sequence[Input], measure: Measure, ranked: Sequenc
         assert measure.first is not None
         assert measure.first_interval is not None
         assert measure.interval is not None
-        _with_intervals(axes, rows - 0.19, measure.first[ranked], measure.first_interval[ranked], BLUE, "first order")
-        _with_intervals(axes, rows + 0.19, values, measure.interval[ranked], ORANGE, "total")
+        _with_intervals(
+            axes, rows - 0.19, measure.first[ranked], measure.first_interval[ranked], style.BLUE, "first order"
+        )
+        _with_intervals(axes, rows + 0.19, values, measure.interval[ranked], style.ORANGE, "total")
         legend_above(axes)
         axes.set_xlabel("Sobol index, 95 % interval")
         ends = np.concatenate([measure.interval[ranked], measure.first_interval[ranked]])
@@ -172,25 +165,25 @@ def _bars(axes: Axes, inputs: Sequence[Input], measure: Measure, ranked: Sequenc
         axes.set_xlim(min(0.0, 1.05 * low), max(1.0, 1.03 * high))
     else:
         if measure.kind == RANK:
-            axes.axvspan(-measure.noise, measure.noise, color=GRID, alpha=0.7, linewidth=0, label="chance")
+            axes.axvspan(-measure.noise, measure.noise, color=style.GRID, alpha=0.7, linewidth=0, label="chance")
             axes.set_xlim(-1, 1)
             legend_above(axes)
         else:
             axes.set_xlim(0, 1)
-        colours = [BLUE if value >= 0 else VERMILLION for value in values]
+        colours = [style.BLUE if value >= 0 else style.VERMILLION for value in values]
         axes.barh(rows, np.nan_to_num(values), 0.6, color=colours, linewidth=0)
         axes.set_xlabel(measure.kind)
         for row, value in zip(rows, values, strict=True):
             if not np.isfinite(value):
                 axes.annotate("not ranked", (0, row), xytext=(4, 0), textcoords="offset points", va="center",
-                              fontsize=8, color=MUTED)  # fmt: skip
-    axes.axvline(0, color=MUTED, linewidth=0.8)
+                              fontsize=8, color=style.MUTED)  # fmt: skip
+    axes.axvline(0, color=style.MUTED, linewidth=0.8)
     heading(axes, "what moves it")
 
 
 def _with_intervals(axes: Axes, rows: Any, values: Array, interval: Array, colour: str, label: str) -> None:
     axes.barh(rows, values, 0.36, color=colour, linewidth=0, label=label, alpha=0.85)
-    axes.hlines(rows, interval[:, 0], interval[:, 1], color=INK, linewidth=1.0)
+    axes.hlines(rows, interval[:, 0], interval[:, 1], color=style.INK, linewidth=1.0)
 
 
 def _right(measure: Measure, left_out: int) -> str:
@@ -209,26 +202,26 @@ def _panel(axes: Axes, output: Output, each: Input) -> None:
     if len(each.levels):
         without = np.searchsorted(each.levels, without) + 0.5 * ((np.arange(len(without)) * GOLDEN) % 1 - 0.5)
     axes.plot(
-        without, np.full(len(without), 0.02), "x", markersize=4, markeredgewidth=0.9, color=VERMILLION,
+        without, np.full(len(without), 0.02), "x", markersize=4, markeredgewidth=0.9, color=style.VERMILLION,
         transform=axes.get_xaxis_transform(), rasterized=len(without) > VECTORS,
     )  # fmt: skip
     many = len(x) > VECTORS
     size, alpha = (5.0, 0.6) if len(x) <= 200 else (3.0, 0.4) if len(x) <= 2000 else (1.5, 0.2)
-    look: dict[str, Any] = {"s": size, "alpha": alpha, "color": BLUE, "linewidths": 0, "rasterized": many}
+    look: dict[str, Any] = {"s": size, "alpha": alpha, "color": style.BLUE, "linewidths": 0, "rasterized": many}
     if len(each.levels):
         at = np.searchsorted(each.levels, x)
         beside = 0.5 * ((np.arange(len(x)) * GOLDEN) % 1 - 0.5)
         axes.scatter(at + beside, y, **look)
         for k in range(len(each.levels)):
             if np.any(at == k):
-                axes.hlines(np.median(y[at == k]), k - 0.32, k + 0.32, color=VERMILLION, linewidth=1.8)
+                axes.hlines(np.median(y[at == k]), k - 0.32, k + 0.32, color=style.VERMILLION, linewidth=1.8)
         axes.set_xticks(range(len(each.levels)), [plain(each.text(value)) for value in each.levels])
         if len(each.levels) > 5 or sum(len(each.text(value)) for value in each.levels) > 18:
             axes.tick_params(axis="x", labelrotation=45)
         axes.set_xlim(-0.6, len(each.levels) - 0.4)
     else:
         axes.scatter(x, y, **look)
-        axes.plot(*running_median(x, y), color=VERMILLION, linewidth=1.6)
+        axes.plot(*running_median(x, y), color=style.VERMILLION, linewidth=1.6)
         if each.logarithmic:
             _logarithmic(axes)
     axes.set_xlabel(plain(each.label))
@@ -253,7 +246,7 @@ def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
     if len(inputs) == 1:
         with drawing(6.5, 3.6) as figure:
             axes = figure.subplots()
-            _line(axes, inputs[0], output.values, inputs[0].values, BLUE, None)
+            _line(axes, inputs[0], output.values, inputs[0].values, style.BLUE, None)
             _finish_line(axes, inputs[0], output)
             return finish(figure, f"grid-{stem}", title, "A point per run.", worded=True)
     first, second = inputs

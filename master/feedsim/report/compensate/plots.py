@@ -13,15 +13,7 @@ from feedsim.analysis.circularity import quadrant
 from feedsim.analysis.compensation import Compensation, Variation
 from feedsim.report.formatting import minus
 from feedsim.report.labels import heading, legend_above, reversed_note, torque_label
-from feedsim.report.run.circle_plots import (
-    NOMINAL,
-    RING_GAPS,
-    polar_curve,
-    polar_ground,
-    ring_step,
-    unrolled_curve,
-    unrolled_ground,
-)
+from feedsim.report.run import circle_plots
 from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, VERMILLION, Array, Picture, drawing, finish, thinned
 
 BEFORE: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.3, "label": "without"}
@@ -43,21 +35,21 @@ def pictures_of(compensation: Compensation) -> list[Picture]:
 
 
 def _contour_picture(turn: Turn, before: Contour, after: Contour, plane: str) -> Picture:
-    ring = ring_step(float(np.abs(before.deviation).max()) * 1e6)
+    ring = circle_plots.ring_step(float(np.abs(before.deviation).max()) * 1e6)
     rings = 1 if float(np.abs(before.deviation).max()) * 1e6 < 1.1 * ring else 2
-    gap = RING_GAPS[rings]
+    gap = circle_plots.RING_GAPS[rings]
     with drawing(10.0, 6.0) as figure:
         polar, unrolled = figure.subplots(1, 2, width_ratios=[1.35, 1])
-        polar_ground(polar, turn, ring, rings)
+        circle_plots.polar_ground(polar, turn, ring, rings)
         for measured, style in ((before, BEFORE), (after, AFTER)):
-            polar_curve(polar, measured, ring, rings, **style)
-            unrolled_curve(unrolled, measured, **style)
-        unrolled_ground(unrolled, turn)
+            circle_plots.polar_curve(polar, measured, ring, rings, **style)
+            circle_plots.unrolled_curve(unrolled, measured, **style)
+        circle_plots.unrolled_ground(unrolled, turn)
         title = f"Circular test in the plane {plane}, without and with friction compensation"
         caption = (
             f"Radius {turn.radius * 1e3:.6g} mm, turn from {turn.begin:.4f} to {turn.end:.4f} s, by the linear scales. "
-            f"Radius deviation magnified {gap / ring * 1e6 / (NOMINAL / turn.radius):,.0f} times; rings at "
-            f"±{ring:g} µm about the programmed circle."
+            f"Radius deviation magnified {gap / ring * 1e6 / (circle_plots.NOMINAL / turn.radius):,.0f} times; rings "
+            f"at ±{ring:g} µm about the programmed circle."
         )
         return finish(figure, "compensation-contour", title, caption)
 

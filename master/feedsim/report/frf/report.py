@@ -12,19 +12,13 @@ from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.responses import Responses
 from feedsim.analysis.truncation import Truncation
+from feedsim.report import sections
 from feedsim.report.content import Report, Section, Table, Text, Tile, code, tile_value
 from feedsim.report.formatting import display_unit, minus, number, typeset
 from feedsim.report.frf.bode_plots import pictures_of
 from feedsim.report.frf.truncation_plots import truncation_pictures
 from feedsim.report.provenance import InputFile, figures_part, hashed, inputs_part, machine_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
-from feedsim.report.sections import (
-    archives_table,
-    figures_footer,
-    figures_section,
-    parameters_section,
-    provenance_section,
-)
 from feedsim.report.style import Picture, remarked
 from feedsim.scenario import Subject
 from feedsim.trace.response_files import write_response
@@ -85,9 +79,9 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
         warnings=responses.warnings,
         notes=subject.notes,
         tiles=list(_tiles(responses)),
-        main=[*pictures, _resonances(responses), _agreement(responses), figures_section(responses.figures)],
+        main=[*pictures, _resonances(responses), _agreement(responses), sections.figures_section(responses.figures)],
         provenance=_provenance(subject, responses),
-        footer=figures_footer(
+        footer=sections.figures_footer(
             f"Values in full precision: summary.json; curves: frf.csv{', frf_measured.csv' * bool(responses.campaign)}."
         ),
     )
@@ -153,8 +147,10 @@ def _provenance(subject: Subject, responses: Responses) -> Section:
         *((each.reference, f"RMS {each.rms:.4g} {display_unit(each.unit)}, peak {each.peak:.4g}, {each.lines} lines, "
            f"period {each.period:g} s") for each in (campaign.excited if campaign else ())),
     ]  # fmt: skip
-    archives = archives_table(campaign.units) if campaign else None
-    return provenance_section(rows, input_files(subject, responses), archives, parameters_section(responses.machine))
+    archives = sections.archives_table(campaign.units) if campaign else None
+    return sections.provenance_section(
+        rows, input_files(subject, responses), archives, sections.parameters_section(responses.machine)
+    )
 
 
 def _measured(campaign: Campaign) -> str:

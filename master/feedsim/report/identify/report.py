@@ -6,31 +6,13 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from feedsim.identify import Identified
-from feedsim.identify.friction_file import (
-    FRICTION,
-    change_text,
-    constant_load_hint,
-    friction_yaml,
-    interval_text,
-    relative_text,
-    remark_text,
-    value_text,
-)
+from feedsim.identify import Identified, friction_file
+from feedsim.identify.friction_file import FRICTION
 from feedsim.identify.result import NORMAL_95, Estimate, Identification
 from feedsim.report.content import Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import counted, minus, powers, typeset
+from feedsim.report.identify import quantities
 from feedsim.report.identify.plots import describe, pictures_of
-from feedsim.report.identify.quantities import (
-    at_slide,
-    curve_error,
-    input_files,
-    is_curve,
-    remark,
-    shown_unit,
-    speeds_of,
-    unit_text,
-)
 from feedsim.report.identify.summary import open_loop_csv, plateaus_csv, residuals_csv, summary
 from feedsim.report.provenance import software
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
@@ -67,14 +49,14 @@ def write(identified: Identified, directory: Path | str) -> tuple[Path, ...]:
     Returns the paths. Files of an earlier run are replaced. Raises OutputError.
     """
     found = identified.found
-    files: dict[str, Content] = {FRICTION: friction_yaml(identified, software())}
+    files: dict[str, Content] = {FRICTION: friction_file.friction_yaml(identified, software())}
     if found.stationary is not None:
         files[PLATEAUS] = plateaus_csv(found)
     if found.dynamic is not None:
         files[RESIDUALS] = residuals_csv(found)
     if found.balance is not None and found.balance.drifts:
         files[OPEN_LOOP] = open_loop_csv(found.balance)
-    with remarked(remark(identified), REMARK_WIDTH, REMARK_LINES):
+    with remarked(quantities.remark(identified), REMARK_WIDTH, REMARK_LINES):
         pictures = pictures_of(identified)
     return write_report(directory, report_of(identified, pictures), partial(summary, identified), files)
 
@@ -111,12 +93,12 @@ def _tiles(identified: Identified) -> Iterator[Tile]:
     found = identified.found
     if (stage := found.stationary) is not None:
         alone = "" if found.prior else ", stage 1 alone"
-        if is_curve(stage):
-            text = f"±{100 * curve_error(stage):.2g} %"
+        if quantities.is_curve(stage):
+            text = f"±{100 * quantities.curve_error(stage):.2g} %"
             meaning = f"largest half width of the 95 % band of the Stribeck curve{alone}"
             yield Tile(text, f"error of the curve (95 %){alone}", meaning)
         else:
-            count = counted(speeds_of(stage), "speed")
+            count = counted(quantities.speeds_of(stage), "speed")
             yield Tile("no curve", f"{count}, three make a curve", "distinct speeds of the plateaus")
         meaning = "largest relative deviation of a plateau's friction from the curve"
         yield Tile(f"{100 * stage.worst_curve:.2g} %", f"worst plateau{alone}", meaning)
@@ -124,9 +106,10 @@ def _tiles(identified: Identified) -> Iterator[Tile]:
         estimate = found.estimates.get(name)
         if estimate is None or estimate.status not in ("estimated", "given"):
             continue
-        factor, unit = shown_unit(estimate)
-        label = f"{name}, {estimate.meaning}" + (f" (±{relative_text(estimate)})" if relative_text(estimate) else "")
-        value = f"{minus(powers(value_text(estimate, factor)))} {unit_text(unit)}".strip()
+        factor, unit = quantities.shown_unit(estimate)
+        relative = friction_file.relative_text(estimate)
+        label = f"{name}, {estimate.meaning}" + (f" (±{relative})" if relative else "")
+        value = f"{minus(powers(friction_file.value_text(estimate, factor)))} {quantities.unit_text(unit)}".strip()
         yield Tile(value, typeset(label), typeset(estimate.meaning))
     if found.dynamic is not None:
         meaning = "friction torque measured less that of the model, over all stretches"
@@ -135,7 +118,7 @@ def _tiles(identified: Identified) -> Iterator[Tile]:
 
 def _use(found: Identification) -> Section:
     command = f"feedsim run SCENARIO.yaml --set machine.axes.{found.axis}.friction={FRICTION}"
-    hint = constant_load_hint(found)
+    hint = friction_file.constant_load_hint(found)
     load = Paragraph(f"The {typeset(hint)}.") if hint else None
     return Section("Use", [Paragraph((code(command), " (with the file's path)")), load])
 
@@ -193,7 +176,7 @@ def _open_loop(found: Identification) -> Section | None:
 
 def _change(name: Text, pair: tuple[float, float], unit: str, factor: float, unit_there: str) -> tuple[Text, ...]:
     """A row: before and after on the motor's side and at the slide, and the change, in percent unless it is M_0."""
-    change = f"{pair[1] - pair[0]:+.3g} N·m" if name == code("M_0") else change_text(*pair)
+    change = f"{pair[1] - pair[0]:+.3g} N·m" if name == code("M_0") else friction_file.change_text(*pair)
     here = (minus(f"{value:.4g}") for value in pair)
     there = (minus(f"{factor * value:.4g}") for value in pair)
     return name, *here, unit, *there, unit_there, minus(change)
@@ -210,13 +193,15 @@ def _rigid(found: Identification) -> Section | None:
 
 
 def _row(estimate: Estimate, I_P: float) -> tuple[Text, ...]:
-    factor, unit = shown_unit(estimate)
-    slide = at_slide(estimate.name, I_P)
-    there = (minus(powers(value_text(estimate, slide[0]))), unit_text(slide[1])) if slide else ("", "")
+    factor, unit = quantities.shown_unit(estimate)
+    slide = quantities.at_slide(estimate.name, I_P)
+    here, unit_here = friction_file.value_text(estimate, factor), quantities.unit_text(unit)
+    there = friction_file.value_text(estimate, slide[0]) if slide else ""
+    unit_there = quantities.unit_text(slide[1]) if slide else ""
+    interval, relative = friction_file.interval_text(estimate, factor), friction_file.relative_text(estimate)
     return (
-        code(estimate.name), typeset(estimate.meaning), minus(powers(value_text(estimate, factor))), unit_text(unit),
-        minus(powers(interval_text(estimate, factor))), relative_text(estimate), *there,
-        typeset(remark_text(estimate)),
+        code(estimate.name), typeset(estimate.meaning), minus(powers(here)), unit_here, minus(powers(interval)),
+        relative, minus(powers(there)), unit_there, typeset(friction_file.remark_text(estimate)),
     )  # fmt: skip
 
 
@@ -254,4 +239,4 @@ def _provenance(identified: Identified) -> Section:
         rows.append(("Set on the command line", ", ".join(subject.overrides) or "nothing"))
     rows += [(f"--{name}", value) for name, value in identified.settings.items()]
     rows.append(("Duration", ", ".join(f"{step} {taken:.3g} s" for step, taken in identified.found.seconds.items())))
-    return provenance_section(rows, input_files(identified))
+    return provenance_section(rows, quantities.input_files(identified))

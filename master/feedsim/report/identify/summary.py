@@ -11,27 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.identify import Identified
-from feedsim.identify.friction_file import (
-    FRICTION,
-    constant_load_hint,
-    interval_text,
-    open_loop_line,
-    relative_text,
-    remark_text,
-    value_text,
-)
+from feedsim.identify import Identified, friction_file
+from feedsim.identify.friction_file import FRICTION
 from feedsim.identify.result import Balance, Estimate, Identification
 from feedsim.report.formatting import counted
-from feedsim.report.identify.quantities import (
-    MM_PER_MIN,
-    at_slide,
-    curve_error,
-    input_files,
-    is_curve,
-    shown_unit,
-    speeds_of,
-)
+from feedsim.report.identify import quantities
+from feedsim.report.identify.quantities import MM_PER_MIN
 from feedsim.report.provenance import finite, inputs_part, machine_part, quantity, software
 from feedsim.report.style import Array
 from feedsim.trace.csv import quoted, shortest
@@ -72,7 +57,7 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
         "records": [
             {"name": r.name, "rows": len(r), "interval": quantity(r.interval, "s")} for r in identified.records
         ],
-        "inputs": inputs_part(input_files(identified)),
+        "inputs": inputs_part(quantities.input_files(identified)),
         "software": software(),
         "performance": {step: quantity(taken, "s") for step, taken in found.seconds.items()},
         "files": list(files),
@@ -83,12 +68,12 @@ def terminal_lines(identified: Identified, directory: Path) -> list[str]:
     """What the terminal shows: headline, table, what was done besides, advice, and how to use friction.yaml."""
     found = identified.found
     lines = [f"axis {found.axis}: {headline(identified)} -> {directory / 'report.html'}", *table_lines(identified)]
-    if line := open_loop_line(found):
+    if line := friction_file.open_loop_line(found):
         lines.append(f"  open loop: {line}")
     if line := rigid_line(identified):
         lines.append(f"  {line}")
     lines += [f"  advice: {advice}" for advice in found.advice]
-    if hint := constant_load_hint(found):
+    if hint := friction_file.constant_load_hint(found):
         lines.append(f"  {hint}")
     setting = shlex.quote(f"machine.axes.{found.axis}.friction={directory / FRICTION}")
     return [*lines, f"  use: feedsim run SCENARIO.yaml --set {setting}"]
@@ -99,10 +84,10 @@ def table_lines(identified: Identified) -> list[str]:
     found = identified.found
     rows = [("", "value", "95 % interval", "+-", "")]
     for estimate in found.estimates.values():
-        factor, unit = shown_unit(estimate)
-        value = f"{value_text(estimate, factor)} {unit}".removesuffix(" 1")
-        texts = (interval_text(estimate, factor), relative_text(estimate), remark_text(estimate))
-        rows.append((estimate.name, value, *texts))
+        factor, unit = quantities.shown_unit(estimate)
+        value = f"{friction_file.value_text(estimate, factor)} {unit}".removesuffix(" 1")
+        interval, relative = friction_file.interval_text(estimate, factor), friction_file.relative_text(estimate)
+        rows.append((estimate.name, value, interval, relative, friction_file.remark_text(estimate)))
     widths = [max(len(row[i]) for row in rows) for i in range(4)]
     room = max(20, WIDTH - sum(widths) - 10)
     lines = []
@@ -131,12 +116,11 @@ def headline(identified: Identified) -> str:
     if (stage := found.stationary) is not None:
         low, high = (n * found.I_P * MM_PER_MIN for n in stage.range)
         what = "curve" if found.prior else "curve of stage 1 alone"
-        within = (
-            f"{what} within {100 * curve_error(stage):.2g} % (95 %) from {float(f'{low:.3g}'):g} to {high:.5g} mm/min"
-        )
+        error = f"within {100 * quantities.curve_error(stage):.2g} % (95 %)"
+        within = f"{what} {error} from {float(f'{low:.3g}'):g} to {high:.5g} mm/min"
         plateaus = counted(len(stage.plateaus), "plateau")
-        no_curve = f"no curve: {counted(speeds_of(stage), 'speed')}"
-        parts.append(f"{within if is_curve(stage) else no_curve}, {plateaus}")
+        no_curve = f"no curve: {counted(quantities.speeds_of(stage), 'speed')}"
+        parts.append(f"{within if quantities.is_curve(stage) else no_curve}, {plateaus}")
     if (dynamic := found.dynamic) is not None:
         stretches = counted(len(dynamic.stretches), "stretch", "stretches")
         parts.append(f"pre-sliding from {stretches}, residual {dynamic.rms:.2g} N.m rms")
@@ -178,7 +162,7 @@ def _rows(head: str, *columns: Array) -> Iterator[str]:
 
 
 def _estimate(estimate: Estimate, I_P: float) -> dict[str, Any]:
-    slide = at_slide(estimate.name, I_P)
+    slide = quantities.at_slide(estimate.name, I_P)
     low, high = estimate.interval
     return {
         **quantity(estimate.value, estimate.unit),
@@ -195,16 +179,15 @@ def _curve(found: Identification) -> dict[str, Any] | None:
     stage = found.stationary
     if stage is None:
         return None
+    error = quantities.curve_error(stage) if quantities.is_curve(stage) else math.nan
     return {
-        "error": quantity(
-            curve_error(stage) if is_curve(stage) else math.nan, "1", meaning="largest half width of its 95 % band"
-        ),
+        "error": quantity(error, "1", meaning="largest half width of its 95 % band"),
         "worst_plateau": quantity(stage.worst_curve, "1", meaning="largest relative deviation"),
         "rms": quantity(stage.rms, "N.m", meaning="residual of the plateaus"),
         "used": found.prior,
         "warnings": list(stage.warnings),
         "plateaus": len(stage.plateaus),
-        "distinct_speeds": speeds_of(stage),
+        "distinct_speeds": quantities.speeds_of(stage),
         "speeds": {"value": list(stage.range), "unit": "rad/s"},
         "correlation": {"names": list(stage.correlation.names), "matrix": _matrix(stage.correlation.matrix)},
     }
@@ -263,5 +246,5 @@ def _matrix(matrix: Any) -> list[list[float | None]]:
 def rigid_line(identified: Identified) -> str:
     """The simple model in one line; empty where there is none."""
     estimated = [each for each in identified.found.rigid.values() if each.status == "estimated"]
-    parts = [f"{each.name} {value_text(each)} {each.unit}" for each in estimated]
+    parts = [f"{each.name} {friction_file.value_text(each)} {each.unit}" for each in estimated]
     return f"rigid axis with simple friction: {', '.join(parts)}" if parts else ""

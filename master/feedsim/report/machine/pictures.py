@@ -9,18 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feedsim.report.formatting import minus
+from feedsim.report.machine import projection
 from feedsim.report.machine.model import Model, Motion, extent, motion, rotor_disc, solids
-from feedsim.report.machine.projection import (
-    FRONT,
-    OBLIQUE,
-    SIDE,
-    TOP,
-    Faces,
-    View,
-    draw_faces,
-    draw_lines,
-    frame_limits,
-)
+from feedsim.report.machine.projection import Faces, View
 from feedsim.report.style import INK, MUTED, PAPER, PNG_DPI, VERMILLION, Picture, drawing, finish
 from feedsim.structure.build import Built
 from feedsim.structure.geometry.outline import deflection, node_motion
@@ -55,9 +46,9 @@ def structure_picture(info: MachineInfo, of: Model) -> Picture:
             [["oblique", "front"], ["oblique", "side"]], width_ratios=[2.1, 1], height_ratios=[1, 1]
         )
         points = extent(of)
-        for key, where in (("oblique", OBLIQUE), ("front", FRONT), ("side", SIDE)):
+        for key, where in (("oblique", projection.OBLIQUE), ("front", projection.FRONT), ("side", projection.SIDE)):
             axes = panels[key]
-            frame_limits(axes, where, points, 0.03, below=0.2 if where.name else 0.0)
+            projection.frame_limits(axes, where, points, 0.03, below=0.2 if where.name else 0.0)
             _draw(axes, where, of, None, 1.0)
             _marks(axes, where, of)
             triad(axes, where)
@@ -104,8 +95,8 @@ def sheet_picture(info: MachineInfo, built: Built, of: Model, scale: float = 1.0
         motions = [motion(built, of, k, scale) for k in modes]
         points = np.concatenate([extent(of, moved) for moved in motions])
         for axes, k, moved in zip(panels, modes, motions, strict=False):
-            frame_limits(axes, OBLIQUE, points, 0.01)
-            draw_mode(axes, OBLIQUE, of, moved, 1.0)
+            projection.frame_limits(axes, projection.OBLIQUE, points, 0.01)
+            draw_mode(axes, projection.OBLIQUE, of, moved, 1.0)
             axes.set_title(f"{k}: {frequency(info, k)}", fontsize=10, pad=16)
             axes.text(0, 1.0, _short(info.moving[k]), transform=axes.transAxes, fontsize=7.5, color=MUTED, va="bottom")
         figure.set_dpi(PNG_DPI)
@@ -122,9 +113,9 @@ def mode_panels(figure: Drawing, of: Model, moved: Motion) -> Iterator[tuple[Axe
     """Two axes with their views, limits set so that the whole oscillation fits."""
     points = extent(of, moved)
     panels = figure.subplot_mosaic([["oblique", "flat"]], width_ratios=[1.5, 1])
-    for key, where in (("oblique", OBLIQUE), ("flat", telling_view(of, moved))):
+    for key, where in (("oblique", projection.OBLIQUE), ("flat", telling_view(of, moved))):
         axes = panels[key]
-        frame_limits(axes, where, points, 0.03, below=0.2 if where.name else 0.0)
+        projection.frame_limits(axes, where, points, 0.03, below=0.2 if where.name else 0.0)
         triad(axes, where)
         if where.name:
             axes.set_title(where.name, fontsize=9, fontweight="normal", color=MUTED)
@@ -139,7 +130,9 @@ def telling_view(of: Model, moved: Motion) -> View:
         dofs = of.geometry.dofs[:, d]
         by_direction.append(float(motion_energy[dofs[dofs >= 0]].sum()))
     x, y, z = by_direction
-    return max(((x + y, FRONT), (y + z, SIDE), (x + z, TOP)), key=lambda pair: pair[0])[1]
+    return max(
+        ((x + y, projection.FRONT), (y + z, projection.SIDE), (x + z, projection.TOP)), key=lambda pair: pair[0]
+    )[1]
 
 
 def draw_mode(axes: Axes, where: View, of: Model, moved: Motion, phase: float) -> None:
@@ -208,7 +201,7 @@ def _draw(axes: Axes, where: View, of: Model, moved: Motion | None, phase: float
         faces = solids(of, moved, phase)
         if ghost:
             faces = [Faces(group.corners, np.tile(GHOST, (len(group.corners), 1))) for group in faces]
-        draw_faces(axes, where, faces, flat=ghost, zorder=1 if ghost else 2)
+        projection.draw_faces(axes, where, faces, flat=ghost, zorder=1 if ghost else 2)
         for feature in of.looks.features:
             if feature.kind == "motor" and not ghost:
                 _pointer(axes, where, of, feature.name, moved, phase)
@@ -220,7 +213,7 @@ def _draw(axes: Axes, where: View, of: Model, moved: Motion | None, phase: float
         colours = np.array([of.colours[geometry.bodies[first]] for first in geometry.lines[:, 0].tolist()])
         if ghost:
             colours = np.tile(GHOST * 0.9, (len(colours), 1))
-        draw_lines(axes, where, bent.points + bent.displacements, colours, 1.5, zorder=1 if ghost else 2)
+        projection.draw_lines(axes, where, bent.points + bent.displacements, colours, 1.5, zorder=1 if ghost else 2)
     joined = np.zeros(len(geometry.nodes), dtype=bool)
     joined[geometry.lines.ravel()] = True
     if not joined.all():

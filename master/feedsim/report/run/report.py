@@ -10,6 +10,7 @@ from typing import Any
 
 from feedsim.analysis import Figure, PositioningTask, tasks
 from feedsim.cosim import Run
+from feedsim.report import sections
 from feedsim.report.content import Report, Section, Table, Tile, tile_value
 from feedsim.report.formatting import duration, number, typeset
 from feedsim.report.partial import PARTIAL, Partial
@@ -26,13 +27,6 @@ from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.pose import pose_part, pose_section
-from feedsim.report.sections import (
-    archives_table,
-    figures_footer,
-    figures_section,
-    parameters_section,
-    provenance_section,
-)
 from feedsim.report.style import Picture
 from feedsim.scenario import Level, Logging
 from feedsim.trace import Trace, write_csv
@@ -114,9 +108,9 @@ def report_of(run: Run, figures: Mapping[str, Figure], pictures: Sequence[Pictur
         warnings=run.warnings,
         notes=(machine.note, scenario.note),
         tiles=[tile(name, figure) for name, figure in figures.items() if is_leading(name, HEADER)],
-        main=[*pictures, figures_section(figures), motions_section(run), pose_section(run.pose)],
+        main=[*pictures, sections.figures_section(figures), motions_section(run), pose_section(run.pose)],
         provenance=provenance(run),
-        footer=figures_footer(footer) if figures else footer,
+        footer=sections.figures_footer(footer) if figures else footer,
     )
 
 
@@ -189,8 +183,12 @@ def provenance(run: Run) -> Section:
         *([("Log", log_text(scenario.logging, run.log))] if scenario.logging is not None else []),
         ("Coupling", f"{coupling.scheme}, {coupling.substeps} exchange step(s) per control cycle"),
     ]
-    return provenance_section(
-        rows, input_files(scenario), archives_table(run.units), _coupling(run.coupling), parameters_section(machine)
+    return sections.provenance_section(
+        rows,
+        input_files(scenario),
+        sections.archives_table(run.units),
+        _coupling(run.coupling),
+        sections.parameters_section(machine),
     )
 
 

@@ -59,7 +59,8 @@ class Column:
     @property
     def label(self) -> str:
         """Name with unit."""
-        return _label(self.name, self.scale)
+        unit = self.scale.shown_unit
+        return f"{self.name} [{unit}]" if unit else self.name
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -260,10 +261,6 @@ def quantile_interval(ordered: Array, share: float) -> tuple[float, float]:
     if low < 1 or high > n:
         return np.nan, np.nan
     return float(ordered[low - 1]), float(ordered[high - 1])
-
-
-def _label(name: str, unit: Scale) -> str:
-    return f"{name} [{unit.shown_unit}]" if unit.shown_unit else name
 
 
 @dataclass(frozen=True, eq=False)

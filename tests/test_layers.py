@@ -35,7 +35,7 @@ ORDER = [
 SOLE_USERS = {
     "fmpy": {"cosim/archive.py", "cosim/unit.py"},
     "ctypes": {"cosim/unit.py", "cosim/friction_law.py", "cosim/exchange.py"},
-    "yaml": {"files", "scenario/friction_file.py"},
+    "yaml": {"files", "identify/friction_file.py"},
     "matplotlib": {"report"},
     "ruckig": {"motions"},
     "jinja2": {"report/page.py"},

@@ -20,12 +20,13 @@ from feedsim.cli import main
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.identify import Options, identify, stages
+from feedsim.identify.friction_file import Line, friction_text
 from feedsim.identify.read import distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate
 from feedsim.identify.stages import ORDER, merged_correlation, transitions
 from feedsim.scenario import load_machine
-from feedsim.scenario.friction_file import Line, friction_text, read_friction
+from feedsim.scenario.load import read_friction
 from feedsim.trace import write_csv
 from identification_helpers import (
     I_P,

@@ -10,7 +10,7 @@ import pytest
 
 from feedsim.identify.friction_file import constant_load_hint, friction_yaml, interval_text, relative_text, value_text
 from feedsim.identify.result import NORMAL_95, Estimate
-from feedsim.scenario.friction_file import read_friction
+from feedsim.scenario.load import read_friction
 from identification_helpers import TRUE, identified
 
 VERSIONS = {"feedsim": "1.2", "python": "3.4", "numpy": "5.6", "scipy": "7.8"}

@@ -31,7 +31,7 @@ from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_pi
 from feedsim.report.page import html
 from feedsim.report.provenance import friction_origins
 from feedsim.scenario import load_machine
-from feedsim.scenario.friction_file import read_friction
+from feedsim.scenario.load import read_friction
 from identification_helpers import I_P, TRUE, J, balance, identification, identified, provenance, records, stretch
 from report_helpers import Page, contents
 from scenario_helpers import MACHINE

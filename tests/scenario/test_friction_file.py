@@ -13,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feedsim.errors import InputError, OutputError
+from feedsim.identify.friction_file import Line, friction_text
 from feedsim.scenario import Friction, load, load_machine
-from feedsim.scenario.friction_file import Line, friction_text, read_friction
+from feedsim.scenario.load import read_friction
 from feedsim.scenario.schema import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -55,7 +55,7 @@ def _frictions(texts: Sequence[str], program: Program) -> tuple[Mapping[str, Pat
     """Axis -> file, and axis -> what is in it."""
     from feedsim.analysis.compensation import check_moves
     from feedsim.errors import InputError
-    from feedsim.scenario.friction_file import read_friction
+    from feedsim.scenario.load import read_friction
 
     files: dict[str, Path] = {}
     for text in texts:

@@ -12,10 +12,10 @@ from typing import Any
 from feedsim.errors import InputError
 from feedsim.fields import brief
 from feedsim.files import changes
-from feedsim.files.checked import check, fetch, read_group
+from feedsim.files.checked import check, fetch, read_checked, read_group
 from feedsim.files.problems import describe, in_order
 from feedsim.files.source import Place, Source, read
-from feedsim.scenario.machine import Machine
+from feedsim.scenario.machine import Friction, Machine
 from feedsim.scenario.model import Scenario, contradictions
 
 Setting = tuple[str, Source]  # dotted key, value
@@ -134,6 +134,11 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
     machine._files = tuple(_files(source, path))
     machine._directory = path.parent
     return machine
+
+
+def read_friction(path: str | Path) -> Friction:
+    """Read a file with the friction of one axis, as identification leaves it. Raises InputError like load()."""
+    return read_checked(path, Friction)
 
 
 @dataclass(frozen=True, eq=False)

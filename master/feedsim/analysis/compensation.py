@@ -161,15 +161,16 @@ def compensate(
     lags = lags_of(scenario, [axis for axis in axes if axis not in (delays or {})])
     applied = {axis: (delays or {})[axis] if axis not in lags else lags[axis].delay for axis in axes}
     plain = _fully_recorded(scenario, turn)
+    tell = progress or (lambda what, done, total: None)
 
     def told(what: str) -> Callable[[int, int], None]:
-        return lambda done, total: progress(what, done, total) if progress is not None else None
+        return lambda done, total: tell(what, done, total)
 
     with FrictionLaw(fmus) as law:
         torque = friction_feedforward(machine, program, used, applied, law)
         before = run(plain, program=program, fmus=fmus, progress=told("without compensation"))
         after = run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
-        variations = _table(scenario, program, turn, used, applied, law, fmus=fmus, progress=progress) if table else ()
+        variations = _table(scenario, program, turn, used, applied, law, fmus=fmus, progress=tell) if table else ()
     left_before, left_after = (quality(result.trace, turn) for result in (before, after))
     T_c = machine.cycles.T_c
     feedforward = Trace(
@@ -247,7 +248,7 @@ def _table(
     law: Law,
     *,
     fmus: Path | None,
-    progress: Progress | None,
+    progress: Progress,
 ) -> tuple[Variation, ...]:
     """One run up to the end of the turn for every error."""
     machine = scenario.machine
@@ -274,15 +275,13 @@ def _table(
                 wanted.append((", ".join(names), share * 100, "%", varied, delays))
     found = []
     for done, (what, change, unit, set_, delay) in enumerate(wanted):
-        if progress is not None:
-            progress("what errors cost", done, len(wanted))
+        progress("what errors cost", done, len(wanted))
         # Of the whole program, then cut: a delay below 0 looks ahead.
         torque = friction_feedforward(machine, program, set_, delay, law)
         torque = {axis: values[:instants] for axis, values in torque.items()}
         result = run(lean, program=cut, fmus=fmus, torque_feedforward=torque)
         found.append(Variation(what, change, unit, quality(result.trace, turn)))
-    if progress is not None:
-        progress("what errors cost", len(wanted), len(wanted))
+    progress("what errors cost", len(wanted), len(wanted))
     return tuple(found)
 
 

@@ -22,7 +22,7 @@ J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., Wiley
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,16 +36,13 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-Method = Literal["joint", "H1"]
 Pair = tuple[str, str]  # columns of output and input
 
 EVEN = 1e-6  # of a step: rounding of recorded times
 SILENT = 1e-13  # of the largest value: lines below it are rounding, not response
 
 
-def measured(
-    measurements: Sequence[Measurement], pairs: Sequence[Pair], *, method: Method = "joint"
-) -> FrequencyResponse:
+def measured(measurements: Sequence[Measurement], pairs: Sequence[Pair]) -> FrequencyResponse:
     """Responses from one or several measurements of one machine with excitations of the same lines.
 
     Raises:
@@ -67,28 +64,20 @@ def measured(
         reference=first.reference,
         rows=len(first.excitation.samples),
         lines=first.excitation.lines,
-        method=method,
     )
 
 
 def periodic(
-    traces: Sequence[Trace],
-    pairs: Sequence[Pair],
-    *,
-    reference: str,
-    rows: int,
-    lines: NDArray[np.int64],
-    method: Method = "joint",
+    traces: Sequence[Trace], pairs: Sequence[Pair], *, reference: str, rows: int, lines: NDArray[np.int64]
 ) -> FrequencyResponse:
     """Responses at the excited lines of a periodic, steady record.
 
     Args:
         traces: realisations, each of whole periods at an even step.
         pairs: output and input columns; the response is called "output/input".
-        reference: column of the excitation.
+        reference: column of the excitation; the input itself makes the joint estimate H1.
         rows: of a period.
         lines: (K,) excited harmonics of the period, ascending.
-        method: "joint" or "H1".
 
     A trace's linear drift, such as the travel at an offset speed, is taken out: the change from the first period to the
     last tells it exactly. It needs two periods.
@@ -97,8 +86,6 @@ def periodic(
         InputError: a column is missing, a trace holds no whole number of periods, lines beyond half the sampling rate,
             an input that is not excited.
     """
-    if method not in ("joint", "H1"):
-        raise InputError(f"method {method!r} of a frequency response; joint or H1 is expected")
     if not traces or not pairs:
         raise InputError("no trace or no pair of columns to estimate a frequency response from")
     step = _step(traces[0])
@@ -123,33 +110,20 @@ def periodic(
     def cross(a: str, b: str) -> Complexes:
         return np.asarray(np.sum(spectra[a] * spectra[b].conj(), axis=0))
 
-    blocks = len(spectra[reference])
-    return _responses(traces[0], pairs, frequency, reference if method == "joint" else None, cross, blocks)
-
-
-def _responses(
-    trace: Trace,
-    pairs: Sequence[Pair],
-    frequency: Floats,
-    reference: str | None,
-    cross: Callable[[str, str], Complexes],
-    blocks: int,
-) -> FrequencyResponse:
     columns, units, coherence = {}, {}, {}
     for output, input in pairs:
         name = f"{output}/{input}"
-        through = reference or input
         with np.errstate(divide="ignore", invalid="ignore"):
-            columns[name] = cross(output, through) / cross(input, through)
-        units[name] = quotient_unit(trace.unit(output), trace.unit(input))
+            columns[name] = cross(output, reference) / cross(input, reference)
+        units[name] = quotient_unit(traces[0].unit(output), traces[0].unit(input))
         if not np.all(np.isfinite(columns[name])):
             silent = frequency[np.flatnonzero(~np.isfinite(columns[name]))[0]]
             raise InputError(f"column {input!r} is not excited at {silent:.6g} Hz; there is no response to it")
-        if blocks > 1:
-            ends = dict.fromkeys(end for end in (output, input) if end != through)
+        if len(spectra[reference]) > 1:
+            ends = dict.fromkeys(end for end in (output, input) if end != reference)
             coherence[name] = np.ones(len(frequency))
             for end in ends:
-                coherence[name] = np.minimum(coherence[name], _coherence(cross, end, through))
+                coherence[name] = np.minimum(coherence[name], _coherence(cross, end, reference))
     return FrequencyResponse(frequency, columns, units, coherence)
 
 

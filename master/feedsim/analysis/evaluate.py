@@ -82,7 +82,7 @@ def tasks(scenario: Scenario, program: Program) -> tuple[Task, ...]:
             continue
         same = sum(other.prefix.partition("#")[0] == task.prefix for other in found)
         if same:  # the same axis or plane once more: X, X#2, X#3
-            task = _renamed(task, f"{task.prefix}#{same + 1}")
+            task = replace(task, prefix=f"{task.prefix}#{same + 1}")
         found.append(task)
     if problems:
         raise InputError.of(f"{scenario.file}: the evaluation is not possible", problems)
@@ -178,7 +178,3 @@ def _circle(item: CircleTest, chosen: tuple[Segment, ...], program: Program) -> 
     if len(plane) != 2:
         raise InputError(f"circularity: recorded setpoints of {', '.join(plane)}: say which two with plane: [X, Z]")
     return recorded_circle(program, recorded[-1], (plane[0], plane[1]), item.centre, item.radius)
-
-
-def _renamed(task: Task, prefix: str) -> Task:
-    return replace(task, prefix=prefix)

@@ -24,6 +24,10 @@ ONE_REALISATION = (
     "measured with friction and one realisation: every period is alike, so that the coherence says nothing of what is "
     "not linear; take more realisations"
 )
+UNSTABLE = (
+    "the control loops are unstable: {} growing solution(s) of the closed system. The figures of loops presume stable "
+    "ones, and nothing was measured"
+)
 EPILOG = """examples:
   feedsim frf scenarios/machines/test_centre --axes X,Z --out results/frf
   feedsim frf scenarios/xz_circle.yaml --set "machine.axes.Z.drive.K_p=4 N.m.s/rad" --no-measure
@@ -65,7 +69,7 @@ def frf(options: Namespace) -> None:
         if not doubts and (doubt := table_mismatch(machine)) is not None:
             warnings.append(doubt)
         if result.unstable_poles:
-            warnings.append(_unstable(result.unstable_poles))
+            warnings.append(UNSTABLE.format(result.unstable_poles))
         full = _full_model(machine, progress, warnings) if options.full_model else None
         campaign = None
         if not (options.no_measure or result.unstable_poles):
@@ -176,13 +180,6 @@ def _overlays(texts: Sequence[str], known: Sequence[str]) -> tuple[list[Overlay]
         overlays += found
         warnings += doubts
     return overlays, warnings
-
-
-def _unstable(poles: int) -> str:
-    return (
-        f"the control loops are unstable: {poles} growing solution(s) of the closed system. The figures of loops "
-        "presume stable ones, and nothing was measured"
-    )
 
 
 COMMAND = Command(

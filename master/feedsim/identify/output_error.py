@@ -25,7 +25,7 @@ from feedsim.identify.identifiability import (
     verdict,
 )
 from feedsim.identify.motion import noise_of
-from feedsim.identify.parameters import KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
+from feedsim.identify.parameters import FIXED, KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
 from feedsim.identify.search import Search, Solution, grid, joined, motion_covariance, sliding, spread
@@ -175,7 +175,7 @@ def _known(
     elif (turns := reversals(fine)) < LEAST_REVERSALS:
         held["delay"] = "undetermined", f"{turns} reversal{'s'[: turns != 1]} only, {LEAST_REVERSALS} tell it"
     values |= hold
-    held |= {name: ("given", "") for name in hold}
+    held |= {name: ("held", "no stage tells it") if name in FIXED else ("given", "") for name in hold}
     values |= sliding(fine, values, unknown - set(hold))
     if prior is None:
         values["F_S"] = max(hold.get("F_S", values["F_C"]), values["F_C"])
@@ -383,19 +383,8 @@ def _stretches(model: RecordTorque, weight: Array, values: Mapping[str, float], 
     angle = np.asarray(model.motion.speed.antiderivative()(model.motion.time - values["delay"]))[model.rows]
     made = []
     for k, part in enumerate(model.parts):
-        own = model.stretch == k
-        made.append(
-            Stretch(
-                model.record.name,
-                part.kind,
-                model.record.time[part.rows],
-                angle[own],
-                speed[own],
-                measured[own],
-                friction[own],
-                part.amplitude,
-                part.frequency,
-                float(weight[k]),
-            )
-        )
+        on, time = model.stretch == k, model.record.time[part.rows]
+        size, level = part.amplitude, float(weight[k])
+        signals = angle[on], speed[on], measured[on], friction[on]
+        made.append(Stretch(model.record.name, part.kind, time, *signals, size, part.frequency, level))
     return made

@@ -6,7 +6,7 @@ Nothing is resampled: rows stay rows, pieces without gaps, or are refused.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ from feedsim.errors import InputError
 Array = NDArray[np.float64]
 
 EVEN = 1e-3  # of the step: how far an instant may lie off the grid
+SIGNALS = ("torque", "angle", "speed", "load", "setpoint")  # of a record, over its time
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,7 @@ class Record:
             raise InputError(f"{self.name}: {len(self.time)} row(s); at least 2 are needed")
         if self.angle is None and self.speed is None:
             raise InputError(f"{self.name}: neither a position nor a speed; one of them is needed")
-        for role in ("torque", "angle", "speed", "load", "setpoint"):
+        for role in SIGNALS:
             values = getattr(self, role)
             if values is not None and len(values) != len(self.time):
                 raise InputError(f"{self.name}: {role} has {len(values)} values, the time has {len(self.time)}")
@@ -68,20 +69,8 @@ class Record:
 
     def between(self, first: int, last: int) -> Record:
         """Rows first <= i < last."""
-
-        def cut(values: Array | None) -> Array | None:
-            return None if values is None else values[first:last]
-
-        return Record(
-            self.name,
-            self.time[first:last],
-            self.torque[first:last],
-            cut(self.angle),
-            cut(self.speed),
-            cut(self.load),
-            cut(self.setpoint),
-            self.columns,
-        )
+        told = {role: values for role in ("time", *SIGNALS) if (values := getattr(self, role)) is not None}
+        return replace(self, **{role: values[first:last] for role, values in told.items()})
 
 
 # A step of more than that many usual ones is a gap, where rows are missing; the least gap has 2.

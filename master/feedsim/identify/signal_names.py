@@ -125,7 +125,7 @@ def _without_axis(name: str, own: str, others: set[str]) -> Iterator[list[str]]:
     for part in (name, re.split(r"[./:]", name)[-1]):
         words = _tokens(part)
         before = _tokens(name[: len(name) - len(part)])
-        if own and _names_other(before, others):
+        if own and not others.isdisjoint(before):
             continue
         while words:
             if words[0] in _AXIS_WORDS or words[0] == own or words[0].isdecimal():
@@ -141,7 +141,3 @@ def _without_axis(name: str, own: str, others: set[str]) -> Iterator[list[str]]:
             yield words
         if words and part != name:
             yield words
-
-
-def _names_other(words: list[str], others: set[str]) -> bool:
-    return any(word in others for word in words)

@@ -207,14 +207,11 @@ def _channel(recording: Recording, role: str, signal: Signal) -> Channel:
         given = resulting(unit or "1", factor.unit if factor else "1")
         target = target_of(role, given)
     except InputError as error:
-        raise InputError(f"column {column!r} in {unit or 'no unit'}{_times(signal)}: {error}") from None
+        times = f" times a factor in {factor.unit}" if factor else ""
+        raise InputError(f"column {column!r} in {unit or 'no unit'}{times}: {error}") from None
     scale *= signal.sign * float(given.factor / units.unit(target).factor)
     at = getattr(signal, "at", None) or {"m": "scale", "m/s": "scale", "rad": "motor", "rad/s": "motor"}.get(target, "")
     return Channel(role, column, target, scale, is_rms(unit), at)
-
-
-def _times(signal: Signal) -> str:
-    return f" times a factor in {signal.factor.unit}" if signal.factor else ""
 
 
 def _line(role: str, recording: Recording, column: str = "...") -> str:

@@ -20,16 +20,7 @@ from feedsim.identify.output_error import dynamic
 from feedsim.identify.parameters import CONSTANT_SPEED, FIXED, FRICTION, NO_EFFECT, PRE_SLIDING, USUAL, estimate
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
-from feedsim.identify.result import (
-    NORMAL_95,
-    Balance,
-    Correlation,
-    Dynamic,
-    Estimate,
-    Identification,
-    Plateau,
-    Stationary,
-)
+from feedsim.identify.result import NORMAL_95, Correlation, Dynamic, Estimate, Identification, Plateau, Stationary
 from feedsim.identify.stribeck import stationary
 from feedsim.identify.structure_torque import with_structure
 
@@ -93,8 +84,13 @@ class _Run:
                 "the records tell no friction: " + "; ".join(self.reasons[stage] for stage in sorted(self.reasons))
             )
         with self._timed("open loop"):
-            balance = self._balanced(self._merged(first, second, J)) if second is not None else None
-        estimates = balance.estimates if balance is not None else self._merged(first, second, J)
+            estimates: Mapping[str, Estimate] = self._merged(first, second, J)
+            balance = None
+            if second is not None:
+                self.progress("open loop", 0, 1)
+                balance = balanced(transitions(self.records), self.law, estimates, hold=options.hold)
+                estimates = balance.estimates
+                self.progress("open loop", 1, 1)
         prior = self.prior or second is None
         # Doubts of a stage 1 that the estimates do not rest on would be doubts about nothing.
         self.warnings += first.warnings if first is not None and prior else ()
@@ -163,12 +159,13 @@ class _Run:
         if first is not None and any(plateau.record in names for plateau in first.plateaus):
             self.prior = False
         hold, free = self._held((*FRICTION, "M_0"))
+        rigid = self._rigid(others) if others and self.options.J is None else None
         try:
             return dynamic(
                 chosen,
                 self.law,
                 prior=first if self.prior else None,
-                J=self.options.J or self._inertia(others),
+                J=rigid.J if rigid is not None else self.options.J,
                 delay=self.options.delay,
                 hold=hold,
                 free=free,
@@ -182,14 +179,6 @@ class _Run:
             self.warnings.append(f"no pre-sliding parameters: {error}")
             return None
 
-    def _balanced(self, estimates: Mapping[str, Estimate]) -> Balance:
-        """F_C and M_0 from the position in open loop, where stage 2 was fitted to general motion."""
-        self.progress("open loop", 0, 1)
-        options = self.options
-        found = balanced(transitions(self.records), self.law, estimates, hold=options.hold)
-        self.progress("open loop", 1, 1)
-        return found
-
     def _rigid(self, records: Sequence[Record]) -> Inertia | None:
         """Inverse dynamics; None where the records tell no inertia."""
         self.progress("inertia", 0, 1)
@@ -202,10 +191,6 @@ class _Run:
         if self.options.J is None:
             self.warnings += [text for text in found.warnings if text not in self.warnings]
         return found
-
-    def _inertia(self, records: Sequence[Record]) -> Estimate | None:
-        found = self._rigid(records) if records else None
-        return found.J if found is not None else None
 
     def _compare(self, rigid: Inertia | None) -> None:
         """Warn where the given inertia is not that of the accelerating parts.

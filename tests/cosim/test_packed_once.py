@@ -31,7 +31,7 @@ def packs(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 def guid(machine: Path, fmus: Path, *overrides: str) -> str:
     """Of the plant that a run of the machine would have."""
     scenario = load(ROOT / "scenarios" / "one_axis.yaml", [f"machine={machine}", *overrides])
-    archive = plant.open_plant(scenario.machine, fmus).archive
+    archive = plant.open_plant(scenario.machine, fmus)[0]
     archive.close()
     return archive.guid
 

@@ -100,17 +100,17 @@ def test_own_archive_gives_the_numbers_of_the_table(tmp_path: Path, fmus: Path) 
 
 def test_general_archive_serves_its_own_axes_unpacked(fmus: Path) -> None:
     machine = load_machine(MACHINE)
-    plant = open_plant(machine, fmus)
-    with plant.archive as archive:
+    plant, modes_file = open_plant(machine, fmus)
+    with plant as archive:
         assert archive.path == fmus / "plant.fmu"
-        assert plant.modes_file == machine.modes
+        assert modes_file == machine.modes
 
 
 def test_archive_of_other_modes_or_axes_is_refused(tmp_path: Path, fmus: Path) -> None:
     write_machine(tmp_path, {"Q": 0.1})
     pack(fmus / "plant.fmu", tmp_path / "own.fmu", modes=tmp_path / "modes.csv", pose={"Q": 0.1})
     path = write_machine(tmp_path, {"Q": 0.1}, plant="own.fmu")
-    with open_plant(load_machine(path), fmus).archive as archive:
+    with open_plant(load_machine(path), fmus)[0] as archive:
         assert axes_of(archive) == ("Q",)
 
     table = (tmp_path / "modes.csv").read_text(encoding="utf-8")
@@ -141,7 +141,7 @@ def test_pack_command_makes_what_plant_names(
         assert axes_of(archive) == ("Q", "b2")
         assert archive.description.description.endswith("Machine: Saw 3. Synthetic; for tests")
     write_machine(path.parent, {"Q": 0.1, "b2": 0.25}, plant=str(out))
-    with open_plant(load_machine(path), fmus).archive as archive:
+    with open_plant(load_machine(path), fmus)[0] as archive:
         assert archive.path == out
 
     base = tmp_path / "base.fmu"

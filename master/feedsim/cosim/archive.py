@@ -18,7 +18,7 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 from feedsim.cosim import signals, untrusted
-from feedsim.cosim.unpacked import STORE, Content, Description, check_there
+from feedsim.cosim.unpacked import STORE, Content, check_there
 from feedsim.errors import InputError
 
 _DESCRIPTION = "modelDescription.xml"
@@ -67,9 +67,8 @@ class Archive:
         self.path = path
         allowance = allowance or untrusted.Allowance(path)
         self._content: Content | None = STORE.take(path, allowance, partial(_unpack, path, allowance))
-        self.directory = self._content.directory
-        found = self._content.description
-        self.description, self.variables, self.platforms = found.model, found.variables, found.platforms
+        self.directory, self.description = self._content.directory, self._content.description
+        self.variables, self.platforms = self._content.variables, self._content.platforms
 
     @property
     def guid(self) -> str:
@@ -158,9 +157,9 @@ def _unpack(path: Path, allowance: untrusted.Allowance, file: IO[bytes], content
         for entry in needed:
             untrusted.copy(package, entry, content.directory / entry.filename)
     parts = [name.split("/") for name in found if name.startswith("binaries/")]
-    platforms = tuple(sorted({part[1] for part in parts if len(part) > 2}))
-    model = _read_description(path, content.directory)
-    content.description = Description(model, {each.name: each for each in model.modelVariables}, platforms)
+    content.platforms = tuple(sorted({part[1] for part in parts if len(part) > 2}))
+    content.description = _read_description(path, content.directory)
+    content.variables = {each.name: each for each in content.description.modelVariables}
 
 
 def _read_description(path: Path, directory: Path) -> Any:

@@ -95,7 +95,11 @@ def friction_feedforward(
     t = np.arange(count, dtype=np.float64) * T_c
     return {
         # Linear between the setpoints, as the drive ramps them: a motion at rest stays exactly at rest.
-        axis: law(_numbers(friction), np.interp(t - delays[axis], program.time, program.n_ffw[axis]), T_c)
+        axis: law(
+            {name: float(value) for name, value in friction.parameters().items()},
+            np.interp(t - delays[axis], program.time, program.n_ffw[axis]),
+            T_c,
+        )
         for axis, friction in frictions.items()
     }
 
@@ -124,10 +128,6 @@ def feeders(system: System, torques: TorqueFeedforward, instants: int) -> list[O
         port = Port(system.units[wiring.controller(axis)], ["M_add"])
         sends += set_real(port, port.to_own(torque.reshape(-1, 1)))
     return sends
-
-
-def _numbers(friction: Friction) -> dict[str, float]:
-    return {name: float(value) for name, value in friction.parameters().items()}
 
 
 def _torque_lag(drive: Drive, T_c: float) -> float:

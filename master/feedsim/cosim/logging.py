@@ -46,7 +46,8 @@ def log(fine: Trace, logging: Logging, ideal: Sequence[str] = (), scratch: Path 
         )
     rows = -(-len(fine) // every)
     noise, steps, delays = logging.noise.given(), logging.quantisation.given(), logging.delay.given()
-    names = [(axis, signal) for axis in logging.axes or _axes_of(fine) for signal in logging.signals]
+    axes = logging.axes or dict.fromkeys(name.partition(".")[0] for name in fine)
+    names = [(axis, signal) for axis in axes for signal in logging.signals]
     logs = []
     for axis, signal in names:
         name = f"{axis}.{signal}"
@@ -144,10 +145,6 @@ def _course(signal: str, ideal: bool) -> str:
     if ideal and signal in IDEAL:
         return "ahead"
     return "linear" if signal in LINEAR else "cubic" if signal in SMOOTH else "held"
-
-
-def _axes_of(fine: Trace) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(name.partition(".")[0] for name in fine))
 
 
 def _deviation(level: Level, fine: Trace, axis: str, name: str) -> float:

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.cosim.unit import OK, WARNING, Floats, Log, Port, Unit, reading, setting
+from feedsim.cosim.unit import OK, WARNING, Floats, Log, Port, Unit, exchanging
 
 # An operation in cycle k, which begins at t [s]; it returns the unit's fmi2Status.
 Act = Callable[[int, float], int]
@@ -99,34 +99,34 @@ class Operation:
 def set_real(port: Port, table: Floats | None = None, when: When | None = None) -> list[Operation]:
     """Send the port's values; with a table (rows, n), which is as the unit takes it, its next row, by default in every
     cycle."""
-    converted = [] if table is not None else _converted(port, port.own_values, port.values, inwards=True)
-    return [*converted, _exchange("set_real", port, port.own_values, setting(port.names), table, when)]
+    return _sent("set_real", port, table, when)
 
 
 def set_slopes(port: Port, table: Floats | None = None, when: When | None = None) -> list[Operation]:
-    converted = [] if table is not None else _converted(port, port.own_slopes, port.slopes, inwards=True, slopes=True)
-    return [*converted, _exchange("set_slopes", port, port.own_slopes, setting(port.names, slopes=True), table, when)]
+    return _sent("set_slopes", port, table, when)
 
 
 def get_real(port: Port) -> list[Operation]:
-    converted = _converted(port, port.own_values, port.values)
-    return [_exchange("get_real", port, port.own_values, reading(port.names)), *converted]
+    return [_exchange("get_real", port), *_converted("get_real", port)]
 
 
 def get_slopes(port: Port) -> list[Operation]:
-    converted = _converted(port, port.own_slopes, port.slopes, slopes=True)
-    return [_exchange("get_slopes", port, port.own_slopes, reading(port.names, slopes=True)), *converted]
+    return [_exchange("get_slopes", port), *_converted("get_slopes", port)]
 
 
-def _converted(
-    port: Port, own: Floats, signals: Floats, *, inwards: bool = False, slopes: bool = False
-) -> list[Operation]:
+def _sent(kind: str, port: Port, table: Floats | None, when: When | None) -> list[Operation]:
+    return [*(_converted(kind, port) if table is None else ()), _exchange(kind, port, table, when)]
+
+
+def _converted(kind: str, port: Port) -> list[Operation]:
     """Units of measurement on the way into the unit or out of it; nothing where none is to be converted."""
+    slopes = kind.endswith("slopes")
+    own, signals = (port.own_slopes, port.slopes) if slopes else (port.own_values, port.values)
     operations = []
     for i, alias in enumerate(port.aliases) if port.converts else ():
         at = slice(i, i + 1)
         offset = 0.0 if slopes else alias.offset
-        if inwards:
+        if kind.startswith("set"):
             operations.append(line(own[at], np.array([-offset / alias.factor]), 1 / alias.factor, signals[at]))
         else:
             operations.append(line(signals[at], np.array([offset]), alias.factor, own[at]))
@@ -157,14 +157,11 @@ def get_row(log: Log, when: When) -> list[Operation]:
     ]
 
 
-def _exchange(
-    kind: str, port: Port, buffer: Floats, about: str, table: Floats | None = None, when: When | None = None
-) -> Operation:
+def _exchange(kind: str, port: Port, table: Floats | None = None, when: When | None = None) -> Operation:
+    y, about = port.own_slopes if kind.endswith("slopes") else port.own_values, exchanging(kind, port.names)
     if table is not None:
-        buffer, when = np.ascontiguousarray(table, dtype=np.float64), when or When()
-    return Operation(
-        kind, unit=port.unit, references=port.references, orders=port.orders, y=buffer, about=about, when=when
-    )
+        y, when = np.ascontiguousarray(table, dtype=np.float64), when or When()
+    return Operation(kind, y, unit=port.unit, references=port.references, orders=port.orders, about=about, when=when)
 
 
 # --- arithmetic on vectors with an entry per axis; y may be one of the operands

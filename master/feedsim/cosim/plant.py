@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import threading
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,17 +26,9 @@ _PACKED: dict[Any, bytes] = {}  # by content of what they are packed from; those
 _PACKING = threading.Lock()
 
 
-@dataclass(frozen=True)
-class Plant:
-    """The archive, and the table of modes that the unit is to read in place of the archive's; None where the archive's
-    own counts."""
-
-    archive: Archive
-    modes_file: Path | None
-
-
-def open_plant(machine: Machine, fmus: Path) -> Plant:
-    """The machine's plant archive, unpacked; the caller closes it.
+def open_plant(machine: Machine, fmus: Path) -> tuple[Archive, Path | None]:
+    """The machine's plant archive, unpacked; the caller closes it. And the table of modes that the unit is to read in
+    place of the archive's; None where the archive's own counts.
 
     A machine that names an archive under `plant` has that. Otherwise plant.fmu in the folder `fmus` serves with the
     machine's table of modes; where it has other axes than the machine, the machine is packed into it first.
@@ -52,12 +43,12 @@ def open_plant(machine: Machine, fmus: Path) -> Plant:
         except InputError:
             archive.close()
             raise
-        return Plant(archive, None)
+        return archive, None
     general = Archive(fmus / "plant.fmu")
     if set(axes_of(general)) == set(machine.axes):
-        return Plant(general, machine.modes)
+        return general, machine.modes
     general.close()
-    return Plant(_packed_for(machine, general.path), None)
+    return _packed_for(machine, general.path), None
 
 
 def _packed_for(machine: Machine, general: Path) -> Archive:
@@ -156,14 +147,11 @@ def plant_modes(machine: Machine) -> tuple[Modes, list[str]]:
 
 def _of_cell(machine: Machine) -> tuple[Modes, list[str]] | None:
     assert machine.plant is not None
-    archive = Archive(machine.plant)
-    try:
+    with Archive(machine.plant) as archive:
         file = archive.directory / POSES_IN_ARCHIVE
         if not file.is_file():
             return None
         modes, centre = read_cell(file, axes_of(archive), machine.pose)
-    finally:
-        archive.close()
     about = ", ".join(f"{axis} {units.show(position, 'm')}" for axis, position in centre.items())
     at = ", ".join(f"{axis} {units.show(machine.pose[axis], 'm')}" for axis in centre)
     return modes, [

@@ -74,18 +74,18 @@ class System:
             raise
 
     def _build(self, machine: Machine, fmus: Path) -> None:
-        plant = open_plant(machine, fmus)
-        self._open.append(plant.archive)
+        plant, self.plant_modes_file = open_plant(machine, fmus)
+        self._open.append(plant)
         self.roles = self._fill(machine, fmus)
-        instances = {wiring.PLANT: plant.archive} | {name: role.archive for name, role in self.roles.items()}
+        instances = {wiring.PLANT: plant} | {name: role.archive for name, role in self.roles.items()}
         given = {name: role.signals for name, role in self.roles.items()}
         connections = wiring.figure_2(self.axes, with_friction=self.friction, given=given)
         wiring.check(connections, instances, [name for name, role in self.roles.items() if role.foreign])
         self.units = {name: self._instantiate(archive, name) for name, archive in instances.items()}
         self.plant = self.units[wiring.PLANT]
-        self.plant_axes, self.plant_modes_file = axes_of(plant.archive), plant.modes_file
+        self.plant_axes = axes_of(plant)
 
-        self.plant.set_parameters(plant_parameters(machine, plant.modes_file))
+        self.plant.set_parameters(plant_parameters(machine, self.plant_modes_file))
         for name, role in self.roles.items():
             self.units[name].set_parameters(role.parameters)
             if wiring.RELEASE in role.signals:

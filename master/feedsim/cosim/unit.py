@@ -232,13 +232,10 @@ class Unit:
         return np.array([known[name].valueReference for name in names], dtype=np.uint32)
 
 
-def setting(names: Sequence[str], slopes: bool = False) -> str:
-    """What a unit is at that gets values, for messages; :func:`reading`: that gives them."""
-    return f"setting {'slopes of ' if slopes else ''}{', '.join(names)}"
-
-
-def reading(names: Sequence[str], slopes: bool = False) -> str:
-    return f"reading {'slopes of ' if slopes else ''}{', '.join(names)}"
+def exchanging(operation: str, names: Sequence[str]) -> str:
+    """What a unit is at, for messages."""
+    done = "setting" if operation.startswith("set") else "reading"
+    return f"{done} {'slopes of ' if operation.endswith('slopes') else ''}{', '.join(names)}"
 
 
 # Another maker's unit leaves it to the importer's logger to print numbers into its messages, as in C. FMPy's library
@@ -303,18 +300,18 @@ class Port:
         """Send the values now."""
         if self.converts:
             self.own_values[:] = self.to_own(self.values)
-        self._exchange("set_real", setting(self.names))
+        self._exchange("set_real")
 
     def get(self) -> None:
         """Find the values now."""
-        self._exchange("get_real", reading(self.names))
+        self._exchange("get_real")
         if self.converts:
             self.values[:] = [alias.to_signal(each) for alias, each in zip(self.aliases, self.own_values, strict=True)]
 
-    def _exchange(self, operation: str, about: str) -> None:
+    def _exchange(self, operation: str) -> None:
         at, count = self.references.ctypes.data, self.references.size
         if self.unit.call(operation)(at, count, self.own_values.ctypes.data) > WARNING:
-            self.unit.fail(about)
+            self.unit.fail(exchanging(operation, self.names))
 
 
 class Log:

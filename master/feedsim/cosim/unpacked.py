@@ -16,7 +16,6 @@ import threading
 import time
 import weakref
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from io import BufferedReader
 from pathlib import Path
 from typing import IO, Any
@@ -32,21 +31,6 @@ RESTED = 2_000_000_000
 DIGESTS = 64  # how many are remembered
 
 
-@dataclass
-class Description:
-    """What an archive says of itself.
-
-    Attributes:
-        model: its modelDescription.xml, as FMPy reads it.
-        variables: by name; not to be changed.
-        platforms: the folders in its binaries/, for this platform and others.
-    """
-
-    model: Any
-    variables: Mapping[str, Any]
-    platforms: tuple[str, ...]
-
-
 class Content:
     """The unpacked content of an archive, in a folder that other users of the same content see too.
 
@@ -54,7 +38,9 @@ class Content:
         directory: the folder; only to be read.
         size: bytes of what is unpacked.
         files: what is unpacked, and the size of each.
-        description: see there.
+        description: what the archive says of itself: modelDescription.xml, as FMPy reads it.
+        variables: of the description, by name; not to be changed.
+        platforms: the folders in its binaries/, for this platform and others.
         library: the loaded shared library, whatever the room that loads it takes for one; None as long as it is not
             needed. `unload` gives it back.
     """
@@ -65,7 +51,9 @@ class Content:
         self.remove_folder = weakref.finalize(self, _remove, str(self.directory), os.getpid())
         self.size = 0
         self.files: dict[Path, int] = {}
-        self.description: Description
+        self.description: Any = None
+        self.variables: Mapping[str, Any] = {}
+        self.platforms: tuple[str, ...] = ()
         self.library: Any = None
         self.unload: Callable[[], None] | None = None
         self.users = 0

@@ -12,7 +12,7 @@ from feedsim.cosim import check, fmus_directory, wiring
 from feedsim.cosim.archive import Archive, UnitDefinition
 from feedsim.cosim.roles import RoleUnit, archive_path, filled
 from feedsim.cosim.system import plant_parameters
-from feedsim.errors import InputError
+from feedsim.cosim.unpacked import check_there
 from feedsim.nc import Program, plan
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.roles import DRIVE, FRICTION, Role
@@ -89,10 +89,8 @@ def _archives(
     """Bytes of the archives by name, in the order of the signal flow; they are left in `folder` too."""
     machine = scenario.machine
     plant, setpoint = machine.plant or fmus / "plant.fmu", fmus / f"{SETPOINT}.fmu"
-    if missing := [path for path in (plant, *sources, setpoint) if not path.is_file()]:
-        raise InputError(
-            f"{missing[0]}: no such file; `make fmus` builds the archives, FEEDSIM_FMUS names their folder"
-        )
+    for path in (plant, *sources, setpoint):
+        check_there(path)
     if machine.plant is not None:
         (folder / "plant.fmu").write_bytes(machine.plant.read_bytes())
     else:

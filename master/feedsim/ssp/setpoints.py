@@ -103,17 +103,11 @@ def segments(planned: Program, program: Program) -> tuple[Segment, ...]:
     end = program.duration
     slack = 1e-6 * (program.time[1] - program.time[0])  # exact ends carry rounding errors
     kept = [segment for segment in planned.segments if segment.start < end - slack]
-    return _cut(kept, program) if kept and kept[-1].end > end + slack else tuple(kept)
-
-
-def _cut(kept: list[Segment], program: Program) -> tuple[Segment, ...]:
-    last = kept[-1]
-    reached = {axis: float(x_s[-1]) for axis, x_s in program.x_s.items()}
-    cut = replace(
-        last, end=program.duration, description=f"{last.description}, cut at the stop time", target=reached,
-        geometry=None,
-    )  # fmt: skip
-    return (*kept[:-1], cut)
+    if kept and kept[-1].end > end + slack:
+        reached = {axis: float(x_s[-1]) for axis, x_s in program.x_s.items()}
+        told = f"{kept[-1].description}, cut at the stop time"
+        kept[-1] = replace(kept[-1], end=end, description=told, target=reached, geometry=None)
+    return tuple(kept)
 
 
 def evaluation(scenario: Scenario, planned: Program, program: Program) -> tuple[Scenario, list[str]]:

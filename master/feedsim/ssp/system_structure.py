@@ -99,11 +99,12 @@ def to_bytes(structure: Structure) -> bytes:
         experiment.set("stopTime", repr(structure.stop))
     annotations = xml.child(experiment, "ssd:Annotations") if structure.step or structure.scenario else experiment
     if structure.step is not None:
-        algorithm = xml.child(_annotation(annotations, ALGORITHM), "osp:Algorithm")
+        algorithm = xml.child(xml.child(annotations, "ssc:Annotation", {"type": ALGORITHM}), "osp:Algorithm")
         xml.child(algorithm, "osp:FixedStepAlgorithm", {"baseStepSize": repr(structure.step)})
     if structure.scenario is not None:
         # Here, since tools that write a file anew keep the experiment's annotations and not always those of the root.
-        xml.child(_annotation(annotations, SCENARIO), "feedsim:Scenario", {"version": "1"}).text = structure.scenario
+        place = xml.child(annotations, "ssc:Annotation", {"type": SCENARIO})
+        xml.child(place, "feedsim:Scenario", {"version": "1"}).text = structure.scenario
     return xml.to_bytes(root)
 
 
@@ -125,10 +126,6 @@ def _append(elements: xml.Element, component: Component) -> None:
         for binding in component.bindings:
             assert binding.source is not None
             xml.child(bindings, "ssd:ParameterBinding", {"source": binding.source})
-
-
-def _annotation(annotations: xml.Element, kind: str) -> xml.Element:
-    return xml.child(annotations, "ssc:Annotation", {"type": kind})
 
 
 def read(content: bytes, where: str) -> Structure:

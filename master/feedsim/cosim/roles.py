@@ -257,16 +257,17 @@ def _listed(known: Sequence[str], kind: str) -> str:
 
 def check_instances(filled: Iterable[RoleUnit]) -> None:
     """InputError where an archive that allows one instance in a process stands on several axes."""
-    axes: dict[object, list[RoleUnit]] = {}
+    axes: dict[Path, list[RoleUnit]] = {}
     for each in filled:
         if each.archive.description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
             axes.setdefault(each.archive.path.resolve(), []).append(each)
-    if crowded := [units for units in axes.values() if len(units) > 1]:
-        problems = [
-            f"{units[0].archive.path.name} allows one instance in a process; it is named as "
-            + ", ".join(f"{each.role.name} of {each.axis}" for each in units)
-            for units in crowded
-        ]
+    problems = [
+        f"{crowd[0].archive.path.name} allows one instance in a process; it is named as "
+        + ", ".join(f"{each.role.name} of {each.axis}" for each in crowd)
+        for crowd in axes.values()
+        if len(crowd) > 1
+    ]
+    if problems:
         raise InputError.of("units that cannot stand twice", problems)
 
 

@@ -87,16 +87,13 @@ def from_element(root: xml.Element, where: str) -> ParameterSet:
         kind = xml.shown(values[0].tag).partition(":")[2]
         found[name] = Parameter(name, kind, values[0].get("value", ""), values[0].get("unit"))
     if problems:
-        raise InputError.of(where, first(problems, where))
+        more = len(problems) - MOST_PROBLEMS
+        raise InputError.of(
+            where, problems if more <= 0 else [*problems[:MOST_PROBLEMS], f"{where}: {more} more problems"]
+        )
     return ParameterSet(
         tuple(found.values()), read_units(root.find(xml.tag("ssv:Units")), where), root.get("description", "")
     )
-
-
-def first(problems: list[str], where: str) -> list[str]:
-    """The first of many problems, and how many more there are."""
-    more = len(problems) - MOST_PROBLEMS
-    return problems if more <= 0 else [*problems[:MOST_PROBLEMS], f"{where}: {more} more problems"]
 
 
 def value(

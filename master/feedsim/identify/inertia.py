@@ -23,26 +23,13 @@ from feedsim.identify.parameters import RIGID, estimate
 from feedsim.identify.record import Array, Record, runs
 from feedsim.identify.result import Correlation, Estimate
 
-
-@dataclass(frozen=True)
-class Filter:
-    """How the low-pass is chosen and what is left out.
-
-    Attributes:
-        window: length of the Hann window [s]: -6 dB at 1/window. It is doubled, up to `longest`, as long as noise of
-            the motion makes up more than the share `noise` of the acceleration's variance (that share is what J comes
-            out too small by).
-        overlap: rows that are kept per window length.
-        slow: share of the highest speed of all records below which the axis counts as near rest.
-        smooth: time that the speed is averaged over for that [s].
-    """
-
-    window: float = 0.04
-    longest: float = 0.32
-    noise: float = 1e-3
-    overlap: int = 4
-    slow: float = 0.003
-    smooth: float = 0.02
+# Length of the Hann window of the low-pass [s]: -6 dB at 1/WINDOW. It is doubled, up to LONGEST, as long as noise of
+# the motion makes up more than the share NOISE of the acceleration's variance (that share is what J comes out too
+# small by).
+WINDOW, LONGEST, NOISE = 0.04, 0.32, 1e-3
+OVERLAP = 4  # rows that are kept per window length
+SLOW = 0.003  # share of the highest speed of all records below which the axis counts as near rest
+SMOOTH = 0.02  # [s] that the speed is averaged over for that
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,22 +56,21 @@ class Inertia:
         return self.estimates["J"]
 
 
-STANDARD = Filter()
 LEAST_ROWS = 20
 LEAST_SHARE = 0.05  # of the torque (rms) that accelerates, below which the friction model's faults may pass for J
 VAGUE = 0.1  # relative standard deviation of J that is worth a warning
 
 
-def inertia(records: Sequence[Record], settings: Filter = STANDARD) -> Inertia:
+def inertia(records: Sequence[Record]) -> Inertia:
     """J with sigma_2, F_C and M_0 from every part of the records where the axis moves.
 
     Raises InputError: nothing moves long enough; the axis does not accelerate.
     """
-    length = settings.window
+    length = WINDOW
     # One threshold for all: what a record of small motions holds is pre-sliding, which is no F_C sgn n.
-    slow = settings.slow * max((float(np.max(np.abs(_smooth_speed(r, settings)))) for r in records), default=0.0)
+    slow = SLOW * max((float(np.max(np.abs(_smooth_speed(r)))) for r in records), default=0.0)
     while True:
-        stretches = [stretch for record in records for stretch in _stretches(record, length, slow, settings)]
+        stretches = [stretch for record in records for stretch in _stretches(record, length, slow)]
         rows = sum(len(stretch.torque) for stretch in stretches)
         if rows < LEAST_ROWS:
             raise InputError(
@@ -93,7 +79,7 @@ def inertia(records: Sequence[Record], settings: Filter = STANDARD) -> Inertia:
             )
         acceleration = np.concatenate([stretch.columns[:, 0] for stretch in stretches])
         noise = max(stretch.noise for stretch in stretches)
-        if noise**2 <= settings.noise * float(np.mean(acceleration**2)) or 2 * length > settings.longest:
+        if noise**2 <= NOISE * float(np.mean(acceleration**2)) or 2 * length > LONGEST:
             break
         length *= 2
     return _solve(stretches, length)
@@ -108,7 +94,7 @@ class _Stretch:
     noise: float
 
 
-def _stretches(record: Record, length: float, slow: float, settings: Filter) -> list[_Stretch]:
+def _stretches(record: Record, length: float, slow: float) -> list[_Stretch]:
     """Filtered moves of a record."""
     h = record.interval
     kernel = np.sin(np.pi * np.arange(max(round(length / h), 4) + 1) / max(round(length / h), 4)) ** 2
@@ -127,7 +113,7 @@ def _stretches(record: Record, length: float, slow: float, settings: Filter) -> 
         ways.append((white(record.angle) * float(np.linalg.norm(second)), record.angle, first, second))
     # The one that tells the acceleration with less noise.
     noise, signal, to_speed, to_acceleration = min(ways, key=lambda way: way[0])
-    speed = _smooth_speed(record, settings)
+    speed = _smooth_speed(record)
     moving = np.abs(speed) > slow
     moving[1:] &= np.sign(speed[1:]) == np.sign(speed[:-1])
     found = []
@@ -135,7 +121,7 @@ def _stretches(record: Record, length: float, slow: float, settings: Filter) -> 
         if end - begin < size:
             continue
         part = slice(begin, end)
-        step = max(size // settings.overlap, 1)
+        step = max(size // OVERLAP, 1)
         side = float(np.sign(speed[(begin + end) // 2]))
         count = len(range(0, end - begin - size + 1, step))
         columns = [
@@ -155,9 +141,9 @@ def _apply(weights: Array, signal: Array, step: int) -> Array:
     return np.asarray(away + signal[0] * np.sum(weights), dtype=np.float64)
 
 
-def _smooth_speed(record: Record, settings: Filter) -> Array:
+def _smooth_speed(record: Record) -> Array:
     """(N,) speed, averaged over a short time, to tell rest and reversals."""
-    half = max(ceil(settings.smooth / record.interval / 2), 1)
+    half = max(ceil(SMOOTH / record.interval / 2), 1)
     if record.speed is not None:
         spread = np.pad(record.speed, half, mode="edge")
         return np.convolve(spread, np.full(2 * half + 1, 1 / (2 * half + 1)), "valid")

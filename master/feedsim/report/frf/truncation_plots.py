@@ -18,7 +18,13 @@ from feedsim.trace.response import FrequencyResponse
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
+STYLES: list[dict[str, Any]] = [
+    {"color": BLUE, "linestyle": "-", "linewidth": 1.2},
+    {"color": VERMILLION, "linestyle": (0, (5, 1.5)), "linewidth": 1.2},
+    {"color": GREEN, "linestyle": (0, (2, 1.2)), "linewidth": 1.2},
+    {"color": PURPLE, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.2},
+    {"color": ORANGE, "linestyle": "-", "linewidth": 1.2},
+]
 MOST_COLUMNS = 3
 FINEST, COARSEST = 1e-4, 100.0  # dB, of the axis of deviations
 AGREED = 0.1  # dB
@@ -73,13 +79,14 @@ def _picture(
     what: str,
 ) -> Picture:
     full = responses[FULL]
+    others = [(name, response) for name, response in responses.items() if name != FULL]
     with drawing(max(4.0 * len(columns), 9.0), 6.0) as figure:
         rooms = figure.subplots(2, len(columns), sharex="all", sharey="row", squeeze=False, height_ratios=[1.5, 1])
         for j, (title, name) in enumerate(columns.items()):
             above, below = rooms[0, j], rooms[1, j]
             heading(above, f"{'Direction' if name.startswith('tool') else 'Axis'} {title}")
             above.plot(full.frequency, ordinate.of(full[name]), color=MUTED, linewidth=2.6, alpha=0.6, label=FULL)
-            for style, (model, response) in zip(_styles(), _others(responses), strict=False):
+            for style, (model, response) in zip(STYLES, others, strict=False):
                 above.plot(response.frequency, ordinate.of(response[name]), label=model, **style)
                 size = np.maximum(np.abs(deviation(response, full, name)), FINEST)
                 below.plot(response.frequency, size, **style)
@@ -113,14 +120,3 @@ def _axes(above: Axes, below: Axes, full: FrequencyResponse, ordinate: Ordinate)
     below.set_ylim(FINEST, COARSEST)
     below.yaxis.set_major_formatter(plain)
     below.set_ylabel("deviation [dB]")
-
-
-def _others(responses: Mapping[str, FrequencyResponse]) -> list[tuple[str, FrequencyResponse]]:
-    return [(name, response) for name, response in responses.items() if name != FULL]
-
-
-def _styles() -> list[dict[str, Any]]:
-    dashes: list[Any] = ["-", (0, (5, 1.5)), (0, (2, 1.2)), (0, (6, 1.5, 1, 1.5)), "-"]
-    return [
-        {"color": colour, "linestyle": dash, "linewidth": 1.2} for colour, dash in zip(COLOURS, dashes, strict=True)
-    ]

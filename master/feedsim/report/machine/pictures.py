@@ -162,7 +162,8 @@ def mode_heading(figure: Drawing, info: MachineInfo, of: Model, k: int) -> None:
 def remark(figure: Drawing, info: MachineInfo, *, below: bool = False) -> None:
     """What the machine's numbers are worth, in a corner on the right: a picture travels without its page."""
     y, side = (0.012, "bottom") if below else (0.985, "top")
-    words = figure.text(0.99, y, _wrapped(info.note), fontsize=7.5, color=MUTED, ha="right", va=side)
+    note = "\n".join(textwrap.wrap(info.note, NOTE_WIDTH)[:NOTE_LINES])
+    words = figure.text(0.99, y, note, fontsize=7.5, color=MUTED, ha="right", va=side)
     words.set_in_layout(False)
 
 
@@ -319,10 +320,6 @@ def _legend(figure: Drawing, of: Model, more: Sequence[object] = ()) -> None:
         handles=[*handles, *more], loc="outside lower left", fontsize=8.5, ncols=7, handlelength=1.2,
         handleheight=0.9, columnspacing=1.6, handletextpad=0.5,
     )  # fmt: skip
-
-
-def _wrapped(note: str) -> str:
-    return "\n".join(textwrap.wrap(note, NOTE_WIDTH)[:NOTE_LINES])
 
 
 def _short(words: str) -> str:

@@ -183,13 +183,8 @@ def provenance(run: Run) -> Section:
         *([("Log", log_text(scenario.logging, run.log))] if scenario.logging is not None else []),
         ("Coupling", f"{coupling.scheme}, {coupling.substeps} exchange step(s) per control cycle"),
     ]
-    return sections.provenance_section(
-        rows,
-        input_files(scenario),
-        sections.archives_table(run.units),
-        _coupling(run.coupling),
-        sections.parameters_section(machine),
-    )
+    used, parameters = sections.archives_table(run.units), sections.parameters_section(machine)
+    return sections.provenance_section(rows, input_files(scenario), used, _coupling(run.coupling), parameters)
 
 
 def _coupling(coupling: Mapping[str, float]) -> Section | None:

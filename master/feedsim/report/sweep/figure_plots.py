@@ -100,12 +100,8 @@ def _histogram(axes: Axes, output: Output, exceedance: bool) -> None:
     statistics = output.statistics
     for share in QUANTILES:
         value = statistics[f"q{share}"]
-        axes.axvline(
-            value,
-            color=style.INK if share == 50 else style.MUTED,
-            linewidth=1.1,
-            linestyle="-" if share == 50 else "--",
-        )
+        colour, dash = (style.INK, "-") if share == 50 else (style.MUTED, "--")
+        axes.axvline(value, color=colour, linewidth=1.1, linestyle=dash)
     ends = {5: ("right", -3), 50: ("center", 0), 95: ("left", 3)}
     if np.ptp(known) > 0:
         for share, (side, shift) in ends.items():

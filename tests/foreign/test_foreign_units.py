@@ -14,6 +14,8 @@ from scipy.integrate import solve_ivp
 
 from feedsim import cosim, scenario
 from feedsim.cosim import Run
+from feedsim.cosim.archive import Archive
+from feedsim.cosim.roles import start_value
 from feedsim.errors import InputError, SimulationError
 from feedsim.scenario.study import load_study
 from foreign import acme
@@ -173,6 +175,12 @@ def test_an_input_that_no_signal_is_given_to_can_be_held(units: Path, fmus: Path
     assert not np.array_equal(
         by["50"].trace["X.n_a"], cosim.run(scenario.load(units / "s.yaml", mapped(units)), fmus=fmus).trace["X.n_a"]
     )
+
+
+def test_a_text_may_have_the_unit_by_the_archives_own_name(units: Path) -> None:
+    with Archive(units / "acme_drive.fmu") as archive:
+        told = [start_value(archive, "Lead", text, {}) for text in (10, "10 mm/turn", "10 mm/rev")]
+    assert told == pytest.approx([10, 10, 10], rel=1e-15)
 
 
 def test_a_study_varies_what_another_archive_calls_its_parameter(units: Path) -> None:

@@ -76,7 +76,7 @@ class Archive:
 
     @property
     def version(self) -> str:
-        return str(self.description.version)
+        return str(self.description.version or "")
 
     def close(self) -> None:
         """Its units are to be closed before it."""

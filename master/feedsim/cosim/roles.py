@@ -90,7 +90,7 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
     """
     problems: list[str] = []
     warnings: list[str] = []
-    where = f"axis {axis}: {role.name} {archive.path.name}"
+    where, key = f"axis {axis}: {role.name} {archive.path.name}", f"machine.axes.{axis}.{role.name}"
     signals: dict[str, Alias] = {}
     taken: dict[str, str] = {}
     for name, variable in unit.variables.items():
@@ -101,7 +101,8 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
             signals[name] = _alias(signal, signal in role.inputs, variable, archive)
             taken[variable] = name
         except InputError as error:
-            problems.append(f"{where}: {name}: {variable!r} {error}")
+            group = "inputs" if signal in role.inputs else "outputs"
+            problems.append(f"{archive.path.name}: {key}.{group}.{name}: {variable!r} {error}")
     bare = [name for name, each in signals.items() if role.signals[name].unit not in (BOOLEAN, "1")
             and archive.declared_unit(each.name) is None]  # fmt: skip
     if bare:
@@ -112,7 +113,7 @@ def foreign(role: Role, axis: str, unit: ForeignUnit, archive: Archive) -> RoleU
         try:
             parameters[name] = start_value(archive, name, given, taken)
         except InputError as error:
-            problems.append(f"{where}: parameter {name!r} {error}")
+            problems.append(f"{archive.path.name}: {key}.parameters: parameter {name!r} {error}")
     if problems:
         raise InputError.of(where, problems)
     left = [each for each in archive.variables.values()
@@ -230,7 +231,13 @@ def _parsed(text: str, archive: Archive, name: str) -> float:
     definition = archive.unit_definitions.get(declared or "")
     if definition is None:
         return units.parse(text, declared or units.DIMENSIONLESS)
-    return (units.parse(text, definition.text) - definition.offset) / definition.factor
+    number, _, unit = text.strip().partition(" ")
+    if unit.strip() == declared:  # the archive's own name for it, which need not be one of ours
+        return units.parse(number, units.DIMENSIONLESS)
+    try:
+        return (units.parse(text, definition.text) - definition.offset) / definition.factor
+    except InputError as error:
+        raise InputError(f"{error}; the archive declares it in {declared}") from None
 
 
 def _limit(variable: Any, end: str) -> float | None:

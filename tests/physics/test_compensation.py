@@ -53,7 +53,7 @@ def left_with(described: Scenario, error: float, fmus: Path) -> Quality:
     program = nc.plan(described)
     machine = described.machine
     axes = ("X", "Z")
-    delays = {axis: lag_of(machine.axes[axis], machine.cycles).delay + error for axis in axes}
+    delays = {axis: lag_of(machine.axes[axis].drive, machine.cycles).delay + error for axis in axes}
     with FrictionLaw(fmus) as law:
         frictions = {axis: machine.axes[axis].friction for axis in axes}
         torque = friction_feedforward(machine, program, frictions, delays, law)
@@ -73,7 +73,7 @@ def test_axis_lag_is_that_of_the_speed_loop() -> None:
         assert drive.D is not None
         assert drive.omega_0 is not None
         expected = drive.T_dyn + 2 * drive.D / drive.omega_0 + cycles.T_pos - cycles.T_c
-        assert lag_of(axis, cycles).axis == pytest.approx(expected, abs=1e-6)
+        assert lag_of(axis.drive, cycles).axis == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize("changes", [{}, {"ideal_current_loop": True}, {"filter_2": ("low_pass", 900.0)}])
@@ -85,7 +85,7 @@ def test_torque_lag_is_the_slope_of_the_phase(changes: dict[str, object]) -> Non
         axis = changed(axis, changes)
         response = LinearDrive(axis.drive, machine.cycles, axis.I_P).torque(s)[0][0]
         held = machine.cycles.T_c / 2 if axis.drive.ideal_current_loop else 0.0
-        assert lag_of(axis, machine.cycles).torque == pytest.approx(-np.angle(response) + held, abs=1e-9)
+        assert lag_of(axis.drive, machine.cycles).torque == pytest.approx(-np.angle(response) + held, abs=1e-9)
 
 
 def changed(axis: Axis, changes: dict[str, object]) -> Axis:

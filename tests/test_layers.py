@@ -30,6 +30,7 @@ ORDER = [
     "fields",
     "variables",
     "units",
+    "findings",
     "errors",
 ]
 SOLE_USERS = {

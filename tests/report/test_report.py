@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import Figure, evaluate
+from feedsim.cli.terminal import warn
 from feedsim.errors import OutputError
+from feedsim.findings import Note, Wrong
 from feedsim.motions import Arc, Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.content import Tile
@@ -117,6 +119,21 @@ def test_warnings_stand_at_the_top(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["warnings"] == list(run.warnings)
     report.write(positioning_run(), {}, tmp_path)
     assert 'role="alert"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_what_is_wrong_is_said_first_and_in_red(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = (Note("as built"), "doubtful", Wrong("worse than < before"), "doubtful")
+    report.write(replace(positioning_run(), warnings=found), {}, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    wrong = page.index('<p class="wrong"><strong>Wrong:</strong> worse than &lt; before</p>')
+    assert wrong < page.index("<strong>Warning:</strong> doubtful") < page.index('<p class="note">as built</p>')
+    told = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert told["warnings"] == ["worse than < before", "doubtful"]
+    assert [each["severity"] for each in told["findings"]] == ["wrong", "doubt", "note"]
+    warn(found)
+    assert capsys.readouterr().err.splitlines() == [
+        "feedsim: WRONG: worse than < before", "feedsim: warning: doubtful", "feedsim: note: as built",
+    ]  # fmt: skip
 
 
 def test_real_time_factor_is_simulated_over_elapsed_time() -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
+
+from feedsim.findings import ranked, severity
 
 if TYPE_CHECKING:
     from feedsim.scenario import Machine
@@ -46,9 +49,12 @@ def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Ite
 
 
 def warn(warnings: Iterable[str]) -> None:
-    """Say on standard error what the user should know before believing the results."""
-    for warning in warnings:
-        print(f"feedsim: warning: {warning}", file=sys.stderr)
+    """Say on standard error what the user should know before believing the results; what is wrong first, and in red."""
+    for each in ranked(warnings):
+        kind = {"wrong": "WRONG", "doubt": "warning", "note": "note"}[severity(each)]
+        line = f"feedsim: {kind}: {each}"
+        red = kind == "WRONG" and sys.stderr.isatty() and "NO_COLOR" not in os.environ
+        print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr)
 
 
 def announce(machine: Machine) -> None:

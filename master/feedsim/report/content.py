@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from feedsim.findings import ranked, severity
 from feedsim.report.formatting import minus, shown
 from feedsim.report.style import Picture
 
@@ -127,7 +128,8 @@ class Report:
     """A report of any kind, in the order in which it is read; what is None or empty is left out.
 
     Attributes:
-        warnings: above everything else. notes: what the numbers are worth, each once.
+        warnings: above everything else, what is wrong first (`feedsim.findings`). notes: what the numbers are
+            worth, each once.
         tiles: leading numbers.
         main: sections, tables and pictures.
         provenance: where the numbers come from: the last section, in small print.
@@ -141,6 +143,11 @@ class Report:
     warnings: Sequence[str] = ()
     notes: Sequence[str] = ()
     tiles: Sequence[Tile] = ()
+
+    @property
+    def findings(self) -> list[tuple[str, str]]:
+        """Severity and text of the warnings, the gravest first."""
+        return [(severity(each), str(each)) for each in ranked(self.warnings)]
 
     @property
     def pictures(self) -> list[Picture]:

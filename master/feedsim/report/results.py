@@ -109,9 +109,17 @@ def write_report(
             elif (already := content(fresh / name)) is not None:
                 grown[name] = already
         write_text(fresh / REPORT, html(report))
-        write_text(fresh / SUMMARY, to_json(summary(names)))
+        write_text(fresh / SUMMARY, to_json({**summary(names), **_found(report)}))
 
     return write_results(directory, (*files, REPORT, SUMMARY), report.pictures, fill, grown)
+
+
+def _found(report: Report) -> dict[str, Any]:
+    """Entries of summary.json: what there is to say about the result by its severity, and of that the warnings."""
+    return {
+        "warnings": [text for severity, text in report.findings if severity != "note"],
+        "findings": [{"severity": severity, "text": text} for severity, text in report.findings],
+    }
 
 
 def discard(directory: Path | str) -> None:

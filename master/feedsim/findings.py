@@ -1,0 +1,26 @@
+"""What there is to say about a result, by its weight: `Wrong`, then a plain text, which is a doubt, then `Note`.
+
+Findings go through the house as the warnings that they are; whoever shows them takes them by `ranked`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class Wrong(str):
+    """A figure, a file or a verdict is wrong, or worse than none: nobody may read the result without this."""
+
+
+class Note(str):
+    """How a result is to be read; nothing is the matter."""
+
+
+def severity(finding: str) -> str:
+    """ "wrong", "doubt" (a text that is no more than that) or "note"."""
+    return {Wrong: "wrong", Note: "note"}.get(type(finding), "doubt")
+
+
+def ranked(findings: Iterable[str]) -> list[str]:
+    """Each once, the wrong ones first and notes last, else in their order."""
+    return sorted(dict.fromkeys(findings), key=lambda each: ("wrong", "doubt", "note").index(severity(each)))

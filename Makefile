@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-processors test-importers test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all lint format reference check-reference bench worst-case pose-study identification-study lock ansys clean
+.PHONY: help run test test-c test-python test-processors test-importers test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all lint format reference check-reference bench worst-case pose-study identification-study identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -183,7 +183,10 @@ worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-ti
 pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full model (some minutes; docs/position-dependence.md)
 	$(PY) benchmarks/pose_grid.py
 
-identification-study: fmus $(VENV)/.run ## how far identified parameters can be trusted, Monte Carlo (some ten minutes; docs/identification.md)
+identification-study: fmus $(VENV)/.run ## whether intervals hold the truth: 320 logs of known axes, good and flawed (half an hour; docs/identification.md)
+	$(PY) benchmarks/identification_study.py
+
+identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good logs are, Monte Carlo (some ten minutes; docs/identification.md)
 	$(PY) benchmarks/identification.py
 
 # --- keep ----------------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """How far identification can be trusted: Monte Carlo over noisy logs of simulated experiments.
 
-Run by ``make identification-study`` (some ten minutes). The experiments of scenarios/identify_*.yaml run once on the
+Run by ``make identification-accuracy`` (some ten minutes). The experiments of scenarios/identify_*.yaml run once on the
 whole machine and are then logged again and again, with other noise. The default machine, whose numbers are synthetic
 and known. Writes table.md; what it shows is explained in docs/identification.md.
 """

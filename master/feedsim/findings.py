@@ -16,6 +16,9 @@ class Note(str):
     """How a result is to be read; nothing is the matter."""
 
 
+WRONG = "WRONG: "  # ahead of what is wrong where a finding is mere text: on a console, in the table of a study
+
+
 def severity(finding: str) -> str:
     """ "wrong", "doubt" (a text that is no more than that) or "note"."""
     return {Wrong: "wrong", Note: "note"}.get(type(finding), "doubt")

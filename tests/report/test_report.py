@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import Figure, evaluate
-from feedsim.cli.terminal import warn
+from feedsim.cli.terminal import finish, warn
 from feedsim.errors import OutputError
 from feedsim.findings import Note, Wrong
 from feedsim.motions import Arc, Dwell, Move
@@ -134,6 +134,8 @@ def test_what_is_wrong_is_said_first_and_in_red(tmp_path: Path, capsys: pytest.C
     assert capsys.readouterr().err.splitlines() == [
         "feedsim: WRONG: worse than < before", "feedsim: warning: doubtful", "feedsim: note: as built",
     ]  # fmt: skip
+    finish(False, found, "done")
+    assert capsys.readouterr().out.splitlines() == ["WRONG: worse than < before", "done"]
 
 
 def test_real_time_factor_is_simulated_over_elapsed_time() -> None:

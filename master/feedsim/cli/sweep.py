@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, QUIET, Command, Option, out, settings
 from feedsim.cli.terminal import announce, finish, progress_bar, warn
+from feedsim.findings import WRONG, Wrong
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -84,7 +85,9 @@ def sweep(options: Namespace) -> int:
         print(f"feedsim: interrupted; {done} {directory}; the same command continues", file=sys.stderr)
         return 130
     report.write(table, study, planned, directory)
-    finish(options.quiet, (), _summary(study, last[0], perf_counter() - begun, directory))
+    wrong = [str(text) for text in table["warnings"] if str(text).startswith(WRONG)]
+    told = [Wrong(f"{len(wrong)} of {len(table)} runs, the first: {wrong[0].removeprefix(WRONG)}")] if wrong else []
+    finish(options.quiet, told, _summary(study, last[0], perf_counter() - begun, directory))
     return 0
 
 

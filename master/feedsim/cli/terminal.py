@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from feedsim.findings import ranked, severity
+from feedsim.findings import WRONG, ranked, severity
 
 if TYPE_CHECKING:
     from feedsim.scenario import Machine
@@ -51,9 +51,9 @@ def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Ite
 def warn(warnings: Iterable[str]) -> None:
     """Say on standard error what the user should know before believing the results; what is wrong first, and in red."""
     for each in ranked(warnings):
-        kind = {"wrong": "WRONG", "doubt": "warning", "note": "note"}[severity(each)]
-        line = f"feedsim: {kind}: {each}"
-        red = kind == "WRONG" and sys.stderr.isatty() and "NO_COLOR" not in os.environ
+        kind = {"wrong": WRONG, "doubt": "warning: ", "note": "note: "}[severity(each)]
+        line = f"feedsim: {kind}{each}"
+        red = kind == WRONG and sys.stderr.isatty() and "NO_COLOR" not in os.environ
         print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr)
 
 
@@ -64,7 +64,11 @@ def announce(machine: Machine) -> None:
 
 
 def finish(quiet: bool, warnings: Iterable[str], *lines: str) -> None:
-    """How a command ends: with its warnings, and with what it has made unless it is to be quiet."""
+    """How a command ends: with its warnings, and with what it has made unless it is to be quiet.
+
+    What is wrong is the first line of the output besides, which may be all that is kept.
+    """
+    warnings = ranked(warnings)
     warn(warnings)
     if not quiet:
-        print("\n".join(lines))
+        print(*(WRONG + each for each in warnings[:1] if severity(each) == "wrong"), *lines, sep="\n")

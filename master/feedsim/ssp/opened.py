@@ -267,6 +267,6 @@ def _own_names(path: Path, folder: Path) -> Iterator[None]:
         ) from None
 
 
-def _named(text: str, path: Path, folder: Path) -> str:
-    text = re.sub(rf"{re.escape(str(folder / 'scenario.yaml'))}(:\d+)?", lambda _: str(path), text)
-    return text.replace(str(folder / "x")[:-1], f"{path}: ")
+def _named(warning: str, path: Path, folder: Path) -> str:
+    text = re.sub(rf"{re.escape(str(folder / 'scenario.yaml'))}(:\d+)?", lambda _: str(path), warning)
+    return type(warning)(text.replace(str(folder / "x")[:-1], f"{path}: "))

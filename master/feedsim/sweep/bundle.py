@@ -22,6 +22,7 @@ from typing import Any
 
 from feedsim import analysis, cosim, units
 from feedsim.errors import FeedsimError, InputError
+from feedsim.findings import WRONG, ranked, severity
 from feedsim.nc import Program, plan
 from feedsim.scenario import Base, Scenario
 from feedsim.scenario.study import Study
@@ -152,7 +153,8 @@ class Workplace:
         except Exception as error:
             said = str(error) if isinstance(error, FeedsimError) else f"{type(error).__name__}: {error}"
             return Outcome(task.run, None, self._as_named(said), time.perf_counter() - begun)
-        return Outcome(task.run, figures, None, time.perf_counter() - begun, tuple(map(self._as_named, warnings)))
+        told = tuple(self._as_named(WRONG * (severity(each) == "wrong") + each) for each in ranked(warnings))
+        return Outcome(task.run, figures, None, time.perf_counter() - begun, told)
 
     def _figures(self, task: Task) -> tuple[dict[str, tuple[float, str]], Sequence[str]]:
         scenario = self._base.with_changes(task.changes)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.findings import WRONG, Wrong
 from feedsim.report.formatting import Scale, number, scale
 from feedsim.report.style import Array
 from feedsim.sweep.failures import Failure, Where, failures, kinds, levels
@@ -222,7 +223,10 @@ class Account:
             if missing:
                 found.append(f"{each.name} could not be determined in {missing} of {int(self.ok.sum())} runs.")
         told = kinds(str(text) for text in self.table["warnings"] if text)
-        found += [f"{count} of {len(self.table)} runs warn: {example}" for example, count in told.values()]
+        for example, count in told.values():
+            head = f"{count} of {len(self.table)} runs"
+            wrong = example.startswith(WRONG)
+            found.append(Wrong(f"{head}: {example[len(WRONG) :]}") if wrong else f"{head} warn: {example}")
         return tuple(dict.fromkeys([*found, *self.sensitivities.warnings]))
 
     @cached_property

@@ -14,6 +14,7 @@ from feedsim.errors import InputError
 from feedsim.fields import Reading, brief, is_multiple
 from feedsim.files import shape
 from feedsim.files.problems import describe, explain, in_order, quantity_of
+from feedsim.files.references import referred
 from feedsim.files.source import Place, Source, at, read
 
 M = TypeVar("M", bound=BaseModel)
@@ -59,14 +60,22 @@ def fetch(source: Source, model: Any, place: Place, faults: list[str]) -> None:
     if annotation is None:
         return
     if isinstance(data, str):
-        folder = source.mark(place).folder
-        if shape.is_file(annotation) and data:
+        is_file = shape.is_file(annotation) and bool(data)
+        is_group = shape.is_model(annotation) and bool(annotation.IN_FOLDER or data.endswith((".yaml", ".yml")))
+        if not (is_file or is_group):
+            return
+        try:
+            named = referred(source.mark(place).folder, data)
+        except InputError as error:
+            faults.append(describe(source, place, str(error)))
+            source.put(place, Source(UNREAD, {(): source.mark(place)}))
+            return
+        if is_file:
             parent: Any = source.data
             for key in place[:-1]:
                 parent = parent[key]
-            parent[place[-1]] = str(folder / data)
-        elif shape.is_model(annotation) and (annotation.IN_FOLDER or data.endswith((".yaml", ".yml"))):
-            named = folder / data
+            parent[place[-1]] = str(named)
+        else:
             file = named / annotation.IN_FOLDER if annotation.IN_FOLDER and named.is_dir() else named
             try:
                 source.put(place, read_group(file))

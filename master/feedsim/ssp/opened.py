@@ -18,6 +18,7 @@ from feedsim import units
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.untrusted import readable
 from feedsim.errors import InputError
+from feedsim.files.references import closed
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment, plan
 from feedsim.nc.program import LONGEST
@@ -84,7 +85,7 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
             raise InputError.of(str(path), problems)
         _lay_out(folder, files, parts, own, path)
         program = _sampled(parts, structure, path)
-        with _own_names(path, folder):
+        with closed(folder), _own_names(path, folder):
             scenario, program, warnings = _with_motions(parts, own, program, path, folder, overrides)
             told = (*_late(structure, path), *_jumps(scenario, program, path), *warnings)
             if guessed:

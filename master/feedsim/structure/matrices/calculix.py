@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from feedsim.errors import InputError
+from feedsim.files.references import referred
 from feedsim.scenario.structure.matrices import CalculixStructure
 from feedsim.structure.assembly import Integers
 from feedsim.structure.matrices.raw import DIRECTIONS, Points, Raw, from_triangle
@@ -211,7 +212,7 @@ def _cards(file: Path, depth: int = 0) -> Iterator[tuple[str, str]]:
             if keyword == "INCLUDE":
                 if depth == DEEPEST:
                     raise InputError(f"{file}:{number}: files include one another more than {DEEPEST} deep")
-                yield from _cards(file.parent / options.get("INPUT", ""), depth + 1)
+                yield from _cards(referred(file.parent, options.get("INPUT", "")), depth + 1)
                 continue
         yield f"{file}:{number}", text
 

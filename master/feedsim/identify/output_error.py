@@ -89,7 +89,7 @@ def dynamic(
     carries over. The noise level is taken from the residuals of each stretch and the fit repeated with it.
 
     Args:
-        records: of one axis. Those of constant speed that `prior` was made of would count twice: leave them out.
+        records: of one axis. The plateaus that `prior` was made of are left out of them: they would count twice.
         law: the friction law.
         prior: result of stage 1; None: everything from these records, as far as they tell it.
         J: inertia [kg.m2]; with a standard deviation it is refined, without it is held; None: estimated.
@@ -102,7 +102,8 @@ def dynamic(
     """
     tell = progress or (lambda what, share: None)
     tell("motion", 0.0)
-    fine = models(records, law)
+    without = prior.plateaus if prior is not None else ()
+    fine = models(records, law, without=without)
     if not fine:
         raise InputError("stage 2: nothing moves in " + ", ".join(record.name for record in records))
     known = _known(fine, prior, J, delay, hold or {}, free)
@@ -111,7 +112,7 @@ def dynamic(
     tell("start values", 0.1)
     search = Search(fine, known.prior, weights)
     states = np.zeros((len(fine), 2))
-    coarse = models(records, law, coarse=True)
+    coarse = models(records, law, coarse=True, without=without)
     starts = [start for start in grid(coarse, known.values, base, STARTS + 1) if "W" not in base or start["W"] > 0]
     tell("first fits", 0.2)
     found = min(
@@ -383,7 +384,8 @@ def _stretches(model: RecordTorque, weight: Array, values: Mapping[str, float], 
     angle = np.asarray(model.motion.speed.antiderivative()(model.motion.time - values["delay"]))[model.rows]
     made = []
     for k, part in enumerate(model.parts):
-        on, time = model.stretch == k, model.record.time[part.rows]
+        on = model.stretch == k
+        time = model.record.time[model.rows[on]]
         size, level = part.amplitude, float(weight[k])
         signals = angle[on], speed[on], measured[on], friction[on]
         made.append(Stretch(model.record.name, part.kind, time, *signals, size, part.frequency, level))

@@ -217,10 +217,10 @@ def stiffnesses(models: Sequence[RecordTorque], values: Mapping[str, float]) -> 
     for model in models:
         friction = model.friction_measured(values)
         speed = model.moved(values["delay"])[1]
-        interval = model.motion.interval
+        travelled_to = np.asarray(model.motion.speed.antiderivative()(model.motion.time))[model.rows]
         for k in range(len(model.parts)):
             own = np.flatnonzero(model.stretch == k)
-            angle = np.cumsum(speed[own]) * interval
+            angle = travelled_to[own]
             reach = float(np.quantile(friction[own], 0.98) - np.quantile(friction[own], 0.02))
             least = max(least, reach / max(float(np.ptp(angle)), 1e-300))
             turns = np.flatnonzero(speed[own][1:] * speed[own][:-1] < 0) + 1

@@ -22,6 +22,7 @@ from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Correlation, Dynamic, Estimate, Identification, Plateau, Stationary
 from feedsim.identify.stribeck import stationary
+from feedsim.identify.stribeck_identifiability import FEW_SPEEDS, Points
 from feedsim.identify.structure_torque import with_structure
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ class _Run:
         with self._timed("open loop"):
             estimates: Mapping[str, Estimate] = self._merged(first, second, J)
             balance = None
-            if second is not None:
+            if second is not None and not (first is not None and self.prior):  # the curve is told by its plateaus
                 self.progress("open loop", 0, 1)
                 balance = balanced(transitions(self.records), self.law, estimates, hold=options.hold)
                 estimates = balance.estimates
@@ -153,11 +154,12 @@ class _Run:
             )
         if not chosen:
             return None
-        # No record counts twice: what was found at constant speed in the same records is no prior to their motion.
+        # Nothing counts twice: plateaus that a prior is made of are left out of the motion. But where a few speeds
+        # among it tell no curve, the motion as a whole tells more than they and the rest apart.
         names = {record.name for record in chosen}
         others = [record for record in self.records if record.name not in names]
         if first is not None and any(plateau.record in names for plateau in first.plateaus):
-            self.prior = False
+            self.prior = len(Points.of(first.plateaus).speeds) >= FEW_SPEEDS
         hold, free = self._held((*FRICTION, "M_0"))
         rigid = self._rigid(others) if others and self.options.J is None else None
         try:

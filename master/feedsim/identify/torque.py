@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feedsim.identify.motion import Motion, Part, motion, noise_of, parts
+from feedsim.identify.motion import SHORTEST, Motion, Part, motion, noise_of, parts
 from feedsim.identify.parameters import FRICTION
 from feedsim.identify.record import Array, Record
+from feedsim.identify.result import Plateau
 
 if TYPE_CHECKING:
     from feedsim.cosim.friction_law import FrictionLaw
@@ -39,13 +40,21 @@ class RecordTorque:
     nothing is left of them.
     """
 
-    def __init__(self, record: Record, law: FrictionLaw, *, coarse: bool = False) -> None:
-        """coarse: a step of the law per row, for a first look."""
+    def __init__(
+        self, record: Record, law: FrictionLaw, *, coarse: bool = False, without: Sequence[Plateau] = ()
+    ) -> None:
+        """coarse: a step of the law per row, for a first look. without: plateaus whose rows do not count."""
         self.record, self.law = record, law
         self.motion: Motion = motion(record)
-        self.parts: tuple[Part, ...] = parts(record, self.motion)
         self.count = 1 if coarse else self.motion.parts
-        chosen = [np.arange(part.first, part.last) for part in self.parts]
+        counted = np.ones(len(record), dtype=np.bool_)
+        for plateau in without:
+            if plateau.record == record.name:
+                counted &= (record.time < plateau.begin) | (record.time > plateau.end)
+        moving = [(part, part.first + np.flatnonzero(counted[part.rows])) for part in parts(record, self.motion)]
+        moving = [(part, rows) for part, rows in moving if len(rows) >= SHORTEST]
+        self.parts: tuple[Part, ...] = tuple(part for part, _ in moving)
+        chosen = [rows for _, rows in moving]
         self.rows = np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.intp)
         # Which stretch a row belongs to.
         self.stretch = np.repeat(np.arange(len(chosen)), [len(rows) for rows in chosen])
@@ -120,7 +129,9 @@ class RecordTorque:
         return moved
 
 
-def models(records: Sequence[Record], law: FrictionLaw, *, coarse: bool = False) -> tuple[RecordTorque, ...]:
+def models(
+    records: Sequence[Record], law: FrictionLaw, *, coarse: bool = False, without: Sequence[Plateau] = ()
+) -> tuple[RecordTorque, ...]:
     """Of the records that move at all."""
-    made = (RecordTorque(record, law, coarse=coarse) for record in records)
+    made = (RecordTorque(record, law, coarse=coarse, without=without) for record in records)
     return tuple(model for model in made if len(model.rows))

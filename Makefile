@@ -154,7 +154,7 @@ test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)
 
 # A file of tests stays together on one core: its fixtures are made once. Programs that packages bring (cmake) are found.
 test-python: fmus $(VENV)/.importers
-	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=25
 
 test-processors: fmus $(VENV)/.dev ## references, physics, identification as other processors round (ARGS=--all: all of them)
 	$(PY) tests/processors/run.py $(ARGS)

@@ -68,7 +68,7 @@ def inertia(records: Sequence[Record]) -> Inertia:
     """
     length = WINDOW
     # One threshold for all: what a record of small motions holds is pre-sliding, which is no F_C sgn n.
-    slow = SLOW * max((float(np.max(np.abs(_smooth_speed(r)))) for r in records), default=0.0)
+    slow = SLOW * max((float(np.max(np.abs(smooth_speed(r)))) for r in records), default=0.0)
     while True:
         stretches = [stretch for record in records for stretch in _stretches(record, length, slow)]
         rows = sum(len(stretch.torque) for stretch in stretches)
@@ -113,9 +113,11 @@ def _stretches(record: Record, length: float, slow: float) -> list[_Stretch]:
         ways.append((white(record.angle) * float(np.linalg.norm(second)), record.angle, first, second))
     # The one that tells the acceleration with less noise.
     noise, signal, to_speed, to_acceleration = min(ways, key=lambda way: way[0])
-    speed = _smooth_speed(record)
+    speed = smooth_speed(record)
     moving = np.abs(speed) > slow
     moving[1:] &= np.sign(speed[1:]) == np.sign(speed[:-1])
+    if record.clipped is not None:
+        moving &= ~record.clipped
     found = []
     for begin, end in runs(moving):
         if end - begin < size:
@@ -141,7 +143,7 @@ def _apply(weights: Array, signal: Array, step: int) -> Array:
     return np.asarray(away + signal[0] * np.sum(weights), dtype=np.float64)
 
 
-def _smooth_speed(record: Record) -> Array:
+def smooth_speed(record: Record) -> Array:
     """(N,) speed, averaged over a short time, to tell rest and reversals."""
     half = max(ceil(SMOOTH / record.interval / 2), 1)
     if record.speed is not None:

@@ -218,6 +218,8 @@ def _unfit(record: Record, model: RecordTorque | None, values: Mapping[str, floa
     duration = record.interval * (len(record) - 1)
     if record.angle is None:
         return "no position"
+    if record.clipped is not None and np.any(record.clipped):
+        return "its torque is cut off at a limit"
     if duration < SHORTEST or model is None:
         return f"{duration:.3g} s are too short; at least {SHORTEST:g} s are needed"
     if not model.parts:

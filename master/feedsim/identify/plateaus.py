@@ -195,6 +195,8 @@ def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float, s
     torque = record.torque if record.load is None else record.torque - record.load
     step = resolution(record.torque)
     start, drift = _settled(torque, earliest, begin + int(MOST_DROPPED * (end - begin)), end, least, step, search)
+    if record.clipped is not None and np.any(record.clipped[start:end]):
+        return "the torque is cut off at a limit"
     weights = _weights(end - start, search.taper, interval)
     order = 1 if motion.direct else 2
     average, sigma = mean(torque[start:end], weights, step)

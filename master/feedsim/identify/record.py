@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from feedsim.errors import InputError
 Array = NDArray[np.float64]
 
 EVEN = 1e-3  # of the step: how far an instant may lie off the grid
-SIGNALS = ("torque", "angle", "speed", "load", "setpoint")  # of a record, over its time
+SIGNALS = ("torque", "angle", "speed", "load", "setpoint", "clipped")  # of a record, over its time
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +34,7 @@ class Record:
         load: (N,) known torque against the motor torque [N.m], for example a measured disturbance; None: none.
         setpoint: (N,) commanded angle [rad]; None where it was not recorded.
         columns: role -> name of the trace's column.
+        clipped: (N,) bool, where the torque was cut off at a limit (clipping.py); None: nowhere.
 
     Raises InputError: fewer than two rows, lengths that differ, uneven time, neither angle nor speed.
     """
@@ -45,6 +47,7 @@ class Record:
     load: Array | None = None
     setpoint: Array | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
+    clipped: NDArray[Any] | None = None
 
     def __post_init__(self) -> None:
         if len(self.time) < 2:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.identify.clipping import without_clipped
 from feedsim.identify.inertia import Inertia, inertia
 from feedsim.identify.motion import Part, motion, parts
 from feedsim.identify.open_loop import balanced
@@ -51,18 +52,26 @@ def identify(
     """
     if not records:
         raise InputError("no records to identify from")
+    records, said = without_clipped(records, options.J.value if options.J is not None else None)
     if options.modes is not None:
         records = [with_structure(record, options.modes, options.axis) for record in records]
-    return _Run(records, law, options, progress or (lambda what, done, total: None)).result()
+    return _Run(records, law, options, progress or (lambda what, done, total: None), said).result()
 
 
 class _Run:
     """One identification: steps, how long each took, and what there is to say."""
 
-    def __init__(self, records: Sequence[Record], law: FrictionLaw, options: Options, progress: Progress) -> None:
+    def __init__(
+        self,
+        records: Sequence[Record],
+        law: FrictionLaw,
+        options: Options,
+        progress: Progress,
+        said: Sequence[str] = (),
+    ) -> None:
         self.records, self.law, self.options, self.progress = records, law, options, progress
         self.seconds: dict[str, float] = {}
-        self.warnings: list[str] = []
+        self.warnings: list[str] = list(said)
         self.advice: list[str] = []
         self.reasons: dict[int, str] = {}  # stage -> why it is absent
         self.prior = True  # whether stage 1 enters stage 2

@@ -47,7 +47,7 @@ class RecordTorque:
         self.record, self.law = record, law
         self.motion: Motion = motion(record)
         self.count = 1 if coarse else self.motion.parts
-        counted = np.ones(len(record), dtype=np.bool_)
+        counted = np.ones(len(record), dtype=np.bool_) if record.clipped is None else ~record.clipped
         for plateau in without:
             if plateau.record == record.name:
                 counted &= (record.time < plateau.begin) | (record.time > plateau.end)

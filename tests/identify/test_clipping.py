@@ -1,0 +1,86 @@
+"""A torque that the record cuts off at a limit is told from one that is as large as that, and is left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from feedsim.identify.clipping import without_clipped
+from feedsim.identify.plateaus import plateaus
+from feedsim.identify.record import Record
+from feedsim.identify.stribeck import stationary
+from identify_records import SPEEDS, TRUE, J, constant_speeds
+from identify_records import stationary as friction_at
+
+H = 2e-3
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    return constant_speeds(speeds=SPEEDS[4:], durations=[1.0] * 8, acceleration=1000.0)
+
+
+def noise(record: Record, share: float) -> np.ndarray:
+    return share * np.sqrt(np.mean(record.torque**2)) * np.random.default_rng(5).standard_normal(len(record))
+
+
+@pytest.mark.parametrize("angle", [False, True], ids=["speed", "position in steps"])
+@pytest.mark.parametrize("before", [False, True], ids=["noise behind the limit", "noise before it"])
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.05])
+@pytest.mark.parametrize("limit", [2.4, 3.5, 14.0])
+def test_rows_at_a_limit_are_marked(record: Record, limit: float, share: float, before: bool, angle: bool) -> None:
+    assert record.angle is not None
+    disturbance = noise(record, share)
+    torque = np.clip(record.torque + before * disturbance, -limit, limit) + (not before) * disturbance
+    path = np.round(record.angle / 3e-4) * 3e-4 if angle else None
+    (found,), said = without_clipped([Record("cut", record.time, torque, path, None if angle else record.speed)])
+    cut = np.abs(record.torque) > limit
+    assert found.clipped is not None
+    # The ends of a run of few rows, whose mean is below the limit, are all that may be missed.
+    assert np.count_nonzero(cut & ~found.clipped) <= 0.05 * np.count_nonzero(cut)
+    assert len(said) == 1
+    assert "cut off at" in said[0]
+    for text in said[0].split("cut off at ")[1].split(",")[0].split(" and "):
+        assert abs(float(text.removesuffix(" N.m"))) == pytest.approx(limit, rel=0.03)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_limit_in_one_direction_with_a_load(record: Record, side: float) -> None:
+    torque = record.torque + 6.0
+    limit = 6.0 + side * 3.0
+    cut = replace(record, torque=np.minimum(torque, limit) if side > 0 else np.maximum(torque, limit))
+    (found,), said = without_clipped([cut])
+    assert found.clipped is not None
+    assert np.count_nonzero(found.clipped != (side * torque >= side * limit)) < 0.01 * np.count_nonzero(found.clipped)
+    assert f"cut off at {limit:+.4g} N.m," in said[0]
+
+
+def test_the_curve_comes_back_from_what_is_left(record: Record) -> None:
+    rest = np.random.default_rng(1).standard_normal(len(record))
+    cut = replace(record, torque=np.clip(record.torque, -3.0, 3.0) + 0.02 * rest)
+    (found,), _ = without_clipped([cut])
+    kept = plateaus(found, J)
+    assert len(kept) == 12  # of 16; the two fastest speeds need more than 3 N.m
+    assert max(abs(plateau.torque - friction_at(TRUE, plateau.speed)) for plateau in kept) < 0.01
+    curve = stationary(kept)
+    away = curve.torque - np.array([friction_at(TRUE, n) for n in curve.speeds])
+    assert np.max(np.abs(away)) < 0.02
+
+
+def even_acceleration(share: float, top: float = 100.0) -> Record:
+    """A rigid axis that accelerates evenly, to and fro: the drive's torque stands still at its largest value."""
+    ramp = np.concatenate([np.linspace(0, top, 100), np.full(300, top), np.linspace(top, 0, 100), np.zeros(100)])
+    speed = np.tile(np.concatenate([ramp, -ramp]), 4)
+    torque = J * np.gradient(speed, H) + 1.6 * np.sign(speed) + 0.002 * speed
+    plain = Record("even", np.arange(len(speed)) * H, torque, speed=speed)
+    return replace(plain, torque=torque + noise(plain, share))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.05])
+def test_what_is_as_large_as_it_has_to_be_is_not_cut_off(record: Record, share: float) -> None:
+    for whole in (even_acceleration(share), replace(record, torque=record.torque + noise(record, share))):
+        (found,), said = without_clipped([whole])
+        assert found.clipped is None
+        assert said == ()

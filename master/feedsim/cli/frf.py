@@ -47,7 +47,7 @@ def frf(options: Namespace) -> None:
 
     subject = load_subject(options.subject, options.overrides)
     machine = subject.machine
-    announce(machine)
+    announce(machine, options.fmus)
     axes = _axes(options.axes, machine)
     plan = _plan(options, machine)
     named = options.subject.stem if options.subject.is_file() else options.subject.resolve().name

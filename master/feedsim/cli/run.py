@@ -38,7 +38,8 @@ def run(options: Namespace) -> None:
     from feedsim.report import run as report
 
     directory: Path = options.out or Path("results") / options.scenario.stem
-    with _subject(options) as (plan, program, fmus, worded):
+    with _subject(options) as (plan, program, fmus, worded, named):
+        announce(plan.machine, fmus, named)
         analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
         report.check_writable(directory, report.input_paths(plan))
         with _rows_kept(report.growing(directory)) as recorded:
@@ -74,11 +75,15 @@ def validate(options: Namespace) -> None:
     if is_study(options.scenario):
         sweep.validate(options)
         return
-    with _subject(options) as (plan, program, fmus, worded):
+    with _subject(options) as (plan, program, fmus, worded, _):
         analysis.check(plan, program)
-        warn(worded(cosim.check(plan, program, fmus=fmus)))
+        warnings = worded(cosim.check(plan, program, fmus=fmus))
+        warn(warnings)
     motions = f"{len(plan.motions)} motion{'s'[: len(plan.motions) != 1]}"
-    print(f"{options.scenario}: valid; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}")
+    apart = (
+        " as far as no other maker's program has a say" if any(": not checked: " in each for each in warnings) else ""
+    )
+    print(f"{options.scenario}: valid{apart}; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}")
 
 
 def write_ssp(options: Namespace) -> None:
@@ -93,7 +98,6 @@ def write_ssp(options: Namespace) -> None:
     if not options.out.absolute().parent.is_dir():
         raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
     plan = scenario.load(options.scenario, options.overrides)
-    announce(plan.machine)
     done = ssp.export(plan, options.out, fmus=options.fmus)
     warn(done.warnings)
     print(
@@ -104,10 +108,11 @@ def write_ssp(options: Namespace) -> None:
 
 
 @contextmanager
-def _subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | None, Wording]]:
+def _subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | None, Wording, Callable[[str], str]]]:
     """What ``run`` and ``validate`` are to look at: a scenario file, or an SSP, whose archives are its own.
 
-    Scenario, program, folder of archives, and what makes a run's warnings all that is to be said.
+    Scenario, program, folder of archives, what makes a run's warnings all that is to be said, and what makes a sentence
+    speak of the file.
     """
     from feedsim import nc, scenario
     from feedsim.files.source import is_ssp, is_study
@@ -116,17 +121,21 @@ def _subject(options: Namespace) -> Iterator[tuple[Scenario, Program, Path | Non
         if is_study(options.scenario):
             raise InputError(f"{options.scenario}: is a study of many runs: feedsim sweep {options.scenario}")
         loaded = scenario.load(options.scenario, options.overrides)
-        announce(loaded.machine)
-        yield loaded, nc.plan(loaded), options.fmus, tuple
+        yield loaded, nc.plan(loaded), options.fmus, tuple, str
         return
     if options.fmus is not None:
         raise InputError(f"--fmus {options.fmus}: {options.scenario} has its own archives; leave the option out")
     from feedsim import ssp  # not for runs of scenario files
 
     with ssp.opened(options.scenario, options.overrides) as found:
-        announce(found.scenario.machine)
-        yield found.scenario, found.program, found.fmus, found.told
+        yield found.scenario, found.program, found.fmus, found.told, found.named
 
+
+TRUST = """An FMU is a program, and so is an SSP, which holds some: to run it is to run its libraries with your rights.
+The shipped libraries are known by their bytes, wherever they lie. `feedsim run` names every other one on standard
+error, with its place in the archive and its SHA-256, before it executes it. `feedsim validate` executes none of them:
+it judges what the archives say of themselves, and tells what it has not checked. No text in an archive makes feedsim
+read a file outside of it."""
 
 SUBJECT = (
     FMUS,
@@ -138,10 +147,12 @@ RUN = Command(
     "run a scenario or an SSP; write result.csv, summary.json, report.html and figures",
     run,
     (*SUBJECT, out("<name of the scenario file>"), QUIET),
+    epilog=TRUST,
 )
 VALIDATE = Command(
-    "validate", "check a scenario, an SSP or a study, its machine and its motion without running it", validate, SUBJECT
-)
+    "validate", "check a scenario, an SSP or a study, its machine and its motion without running it", validate, SUBJECT,
+    epilog=TRUST,
+)  # fmt: skip
 SSP = Command(
     "ssp",
     "write a scenario as an SSP file, which other simulators run",

@@ -45,12 +45,12 @@ def sweep(options: Namespace) -> int:
     from feedsim.sweep.study import AllFailed, run
 
     study = load_study(options.study, options.overrides, runs=options.runs)
-    announce(study.base.scenario.machine)
     warn(study.warnings)
     planned = design(study)
     if options.row is not None:
         print(_command(study, planned, options.row, options.fmus))
         return 0
+    announce(study.base.scenario.machine, options.fmus)
     if options.dry_run:
         return _dry_run(study, planned, options)
     directory: Path = options.out or Path("results") / options.study.stem
@@ -151,7 +151,6 @@ def validate(options: Namespace) -> None:
     from feedsim.sweep.trial import check
 
     study = load_study(options.scenario, options.overrides)
-    announce(study.base.scenario.machine)
     planned = design(study)
     run, warnings, failed = check(study, planned, options.fmus)
     refused = [f"run {other} is refused, run {run} is not: {why}" for other, why in failed.items()]

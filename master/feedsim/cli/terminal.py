@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feedsim.findings import WRONG, ranked, severity
@@ -57,10 +58,13 @@ def warn(warnings: Iterable[str]) -> None:
         print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr)
 
 
-def announce(machine: Machine) -> None:
-    """Say on standard error, ahead of a run, whose programs are executed besides the shipped units."""
-    for axis, unit in machine.foreign_units:
-        print(f"feedsim: axis {axis}: executes {unit.fmu} of another maker as {unit.role.name}", file=sys.stderr)
+def announce(machine: Machine, fmus: Path | None, named: Callable[[str], str] = str) -> None:
+    """Say on standard error, ahead of a run, whose programs are executed besides the shipped ones; `named`: what is to
+    be said for a sentence."""
+    from feedsim import cosim
+
+    for sentence in cosim.executed(machine, fmus):
+        print(f"feedsim: {named(sentence)}", file=sys.stderr)
 
 
 def finish(quiet: bool, warnings: Iterable[str], *lines: str) -> None:

@@ -125,14 +125,19 @@ class Archive:
         slave.instanceName = name
         return slave
 
-    def _load(self) -> FMU2Slave:
+    def library(self) -> Path:
+        """The shared library for this platform. InputError: there is none."""
         identifier = self.description.coSimulation.modelIdentifier
-        path = library(self.directory, identifier, self.platforms, f"{self.path}")
+        return library(self.directory, identifier, self.platforms, f"{self.path}")
+
+    def _load(self) -> FMU2Slave:
+        path = self.library()
         before = Path.cwd()
         try:
             return FMU2Slave(
-                guid=self.guid, unzipDirectory=str(self.directory), modelIdentifier=identifier, libraryPath=str(path)
-            )
+                guid=self.guid, unzipDirectory=str(self.directory), libraryPath=str(path),
+                modelIdentifier=self.description.coSimulation.modelIdentifier,
+            )  # fmt: skip
         except Exception as error:
             os.chdir(before)  # fmpy goes to the library's folder and does not come back when it fails
             folder = f"binaries/{path.parent.name}"

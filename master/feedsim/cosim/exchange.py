@@ -42,7 +42,7 @@ INTERFACE = f"{VERSION}: {' '.join(KINDS)}; {' '.join(f'{kind} {name},' for kind
 
 _TYPES = {"int32_t": np.int32, "int64_t": np.int64, "double": np.float64, "function": np.uintp, "address": np.uintp}
 _OPERATION = np.dtype([(name, _TYPES[kind]) for kind, name in FIELDS], align=True)
-_LIBRARY = {"win32": "exchange.dll", "darwin": "exchange.dylib"}.get(sys.platform, "exchange.so")
+NAME = {"win32": "exchange.dll", "darwin": "exchange.dylib"}.get(sys.platform, "exchange.so")
 
 _log = logging.getLogger(__name__)
 
@@ -63,7 +63,7 @@ def library(folder: Path) -> Native | None:
 
     Told once per folder: at debug level that there is none, as a warning that there is one that does not fit.
     """
-    path = folder.resolve() / _LIBRARY
+    path = folder.resolve() / NAME
     if not path.is_file():
         _log.debug("%s: no such file; the cycle loop runs in Python, `make fmus` builds the native one", path)
         return None

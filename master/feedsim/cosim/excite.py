@@ -16,10 +16,10 @@ from typing import Literal
 import numpy as np
 
 from feedsim.cosim import wiring
+from feedsim.cosim.binaries import fmus_directory
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.operations import Operation, When, copy, get_row, set_real, set_slopes
-from feedsim.cosim.run import fmus_directory
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.trust import LOAD_TAKEN_UP

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from feedsim.cosim.archive import Archive
-from feedsim.cosim.run import fmus_directory
+from feedsim.cosim.binaries import fmus_directory
 from feedsim.cosim.unit import Floats, Unit
 from feedsim.errors import InputError, SimulationError
 
@@ -44,7 +44,7 @@ class FrictionLaw:
     """
 
     def __init__(self, fmus: Path | None = None) -> None:
-        """Open friction.fmu in the folder `fmus` (default: :func:`~feedsim.cosim.run.fmus_directory`).
+        """Open friction.fmu in the folder `fmus` (default: :func:`~feedsim.cosim.binaries.fmus_directory`).
 
         Raises:
             InputError: no usable archive, or one without the functions.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from feedsim.cosim import trust
+from feedsim.cosim.binaries import fmus_directory
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
@@ -56,12 +56,6 @@ class Run:
     fine: Trace | None = None
     log: Trace | None = None
     native: bool = False
-
-
-def fmus_directory() -> Path:
-    """Folder of the built archives: FEEDSIM_FMUS, else `fmus/` of the checkout this package runs from."""
-    named = os.environ.get("FEEDSIM_FMUS")
-    return Path(named) if named else Path(__file__).resolve().parents[3] / "fmus"
 
 
 def run(
@@ -151,14 +145,17 @@ def run(
 
 
 def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> tuple[str, ...]:
-    """Let the units judge their parameters, without a step; return the warnings that can be given before a run.
+    """Judge a scenario without a step; return the warnings that can be given before a run.
+
+    The shipped units judge their parameters. No other program is executed: of another maker's unit counts what its
+    archive says of itself, and a warning says what is not checked.
 
     Raises:
         InputError: what :func:`run` would refuse before its first step.
     """
     recorded_columns(scenario)
     modes = checked_modes(scenario.machine)
-    with System(scenario.machine, fmus or fmus_directory()) as system:
+    with System(scenario.machine, fmus or fmus_directory(), only_shipped=True) as system:
         system.initialise(program, stop=float(program.time[-1]))
         pose = pose_use(scenario.machine, program, system)
         cycles, coupling = scenario.machine.cycles, scenario.coupling

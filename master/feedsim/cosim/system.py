@@ -10,9 +10,10 @@ import numpy as np
 
 from feedsim.cosim import wiring
 from feedsim.cosim.archive import Archive
+from feedsim.cosim.binaries import is_shipped
 from feedsim.cosim.plant import axes_of, open_plant
 from feedsim.cosim.roles import RoleUnit, archive_path, check_instances, filled
-from feedsim.cosim.unit import Floats, Port, Unit
+from feedsim.cosim.unit import Floats, Port, Unexecuted, Unit
 from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Machine
@@ -63,9 +64,10 @@ class System:
     ======================= ==============================================================================
     """
 
-    def __init__(self, machine: Machine, fmus: Path, *, friction: bool = True) -> None:
+    def __init__(self, machine: Machine, fmus: Path, *, friction: bool = True, only_shipped: bool = False) -> None:
+        """only_shipped: no program but those that this installation ships is executed: to judge, not to run."""
         self.machine, self.axes = machine, tuple(machine.axes)
-        self.friction = friction
+        self.friction, self.only_shipped = friction, only_shipped
         self._open: list[Archive | Unit] = []
         try:
             self._build(machine, fmus)
@@ -120,7 +122,8 @@ class System:
 
     def _instantiate(self, archive: Archive, name: str) -> Unit:
         role = self.roles.get(name)
-        unit = Unit(archive, name, role.signals if role is not None and role.foreign else None)
+        kind = Unexecuted if self.only_shipped and not is_shipped(archive) else Unit
+        unit = kind(archive, name, role.signals if role is not None and role.foreign else None)
         self._open.append(unit)
         return unit
 

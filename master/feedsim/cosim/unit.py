@@ -232,6 +232,39 @@ class Unit:
         return np.array([known[name].valueReference for name in names], dtype=np.uint32)
 
 
+class Unexecuted(Unit):
+    """A unit whose library is not loaded: it has its names, answers nothing and judges nothing."""
+
+    def __init__(self, archive: Archive, name: str, signals: Mapping[str, Alias] | None = None) -> None:
+        """InputError: the archive has no library for this platform."""
+        self.archive, self.name, self.signals = archive, name, signals
+        self._component = None
+        archive.library()
+        self.warnings = [
+            f"{name}: not checked: what {archive.path} itself says of its parameters, and whether it can be loaded; "
+            "its program is another maker's, which only a run executes"
+        ]
+
+    def call(self, operation: str) -> Callable[..., int]:
+        return lambda *_: OK
+
+    def set_parameters(self, parameters: Mapping[str, float | int | bool | str]) -> None:
+        self.references(parameters)
+
+    def enter_initialisation(self, start: float, stop: float) -> None:
+        pass
+
+    def exit_initialisation(self) -> None:
+        pass
+
+    def check_parameters(self) -> None:
+        pass
+
+    def value(self, name: str) -> float:
+        self.references([name])
+        return 0.0
+
+
 def exchanging(operation: str, names: Sequence[str]) -> str:
     """What a unit is at, for messages."""
     done = "setting" if operation.startswith("set") else "reading"

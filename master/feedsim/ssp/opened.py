@@ -45,6 +45,7 @@ class Opened:
         program: the setpoints of the file's own table; its segments are the motions, where the annotation tells them.
         fmus: folder with the file's own archives.
         warnings: what a user should know, a sentence each.
+        sources: place in that folder -> what the archive there is called in the file.
     """
 
     scenario: Scenario
@@ -52,10 +53,17 @@ class Opened:
     path: Path
     fmus: Path
     warnings: tuple[str, ...]
+    sources: Mapping[str, str]
 
     def told(self, warnings: Iterable[str]) -> tuple[str, ...]:
         """The file's own warnings and those of a run of it, which then speak of the file as well."""
-        return (*self.warnings, *(_named(warning, self.path, self.fmus) for warning in warnings))
+        return (*self.warnings, *map(self.named, warnings))
+
+    def named(self, text: str) -> str:
+        """A text that speaks of the file's parts by their names in it."""
+        for place, source in self.sources.items():
+            text = text.replace(str(self.fmus / place), f"{self.path}: {source}")
+        return _named(text, self.path, self.fmus)
 
 
 @contextmanager
@@ -91,7 +99,7 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
             if guessed:
                 cycle = units.show(T_c, "s")
                 told += (f"{path.name}: no drive tells its control cycle; it is {cycle}, {guessed}",)
-            yield Opened(scenario, program, path, folder, told)
+            yield Opened(scenario, program, path, folder, told, _sources(structure, parts, folder))
 
 
 def _archives(
@@ -147,6 +155,16 @@ def _lay_out(folder: Path, files: archive.Files, parts: Parts, own: Mapping[str,
         needed.append(STRUCTURE)
     for name in needed:
         files.copy(name, folder / name)
+
+
+def _sources(structure: Structure, parts: Parts, folder: Path) -> dict[str, str]:
+    roles = parts.roles
+    moved = {"plant": [roles.plant], "controller": roles.shipped_drives, "friction": roles.shipped_frictions}
+    places = {component: f"{kind}.fmu" for kind, components in moved.items() for component in components[:1]}
+    return {
+        places.get(each.name, str(parts.archives[each.name].path.relative_to(folder))): each.source
+        for each in structure.components
+    }
 
 
 def _sampled(parts: Parts, structure: Structure, path: Path) -> Program:

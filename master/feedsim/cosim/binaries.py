@@ -1,0 +1,93 @@
+"""Whose programs an archive holds: those that this installation ships, or another maker's, which only a run executes.
+
+A program is known by its bytes, not by the name of its archive: a plant that is packed for a machine, or an SSP that
+was exported here, holds the shipped libraries; whatever differs in one byte is another maker's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import zipfile
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+
+from feedsim.cosim import exchange
+from feedsim.cosim.archive import Archive, folders
+from feedsim.cosim.roles import archive_path
+from feedsim.errors import InputError
+from feedsim.scenario import Machine
+from feedsim.scenario.roles import DRIVE, FRICTION
+
+SHIPPED = ("plant.fmu", "controller.fmu", "friction.fmu", "setpoint.fmu")
+Programs = Mapping[str, str]  # path inside the archive -> SHA-256, of all files beside the library for this platform
+
+
+def fmus_directory() -> Path:
+    """Folder of the built archives: FEEDSIM_FMUS, else `fmus/` of the checkout this package runs from."""
+    named = os.environ.get("FEEDSIM_FMUS")
+    return Path(named) if named else Path(__file__).resolve().parents[3] / "fmus"
+
+
+def is_shipped(archive: Archive) -> bool:
+    """Whether all that can be loaded from an archive is what this installation ships, to the last byte."""
+    return _is_ours(archive.path) or programs(archive) in _shipped(*_states(fmus_directory()))
+
+
+def programs(archive: Archive) -> dict[str, str]:
+    """What of an archive can be loaded on this platform."""
+    root = archive.directory
+    found = [file for folder in folders() for file in (root / "binaries" / folder).rglob("*") if file.is_file()]
+    return {file.relative_to(root).as_posix(): _digest(file.read_bytes()) for file in sorted(found)}
+
+
+def executed(machine: Machine, fmus: Path | None) -> list[str]:
+    """What a run of the machine executes that is not shipped, a sentence for each file: who, where, SHA-256.
+
+    What cannot be opened is left out: the run says why. fmus: folder of the archives, where one was named.
+    """
+    folder = fmus or fmus_directory()
+    parts: dict[Path, list[str]] = {machine.plant or folder / "plant.fmu": ["plant"]}
+    for axis in machine.axes:
+        for role in (DRIVE, FRICTION):
+            parts.setdefault(archive_path(machine, axis, role, folder), []).append(f"{role.name} of {axis}")
+    told = []
+    for path, who in parts.items():
+        if _is_ours(path):
+            continue
+        with suppress(InputError), Archive(path) as archive:
+            if not is_shipped(archive):
+                told += [f"executes {path} as {', '.join(who)}: {name}, SHA-256 {digest}"
+                         for name, digest in programs(archive).items()]  # fmt: skip
+    loop, ours = folder / exchange.NAME, fmus_directory() / exchange.NAME
+    with suppress(OSError):
+        if folder != fmus_directory() and (digest := _digest(loop.read_bytes())) != _digest(ours.read_bytes()):
+            told.append(f"executes {loop} as cycle loop, SHA-256 {digest}")
+    return told
+
+
+def _is_ours(path: Path) -> bool:
+    return path in [fmus_directory() / name for name in SHIPPED]
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _states(folder: Path) -> list[tuple[Path, int, int]]:
+    there = [path for name in SHIPPED if (path := folder / name).is_file()]
+    return [(path, path.stat().st_mtime_ns, path.stat().st_size) for path in there]
+
+
+@lru_cache(maxsize=4)
+def _shipped(*states: tuple[Path, int, int]) -> list[Programs]:
+    """Programs of the shipped archives, none of which is unpacked for it."""
+    wanted = tuple(f"binaries/{folder}/" for folder in folders())
+    found: list[Programs] = []
+    for path, _, _ in states:
+        with suppress(OSError, zipfile.BadZipFile), zipfile.ZipFile(path) as package:
+            names = [each.filename for each in package.infolist() if not each.is_dir()]
+            found.append({name: _digest(package.read(name)) for name in names if name.startswith(wanted)})
+    return found

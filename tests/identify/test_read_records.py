@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -252,22 +253,38 @@ def test_emps() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "line"),
+    ("name", "held", "line"),
     [
-        ("pulses_N", "load: {column: pulses_N, unit: N}"),
-        ("LOAD torque [N.m]", "load: {column: LOAD torque}"),
-        ("Disturbance", "load: {column: Disturbance, unit: N.m}"),
-        ("external force [N]", "load: {column: external force}"),
+        ("pulses_N", 1.0, "load: {column: pulses_N, unit: N}"),
+        ("LOAD torque [Nm]", 1.0, "load: {column: LOAD torque}"),
+        ("Disturbance", -1.0, "load: {column: Disturbance, unit: N.m, sign: -1}"),
+        ("external force [N]", 1.0, "load: {column: external force}"),
+        # What the torque does not hold any more is no load, whatever its name says.
+        ("pulses_N", 0.0, ""),
+        ("Disturbance", 0.0, ""),
     ],
 )
-def test_a_load_that_is_not_read_is_told(tmp_path: Path, name: str, line: str) -> None:
-    path = simple(tmp_path / "a.csv", **{name: np.ones(500)})
-    columns = "position: {column: ActPos}\ntorque: {column: ActTorque}\npitch: 20 mm\n"
-    (said,) = read_records(path, mapped(tmp_path, columns)).provenance.warnings
-    assert f"a.csv:1: {name.split(' [')[0]!r} may be a known load, and is not read; mapping: {line}" in said
-    assert "sign: -1 where it helps it" in said
+def test_a_load_is_told_where_it_leaves_less_of_the_torque(tmp_path: Path, name: str, held: float, line: str) -> None:
+    """held: how often the recorded torque holds the column, against the motor."""
+    time = np.arange(1000) * 2e-3
+    speed = 20 * np.sin(2 * pi * time)
+    pulses = np.where(np.sin(2 * pi * 3.3 * time) > 0.3, 0.5, 0.0)
+    force = name in ("pulses_N", "external force [N]")
+    torque = 0.02 * np.gradient(speed, time) + 1.5 * np.sign(speed) + held * pulses
+    angle = -20 / (2 * pi) * np.cos(2 * pi * time)
+    columns = {"t [s]": time, "ActPos [rad]": angle, "ActTorque [N.m]": torque}
+    path = table(tmp_path / "a.csv", columns | {name: pulses / LEAD if force else pulses})
+    text = "position: {column: ActPos}\ntorque: {column: ActTorque}\npitch: 20 mm\n"
+    said = read_records(path, mapped(tmp_path, text)).provenance.warnings
+    if not line:
+        assert said == ()
+        return
+    (only_one,) = said
+    assert f"a.csv:1: {name.split(' [')[0]!r} may be a known load, and is not read. With it" in only_one
+    assert only_one.endswith(f"mapping: {line}")
+    assert re.search(r"leaves \S+e-1\d in place of 0\.232 N\.m of the torque", only_one)
     # The line serves as it stands.
-    found = read_records(path, mapped(tmp_path, columns + line + "\n"))
+    found = read_records(path, mapped(tmp_path, text + line + "\n"))
     assert found.provenance.warnings == ()
     assert only(found).load is not None
 
@@ -276,6 +293,5 @@ def test_names_that_are_no_load_and_columns_of_another_length(tmp_path: Path) ->
     columns = "position: {column: ActPos}\ntorque: {column: ActTorque}\npitch: 20 mm\n"
     path = simple(tmp_path / "a.csv", **{"download": np.ones(500), "ext": np.ones(500), "download_rate": np.ones(500)})
     assert read_records(path, mapped(tmp_path, columns)).provenance.warnings == ()
-    for count, told in ((500, 1), (7, 0)):
-        path = mat(tmp_path / "a.mat", pulses_N=np.ones(count))
-        assert len(read_records(path, mapped(tmp_path, EMPS_LIKE)).provenance.warnings) == told
+    path = mat(tmp_path / "a.mat", pulses_N=np.ones(7))
+    assert read_records(path, mapped(tmp_path, EMPS_LIKE)).provenance.warnings == ()

@@ -13,15 +13,19 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.fields import no_axis
-from feedsim.files.columns import Columns
+from feedsim.files.columns import Columns, Signal
+from feedsim.identify.inertia import inertia
+from feedsim.identify.magnitudes import check_slide, check_time
 from feedsim.identify.record import Array, Record, even_pieces
-from feedsim.identify.signals import Channel, Chosen, choose
+from feedsim.identify.signals import Channel, Chosen, choose, column
 from feedsim.identify.signs import checked
 from feedsim.scenario import Drive, Machine
 from feedsim.trace import Recording, read_recording
 
 # Values given twice are the same up to the rounding of what people write.
 SAME = 1e-9
+# Share of the residual that may be left for a column to be advised as a load: less than that is chance.
+SMALLER = 0.98
 # Names of columns that hold a known load; "workload" or "payload" are not.
 LOAD_NAME = re.compile(
     r"(?<![a-z])load|pulse|disturbance|(?<![a-z])external[ _.-]*force|(?<![a-z])ext[ _.-]+force", re.IGNORECASE
@@ -92,7 +96,8 @@ def read_records(
     gaps; nothing is resampled (see record.even_pieces).
 
     Raises InputError with file and line: what cannot be read, columns that are missing or not clear, units, time that
-    is not even, pitch or torque constant that is needed and not given, a sign or unit wrong beyond doubt (signs.py).
+    is not even, pitch or torque constant that is needed and not given, a sign or unit wrong beyond doubt (signs.py,
+    magnitudes.py).
     """
     path = Path(path)
     recording = read_recording(path)
@@ -119,8 +124,11 @@ def read_records(
         )
         for piece in pieces
     )
-    unread = _unread_load(recording, chosen)
-    warnings = (*chosen.notes, *unread, *drive.warnings, *gaps, *checked(path, records))
+    check_time(path, records)
+    signs = tuple(checked(path, records))
+    check_slide(path, records, drive.pitch)
+    unread = _unread_load(recording, chosen, drive, records, [slice(piece.first, piece.last) for piece in pieces])
+    warnings = (*chosen.notes, *unread, *drive.warnings, *gaps, *signs)
     return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings))
 
 
@@ -199,25 +207,42 @@ def _which(chosen: Chosen, machine: Machine | None) -> str:
     return ""
 
 
-def _unread_load(recording: Recording, chosen: Chosen) -> Iterator[str]:
-    """Columns of full length whose names speak of a disturbance, while no load is read."""
+def _unread_load(
+    recording: Recording, chosen: Chosen, drive: _Drive, records: Sequence[Record], pieces: Sequence[slice]
+) -> Iterator[str]:
+    """Columns whose names speak of a disturbance, while no load is read, and without which less is left of the torque.
+
+    A torque may hold the disturbance already; to subtract it then makes things worse.
+    """
     used = {channel.column for channel in chosen.channels.values()}
     if "load" in chosen.channels:
         return
     for name in recording.names:
         if name in used or not LOAD_NAME.search(name):
             continue
+        unit = "" if recording.units[name] else "N" if re.search(r"(?:^|[^A-Za-z])N$", name) else "N.m"
         try:
-            recording.read([*used, name])
+            load = column(recording, "load", Signal(column=name, unit=unit or None))
+            if load.target == "N" and drive.pitch is None:
+                continue
+            values = recording.read([*used, name])[name] * load.scale
+            torque = _motor_side({"load": load}, {"load": values}, drive)["load"]
+            left = [_residual(records, [side * torque[rows] for rows in pieces]) for side in (0.0, 1.0, -1.0)]
         except InputError:
-            continue  # cells that are no numbers, or of another length: no signal of this trace
-        unit = recording.units[name]
-        guess = "N" if re.search(r"(?:^|[^A-Za-z])N$", name) else "N.m"
-        given = "" if unit else f", unit: {guess}"
+            continue  # no signal of this trace, no force, or nothing moves that would tell
+        best = min(left[1:])
+        if best > SMALLER * left[0]:
+            continue
+        given = (f", unit: {unit}" if unit else "") + ("" if best == left[1] else ", sign: -1")
         yield (
-            f"{recording.header}: {name!r} may be a known load, and is not read; mapping: load: {{column: {name}"
-            f"{given}}}. It counts against the motor: sign: -1 where it helps it"
+            f"{recording.header}: {name!r} may be a known load, and is not read. With it a rigid axis with simple "
+            f"friction leaves {best:.3g} in place of {left[0]:.3g} N.m of the torque (rms); mapping: load: {{column: "
+            f"{name}{given}}}"
         )
+
+
+def _residual(records: Sequence[Record], loads: Sequence[Array]) -> float:
+    return inertia([replace(record, load=load) for record, load in zip(records, loads, strict=True)]).rms
 
 
 def _motor_side(channels: Mapping[str, Channel], signals: Mapping[str, Array], drive: _Drive) -> dict[str, Array]:

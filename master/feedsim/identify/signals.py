@@ -84,7 +84,7 @@ def _mapped(recording: Recording, mapping: Columns, axis: str) -> Chosen:
             faults.append(f"{mapping.where(role)}: {missing}")
             continue
         try:
-            channels[role] = _channel(recording, role, signal)
+            channels[role] = column(recording, role, signal)
         except InputError as error:
             faults.append(f"{mapping.where(role)}: {error}")
     if faults:
@@ -141,7 +141,7 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...]) -> Chosen:
             unit = "s" if role == "time" and not recording.units[name] else None
             alias = alias_of(name, axis, axes)
             at = alias.at if alias else None
-            channels[role] = _channel(recording, role, MotionSignal(column=name, unit=unit, at=at))
+            channels[role] = column(recording, role, MotionSignal(column=name, unit=unit, at=at))
         except InputError as error:
             faults.append(f"{recording.header}: {error}; mapping: {_line(role, recording, name)}")
     if faults:
@@ -187,7 +187,7 @@ def _named_time(recording: Recording, axis: str) -> str:
     )
 
 
-def _channel(recording: Recording, role: str, signal: Signal) -> Channel:
+def column(recording: Recording, role: str, signal: Signal) -> Channel:
     """Unit, factor and sign of a column. InputError: no unit, a wrong one, or one that contradicts the header."""
     column, header, factor = signal.column, recording.units[signal.column], signal.factor
     known = header if header and known_unit(header) else ""

@@ -14,6 +14,7 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.identify.clipping import without_clipped
 from feedsim.identify.inertia import Inertia, inertia
+from feedsim.identify.magnitudes import check_found, check_inertia, check_size
 from feedsim.identify.motion import Part, motion, parts
 from feedsim.identify.open_loop import balanced
 from feedsim.identify.options import Options
@@ -52,6 +53,7 @@ def identify(
     """
     if not records:
         raise InputError("no records to identify from")
+    check_size(records)
     records, said = without_clipped(records, options.J.value if options.J is not None else None)
     if options.modes is not None:
         records = [with_structure(record, options.modes, options.axis) for record in records]
@@ -82,6 +84,8 @@ class _Run:
             rigid = self._rigid(self.records)
             J = options.J or (rigid.J if rigid is not None else None)
             self._compare(rigid)
+            if rigid is not None:
+                check_found(rigid.estimates, options.I_P)
         with self._timed("plateaus"):
             # J dn/dt hardly matters at constant speed.
             found = self._plateaus(J.value if J is not None else 0.0) if 1 in options.stages else ()
@@ -101,6 +105,7 @@ class _Run:
                 balance = balanced(transitions(self.records), self.law, estimates, hold=options.hold)
                 estimates = balance.estimates
                 self.progress("open loop", 1, 1)
+        check_found(estimates, options.I_P)
         prior = self.prior or second is None
         # Doubts of a stage 1 that the estimates do not rest on would be doubts about nothing.
         self.warnings += first.warnings if first is not None and prior else ()
@@ -217,6 +222,7 @@ class _Run:
         if far and any(
             part.kind != "sine" or part.amplitude > SLIDING for record in self.records for part in _parts(record)
         ):
+            check_inertia(given, rigid.J)
             self.warnings.append(
                 f"the inertia is given as {given.value:.4g} kg.m2, accelerating parts of the records say "
                 f"{rigid.J.value:.4g} +- {NORMAL_95 * rigid.J.sigma:.2g} kg.m2: check the inertia, the torque constant "

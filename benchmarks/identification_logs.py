@@ -157,7 +157,7 @@ def strokes(speeds: Sequence[tuple[float, float]], acceleration: float, rise: fl
     """
     parts = [np.zeros(300)]
     for pair in speeds:
-        length = max(max(least, 0.6 * pair[0]), 0.6 * min(pair[1], 0.1))  # what the faster way needs
+        length = max(least, (0.6 if pair[0] == pair[1] else 0.4) * max(pair))  # what the faster way needs
         for side, speed in zip((1.0, -1.0), pair, strict=True):
             ramp = max(round(speed / acceleration / CYCLE), 1)
             up = np.arange(1, ramp + 1) / ramp
@@ -286,7 +286,7 @@ def _moves(rng: np.random.Generator, flaws: Sequence[str], axis: Axis) -> list[F
     if "one_way" in flaws:
         # Up fast, down slowly: the strokes of a vertical axis, a file each; a few slow ones both ways.
         for _ in range(3):
-            fast = [(speed, 5.83e-3 * rng.uniform(0.5, 3.0)) for speed in rng.uniform(0.4, 1.0, 2) * top]
+            fast = [(speed, 5.83e-3 * rng.uniform(1.0, 3.0)) for speed in rng.uniform(0.4, 1.0, 2) * top]
             moves.append(strokes(fast, acceleration, rise, 0.02))
     elif "sines_only" not in flaws:
         lowest = 500.0 if "no_slow_speeds" in flaws else 10.0
@@ -359,8 +359,11 @@ def names(total: int = 320) -> list[tuple[str, tuple[str, ...]]]:
     ]
     kinds: list[tuple[tuple[str, ...], int]] = [((), 40)]
     kinds += [((flaw,), 12) for flaw in FLAWS]
-    each, more = divmod(total - sum(count for _, count in kinds), len(pairs))
-    kinds += [(pair, each + (k < more)) for k, pair in enumerate(pairs)]
+    wrong = [pair for pair in pairs if any(FLAWS[flaw].wrong for flaw in pair)]
+    kinds += [(pair, 2) for pair in wrong]
+    others = [pair for pair in pairs if pair not in wrong]
+    each, more = divmod(total - sum(count for _, count in kinds), len(others))
+    kinds += [(pair, each + (k < more)) for k, pair in enumerate(others)]
     return [
         ("+".join(flaws) + f"-{k}" if flaws else f"good-{k}", flaws) for flaws, count in kinds for k in range(count)
     ]

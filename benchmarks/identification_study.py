@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from math import sqrt
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from types import FrameType
 
 from identification_logs import FLAWS, Log, made, names
@@ -28,7 +28,7 @@ from feedsim.files.columns import load_columns
 from feedsim.identify import Asked, identify, named_apart, read_traces
 from feedsim.identify.result import NORMAL_95
 
-LONGEST = 120  # s: a log that takes longer is given up
+LONGEST = 120  # s of one core: a log that takes longer is given up
 BY_CHANCE = 3.0  # standard deviations: a value farther off is no matter of chance
 CURVE = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0")
 
@@ -43,7 +43,7 @@ class Outcome:
         off: parameter that is called estimated -> standard deviations between it and the truth.
         errors: the same -> error [1] over the truth (sigma over the truth in `sigmas`); of the delay in s.
         states: parameter -> status.
-        warnings, advice: what was said. seconds: that it took.
+        warnings, advice: what was said. seconds: of one core, that it took.
     """
 
     name: str
@@ -75,13 +75,13 @@ def _given_up(seconds: float) -> Iterator[None]:
     def stop(number: int, frame: FrameType | None) -> None:
         raise TimeoutError(f"no end after {seconds:g} s")
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def judged(log: Log) -> Outcome:
@@ -93,7 +93,7 @@ def judged(log: Log) -> Outcome:
     warnings: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
     refused = ""
-    begun = perf_counter()
+    begun = process_time()
     try:
         with _given_up(LONGEST):
             recorded = read_traces(log.files, load_columns(log.mapping))
@@ -114,7 +114,7 @@ def judged(log: Log) -> Outcome:
             errors[name], sigmas[name] = away / size, estimate.sigma / size
     except (InputError, TimeoutError) as error:
         refused = f"{type(error).__name__}: {error}"
-    seconds = perf_counter() - begun
+    seconds = process_time() - begun
     return Outcome(log.name, log.flaws, log.words, refused, off, errors, sigmas, states, warnings, advice, seconds)
 
 

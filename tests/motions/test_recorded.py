@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.motions import Column, MeasuredSetpoints, Move
 from feedsim.nc import plan
-from feedsim.trace import convert_mat, read_csv
+from feedsim.trace import convert, read_csv
 from scenario_helpers import scenario
 
 POSE = {"X": 0.8, "Y": 0.327, "Z": 0.1}
@@ -105,7 +105,7 @@ def test_limits_hold_for_recordings_too(tmp_path: Path) -> None:
 def test_reference_of_a_real_axis_drives_the_default_z_axis(tmp_path: Path) -> None:
     """It begins at 14 mm/s and ends at -42 mm/s: run-in and run-out are its own."""
     path = tmp_path / "emps.csv"
-    convert_mat(os.environ["FEEDSIM_EMPS"], [("t", "time", "s"), ("qg", "q", "m")], path)
+    convert(os.environ["FEEDSIM_EMPS"], [("t", "time", "s"), ("qg", "q", "m")], path)
     motion = MeasuredSetpoints(file=path, columns={"Z": Column(column="q")}, relative=True)
     program = plan(scenario(motion))
     recorded = read_csv(path)

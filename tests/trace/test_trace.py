@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from feedsim.errors import InputError, OutputError
-from feedsim.trace import Trace, convert_mat, read_csv, read_setpoints, write_csv, written_whole
+from feedsim.trace import Trace, convert, read_csv, read_setpoints, write_csv, written_whole
 
 
 def trace(rows: int = 5) -> Trace:
@@ -317,9 +317,7 @@ def mat(tmp_path: Path) -> Path:
 
 def test_mat_to_csv(mat: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.csv"
-    written = convert_mat(
-        mat, [("t", "time", "ms"), ("q", "Z.x_s", "mm"), ("rec.pos", "X.x_s", "m"), ("n", "n", "1")], out
-    )
+    written = convert(mat, [("t", "time", "ms"), ("q", "Z.x_s", "mm"), ("rec.pos", "X.x_s", "m"), ("n", "n", "1")], out)
     assert out.read_text().splitlines()[:3] == ["time [s],Z.x_s [mm],X.x_s [m],n [1]", "0,0,0,0", "0.001,1,0.125,1"]
     assert read_csv(out)["Z.x_s"].tolist() == written["Z.x_s"].tolist() == [0, 1, 4, 9]
 
@@ -329,7 +327,7 @@ def test_mat_to_csv(mat: Path, tmp_path: Path) -> None:
     [
         ([("t", "time", "s"), ("qq", "x", "m")], "no variable 'qq'; did you mean 'q'?"),
         ([("t", "time", "s"), ("position", "x", "m")], "no variable 'position'; there is t, q, n, k"),
-        ([("t", "time", "s"), ("short", "x", "m")], "'short' has 3 values, the time 't' has 4"),
+        ([("t", "time", "s"), ("short", "x", "m")], "'short' has 3 values, 't' has 4"),
         ([("t", "time", "s"), ("bad", "x", "m")], "'bad' is not finite at element 3"),
         ([("t", "time", "s"), ("text", "x", "m")], "'text' is no numbers; a vector of real numbers is needed"),
         ([("t", "time", "s"), ("z", "x", "m")], "'z' is complex128 of shape (4,); a vector"),
@@ -342,14 +340,14 @@ def test_mat_to_csv(mat: Path, tmp_path: Path) -> None:
         ([("t", "time", "s"), ("q", "x", "furlong")], "unknown unit 'furlong'"),
         ([("t", "time", "s"), ("q", "x", "m"), ("n", "x", "m")], "two columns are to be called 'x'"),
         ([("q", "x", "m")], "the first column must be the time"),
-        ([], "the first column must be the time"),
+        ([], "which column is the time? --column t=time:s"),
     ],
 )
 def test_mat_files_that_are_refused(
     mat: Path, tmp_path: Path, columns: list[tuple[str, str, str]], message: str
 ) -> None:
     with pytest.raises(InputError) as caught:
-        convert_mat(mat, columns, tmp_path / "out.csv")
+        convert(mat, columns, tmp_path / "out.csv")
     assert message in str(caught.value)
     assert not (tmp_path / "out.csv").exists()
 
@@ -366,19 +364,19 @@ def test_files_that_are_no_mat_files(tmp_path: Path, content: bytes, message: st
     path = tmp_path / "x.mat"
     path.write_bytes(content)
     with pytest.raises(InputError) as caught:
-        convert_mat(path, [("t", "time", "s"), ("q", "x", "m")], tmp_path / "out.csv")
+        convert(path, [("t", "time", "s"), ("q", "x", "m")], tmp_path / "out.csv")
     assert message in str(caught.value)
 
 
 def test_missing_mat_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
-        convert_mat(tmp_path / "none.mat", [("t", "time", "s")], tmp_path / "out.csv")
+        convert(tmp_path / "none.mat", [("t", "time", "s")], tmp_path / "out.csv")
 
 
 @pytest.mark.skipif("FEEDSIM_EMPS" not in os.environ, reason="FEEDSIM_EMPS names no measured data")
 def test_measured_reference_of_a_real_axis(tmp_path: Path) -> None:
     out = tmp_path / "emps.csv"
-    convert_mat(os.environ["FEEDSIM_EMPS"], [("t", "time", "s"), ("qg", "Z.x_s", "m")], out)
+    convert(os.environ["FEEDSIM_EMPS"], [("t", "time", "s"), ("qg", "Z.x_s", "m")], out)
     # Facts of the data set: 24.84 s at 1 kHz, a stroke of 246.36 mm.
     setpoints = read_setpoints(out, {"Z": ("Z.x_s", None)})
     assert len(setpoints) == 24841

@@ -21,7 +21,7 @@ def schema(options: Namespace) -> None:
 
 def convert(options: Namespace) -> None:
     """feedsim convert."""
-    from feedsim.trace import convert_mat
+    from feedsim import trace
 
     columns = []
     for text in options.column:
@@ -30,8 +30,8 @@ def convert(options: Namespace) -> None:
         if not (equals and colon and variable and name and unit):
             raise InputError(f"--column {text}: VARIABLE=NAME:UNIT is needed, e.g. qg=Z.x_s:m")
         columns.append((variable, name, unit))
-    convert_mat(options.file, columns, options.out)
-    print(f"{options.out}: {len(columns)} columns from {options.file}")
+    written = trace.convert(options.file, columns, options.out)
+    print(f"{options.out}: {len(written.columns) + 1} columns from {options.file}")
 
 
 KINDS = ("scenario", "machine", "structure", "columns", "tolerances", "study")
@@ -43,13 +43,16 @@ SCHEMA = Command(
 )
 CONVERT = Command(
     "convert",
-    "turn variables of a MAT file into a CSV trace",
+    "turn a MAT file or a control's capture into a CSV trace",
     convert,
     (
-        Option("file", "FILE.mat", "", type=Path),
-        Option("--column", "VARIABLE=NAME:UNIT", "one column; the first must be time", many=True, required=True),
+        Option("file", "FILE", "MAT, CSV, or a capture of a SINUMERIK (.json)", type=Path),
+        Option(
+            "--column", "VARIABLE=NAME:UNIT", "one column; the first must be time; none: all of a capture", many=True
+        ),
         Option("--out", "FILE.csv", "", type=Path, required=True),
     ),
-    description="Turn variables of a MAT file into a CSV trace with units in its header, e.g. the recorded position "
-    "reference of an axis: feedsim convert record.mat --column t=time:s --column qg=Z.x_s:m --out reference.csv",
+    description="Turn a recording into a CSV trace with units in its header: all signals of a control's capture, or "
+    "variables of a MAT file, e.g. the recorded position reference of an axis: "
+    "feedsim convert record.mat --column t=time:s --column qg=Z.x_s:m --out reference.csv",
 )

@@ -26,6 +26,7 @@ from feedsim.trace import Recording, read_recording
 SAME = 1e-9
 # Share of the residual that may be left for a column to be advised as a load: less than that is chance.
 SMALLER = 0.98
+TOLD = 0.02  # relative; what a pitch that a record tells may be off the machine's without a word
 # Names of columns that hold a known load; "workload" or "payload" are not.
 LOAD_NAME = re.compile(
     r"(?<![a-z])load|pulse|disturbance|(?<![a-z])external[ _.-]*force|(?<![a-z])ext[ _.-]+force", re.IGNORECASE
@@ -179,7 +180,13 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
                 f"{mapping.where('torque_constant')}: {constant:.9g} N.m/A counts, not the {K_t:.9g} N.m/A of axis "
                 f"{chosen.axis} of machine {machine.name}"
             )
+        if chosen.pitch is not None and abs(chosen.pitch - own.pitch) > TOLD * own.pitch:
+            warnings.append(
+                f"{recording.path}: the record tells a pitch of {1e3 * chosen.pitch:.4g} mm; axis {chosen.axis} of "
+                f"machine {machine.name} has {1e3 * own.pitch:.9g} mm, which counts"
+            )
         pitch, constant = own.pitch if pitch is None else pitch, K_t if constant is None else constant
+    pitch = chosen.pitch if pitch is None else pitch
     for role, channel in chosen.channels.items():
         if pitch is None and channel.target in ("m", "m/s", "N"):
             raise InputError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from feedsim import units
 from feedsim.errors import InputError
@@ -51,12 +52,13 @@ class Channel:
 
 @dataclass(frozen=True)
 class Chosen:
-    """Columns to use; of the time either the column or the interval [s]."""
+    """Columns to use; of the time either the column or the interval [s]. pitch: [m], as the recording tells it."""
 
     axis: str
     channels: Mapping[str, Channel]
     interval: float | None
     notes: tuple[str, ...]
+    pitch: float | None = None
 
 
 def choose(recording: Recording, mapping: Columns | None, axis: str, axes: Iterable[str]) -> Chosen:
@@ -114,6 +116,9 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...]) -> Chosen:
             raise InputError(f"{recording.header}: the axes {', '.join(own)} are in the file; which one is meant?")
         axis = next(iter(own))
     notes: list[str] = []
+    if recording.axes:
+        recording, axis_notes = _of_capture(recording, axis)
+        notes += axis_notes
     if own:
         if axis not in own:
             raise InputError(f"{recording.header}: nothing of axis {axis!r}; there is {', '.join(own)}")
@@ -141,12 +146,38 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...]) -> Chosen:
             unit = "s" if role == "time" and not recording.units[name] else None
             alias = alias_of(name, axis, axes)
             at = alias.at if alias else None
-            channels[role] = column(recording, role, MotionSignal(column=name, unit=unit, at=at))
+            against = role in DRIVING and len(recording.axes) == 1 and recording.axes[0].sign < 0
+            sign: Literal[1, -1] = -1 if against else 1
+            channels[role] = column(recording, role, MotionSignal(column=name, unit=unit, at=at, sign=sign))
         except InputError as error:
             faults.append(f"{recording.header}: {error}; mapping: {_line(role, recording, name)}")
     if faults:
         raise InputError.of(str(recording.path), faults)
-    return Chosen(axis, channels, None, tuple(notes))
+    pitch = recording.axes[0].pitch if recording.axes else None
+    return Chosen(axis, channels, None, tuple(notes), None if pitch is None else 1e-3 * pitch)
+
+
+def _of_capture(recording: Recording, axis: str) -> tuple[Recording, list[str]]:
+    """The signals of an axis of a capture, and what was found of it. InputError: which axis is meant is not clear."""
+    there = ", ".join(f"{each.name} (|{each.number})" for each in recording.axes)
+    meant = [each for each in recording.axes if each.called(axis)] if axis else list(recording.axes)
+    if len(meant) != 1:
+        problem = f"nothing of axis {axis!r}" if axis and not meant else "which axis is meant?"
+        raise InputError(f"{recording.header}: {problem}; there is {there}")
+    found = meant[0]
+    where = f"{recording.path}: axis {found.name} (|{found.number})"
+    if found.pitch is None:
+        return recording.of_axis(found), [
+            f"{where}: POWER does not tell the pitch, nor whether TORQUE and CURRENT count in the position's "
+            "direction: they are taken to"
+        ]
+    if found.rotary:
+        raise InputError(f"{where}: turns by 360 deg with its motor; rotary axes are not identified here")
+    against = "against" if found.sign < 0 else "in"
+    return recording.of_axis(found), [
+        f"{where}: by POWER = TORQUE times the motor's speed the pitch is {found.pitch:.6g} mm, and TORQUE and CURRENT "
+        f"count {against} the position's direction; positions are taken as mm, as the file has no units"
+    ]
 
 
 def _aliases(recording: Recording, axis: str, axes: tuple[str, ...]) -> dict[str, str]:

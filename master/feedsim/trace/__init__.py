@@ -7,13 +7,13 @@ response.py and response_files.py.
 
 from feedsim.trace.csv import read_csv, read_setpoints, write_csv
 from feedsim.trace.files import written_whole
-from feedsim.trace.recording import Recording, convert_mat, read_recording
+from feedsim.trace.recording import Recording, convert, read_recording
 from feedsim.trace.series import Series, as_series, read_series
 from feedsim.trace.table import Table, least_and_largest, release, stretches
 from feedsim.trace.trace import Array, Trace, matches, matching
 
 __all__ = [
-    "Array", "Recording", "Series", "Table", "Trace", "as_series", "convert_mat", "least_and_largest", "matches",
+    "Array", "Recording", "Series", "Table", "Trace", "as_series", "convert", "least_and_largest", "matches",
     "matching", "read_csv", "read_recording", "read_series", "read_setpoints", "release", "stretches", "write_csv",
     "written_whole",
 ]  # fmt: skip

@@ -1,12 +1,13 @@
-"""A recorded file as it is: the columns of a CSV file or the variables of a MAT file, read when they are asked for.
+"""A recorded file as it is: the columns of a CSV file, the variables of a MAT file or the signals of a control's
+capture, read when they are asked for.
 
-MAT files are those of version 4 to 7; a field inside a structure is "structure.field".
+MAT files are those of version 4 to 7; a field inside a structure is "structure.field". Captures: capture.py.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.trace import capture
 from feedsim.trace.cells import Table, read_table
 from feedsim.trace.csv import write_csv
 from feedsim.trace.trace import Array, Trace, suggest
@@ -30,14 +32,18 @@ class Recording:
         names: its columns: of a CSV file without their units, of a MAT file its vectors, rows and columns alike.
         units: column -> unit as the header has it; "" where it tells none, as always in MAT files.
         scalars: numbers that stand beside the columns (MAT).
+        axes: of a capture, whose columns are called NAME|number of the axis; empty for other files.
+        marks: what the control did, and when (capture).
     """
 
     path: Path
     names: tuple[str, ...]
     units: Mapping[str, str]
     scalars: Mapping[str, float] = field(default_factory=dict)
+    axes: tuple[capture.CaptureAxis, ...] = ()
+    marks: tuple[capture.Mark, ...] = ()
     _table: Table | None = None  # of a CSV file
-    _variables: Mapping[str, Any] = field(default_factory=dict)  # of a MAT file
+    _variables: Mapping[str, Any] = field(default_factory=dict)  # of a MAT file or a capture
 
     def read(self, names: Iterable[str]) -> dict[str, Array]:
         """Values of columns, all of one length.
@@ -46,9 +52,6 @@ class Recording:
         number, decimal marks that are not clear; variables of different lengths.
         """
         wanted = list(dict.fromkeys(names))
-        for name in wanted:
-            if name not in self.names:
-                raise InputError(f"{self.header}: no column {name!r}{suggest(name, self.names)}")
         if self._table is not None:
             return dict(zip(wanted, self._table.values(map(self._table.index, wanted)).values(), strict=True))
         values = {name: _vector(self.path, self._variables, name) for name in wanted}
@@ -68,6 +71,11 @@ class Recording:
         hint = "; a CSV file has none, write the number itself" if self._table else suggest(name, self.scalars)
         raise InputError(f"{self.path}: no variable {name!r}{hint}")
 
+    def of_axis(self, axis: capture.CaptureAxis) -> Recording:
+        """The signals of one axis of a capture alone, and the time."""
+        own = tuple(name for name in self.names if "|" not in name or name.endswith(f"|{axis.number}"))
+        return replace(self, names=own, axes=(axis,))
+
     @property
     def header(self) -> str:
         """Where the columns are named, for messages: "file.csv:1"."""
@@ -81,12 +89,17 @@ class Recording:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Look into a CSV or MAT file (told by its ending .mat).
+    """Look into a CSV file, a MAT file (told by its ending .mat) or a control's capture (.json).
 
-    Raises InputError: what read_csv() refuses; a MAT file that is not there or is none, one of version 7.3, which is
-    HDF5, or one without a vector of real numbers.
+    Raises InputError: what read_csv() and read_capture() refuse; a MAT file that is not there or is none, one of
+    version 7.3, which is HDF5, or one without a vector of real numbers.
     """
     path = Path(path)
+    if path.suffix.lower() == capture.SUFFIX:
+        found = capture.read_capture(path)
+        return Recording(
+            path, tuple(found.columns), found.units, axes=found.axes, marks=found.marks, _variables=found.columns
+        )
     if path.suffix.lower() == MAT:
         return _read_mat(path)
     table = read_table(path)
@@ -128,33 +141,34 @@ def _flat(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
             yield from _flat({each: getattr(value, each) for each in fields}, f"{prefix}{name}.")
 
 
-def convert_mat(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:
-    """Write variables of a MAT file as a CSV trace and return the trace.
+def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:
+    """Write columns of a recording as a CSV trace and return the trace.
 
     columns  (variable, new name, unit of the values); the first must be the time (name "time", any unit of time). A
-             variable inside a structure is "structure.field".
+             variable inside a structure of a MAT file is "structure.field". Empty: all columns, as the file calls them.
 
-    Raises InputError: no MAT file that can be read, a variable that is missing (with those there are), no vector of
+    Raises InputError: what read_recording() refuses, a variable that is missing (with those there are), no vector of
     real finite numbers, or of another length than the time. OutputError: `out` cannot be written.
     """
     path = Path(path)
-    if not columns or columns[0][1] != "time":
+    if columns and columns[0][1] != "time":
         raise InputError("the first column must be the time, for example t=time:s")
-    factor = units.factor(columns[0][2], "s")
+    factor = units.factor(columns[0][2], "s") if columns else 1
     for _, _, unit in columns[1:]:
         units.unit(unit)
     if doubled := [name for i, (_, name, _) in enumerate(columns) if name in [other for _, other, _ in columns[:i]]]:
         raise InputError(f"two columns are to be called {doubled[0]!r}")
-    variables = _load(path)
-    vectors = {name: _vector(path, variables, variable) for variable, name, _ in columns}
-    time = vectors.pop("time") * float(factor)
-    for variable, name, _ in columns[1:]:
-        if vectors[name].size != time.size:
-            raise InputError(
-                f"{path}: {variable!r} has {vectors[name].size} values, the time {columns[0][0]!r} has {time.size}"
-            )
+    recording = read_recording(path)
+    if not columns:
+        if recording.units.get("time") != "s":
+            raise InputError(f"{path}: which column is the time? --column t=time:s, and one for each other column")
+        columns = [("time", "time", "s")]
+        columns += [(name, name, recording.units[name]) for name in recording.names if name != "time"]
+    read = recording.read(variable for variable, _, _ in columns)
+    time = read[columns[0][0]] * float(factor)
     try:
-        trace = Trace(time, vectors, {name: unit for _, name, unit in columns[1:]})
+        trace = Trace(time, {name: read[variable] for variable, name, _ in columns[1:]},
+                      {name: unit for _, name, unit in columns[1:] if unit})  # fmt: skip
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     write_csv(out, trace)

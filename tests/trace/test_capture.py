@@ -1,0 +1,171 @@
+"""Captures of a SINUMERIK control: clock, units, and what power tells of pitch and direction."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feedsim.errors import InputError
+from feedsim.identify import read_records
+from feedsim.trace import convert, read_csv, read_recording
+
+CYCLE = 0.002
+SIGNALS = ("DES_POS", "ENC_POS", "CMD_SPEED", "TORQUE", "CURRENT", "POWER")
+ROWS = 1000
+
+
+def axis_signals(pitch: float, sign: int, amplitude: float = 100.0, per_minute: bool = False) -> dict[str, Any]:
+    """An axis that goes to and fro at 1 Hz by `amplitude` mm, J = 0.02 kg.m2, F_C = 3 N.m; its torque and the
+    speed of its motor count in `sign` times the position's direction."""
+    t = CYCLE * np.arange(ROWS)
+    x = amplitude * np.sin(2 * np.pi * t)
+    v = amplitude * 2 * np.pi * np.cos(2 * np.pi * t)  # mm/s
+    turning = 2 * np.pi * v / pitch
+    torque = 0.02 * np.gradient(turning, t) + 3.0 * np.sign(turning)
+    return {
+        "DES_POS": x, "ENC_POS": x, "CMD_SPEED": v * (60 if per_minute else 1), "TORQUE": sign * torque,
+        "CURRENT": sign * torque / 1.4, "POWER": torque * turning,
+    }  # fmt: skip
+
+
+def content(axes: dict[str, dict[str, Any]], counter: Any = None) -> dict[str, Any]:
+    """A capture of axes, called name|number."""
+    counter = 5000 + np.arange(ROWS) if counter is None else counter
+    listed = [{"Name": "CYCLE", "Type": "INTEGER", "Axis": "Cycle", "Address": "CYCLE"}]
+    columns = [counter]
+    for called, signals in axes.items():
+        name, _, number = called.partition("|")
+        for signal, values in signals.items():
+            listed.append({"Name": signal, "Type": "DOUBLE", "Axis": name, "Address": f"{signal}|{number}"})
+            columns.append(values)
+    rows = [[int(row[0]), *(float(cell) for cell in row[1:])] for row in zip(*columns, strict=True)]
+    block = {"HFProbeCounter": int(counter[0]) + 50, "GCode": "N10 G0 Y100 "}
+    return {
+        "Header": {"SignalListHFData": listed, "CycleTimeMs": 2},
+        "Payload": [{"HFData": rows[:400]}, {"HFBlockEvent": block}, {"HFData": rows[400:]}, {"LFData": []}],
+    }
+
+
+def written(tmp_path: Path, data: object) -> Path:
+    path = tmp_path / "capture.json"
+    path.write_text(json.dumps(data))
+    return path
+
+
+@pytest.mark.parametrize(("pitch", "sign"), [(10.0, -1), (20.0, 1), (7.3, -1)])
+def test_pitch_and_direction_follow_from_power(tmp_path: Path, pitch: float, sign: int) -> None:
+    path = written(tmp_path, content({"X1|1": axis_signals(5.0, 1), "Y1|2": axis_signals(pitch, sign)}))
+    recording = read_recording(path)
+    found = recording.axes[1]
+    assert (found.name, found.number, found.sign) == ("Y1", "2", sign)
+    assert found.pitch == pytest.approx(pitch, rel=1e-12 if pitch != 7.3 else 1e-3)
+    assert recording.units["ENC_POS|2"] == "mm"
+    assert recording.units["CMD_SPEED|2"] == "mm/s"
+    assert recording.marks[0].time == pytest.approx(50 * CYCLE)
+    assert recording.marks[0].text == "N10 G0 Y100"
+    for called in ("Y", "Y1", "2"):
+        read = read_records(path, axis=called)
+        (record,) = read.records
+        assert read.provenance.pitch == pytest.approx(found.pitch * 1e-3)
+        # Torque drives the motion in the position's own direction, whatever the recorded sign.
+        assert record.torque is not None
+        assert record.angle is not None
+        assert record.torque @ np.gradient(record.angle) > 0
+        assert any("the pitch is" in text and "TORQUE" in text for text in read.provenance.warnings)
+
+
+def test_a_gap_of_the_counter_is_a_gap_of_the_time(tmp_path: Path) -> None:
+    counter = np.arange(ROWS) + np.where(np.arange(ROWS) >= 600, 500, 0)
+    path = written(tmp_path, content({"Y1|2": axis_signals(10.0, 1)}, counter))
+    read = read_records(path, axis="Y")
+    assert [len(record.time) for record in read.records] == [600, 400]
+    assert read.records[1].time[0] == pytest.approx(1100 * CYCLE)
+    assert any("missing" in text or "gap" in text for text in read.provenance.warnings)
+
+
+def test_speeds_that_are_no_slopes_have_no_unit(tmp_path: Path) -> None:
+    path = written(tmp_path, content({"Y1|2": axis_signals(10.0, 1, per_minute=True)}))
+    assert read_recording(path).units["CMD_SPEED|2"] == ""
+
+
+def test_a_turning_axis_counts_degrees(tmp_path: Path) -> None:
+    path = written(tmp_path, content({"C1|4": axis_signals(360.0, -1)}))
+    assert read_recording(path).units["ENC_POS|4"] == "deg"
+    with pytest.raises(InputError, match="rotary axes are not identified"):
+        read_records(path, axis="C")
+
+
+def test_an_axis_that_stands_tells_no_pitch(tmp_path: Path) -> None:
+    path = written(tmp_path, content({"Y1|2": axis_signals(10.0, 1, amplitude=0.0)}))
+    assert read_recording(path).axes[0].pitch is None
+    with pytest.raises(InputError, match="its pitch is needed"):
+        read_records(path, axis="Y")
+
+
+def test_all_signals_become_a_csv_file(tmp_path: Path) -> None:
+    path = written(tmp_path, content({"X1|1": axis_signals(5.0, 1), "Y1|2": axis_signals(10.0, -1)}))
+    convert(path, [], tmp_path / "out.csv")
+    trace = read_csv(tmp_path / "out.csv")
+    assert set(trace.columns) == {f"{signal}|{number}" for signal in SIGNALS for number in (1, 2)}
+    assert trace.unit("POWER|2") == "W"
+    assert trace.time[1] == CYCLE
+
+
+def _without(*keys: str) -> dict[str, Any]:
+    data = content({"Y1|2": axis_signals(10.0, 1)})
+    part = data
+    for key in keys[:-1]:
+        part = part[key]
+    del part[keys[-1]]
+    return data
+
+
+def _with_row(row: object) -> dict[str, Any]:
+    data = content({"Y1|2": axis_signals(10.0, 1)})
+    data["Payload"][0]["HFData"][3] = row
+    return data
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ([1, 2], "is no capture of a control: Header is missing"),
+        ({"Header": {}}, "Header.SignalListHFData has no CYCLE"),
+        (_without("Payload"), "Payload is missing"),
+        (_without("Header", "CycleTimeMs"), "Header.CycleTimeMs is None; a number of milliseconds"),
+        ({**content({}), "Payload": [7]}, "Payload, message 1: no list of rows"),
+        ({**content({}), "Payload": []}, "0 rows of HFData; at least 2"),
+        (_with_row([5003, 1.0]), "row 4: 2 values; Header.SignalListHFData has 7 signals"),
+        (_with_row("text"), "row 4: no list"),
+        (_with_row([5003, 0, None, 0, 0, 0, 0]), "row 4: ENC_POS|2 is None, no finite number"),
+        (_with_row([5003, 0, "off", 0, 0, 0, 0]), "row 4: ENC_POS|2 is 'off', no finite number"),
+        (_with_row([5002, 0, 0, 0, 0, 0, 0]), "row 4: CYCLE is 5002 behind 5002; it must grow"),
+    ],
+)
+def test_files_that_are_refused(tmp_path: Path, data: object, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_recording(written(tmp_path, data))
+    assert message in str(caught.value)
+
+
+def test_which_axis_is_asked_for(tmp_path: Path) -> None:
+    path = written(tmp_path, content({"X1|1": axis_signals(5.0, 1), "Y1|2": axis_signals(10.0, -1)}))
+    with pytest.raises(InputError, match=r"which axis is meant\?; there is X1 \(\|1\), Y1 \(\|2\)"):
+        read_records(path)
+    with pytest.raises(InputError, match=r"nothing of axis 'Z'; there is X1"):
+        read_records(path, axis="Z")
+
+
+@pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE: a recorded capture")
+def test_a_real_control() -> None:
+    """Pitches 10, 10 and 5 mm; torque of X and Y against the position, that of the sixth axis along it."""
+    found = {axis.number: axis for axis in read_recording(os.environ["FEEDSIM_CAPTURE"]).axes}
+    assert {number: (found[number].pitch, found[number].sign) for number in "126"} == {
+        "1": (10.0, -1), "2": (10.0, -1), "6": (5.0, 1)
+    }  # fmt: skip
+    assert found["4"].rotary

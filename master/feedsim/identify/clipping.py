@@ -86,8 +86,9 @@ def _reach(record: Record) -> float:
 
 def _heap(record: Record, side: float) -> _Heap:
     """Rows about the largest torque on a side: those within a mean's length of one whose mean lies there."""
-    mean, reach = side * _smooth(record), _reach(record)
-    limit = float(np.median(mean[mean >= np.max(mean) - 2 * reach]))
+    mean, torque, reach = side * _smooth(record), side * record.torque, _reach(record)
+    # Of a peak the rows beside it may lie below every mean.
+    limit = min(float(np.median(torque[mean >= np.max(mean) - 2 * reach])), float(np.max(mean)))
     wide = np.convolve((mean >= limit - reach).astype(np.float64), np.ones(MEAN), "same") > 0.5
     return _Heap(side, limit, reach, wide)
 

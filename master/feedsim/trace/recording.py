@@ -6,10 +6,9 @@ MAT files are those of version 4 to 7; a field inside a structure is "structure.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,9 +17,11 @@ from feedsim.errors import InputError
 from feedsim.trace import capture
 from feedsim.trace.cells import Table, read_table
 from feedsim.trace.csv import write_csv
+from feedsim.trace.mat import Other, Value, flat, read_mat
 from feedsim.trace.trace import Array, Trace, suggest
 
 MAT = ".mat"
+REAL = "fiu"  # kinds of numpy's types
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,7 @@ class Recording:
     axes: tuple[capture.CaptureAxis, ...] = ()
     marks: tuple[capture.Mark, ...] = ()
     _table: Table | None = None  # of a CSV file
-    _variables: Mapping[str, Any] = field(default_factory=dict)  # of a MAT file or a capture
+    _variables: Mapping[str, Value] = field(default_factory=dict)  # of a MAT file or a capture
 
     def read(self, names: Iterable[str]) -> dict[str, Array]:
         """Values of columns, all of one length.
@@ -113,32 +114,23 @@ def _read_mat(path: Path) -> Recording:
     vectors: list[str] = []
     scalars: dict[str, float] = {}
     others: list[str] = []
-    for name, value in _flat(variables):
-        array = np.asarray(value)
-        if array.dtype.kind in "fiu" and array.ndim == 1 and array.size > 1:
-            vectors.append(name)
-        elif array.dtype.kind in "fiu" and array.size == 1:
-            scalars[name] = float(array.item())
-        elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
+    for name, value in flat(variables):
+        if isinstance(value, Other):
             others.append(
                 "an object such as a table or timetable, which only MATLAB reads: save its columns as vectors"
+                if value.opaque
+                else f"{name!r} ({value.what})"
             )
+        elif value.dtype.kind in REAL and value.ndim == 1 and value.size > 1:
+            vectors.append(name)
+        elif value.dtype.kind in REAL and value.size == 1:
+            scalars[name] = float(value.item())
         else:
-            others.append(f"{name!r} ({array.dtype} of shape {array.shape})")
+            others.append(f"{name!r} ({value.dtype} of shape {value.shape})")
     if not vectors:
         there = f"; there is {', '.join(others)}" if others else ""
         raise InputError(f"{path}: no variable is a vector of real numbers{there}")
     return Recording(path, tuple(vectors), dict.fromkeys(vectors, ""), scalars, _variables=variables)
-
-
-def _flat(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Variables, those inside structures too, each with its name."""
-    for name, value in content.items():
-        fields = getattr(value, "_fieldnames", None)
-        if fields is None:
-            yield prefix + name, value
-        else:
-            yield from _flat({each: getattr(value, each) for each in fields}, f"{prefix}{name}.")
 
 
 def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:
@@ -175,41 +167,27 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
     return trace
 
 
-def _load(path: Path) -> dict[str, Any]:
-    from scipy.io import loadmat
-
-    try:
-        # Read into memory first: given a name, the reader tries further names of its own.
-        with path.open("rb") as file:
-            content = loadmat(file, struct_as_record=False, squeeze_me=True)
-    except FileNotFoundError:
-        raise InputError(f"no such file: {path}") from None
-    except NotImplementedError:
-        raise InputError(f"{path} is a MAT file of version 7.3 (HDF5); save it with -v7") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
-    except Exception as error:  # the reader raises many kinds on a file that is none
-        raise InputError(f"{path} is no MAT file that can be read: {error}") from error
-    return {name: value for name, value in content.items() if not name.startswith("__")}
+def _load(path: Path) -> dict[str, Value]:
+    return {name: value for name, value in read_mat(path).items() if name and not name.startswith("__")}
 
 
-def _vector(path: Path, variables: Mapping[str, Any], variable: str) -> Array:
+def _vector(path: Path, variables: Mapping[str, Value], variable: str) -> Array:
     names = variable.split(".")
-    value: Any = variables.get(names[0])
+    value = variables.get(names[0])
     if value is None:
         raise InputError(f"{path}: no variable {names[0]!r}{suggest(names[0], variables)}")
     for depth, name in enumerate(names[1:], start=1):
-        fields = getattr(value, "_fieldnames", None)
-        if fields is None:
+        if not isinstance(value, dict):
             raise InputError(f"{path}: {'.'.join(names[:depth])!r} is no structure")
-        if name not in fields:
-            raise InputError(f"{path}: no field {name!r} in {'.'.join(names[:depth])!r}{suggest(name, fields)}")
-        value = getattr(value, name)
-    array = np.asarray(value)
-    if array.dtype.kind not in "fiu" or array.ndim != 1:
-        kind = f"{array.dtype} of shape {array.shape}" if array.dtype.kind in "fiucb" else "no numbers"
+        if name not in value:
+            raise InputError(f"{path}: no field {name!r} in {'.'.join(names[:depth])!r}{suggest(name, value)}")
+        value = value[name]
+    if isinstance(value, (dict, Other)):
+        raise InputError(f"{path}: {variable!r} is no numbers; a vector of real numbers is needed")
+    if value.dtype.kind not in REAL or value.ndim != 1:
+        kind = f"{value.dtype} of shape {value.shape}"
         raise InputError(f"{path}: {variable!r} is {kind}; a vector of real numbers is needed")
-    numbers = array.astype(np.float64)
+    numbers = value.astype(np.float64)
     if not np.all(np.isfinite(numbers)):
         raise InputError(f"{path}: {variable!r} is not finite at element {int(np.argmin(np.isfinite(numbers))) + 1}")
     return numbers

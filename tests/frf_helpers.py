@@ -10,8 +10,8 @@ import numpy as np
 
 from feedsim.analysis import linear
 from feedsim.analysis.campaign import Campaign, Excited, Plan
-from feedsim.analysis.linear.loops import names
 from feedsim.analysis.responses import Overlay, Responses, closed_form
+from feedsim.linear.loops import names
 from feedsim.scenario import Subject, load_subject
 from feedsim.structure import checked_modes
 from feedsim.trace.response import FrequencyResponse

@@ -21,6 +21,7 @@ ORDER = [
     "compare",
     "ssp",
     "cosim",
+    "linear",
     "structure",
     "nc",
     "scenario",

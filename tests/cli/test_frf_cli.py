@@ -17,9 +17,9 @@ import pytest
 
 from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Plan, signal_of
-from feedsim.analysis.linear.loops import names, response, unit_of
 from feedsim.analysis.responses import Responses, frequencies, read_overlays
 from feedsim.errors import InputError, OutputError
+from feedsim.linear.loops import names, response, unit_of
 from feedsim.report import frf as report
 from feedsim.report.frf import report as report_module
 from feedsim.report.frf.bode_plots import curves_of, speed_controlled_pictures

@@ -13,10 +13,10 @@ import pytest
 from feedsim import cosim, nc, scenario
 from feedsim.analysis import compensation as module
 from feedsim.analysis.compensation import Compensation, Quality, circle_task, compensate, quality
-from feedsim.analysis.linear.drive import LinearDrive
 from feedsim.cosim.feedforward import friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
+from feedsim.linear.drive import LinearDrive
 from feedsim.report import compensate as report
 from feedsim.report.compensate.report import rows_of
 from feedsim.scenario import Axis, Machine, Scenario

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import bilinear, cont2discrete, freqz
 
-from feedsim.analysis.linear.drive import LinearDrive, OperatingPoint
-from feedsim.analysis.linear.plant import ModalPlant
+from feedsim.linear.drive import LinearDrive, OperatingPoint
+from feedsim.linear.plant import ModalPlant
 from feedsim.scenario import Filter
 from physics import controller_reference
 from scenario_helpers import default_machine

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from feedsim.analysis import estimate
-from feedsim.analysis.linear.system import LinearSystem
 from feedsim.cosim.excite import Measurement, measure, usual_rms
 from feedsim.errors import InputError
+from feedsim.linear.system import LinearSystem
 from feedsim.nc.excitation import binary_sequence, multisine
 from feedsim.structure import checked_modes
 from feedsim.trace.response import FrequencyResponse

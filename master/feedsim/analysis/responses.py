@@ -14,10 +14,10 @@ import numpy as np
 from feedsim.analysis import linear
 from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.figures import Figure
-from feedsim.analysis.linear.loops import figure_key, response, unit_of
-from feedsim.analysis.linear.plant import Floats
 from feedsim.analysis.truncation import Truncation
 from feedsim.errors import InputError
+from feedsim.linear.loops import figure_key, response, unit_of
+from feedsim.linear.plant import Floats
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
 from feedsim.trace.response import FrequencyResponse

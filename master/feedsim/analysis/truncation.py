@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from feedsim.analysis.figures import Figure
-from feedsim.analysis.linear import loops
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Floats, ModalPlant
 from feedsim.errors import InputError
+from feedsim.linear import loops
+from feedsim.linear.plant import TOOL_DIRECTIONS, Floats, ModalPlant
 from feedsim.scenario.structure import Structure
 from feedsim.structure import Modes
 from feedsim.structure.build import assemble

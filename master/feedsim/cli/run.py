@@ -78,12 +78,13 @@ def validate(options: Namespace) -> None:
     with _subject(options) as (plan, program, fmus, worded, _):
         analysis.check(plan, program)
         warnings = worded(cosim.check(plan, program, fmus=fmus))
-        warn(warnings)
     motions = f"{len(plan.motions)} motion{'s'[: len(plan.motions) != 1]}"
     apart = (
         " as far as no other maker's program has a say" if any(": not checked: " in each for each in warnings) else ""
     )
-    print(f"{options.scenario}: valid{apart}; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}")
+    finish(
+        False, warnings, f"{options.scenario}: valid{apart}; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}"
+    )
 
 
 def write_ssp(options: Namespace) -> None:

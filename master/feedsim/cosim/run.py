@@ -18,6 +18,7 @@ from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.trust import PoseUse, pose_use
 from feedsim.errors import InputError
+from feedsim.linear.judgement import judge
 from feedsim.nc import Program, plan
 from feedsim.scenario import Logging, Scenario
 from feedsim.structure import checked_modes
@@ -119,6 +120,7 @@ def run(
             each.record(total)
             each.collect(total + 1)
         wall_time = time.perf_counter() - begun - recording.sinking
+        loops = judge(scenario.machine, modes)
         pose = pose_use(scenario.machine, program, system)
         fine = None if at_full_rate is None else at_full_rate.trace()
         return Run(
@@ -132,9 +134,9 @@ def run(
             warnings=(
                 *system.warnings,
                 *cycle.warnings,
-                *trust.foreseen(scenario, modes),
+                *trust.foreseen(scenario, modes, program, loops),
                 *pose.warnings,
-                *trust.found(scenario, cycle, recording),
+                *trust.found(scenario, cycle, recording, loops),
             ),
             fine=fine,
             log=None
@@ -160,7 +162,8 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
         pose = pose_use(scenario.machine, program, system)
         cycles, coupling = scenario.machine.cycles, scenario.coupling
         cycle = Cycle(system, SCHEMES[coupling.scheme], cycles.T_c, coupling.substeps)
-        return (*system.warnings, *cycle.warnings, *trust.foreseen(scenario, modes), *pose.warnings)
+        told = trust.foreseen(scenario, modes, program, judge(scenario.machine, modes))
+        return (*system.warnings, *cycle.warnings, *told, *pose.warnings)
 
 
 def logged(source: Run | Trace, logging: Logging | None = None, *, ideal: Sequence[str] = ()) -> Trace:

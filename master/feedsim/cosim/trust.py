@@ -3,13 +3,18 @@ and the plant's pose: how far the motion leaves it, or how the plant followed it
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from feedsim import units
 from feedsim.cosim.recording import Recording
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
+from feedsim.findings import Wrong
+from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop
 from feedsim.nc import Program
 from feedsim.scenario import ForeignUnit, Machine, Scenario
 from feedsim.structure import Modes
@@ -21,6 +26,8 @@ from feedsim.structure.table_check import table_mismatch
 # Of the friction work, and J (an axis at rest has no work to speak of). On the default machine the first-order schemes
 # lose up to 5e-5 of it, the second-order ones 2e-7; chatter loses 1e-3 and more.
 TRUSTED_SHARE, TRUSTED_ENERGY = 3e-4, 1e-3
+GAIN = {"speed": ("K_p", "N.m.s/rad", "N.m.s/rad"), "position": ("K_v", "1/s", "(m/min)/mm")}
+STATE = {"moving": "while the axis slides", "at rest": "at rest, where friction holds it like a spring"}
 LOAD_TAKEN_UP = 1.0  # s; position and speed controller together settle in some tenths of it
 
 
@@ -31,14 +38,79 @@ def energies(system: System, cycle: Cycle) -> dict[str, float]:
     return {f"{axis}.{kind}": float(kinds[kind][i]) for i, axis in enumerate(system.axes) for kind in kinds}
 
 
-def foreseen(scenario: Scenario, modes: Modes) -> tuple[str, ...]:
+def foreseen(scenario: Scenario, modes: Modes, program: Program, loops: Sequence[Loop]) -> tuple[str, ...]:
     """What the parameters alone tell a user to doubt, a sentence each."""
-    return (*_stability(scenario, modes), *_unbalanced_loads(scenario))
+    return (
+        *_control(scenario.machine, program, loops), *_stability(scenario, modes), *_unbalanced_loads(scenario)
+    )  # fmt: skip
 
 
-def found(scenario: Scenario, cycle: Cycle, recording: Recording) -> tuple[str, ...]:
+def found(scenario: Scenario, cycle: Cycle, recording: Recording, loops: Sequence[Loop]) -> tuple[str, ...]:
     """What the run itself tells a user to doubt, a sentence each."""
-    return (*_energy(scenario, cycle.system, cycle), *_limits(recording))
+    return (*_energy(scenario, cycle.system, cycle, loops), *_limits(recording))
+
+
+def _control(machine: Machine, program: Program, loops: Sequence[Loop]) -> list[str]:
+    """Loops that are unstable or have less than the usual margins, with the gain that would do, and those not judged.
+
+    A loop is wrong where it is unstable in a state that the motion brings about: axes that do not move rest.
+    """
+    found: list[str] = []
+    for axis, kind in dict.fromkeys((loop.axis, loop.kind) for loop in loops):
+        states = [loop for loop in loops if (loop.axis, loop.kind) == (axis, kind)]
+        unstable, thin = [loop for loop in states if loop.unstable], [loop for loop in states if loop.thin]
+        if not (unstable or thin):
+            continue
+        now = _gain(kind, states[0].gain)
+        advised = [loop.advised for loop in unstable or thin]
+        nearest = None if None in advised else _gain(kind, min(filter(None, advised)))
+        usual = f"the usual {_decibels(GAIN_MARGIN):.0f} dB and {PHASE_MARGIN:g} deg"
+        better = f"; with {nearest} it has {usual}" if nearest else f"; with no {GAIN[kind][0]} it has {usual}"
+        if not unstable:
+            margins = "; ".join(
+                f"gain {_decibels(loop.gain_margin):.1f} dB, phase {loop.phase_margin:.0f} deg {STATE[loop.state]}"
+                for loop in thin
+            )
+            found.append(f"axis {axis}: the {kind} loop has thin margins with {now}: {margins}{better}")
+            continue
+        where = "; ".join(map(_where, states))
+        text = (
+            f"axis {axis}: the {kind} loop is unstable with {now}: {where}{better}. A run shows this instability, "
+            "whatever coupling.substeps are"
+        )
+        met = any(loop.growing and (loop.state == "at rest" or _moves(program, axis)) for loop in unstable)
+        found.append(Wrong(text) if met else text)
+    if unknown := [name for name, axis in machine.axes.items() if isinstance(axis.drive, ForeignUnit)]:
+        found.append(
+            f"axis {', '.join(unknown)}: whether the loops are stable is not judged, the drive is another maker's; the "
+            "other axes are judged with its motor free"
+        )
+    return found
+
+
+def _moves(program: Program, axis: str) -> bool:
+    low, high = program.reached(axis)
+    return low < high
+
+
+def _where(loop: Loop) -> str:
+    """In which state a loop is stable, and from which gain on it is not."""
+    if loop.limit is None:
+        bound = ""
+    elif loop.unstable:
+        bound = f", stable {'below' if loop.limit < loop.gain else 'above'} {_gain(loop.kind, loop.limit)}"
+    else:
+        bound = f" {'up' if loop.limit > loop.gain else 'down'} to {_gain(loop.kind, loop.limit)}"
+    return f"{'un' * loop.unstable}stable {STATE[loop.state]}{bound}"
+
+
+def _decibels(factor: float) -> float:
+    return 20 * math.log10(factor)
+
+
+def _gain(kind: str, value: float) -> str:
+    name, unit, shown = GAIN[kind]
+    return f"{name} = {units.convert(value, unit, shown):.4g} {shown}"
 
 
 def _stability(scenario: Scenario, modes: Modes) -> list[str]:
@@ -78,12 +150,19 @@ def _unbalanced_loads(scenario: Scenario) -> list[str]:
     ]
 
 
-def _energy(scenario: Scenario, system: System, cycle: Cycle) -> list[str]:
+def _energy(scenario: Scenario, system: System, cycle: Cycle, loops: Sequence[Loop]) -> list[str]:
+    """The coupling is blamed where nothing else is known to make an axis chatter."""
     bond = cycle.bond
+    if any(loop.growing for loop in loops):
+        why = "that is a consequence of the unstable control loop, and tells nothing of the coupling"
+    else:
+        why = (
+            "it is unstable or too coarse, and the result is not to be trusted; try coupling.substeps above "
+            f"{scenario.coupling.substeps}"
+        )
     return [
         f"axis {axis}: the exchange between plant and friction has lost {residual:.3g} J against {work:.3g} J of "
-        f"friction work (scheme {cycle.scheme.name}, exchange step {cycle.step * 1e6:.6g} us): it is unstable or too "
-        f"coarse, and the result is not to be trusted; try coupling.substeps above {scenario.coupling.substeps}"
+        f"friction work (scheme {cycle.scheme.name}, exchange step {cycle.step * 1e6:.6g} us): {why}"
         for axis, residual, work in zip(system.axes, bond.residual_peak, np.abs(bond.dissipated), strict=True)
         if residual > max(TRUSTED_SHARE * work, TRUSTED_ENERGY)
     ]

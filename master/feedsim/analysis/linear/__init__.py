@@ -1,12 +1,12 @@
-"""Frequency responses of structure and drives in closed form: exact for the sampled system, friction off.
+"""Figures of the linear system (feedsim.linear), and its names at one place for who evaluates it.
 
-May use structure, scenario and trace.
-Start with system.py, which couples drive.py and plant.py; loops.py has the responses by their names.
+May use linear, structure, scenario and trace.
+Start with evaluate.py.
 """
 
-from feedsim.analysis.linear.drive import OperatingPoint
 from feedsim.analysis.linear.evaluate import AxisResult, LinearResult, PositionLoop, SpeedLoop, evaluate, figures
-from feedsim.analysis.linear.loops import (
+from feedsim.linear.drive import OperatingPoint
+from feedsim.linear.loops import (
     compliance,
     names,
     position_gain,
@@ -18,7 +18,7 @@ from feedsim.analysis.linear.loops import (
     speed_reference,
     structure,
 )
-from feedsim.analysis.linear.margins import (
+from feedsim.linear.margins import (
     Bandwidth,
     Extreme,
     GainCrossing,
@@ -34,8 +34,8 @@ from feedsim.analysis.linear.margins import (
     pairs,
     peak,
 )
-from feedsim.analysis.linear.stability import unstable_poles
-from feedsim.analysis.linear.system import Closed, LinearSystem
+from feedsim.linear.stability import unstable_poles
+from feedsim.linear.system import Closed, LinearSystem
 
 __all__ = [
     "AxisResult", "Bandwidth", "Closed", "Extreme", "GainCrossing", "LinearResult", "LinearSystem", "Margins",

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim.analysis.figures import Figure
-from feedsim.analysis.linear import loops
-from feedsim.analysis.linear.margins import (
+from feedsim.linear import loops
+from feedsim.linear.margins import (
     Bandwidth,
     Extreme,
     Margins,
@@ -22,9 +22,9 @@ from feedsim.analysis.linear.margins import (
     pairs,
     peak,
 )
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
-from feedsim.analysis.linear.stability import unstable_poles
-from feedsim.analysis.linear.system import Closed, LinearSystem
+from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
+from feedsim.linear.stability import unstable_poles
+from feedsim.linear.system import Closed, LinearSystem
 
 LOWEST = 1.0  # [Hz]
 LOW_BAND = 5.0  # [Hz] up to here the axis is its inertia

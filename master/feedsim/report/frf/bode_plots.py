@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from feedsim.analysis import linear
-from feedsim.analysis.linear.loops import COMPLIANCE, QUANTITIES
-from feedsim.analysis.linear.margins import Bandwidth, Margins, Pair
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS
 from feedsim.analysis.responses import Responses
+from feedsim.linear.loops import COMPLIANCE, QUANTITIES
+from feedsim.linear.margins import Bandwidth, Margins, Pair
+from feedsim.linear.plant import TOOL_DIRECTIONS
 from feedsim.report.frf.bode import Column, Curve, Ordinate, Panels, at, bode, dot, level, note, phases, size, stretch
 from feedsim.report.labels import keep_inside
 from feedsim.report.style import INK, Picture, drawing, finish

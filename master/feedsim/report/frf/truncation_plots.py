@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS
 from feedsim.analysis.truncation import FULL, deviation, structure_responses
+from feedsim.linear.plant import TOOL_DIRECTIONS
 from feedsim.report.frf.bode import Ordinate, frequency_axis
 from feedsim.report.labels import heading, legend_above
 from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILLION, Array, Picture, drawing, finish

@@ -87,8 +87,8 @@ class ModalPlant:
         for start in range(0, len(s), CHUNK):
             part = slice(start, start + CHUNK)
             q, v = self.modal(s[part], T, hold)
-            result[part, :axes] = _sums(v, speeds).reshape(-1, axes, columns)
-            result[part, axes:] = _sums(q, places).reshape(-1, axes + len(TOOL_DIRECTIONS), columns)
+            result[part, :axes] = modal_sums(v, speeds).reshape(-1, axes, columns)
+            result[part, axes:] = modal_sums(q, places).reshape(-1, axes + len(TOOL_DIRECTIONS), columns)
         return result
 
     def modal(self, s: Complexes, T: float, hold: Hold) -> tuple[Complexes, Complexes]:
@@ -103,7 +103,7 @@ class ModalPlant:
         return q, v
 
 
-def _sums(responses: Complexes, shapes: Floats) -> Complexes:
+def modal_sums(responses: Complexes, shapes: Floats) -> Complexes:
     """(F, N) complex times (N, K) real, without making the latter complex."""
     result = np.empty((len(responses), shapes.shape[1]), dtype=np.complex128)
     result.real = responses.real @ shapes

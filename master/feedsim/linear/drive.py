@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import expm
 
-from feedsim.analysis.linear.plant import Complexes, Floats
+from feedsim.linear.plant import Complexes, Floats
 from feedsim.scenario import Cycles, Drive, Filter
 
 WHOLE = 1e-9  # a delay this close to a whole number of samples is one: quotients of times are off by some 1e-16
@@ -182,15 +182,18 @@ class _CurrentLoop:
         """M_a per torque setpoint behind the filters [1], and per speed [N.m.s/rad]."""
         z = np.exp(s * self.T_c)
         K = self.K_p + self.K_i / -np.expm1(-s * self.T_c)
-        eye = np.eye(2)
         drives = self.Gamma / self.L  # current per voltage
-        system = z[:, None, None] * eye - self.Phi
-        system = system + drives @ (K[:, None, None] * eye - self.W) / z[:, None, None]
-        into = np.empty((len(s), 2, 2), dtype=np.complex128)
-        into[:, :, 0] = drives[:, 1] * (K / z)[:, None] / self.K_t
-        into[:, :, 1] = (self.Gamma @ self.v) * -np.expm1(-s * self.T_c)[:, None]
-        M_a = self.per_current @ np.linalg.solve(system, into)
-        return M_a[:, 0], M_a[:, 1]
+        decoupling = drives @ self.W
+        # the system's matrix and, by Cramer's rule, what its inverse makes of an input: thousands of 2 x 2 at once
+        (a, b), (c, d) = (
+            [z * (i == j) - self.Phi[i, j] + (drives[i, j] * K - decoupling[i, j]) / z for j in (0, 1)] for i in (0, 1)
+        )
+        row = (self.per_current[0] * d - self.per_current[1] * c, self.per_current[1] * a - self.per_current[0] * b)
+        determinant = a * d - b * c
+        per_setpoint = (row[0] * drives[0, 1] + row[1] * drives[1, 1]) * K / z / self.K_t
+        emf = self.Gamma @ self.v
+        per_speed = (row[0] * emf[0] + row[1] * emf[1]) * -np.expm1(-s * self.T_c)
+        return per_setpoint / determinant, per_speed / determinant
 
 
 def _given(value: float | None) -> float:

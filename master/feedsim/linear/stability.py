@@ -12,10 +12,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from feedsim.analysis.linear.margins import grid
-from feedsim.analysis.linear.plant import Complexes
-from feedsim.analysis.linear.system import LinearSystem
 from feedsim.errors import InputError
+from feedsim.linear.margins import grid
+from feedsim.linear.plant import Complexes
+from feedsim.linear.system import LinearSystem
 
 GROWTH = 1e-2  # [1/s] what grows more slowly counts as stable: the contour passes integrators at this distance
 TURN = 0.6  # [rad] and

@@ -20,9 +20,9 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.linear.drive import LinearDrive, OperatingPoint
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, Hold, ModalPlant
 from feedsim.errors import InputError
+from feedsim.linear.drive import LinearDrive, OperatingPoint
+from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, Hold, ModalPlant
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
 from feedsim.trace.response import FrequencyResponse

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feedsim.analysis.linear.plant import Complexes, Floats
+from feedsim.linear.plant import Complexes, Floats
 from feedsim.structure import Modes
 
 Curve = Callable[[Floats], Floats]

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from feedsim.analysis.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
-from feedsim.analysis.linear.system import LinearSystem
-from feedsim.analysis.linear.system import unit_of as unit_of_response
 from feedsim.errors import InputError
+from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
+from feedsim.linear.system import LinearSystem
+from feedsim.linear.system import unit_of as unit_of_response
 
 QUANTITIES = {  # of an axis: part of a figure's name -> response, what it is
     "n_M": ("{0}.n_a/{0}.M_a", "n/M"),

@@ -49,13 +49,13 @@ def make_case(wanted: Pinned, root: Path) -> Iterator[str]:
     if case.modes:
         (root / case.unit / f"{case.name}_modes.csv").write_bytes(case.modes.read_bytes())
     solve = SOLVERS[case.unit]
-    finer = refined(case, 1e-3) if case.unit in CONTINUOUS else case
-    write_reference(case, solve(finer, wanted.every, wanted.outputs), root)
+    finer = refined(case, case.step) if case.unit in CONTINUOUS else case
+    write_reference(case, solve(finer, case.step, wanted.outputs), wanted.every, root)
     yield f"{case.unit}/{case.name}"
     # a controller samples at the start of its cycles: held or linear is one to it where a step is a cycle
     if case.moving and (case.unit in CONTINUOUS or case.step != STEP):
-        held = replace(refined(case, case.step) if case.unit in CONTINUOUS else case, held=True)
-        write_reference(held, solve(held, wanted.every, wanted.outputs), root)
+        held = replace(finer, held=True)
+        write_reference(held, solve(held, case.step, wanted.outputs), wanted.every, root)
         yield f"{case.unit}/held/{case.name}"
 
 

@@ -2,19 +2,25 @@
 
 CSV: first column "time" [s], double-quoted header of exact variable names, no row of units. Inputs run linearly between
 the rows, Boolean ones keep the value of a row until the next. Additions to the rules: <case>_par.csv with the columns
-"name","value" sets parameters; held/<case>_ref.csv is what comes out where the importer holds every input over a step
-of StepSize; <case>_modes.csv is a table of modes that the plant takes instead of its archive's (parameter modes_file).
+"name","value" sets parameters; <case>_ref.bounds.csv tells what lies between the rows of
+<case>_ref.csv (feedsim.compare.between); held/<case>_ref.csv is what comes out where the importer holds every input
+over a step of StepSize; <case>_modes.csv is a table of modes that the plant takes instead of its archive's (parameter
+modes_file).
 """
 
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from feedsim.compare import thinned
+from feedsim.trace import Series
 
 HERE = Path(__file__).parent
 UNITS = ("friction", "plant", "controller", "setpoint")
@@ -105,11 +111,39 @@ def write_inputs(case: Case, root: Path = HERE) -> Case:
     return replace(case, inputs=read_table(path) if case.inputs else {})
 
 
-def write_reference(case: Case, reference: Table, root: Path = HERE) -> None:
-    """Write the reference results of a case, below held/ where its inputs are held."""
+def write_reference(case: Case, dense: Table, every: float, root: Path = HERE) -> None:
+    """Write the reference results of a case every `every` seconds, and what lies between; below held/ of held inputs.
+
+    dense: the results at every step.
+    """
     directory = root / case.unit / (HELD if case.held else "")
     directory.mkdir(parents=True, exist_ok=True)
-    write_table(directory / f"{case.name}_ref.csv", reference)
+    steps = round(every / case.step)
+    write_table(directory / f"{case.name}_ref.csv", {name: values[::steps] for name, values in dense.items()})
+    write_bounds(directory / f"{case.name}_ref.bounds.csv", dense, steps)
+
+
+def write_bounds(path: Path, dense: Table, every: int, digits: int = 15) -> None:
+    """Write what lies between the rows of a reference that has every `every`-th row of `dense`.
+
+    digits: with which the reference is written; what is below them is none. To three digits, away from 0.
+    """
+    assert (len(dense["time"]) - 1) % every == 0, f"{path}: the last row would not be kept"
+    if every == 1:
+        path.unlink(missing_ok=True)
+        return
+    columns = {name: values for name, values in dense.items() if name != "time"}
+    table = {"time": dense["time"][::every]}
+    for name, values in thinned(Series(dense["time"], columns), every)[1].columns.items():
+        least = 10.0**-digits * float(np.abs(columns[name.rpartition(".")[0]]).max())
+        table[name] = np.array([_outward(value) if abs(value) > least else 0.0 for value in values])
+    write_table(path, table)
+
+
+def _outward(value: float) -> float:
+    """A bound to three digits, away from 0."""
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 2)
+    return float(f"{math.copysign(math.ceil(abs(value) / unit) * unit, value):.3g}")
 
 
 def read_case(unit: str, name: str, root: Path = HERE, *, held: bool = False) -> Case:

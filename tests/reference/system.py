@@ -12,7 +12,7 @@ from pathlib import Path
 import monolithic
 import numpy as np
 from monolithic import Machine, Setpoints
-from reference_files import HERE, Table, read_table, write_table
+from reference_files import HERE, Table, read_table, write_bounds, write_table
 
 FOLDER = "system"
 SCENARIOS = HERE.parents[1] / "scenarios"
@@ -56,14 +56,19 @@ def read(scenario: Scenario, root: Path = HERE) -> Table:
     return read_table(path_of(scenario, root))
 
 
-def solve(scenario: Scenario) -> Table:
-    """The pinned variables by the monolithic implementation; the builds of other machines differ by rounding."""
+def solve(scenario: Scenario) -> tuple[Table, Table]:
+    """The pinned variables by the monolithic implementation, as pinned and, up to the last row, at every control cycle.
+
+    The builds of other machines differ by rounding.
+    """
     machine = monolithic.machine()
     result = monolithic.simulate(machine, scenario.setpoints(machine))
-    kept = slice(None, None, round(scenario.every / machine.T_c))
+    every = round(scenario.every / machine.T_c)
     # the instants as the cycle counts them, without the digits of k T_c
-    time = np.round(result["time"][kept], 9)
-    return {"time": time} | {name: result[name][kept] for name in scenario.variables}
+    dense = {"time": np.round(result["time"], 9)} | {name: result[name] for name in scenario.variables}
+    last = (len(dense["time"]) - 1) // every * every
+    dense = {name: values[: last + 1] for name, values in dense.items()}
+    return {name: values[::every] for name, values in dense.items()}, dense
 
 
 def make(root: Path = HERE) -> Iterator[str]:
@@ -71,5 +76,8 @@ def make(root: Path = HERE) -> Iterator[str]:
     for scenario in SYSTEMS:
         path = path_of(scenario, root)
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_table(path, solve(scenario), digits=DIGITS)
+        kept, dense = solve(scenario)
+        write_table(path, kept, digits=DIGITS)
+        every = round(kept["time"][1] / dense["time"][1])
+        write_bounds(path.with_name(f"{scenario.name}_ref.bounds.csv"), dense, every, DIGITS)
         yield f"{FOLDER}/{scenario.name}"

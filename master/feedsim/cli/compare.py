@@ -112,7 +112,7 @@ def _pair(options: Namespace, choice: Options, result: Path, reference: Path) ->
     from dataclasses import replace
 
     from feedsim import units
-    from feedsim.compare import compare_series, estimated_shift, tolerances_of
+    from feedsim.compare import bounds_of, compare_series, estimated_shift, tolerances_of
 
     tolerances: Tolerances = tolerances_of(reference, options.tolerances, options.tol)
     ours = _read_side(result, options.time, options.columns, options)
@@ -123,7 +123,8 @@ def _pair(options: Namespace, choice: Options, result: Path, reference: Path) ->
         shift = estimated_shift(ours, theirs, most, choice, tolerances)
         choice = replace(choice, shift=shift.seconds)
         notes = [shift.note]
-    found = compare_series(ours, theirs, tolerances, choice, names=(str(result), str(reference)))
+    between = bounds_of(reference) if options.reference_columns is None else None
+    found = compare_series(ours, theirs, tolerances, choice, between=between, names=(str(result), str(reference)))
     return replace(found, notes=(*notes, *found.notes))
 
 
@@ -156,7 +157,19 @@ def _options(options: Namespace) -> Options:
         common=options.common,
         max_gap=instant(options.max_gap),
         at=options.at,
+        cover=_share(options.cover),
     )
+
+
+def _share(text: str) -> float:
+    """Of "90 %" or "0.9". InputError."""
+    from feedsim import units
+    from feedsim.errors import InputError
+
+    share = units.parse(text, "1", "90 %")
+    if not 0 <= share <= 1:
+        raise InputError(f"--cover {text}: is outside the allowed range: 0 to 100 %")
+    return share
 
 
 def _read_side(path: Path, time: str | None, mapping: Path | None, options: Namespace) -> Series:
@@ -266,7 +279,10 @@ def _sum(comparisons: list[Comparison]) -> list[str]:
     if len(comparisons) == 1:
         return []
     counts = [(sum(each.verdict == kind for each in comparisons), kind) for kind in ("same", "different", "unusable")]
-    return [f"{len(comparisons)} comparisons: " + ", ".join(f"{number} {kind}" for number, kind in counts if number)]
+    told = ", ".join(f"{number} {kind}" for number, kind in counts if number)
+    partly = sum(each.coverage is not None and each.same and each.coverage.share < 1 for each in comparisons)
+    told += f"; in {partly} of them not all rows are compared" if partly else ""
+    return [f"{len(comparisons)} comparisons: {told}"]
 
 
 def _side(side: str, whose: str) -> tuple[Option, ...]:
@@ -314,9 +330,13 @@ COMMAND = Command(
             Option("--to", "TIME", "compare up to this instant", dest="end"),
             Option("--shift", "TIME", "added to the result's time, such as '0.5 ms', or 'estimate'", default="0 s"),
             Option("--max-shift", "TIME", "largest estimated shift (default: 50 ms)", default="50 ms"),
+            Option("--cover", "SHARE",
+                   "least share of the result's rows that must be compared, such as '90 %%' (default: any, and told)",
+                   default="0 %"),
             Option("--max-gap", "TIME", "longest step between rows of the result (default: any)"),
             Option("--at", "",
-                   "whose instants are looked at (auto: the result's, unless the reference has clearly fewer rows)",
+                   "whose instants are looked at (auto: the result's, unless the reference has clearly fewer rows and "
+                   "no bounds between them)",
                    choices=("auto", "result", "reference"), default="auto"),
         ),
         Group(

@@ -4,16 +4,17 @@ May use files (tolerances) and trace.
 Start with compare.py; tube.py is the method.
 """
 
+from feedsim.compare.between import bounds_of, thinned
 from feedsim.compare.compare import compare
 from feedsim.compare.files import compare_files, compare_series, pairs_of, tolerances_of, unusable
 from feedsim.compare.options import Options
 from feedsim.compare.shift import Shift, estimated_shift
 from feedsim.compare.tolerance import DEFAULT, Tolerance, Tolerances
 from feedsim.compare.tube import along, bounds
-from feedsim.compare.verdict import EXIT_CODES, Comparison, Curves, Variable, seconds
+from feedsim.compare.verdict import EXIT_CODES, Comparison, Coverage, Curves, Variable, percent, seconds
 
 __all__ = [
-    "DEFAULT", "EXIT_CODES", "Comparison", "Curves", "Options", "Shift", "Tolerance", "Tolerances", "Variable",
-    "along", "bounds", "compare", "compare_files", "compare_series", "estimated_shift", "pairs_of", "seconds",
-    "tolerances_of", "unusable",
+    "DEFAULT", "EXIT_CODES", "Comparison", "Coverage", "Curves", "Options", "Shift", "Tolerance", "Tolerances",
+    "Variable", "along", "bounds", "bounds_of", "compare", "compare_files", "compare_series", "estimated_shift",
+    "pairs_of", "percent", "seconds", "thinned", "tolerances_of", "unusable",
 ]  # fmt: skip

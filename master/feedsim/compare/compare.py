@@ -8,6 +8,7 @@ from math import inf
 
 import numpy as np
 
+from feedsim.compare.between import ABOVE, BELOW, Between, check_bounds
 from feedsim.compare.options import (
     Options,
     check_used,
@@ -22,7 +23,7 @@ from feedsim.compare.options import (
 from feedsim.compare.overlap import Overlap
 from feedsim.compare.tolerance import Tolerances, allowed
 from feedsim.compare.tube import along, bounds
-from feedsim.compare.verdict import Comparison, Curves, Variable, Verdict
+from feedsim.compare.verdict import Comparison, Coverage, Curves, Variable, Verdict, percent
 from feedsim.errors import InputError
 from feedsim.trace import Array, Series, Trace, as_series, matches
 
@@ -38,13 +39,15 @@ def compare(
     tolerances: Tolerances | None = None,
     options: Options | None = None,
     *,
+    between: Series | None = None,
     names: tuple[str, str] = ("result", "reference"),
 ) -> Comparison:
     """Every row of the result against the tube around the reference (see tube.bounds).
 
     Columns that the reference lacks are ignored; those that the result lacks are missing, which is different; so is a
     result that begins later or ends earlier than the reference by more than a step. What differs or cannot be compared
-    is told in what is returned. InputError: the options themselves are wrong for these columns.
+    is told in what is returned. between: bounds of the reference between its rows (`feedsim.compare.between`).
+    InputError: the options themselves are wrong for these columns, or the bounds are of another reference.
     """
     tolerances, options = tolerances or Tolerances(), options or Options()
     result, reference = as_series(result), as_series(reference)
@@ -61,7 +64,9 @@ def compare(
         return replace(blank, problem=f"no column in common: {wanted}")
     if not len(result) or not len(reference):
         return replace(blank, problem=f"the {'result' if len(reference) else 'reference'} has no rows")
-    over = Overlap(result, reference, options, min(tolerances.of(name).time or 0.0 for name in found))
+    held = _held(between, reference)
+    reach = min(tolerances.of(name).time or 0.0 for name in found)
+    over = Overlap(result, reference, options, reach, bounded=held.keys() >= found.keys())
     peers = _magnitudes(reference, asked)
     blank = replace(blank, start=over.start, end=over.end)
     if over.problem:
@@ -75,7 +80,7 @@ def compare(
                 Variable(name, "unusable", found.get(name, ""), reference.units.get(name, ""), reason=fault)
             )
         elif name in found:
-            variable, remarks = _variable(over, name, found[name], tolerances, peers)
+            variable, remarks = _variable(over, name, found[name], tolerances, peers, held.get(name))
             for remark in remarks:
                 told.setdefault(remark, []).append(name)
             variables.append(variable)
@@ -87,11 +92,52 @@ def compare(
         verdict = "different"
     if any(each.verdict == "unusable" for each in variables):
         verdict = "unusable"
-    return replace(blank, verdict=verdict, variables=_light(variables), problem=over.uncovered, notes=tuple(notes))
+    coverage = _coverage(over, variables)
+    problem = over.uncovered
+    if coverage is not None and coverage.share < options.cover:
+        verdict = "different" if verdict == "same" else verdict
+        asked_for = f"{coverage.rows} of {coverage.of_rows} rows of the result are compared"
+        problem = "; ".join(part for part in (problem, f"{asked_for}, {percent(options.cover)} are asked for") if part)
+    return replace(
+        blank, verdict=verdict, variables=_light(variables), problem=problem, notes=tuple(notes), coverage=coverage
+    )
+
+
+def _held(between: Series | None, reference: Series) -> dict[str, Between]:
+    """Variable -> its bounds between the rows of the reference. InputError: they are of another one."""
+    if between is None:
+        return {}
+    check_bounds(between, reference)
+    return {
+        name: Between(reference.time, reference[name], between[name + BELOW], between[name + ABOVE])
+        for name in reference.columns
+        if name + BELOW in between
+    }
+
+
+def _coverage(over: Overlap, variables: Sequence[Variable]) -> Coverage | None:
+    compared = [each for each in variables if each.verdict in ("same", "different")]
+    if not compared:
+        return None
+    result, reference = over.result, over.reference
+    return Coverage(
+        rows=min(each.covered for each in compared),
+        of_rows=len(result),
+        columns=len({each.source for each in compared}),
+        of_columns=len(result.all_names) + len(result.skipped),
+        of_reference=len(reference.all_names) + len(reference.skipped),
+        time=over.time_compared,
+        of_time=float(np.ptp(result.time)),
+    )
 
 
 def _variable(
-    over: Overlap, name: str, source: str, tolerances: Tolerances, peers: Mapping[str, float]
+    over: Overlap,
+    name: str,
+    source: str,
+    tolerances: Tolerances,
+    peers: Mapping[str, float],
+    between: Between | None,
 ) -> tuple[Variable, list[str]]:
     """A variable and what there is to say about it."""
     options, tolerance = over.options, tolerances.of(name)
@@ -113,7 +159,7 @@ def _variable(
             "held between rows, as the reference is 0 or 1 alone: the value of either neighbour is right "
             "({hold: false} in a file of tolerances makes it a ramp)"
         )
-    at, y = over.rows_of(source, bool(hold))
+    at, y = over.rows_of(source, bool(hold), between is not None)
     y = y * scale
     usable = np.isfinite(values)
     if not usable.all():
@@ -140,6 +186,8 @@ def _variable(
         remarks.append("neither side tells a unit; both are taken as SI for the tolerance")
     reach = tolerance.time or 0.0
     low, high = bounds(time, values, at, reach, slack=over.slack, hold=bool(hold))
+    if between is not None:
+        low, high = between.widened(low, high, at, reach, over.slack)
     with np.errstate(invalid="ignore"):
         off = np.maximum(np.maximum(y - high, low - y), 0.0)
     bad = ~np.isfinite(y)
@@ -161,6 +209,7 @@ def _variable(
         name, "different" if beyond.any() else "same", source, unit,
         time=float(at[worst]), value=float(y[worst]), expected=expected, deviation=float(off[worst]),
         allowed=limit, reach=reach, rows=len(at), outside=int(np.sum(beyond)),
+        covered=over.covered(at),
         first=float(at[np.argmax(beyond)]) if beyond.any() else None, reason=reason,
         curves=Curves(at, y, low - limit, high + limit, time, values, bool(hold)),
     ), remarks  # fmt: skip

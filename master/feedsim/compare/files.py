@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from feedsim.compare.between import BOUNDS, bounds_of
 from feedsim.compare.compare import compare
 from feedsim.compare.options import Options
 from feedsim.compare.tolerance import Tolerances
@@ -33,6 +34,7 @@ def pairs_of(paths: Sequence[Path]) -> list[tuple[Path, Path]]:
             files = sorted(path for path in reference.rglob("*") if path.suffix.lower() == ".csv" and path.is_file())
             # Beside references of the FMI cross-check lie inputs, parameters and others.
             files = [path for path in files if path.name.endswith(REFERENCE_ENDING)] or files
+            files = [path for path in files if not path.name.endswith(BOUNDS)]
             if not files:
                 raise InputError(f"{reference}: there is no CSV file in the folder of references")
             found += [(_counterpart(result, path.relative_to(reference)), path) for path in files]
@@ -48,14 +50,22 @@ def pairs_of(paths: Sequence[Path]) -> list[tuple[Path, Path]]:
 def compare_files(
     result: Path, reference: Path, tolerances: Tolerances | None = None, options: Options | None = None
 ) -> Comparison:
-    """Read and compare two files; what cannot be read or compared is told in what is returned."""
+    """Read and compare two files, the reference with the bounds beside it.
+
+    What cannot be read or compared is told in what is returned.
+    """
     read: list[Series] = []
     for path, what in ((result, "result"), (reference, "reference")):
         try:
             read.append(read_series(path))
         except InputError as error:
             return unusable(result, reference, f"the {what} cannot be read: {error}")
-    return compare_series(read[0], read[1], tolerances, options, names=(str(result), str(reference)))
+    try:
+        between = bounds_of(reference)
+    except InputError as error:
+        return unusable(result, reference, f"the reference's bounds cannot be read: {error}")
+    names = (str(result), str(reference))
+    return compare_series(read[0], read[1], tolerances, options, between=between, names=names)
 
 
 def compare_series(
@@ -64,11 +74,12 @@ def compare_series(
     tolerances: Tolerances | None = None,
     options: Options | None = None,
     *,
+    between: Series | None = None,
     names: tuple[str, str],
 ) -> Comparison:
     """compare(), with options that are wrong told in what is returned."""
     try:
-        return compare(result, reference, tolerances, options, names=names)
+        return compare(result, reference, tolerances, options, between=between, names=names)
     except InputError as error:
         return unusable(*names, str(error))
 

@@ -27,7 +27,8 @@ class Options:
     common           columns that the result lacks are left out, not missing
     max_gap          longest step between rows of the result [s]; None: any
     at               whose instants are looked at: "result", "reference" (the result is interpolated there), or "auto":
-                     the result's unless the reference has clearly fewer rows, as between its rows it tells nothing
+                     the result's unless the reference has clearly fewer rows and no bounds between them
+    cover            least share of the result's rows that must be compared
     """
 
     columns: Sequence[tuple[str, str]] = ()
@@ -42,6 +43,7 @@ class Options:
     common: bool = False
     max_gap: float | None = None
     at: Literal["auto", "result", "reference"] = "auto"
+    cover: float = 0.0
 
 
 def chosen(names: Sequence[str], options: Options) -> list[str]:

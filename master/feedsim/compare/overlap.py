@@ -27,10 +27,12 @@ class Overlap:
     """The instants at which a result is looked at, and what there is to say about the two times.
 
     start, end: compared time [s]; at: (M,) instants; rows: which rows of the result they are, None where the result is
-    interpolated. problem: why nothing can be compared; uncovered: what of the reference the result does not cover.
+    interpolated; inside: its rows within the compared time. bounded: the reference tells what all that is compared may
+    be between its rows. problem: why nothing can be compared; uncovered: what of the reference the result does not
+    cover.
     """
 
-    def __init__(self, result: Series, reference: Series, options: Options, reach: float) -> None:
+    def __init__(self, result: Series, reference: Series, options: Options, reach: float, bounded: bool) -> None:
         self.result, self.reference, self.options = result, reference, options
         time = reference.time
         self.theirs = result.time + options.shift
@@ -40,7 +42,8 @@ class Overlap:
         self.start = max(float(time[0]), -inf if options.start is None else options.start)
         self.end = min(float(time[-1]), inf if options.end is None else options.end)
         self.problem, self.uncovered, self.notes = "", "", list[str]()
-        rows = self._inside(self.theirs, self.start, self.end)
+        rows = self.inside = self._inside(self.theirs, self.start, self.end)
+        self.bounded = bounded
         self.at, self.rows = self.theirs[rows], None if self._at_reference(len(rows)) else rows
         if self.rows is None:
             inside = self._inside(time, max(self.start, self.theirs[0]), min(self.end, self.theirs[-1]))
@@ -79,11 +82,33 @@ class Overlap:
         parts += self._gaps(self.theirs[rows], max(steps)) or self._unseen(self.theirs[rows], instants)
         self.uncovered = "; ".join(parts)
 
-    def rows_of(self, name: str, hold: bool) -> tuple[Array, Array]:
-        """(K,) instants and values of a column of the result: those looked at, and its rows between that are none."""
+    @property
+    def time_compared(self) -> float:
+        """Of the result's time [s]."""
+        return float(min(self.end, self.theirs[-1]) - max(self.start, self.theirs[0]))
+
+    def covered(self, at: Array) -> int:
+        """Of how many rows the result's values at instants `at` are made."""
+        before = (np.searchsorted(self.theirs, at + self.slack, side="right") - 1).clip(0)
+        after = np.searchsorted(self.theirs, at - self.slack, side="left").clip(max=len(self.theirs) - 1)
+        if not len(at):
+            return 0
+        # All rows of one instant, such as those before and after an event.
+        hit = before >= after
+        low, high = np.where(hit, after, before), np.where(hit, before, after)
+        marks = np.zeros(len(self.theirs) + 1, dtype=np.int64)
+        np.add.at(marks, low, 1)
+        np.add.at(marks, high + 1, -1)
+        return int(np.count_nonzero(np.cumsum(marks[:-1])))
+
+    def rows_of(self, name: str, hold: bool, bounded: bool) -> tuple[Array, Array]:
+        """(K,) instants and values of a column of the result: those looked at, and its rows between that are none.
+
+        bounded: the reference tells what the column may be between its rows, so that all rows are looked at.
+        """
         whole = self.result[name]
-        if self.rows is not None:
-            return self.at, np.asarray(whole[self.rows])
+        if self.rows is not None or (bounded and self.options.at == "auto"):
+            return self.theirs[self.inside], np.asarray(whole[self.inside])
         if hold:
             values = whole[(np.searchsorted(self.theirs, self.at + self.slack, side="right") - 1).clip(0)]
         else:
@@ -104,7 +129,7 @@ class Overlap:
     def _at_reference(self, rows: int) -> bool:
         if self.options.at != "auto":
             return self.options.at == "reference"
-        coarser = usual_step(self.reference.time) > FINER * usual_step(self.theirs) > 0
+        coarser = not self.bounded and usual_step(self.reference.time) > FINER * usual_step(self.theirs) > 0
         if coarser:
             every = [seconds(usual_step(time)) for time in (self.reference.time, self.theirs)]
             self.notes.append(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import floor, inf, isfinite
 from typing import Literal
 
 from feedsim.trace import Array
@@ -41,7 +41,8 @@ class Variable:
                 inf where the result is no number
     allowed     tolerance in value
     reach       tolerance in time [s]
-    rows        rows of the result that were compared; outside: how many are outside the tube
+    rows        instants that were compared; outside: how many are outside the tube
+    covered     rows of the result that were compared: those on which its values at these instants rest
     first       first instant outside [s]
     reason      why it is missing, unusable or special
     """
@@ -58,6 +59,7 @@ class Variable:
     reach: float = 0.0
     rows: int = 0
     outside: int = 0
+    covered: int = 0
     first: float | None = None
     reason: str = ""
     curves: Curves | None = None
@@ -84,6 +86,42 @@ class Variable:
 
 
 @dataclass(frozen=True)
+class Coverage:
+    """How much of a result was held against the reference.
+
+    rows, of_rows         rows of the result, in the variable with the fewest; of all that it has
+    columns, of_columns   columns of the result; of_reference: of how many of the reference
+    time, of_time         [s] of the result
+    """
+
+    rows: int
+    of_rows: int
+    columns: int
+    of_columns: int
+    of_reference: int
+    time: float
+    of_time: float
+
+    @property
+    def share(self) -> float:
+        """Of the result's rows."""
+        return self.rows / self.of_rows
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        parts = [f"all {self.of_rows} rows"]
+        if self.rows < self.of_rows:
+            parts = [f"{self.rows} of {self.of_rows} rows ({percent(self.share)})"]
+        parts += [f"{self.columns} of {self.of_columns} columns"] if self.columns < self.of_columns else ["all columns"]
+        if self.columns < self.of_reference:
+            parts.append(f"{self.columns} of {self.of_reference} of the reference's")
+        if self.time < 0.999 * self.of_time:
+            parts.append(f"{self.time:.4g} of {self.of_time:.4g} s")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
 class Comparison:
     """A result against a reference.
 
@@ -94,6 +132,7 @@ class Comparison:
     start, end         compared time [s]
     shift              added to the result's time [s]
     unused             patterns of tolerances that match no column: they may be for other references
+    coverage           how much of the result was compared; None where nothing was
     """
 
     result: str
@@ -106,6 +145,7 @@ class Comparison:
     end: float = 0.0
     shift: float = 0.0
     unused: tuple[str, ...] = ()
+    coverage: Coverage | None = None
 
     @property
     def same(self) -> bool:
@@ -127,8 +167,15 @@ class Comparison:
         return tuple(each for each in self.variables if each.verdict in verdicts)
 
     @property
+    def heading(self) -> str:
+        """The verdict; of a result that is the same as far as it was compared, how far that is."""
+        if self.same and self.coverage is not None and self.coverage.share < 1:
+            return f"same in {percent(self.coverage.share)} of the rows"
+        return self.verdict
+
+    @property
     def line(self) -> str:
-        """In one line: verdict, how many, the worst with time and amount."""
+        """In one line: verdict and in which share of the rows, how many, what was compared, the worst."""
         compared = self.those("same", "different")
         beyond = len(self.those("different"))
         parts = [self.problem] if self.problem else []
@@ -141,11 +188,18 @@ class Comparison:
                 parts.append(words + shown + (f" and {len(named) - 3} more" if len(named) > 3 else "") + why)
         if self.verdict == "same":
             parts.append(f"{len(compared)} variable{'s'[: len(compared) != 1]}")
+        if self.coverage is not None:
+            parts.append(f"compared {self.coverage.text}")
         worst = self.worst
         text = "; ".join(parts)
         if worst is not None:
             text += f"; worst {worst.name}: {worst.line}"
-        return f"{self.verdict}: {text}"
+        return f"{self.heading}: {text}"
+
+
+def percent(share: float) -> str:
+    """A share, never rounded up to all of it."""
+    return f"{floor(100 * share)} %" if share >= 0.01 else f"{100 * share:.1g} %"
 
 
 def seconds(value: float) -> str:

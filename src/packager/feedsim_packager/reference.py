@@ -47,7 +47,7 @@ def files(directory: Path, variables: Iterable[Variable]) -> dict[str, bytes]:
     away = {path.name.removesuffix("_modes.csv") for path in directory.glob("*_modes.csv")}
     found: dict[str, bytes] = {}
     for path in sorted(directory.rglob("*")):
-        stem = re.sub(r"_(in|ref|par|modes)(\.tolerances)?\.(csv|opt|yaml)$", "", path.name)
+        stem = re.sub(r"_(in|ref|par|modes)(\.tolerances|\.bounds)?\.(csv|opt|yaml)$", "", path.name)
         if path.is_file() and stem not in away and path.suffix in (".csv", ".opt", ".yaml", ".md"):
             found[path.relative_to(directory).as_posix()] = path.read_bytes()
     if README not in found:
@@ -128,7 +128,7 @@ def _manifest(cases: Iterable[_Case], found: Mapping[str, bytes]) -> bytes:
     related = []
     for path in sorted(found):
         stem = path.removeprefix(HELD)
-        case = re.sub(r"_(in|ref|par)(\.tolerances)?\.(csv|opt|ssv|yaml)$", "", stem)
+        case = re.sub(r"_(in|ref|par)(\.tolerances|\.bounds)?\.(csv|opt|ssv|yaml)$", "", stem)
         held = ", inputs held over each step" if path.startswith(HELD) else ""
         kind, role, what = _what(stem)
         description = f"{what}{': ' + about[case] if case in about else ''}{held}"
@@ -151,6 +151,7 @@ def _what(path: str) -> tuple[str, str, str]:
         ("_par.csv", "text/csv", "other", "Parameters as CSV"),
         ("_in.csv", "text/csv", "other", "Inputs"),
         ("_ref.csv", "text/csv", "result", "Reference results"),
+        (".bounds.csv", "text/csv", "other", "What lies between the rows of the reference results"),
         ("_ref.opt", "text/plain", "configuration", "Times and step size"),
         (".yaml", "application/yaml", "configuration", "Tolerances and their reasons"),
     ):

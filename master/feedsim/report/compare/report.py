@@ -8,12 +8,13 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from feedsim.compare import Comparison, Variable
+from feedsim.compare import Comparison, Variable, percent
 from feedsim.errors import OutputError
 from feedsim.report.compare.plots import picture_of, reach_text
 from feedsim.report.content import Paragraph, Part, Report, Section, Span, Table, Text, Tile, code
@@ -77,16 +78,28 @@ def report_of(comparisons: Sequence[Comparison]) -> Report:
     verdict = next((kind for kind in ("unusable", "different") if counts[kind]), "same")
     one = comparisons[0] if len(comparisons) == 1 else None
     return Report(
-        f"Comparison: {verdict}" if one else f"{counted(len(comparisons), 'comparison')}: {verdict}",
+        f"Comparison: {one.heading}" if one else f"{counted(len(comparisons), 'comparison')}: {verdict}",
         f"{one.result} against {one.reference}"
         if one
         else ", ".join(f"{number} {kind}" for kind, number in counts.items() if number),
-        warnings=[one.problem] if one and one.problem else [],
+        warnings=[*([one.problem] if one and one.problem else []), *_not_seen(comparisons)],
         tiles=_tiles(comparisons, counts),
         main=list(_single(one, 1, draw=True, alone=True)) if one else [_pairs(comparisons), *_sections(comparisons)],
         footer="Deviation: distance of the result from the reference, less what the tolerance in time forgives. "
         "How results are compared: docs/comparing.md.",
     )
+
+
+def _not_seen(comparisons: Sequence[Comparison]) -> list[str]:
+    """That rows of results were not compared, of which nobody knows whether they are the same."""
+    partly = [each for each in comparisons if each.same and each.coverage is not None and each.coverage.share < 1]
+    if len(comparisons) == 1:
+        return [
+            f"Compared: {each.coverage.text}. The other rows may hold anything." for each in partly if each.coverage
+        ]
+    named = ", ".join(f"{each.result} ({each.heading})" for each in partly[:3])
+    more = f" and {len(partly) - 3} more" if len(partly) > 3 else ""
+    return [f"Of {counted(len(partly), 'result')} not all rows are compared: {named}{more}."] if partly else []
 
 
 def _sections(comparisons: Sequence[Comparison]) -> Iterator[Section]:
@@ -115,6 +128,10 @@ def _tiles(comparisons: Sequence[Comparison], counts: dict[str, int]) -> list[Ti
     outside = [each for each in compared if each.verdict == "different"]
     missing = [each for pair in comparisons for each in pair.those("missing")]
     tiles = [Tile(f"{len(outside)} of {len(compared)}", "variables outside", "variables that leave their tube")]
+    covers = [each.coverage for each in comparisons if each.coverage is not None]
+    if covers:
+        least = min(covers, key=lambda each: each.share)
+        tiles.append(Tile(percent(least.share), "rows compared", f"of the result, at least; {least.text}"))
     if missing:
         tiles.append(Tile(str(len(missing)), "variables missing", "columns of the reference that the result lacks"))
     worst = max(compared, key=lambda each: (each.ratio, each.deviation), default=None)
@@ -136,8 +153,10 @@ def _pairs(comparisons: Sequence[Comparison]) -> Section:
     rows: list[tuple[Text, ...]] = []
     for number, each in enumerate(comparisons, 1):
         worst = each.problem or (f"{each.worst.name}: {each.worst.line}" if each.worst else "")
-        rows.append((Span(each.result, "link", _anchor(number)), each.reference, _verdict(each.verdict), minus(worst)))
-    return Section("All pairs", [Table("lllp", ("Result", "Reference", "Verdict", "Worst"), rows)])
+        compared = each.coverage.text if each.coverage else "nothing"
+        link = Span(each.result, "link", _anchor(number))
+        rows.append((link, each.reference, _verdict(each.heading), compared, minus(worst)))
+    return Section("All pairs", [Table("lllpp", ("Result", "Reference", "Verdict", "Compared", "Worst"), rows)])
 
 
 def _anchor(number: int) -> str:
@@ -169,7 +188,7 @@ def _row(each: Variable) -> tuple[Text, ...]:
 
 
 def _verdict(verdict: str) -> Text:
-    return verdict if verdict == "same" else Span(verdict, "alarm")
+    return verdict if verdict.startswith("same") else Span(verdict, "alarm")
 
 
 def junit(comparisons: Sequence[Comparison], durations: Sequence[float] = ()) -> bytes:
@@ -183,6 +202,9 @@ def junit(comparisons: Sequence[Comparison], durations: Sequence[float] = ()) ->
         seconds = durations[i] if i < len(durations) else 0.0
         pair = _text(f"{comparison.result} against {comparison.reference}")
         suite = ElementTree.SubElement(root, "testsuite", name=pair)
+        if comparison.coverage is not None:
+            properties = ElementTree.SubElement(suite, "properties")
+            ElementTree.SubElement(properties, "property", name="compared", value=comparison.coverage.text)
         counts = dict.fromkeys(totals, 0)
         whole = ElementTree.SubElement(suite, "testcase", classname=pair, name="(whole)", time=f"{seconds:.3f}")
         counts["tests"] += 1
@@ -228,6 +250,7 @@ def to_json(comparisons: Sequence[Comparison]) -> str:
                 "start": each.start,
                 "end": each.end,
                 "shift": each.shift,
+                "coverage": None if each.coverage is None else asdict(each.coverage) | {"share": each.coverage.share},
                 "worst": each.worst.name if each.worst is not None else None,
                 "variables": [_variable(variable) for variable in each.variables],
             }
@@ -245,7 +268,7 @@ def overall(comparisons: Sequence[Comparison]) -> str:
 def _variable(variable: Variable) -> dict[str, Any]:
     names = (
         "name", "source", "verdict", "unit", "time", "value", "expected", "deviation", "allowed", "ratio", "reach",
-        "rows", "outside", "first", "reason",
+        "rows", "covered", "outside", "first", "reason",
     )  # fmt: skip
     values = {name: getattr(variable, name) for name in names}
     return {k: None if isinstance(v, float) and not isfinite(v) else v for k, v in values.items()}

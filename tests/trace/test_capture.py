@@ -161,6 +161,23 @@ def test_which_axis_is_asked_for(tmp_path: Path) -> None:
         read_records(path, axis="Z")
 
 
+REMARKS = "Drive trace;Z axis\nserial;123;4\n\n"
+LOG = "time [ms];x [µm];n [U/min]\n0;0,5;1\n2;1;1,5\n4;1,5;1\n"
+
+
+def test_remarks_ahead_of_the_header_and_old_encodings(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes((REMARKS + LOG).encode("cp1252"))
+    recording = read_recording(path)
+    assert recording.names == ("time", "x", "n")
+    assert recording.units["x"] == "µm"
+    assert recording.read(["x"])["x"].tolist() == [0.5, 1, 1.5]
+    assert recording.notes == (f"{path}: the header is taken to be line 4; the lines ahead of it are not read",)
+    assert recording.row(0).endswith("log.csv:5")
+    path.write_text(LOG, encoding="utf-8")
+    assert read_recording(path).notes == ()
+
+
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE: a recorded capture")
 def test_a_real_control() -> None:
     """Pitches 10, 10 and 5 mm; torque of X and Y against the position, that of the sixth axis along it."""

@@ -202,7 +202,10 @@ def test_columns_that_are_not_asked_for_may_hold_anything(tmp_path: Path) -> Non
         ("time;x\n0;0.5\n1;1,234\n", "t.csv:3: '1,234', but '0.5' in line 2; decimal point and comma mixed"),
         ('time,x\n0,"1\n', "t.csv:2: unexpected end of data"),
         ("", "t.csv: the file is empty"),
-        (b"time,x [\xb5m]\n0,1\n", "t.csv:1: not UTF-8 (byte 0xb5)"),
+        (b"time,x [\x81m]\n0,1\n", "t.csv:1: neither UTF-8 (byte 0x81) nor Windows-1252"),
+        (b"time,x\n0,1\n1,\x00\n", "t.csv:3: a zero byte; this is no text file"),
+        (b"PK\x03\x04time,x\n0,1\n", "t.csv is a spreadsheet, or another packed file; save its sheet as CSV UTF-8"),
+        (b"\xd0\xcf\x11\xe0time,x\n", "t.csv is a spreadsheet"),
     ],
 )
 def test_what_is_not_clear_is_refused_with_its_row(tmp_path: Path, content: str | bytes, message: str) -> None:

@@ -129,7 +129,7 @@ def read_records(
     signs = tuple(checked(path, records))
     check_slide(path, records, drive.pitch)
     unread = _unread_load(recording, chosen, drive, records, [slice(piece.first, piece.last) for piece in pieces])
-    warnings = (*chosen.notes, *unread, *drive.warnings, *gaps, *signs)
+    warnings = (*recording.notes, *chosen.notes, *unread, *drive.warnings, *gaps, *signs)
     return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings))
 
 

@@ -1,6 +1,7 @@
 """Cells of a CSV file by column, and numbers of them.
 
-Commas, semicolons or tabs between the columns, decimal commas with the latter two, a byte-order mark, UTF-16, quotes.
+Commas, semicolons or tabs between the columns, decimal commas with the latter two, a byte-order mark, UTF-16 and
+Windows-1252, quotes.
 What is not clear is refused with its line, never guessed.
 """
 
@@ -12,6 +13,7 @@ import io
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -27,6 +29,10 @@ _PLAIN = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _PLAIN_COLUMN = re.compile(r"[0-9eE+\-.\n]*")
 # Could mark thousands just as well as a decimal: 1,234 or 12,345, but not 0,125 or 1,25 or 1234,567.
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
+
+MOST_REMARKS = 65536  # characters within which a header is looked for
+_SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # .xlsx and .ods; .xls
+_WINDOWS = "cp1252"  # of programs that know no UTF-8; it has no byte for five values, and digits are the same
 
 Decimal = Literal[".", ","]
 # Heads of the columns, and where they stand -> names and units; InputError.
@@ -92,11 +98,14 @@ class Table:
         return {i: numbers(self.columns[i], mark, self.lines, self.where, self.names[i]) for i in used}
 
 
-def read_table(path: Path, split: Header | None = None, *, as_numbers: bool = False) -> Table:
+def read_table(
+    path: Path, split: Header | None = None, *, as_numbers: bool = False, remarks_ahead: bool = False
+) -> Table:
     """Cells of a file under its header. InputError with file and line.
 
     split: takes the heads of the columns apart into names and units; default: name [unit], each name once.
     as_numbers: numbers alone where nothing else stands in the file, many times faster than cells.
+    remarks_ahead: lines of other kinds may stand ahead of the header, as logs of drives have them.
     """
     lines = io.StringIO(_text(path), newline="")
     first = lines.readline()
@@ -104,6 +113,9 @@ def read_table(path: Path, split: Header | None = None, *, as_numbers: bool = Fa
     header_line = 1
     if match := re.fullmatch(r"sep=(.)\s*", first):  # a spreadsheet's own hint
         separator, first, header_line = match[1], lines.readline(), 2
+    elif remarks_ahead:
+        for _ in range(_remarks(lines.getvalue())):
+            first, header_line = lines.readline(), header_line + 1
     separator = separator or _separator(first, f"{path}:{header_line}")
     if as_numbers and (table := _numbers(path, first, header_line, lines, separator, split or _header)) is not None:
         return table
@@ -140,6 +152,23 @@ def read_table(path: Path, split: Header | None = None, *, as_numbers: bool = Fa
     return Table(str(path), header_line, names, header_units, cells, tuple(body_lines), separator != ",")
 
 
+def _remarks(text: str) -> int:
+    """How many lines stand ahead of the header: the first one with a row of as many cells, a number among them, below
+    it, and none in itself; 0 where there is no such line."""
+    head = text[:MOST_REMARKS].splitlines()
+    for k, (line, below) in enumerate(pairwise(head)):
+        for separator in _SEPARATORS:
+            cells, values = (next(csv.reader([each], delimiter=separator), []) for each in (line, below))
+            numbers_below = sum(_is_number(cell) for cell in values)
+            if len(cells) == len(values) > 1 and numbers_below > len(values) / 2 and not any(map(_is_number, cells)):
+                return k
+    return 0
+
+
+def _is_number(cell: str) -> bool:
+    return _PLAIN.fullmatch(cell.strip().replace(",", ".")) is not None
+
+
 def _numbers(path: Path, head: str, header_line: int, rest: io.StringIO, separator: str, split: Header) -> Table | None:
     """A file of nothing but numbers with decimal points, one line a row; None for any other."""
     cells = [] if head.count('"') % 2 else next(csv.reader([head], delimiter=separator))
@@ -164,12 +193,24 @@ def _text(path: Path) -> str:
         raise InputError(f"no such file: {path}") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from None
+    if raw.startswith(_SPREADSHEETS):
+        raise InputError(
+            f"{path} is a spreadsheet, or another packed file; save its sheet as CSV UTF-8 (in Excel: File, "
+            "Save As) with a header of name [unit]"
+        )
     wide = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
         text = raw.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}:{line}: not UTF-8 (byte 0x{raw[error.start]:02x}); save the file as UTF-8") from None
+        try:
+            text = raw.decode("utf-16" if wide else _WINDOWS)
+        except UnicodeDecodeError:
+            raise InputError(
+                f"{path}:{line}: neither UTF-8 (byte 0x{raw[error.start]:02x}) nor Windows-1252; save the file as UTF-8"
+            ) from None
+    if "\0" in text:
+        raise InputError(f"{path}:{text.count(chr(10), 0, text.index(chr(0))) + 1}: a zero byte; this is no text file")
     if not text.strip():
         raise InputError(f"{path}: the file is empty")
     return text

@@ -35,6 +35,7 @@ class Recording:
         scalars: numbers that stand beside the columns (MAT).
         axes: of a capture, whose columns are called NAME|number of the axis; empty for other files.
         marks: what the control did, and when (capture).
+        notes: what a reader of the file should know.
     """
 
     path: Path
@@ -43,6 +44,7 @@ class Recording:
     scalars: Mapping[str, float] = field(default_factory=dict)
     axes: tuple[capture.CaptureAxis, ...] = ()
     marks: tuple[capture.Mark, ...] = ()
+    notes: tuple[str, ...] = ()
     _table: Table | None = None  # of a CSV file
     _variables: Mapping[str, Value] = field(default_factory=dict)  # of a MAT file or a capture
 
@@ -103,10 +105,14 @@ def read_recording(path: str | Path) -> Recording:
         )
     if path.suffix.lower() == MAT:
         return _read_mat(path)
-    table = read_table(path)
+    table = read_table(path, remarks_ahead=True)
+    ahead = table.header_line - 1
+    notes = (
+        (f"{path}: the header is taken to be line {ahead + 1}; the lines ahead of it are not read",) if ahead else ()
+    )
     # A bracket with digits alone is the index of a parameter, r0078[0], not a unit.
     units = ["" if unit.isdecimal() else unit for unit in table.units]
-    return Recording(path, table.names, dict(zip(table.names, units, strict=True)), _table=table)
+    return Recording(path, table.names, dict(zip(table.names, units, strict=True)), notes=notes, _table=table)
 
 
 def _read_mat(path: Path) -> Recording:

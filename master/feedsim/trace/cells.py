@@ -43,7 +43,8 @@ Header = Callable[[Sequence[str], str], tuple[tuple[str, ...], tuple[str, ...]]]
 class Table:
     """Cells of a file by column, all of one length, with the line of every row; `where` is the file's name.
 
-    numbers: (N, M) in place of the cells, where they were asked for and are nothing else.
+    numbers: (N, M) in place of the cells, where they were asked for and are nothing else. remarks: lines ahead of the header that
+    are not read.
     """
 
     where: str
@@ -54,6 +55,7 @@ class Table:
     lines: Sequence[int]
     decimal_comma: bool  # may a comma stand in a number
     numbers: Array | None = None
+    remarks: int = 0
 
     @property
     def head(self) -> str:
@@ -110,11 +112,12 @@ def read_table(
     lines = io.StringIO(_text(path), newline="")
     first = lines.readline()
     separator = ""
-    header_line = 1
+    header_line, remarks = 1, 0
     if match := re.fullmatch(r"sep=(.)\s*", first):  # a spreadsheet's own hint
         separator, first, header_line = match[1], lines.readline(), 2
     elif remarks_ahead:
-        for _ in range(_remarks(lines.getvalue())):
+        remarks = _remarks(lines.getvalue())
+        for _ in range(remarks):
             first, header_line = lines.readline(), header_line + 1
     separator = separator or _separator(first, f"{path}:{header_line}")
     if as_numbers and (table := _numbers(path, first, header_line, lines, separator, split or _header)) is not None:
@@ -149,7 +152,7 @@ def read_table(
             )
             raise InputError(f"{path}:{line}: {len(row)} values, the header has {len(header)} columns{hint}")
     cells = tuple(tuple(cell.strip() for cell in column) for column in zip(*body, strict=True))
-    return Table(str(path), header_line, names, header_units, cells, tuple(body_lines), separator != ",")
+    return Table(str(path), header_line, names, header_units, cells, tuple(body_lines), separator != ",", None, remarks)
 
 
 def _remarks(text: str) -> int:

@@ -106,10 +106,8 @@ def read_recording(path: str | Path) -> Recording:
     if path.suffix.lower() == MAT:
         return _read_mat(path)
     table = read_table(path, remarks_ahead=True)
-    ahead = table.header_line - 1
-    notes = (
-        (f"{path}: the header is taken to be line {ahead + 1}; the lines ahead of it are not read",) if ahead else ()
-    )
+    taken = f"{path}: the header is taken to be line {table.header_line}; the lines ahead of it are not read"
+    notes = (taken,) if table.remarks else ()
     # A bracket with digits alone is the index of a parameter, r0078[0], not a unit.
     units = ["" if unit.isdecimal() else unit for unit in table.units]
     return Recording(path, table.names, dict(zip(table.names, units, strict=True)), notes=notes, _table=table)

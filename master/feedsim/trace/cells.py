@@ -43,8 +43,8 @@ Header = Callable[[Sequence[str], str], tuple[tuple[str, ...], tuple[str, ...]]]
 class Table:
     """Cells of a file by column, all of one length, with the line of every row; `where` is the file's name.
 
-    numbers: (N, M) in place of the cells, where they were asked for and are nothing else. remarks: lines ahead of the header that
-    are not read.
+    numbers: (N, M) in place of the cells, where they were asked for and are nothing else. remarks: lines ahead of the
+    header that are not read.
     """
 
     where: str

@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from itertools import zip_longest
 from math import sqrt
 from pathlib import Path
 from time import process_time
@@ -198,19 +199,20 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="folder that the logs' files are left in")
     parser.add_argument("--out", type=Path, default=Path("build/identification"), help="folder of tables")
     options = parser.parse_args()
-    chosen: dict[tuple[str, ...], list[str]] = {}
+    chosen: dict[tuple[str, ...], list[tuple[str, tuple[str, ...]]]] = {}
     for name, flaws in names(options.total):
         size = {"single": 1, "pairs": 2}.get(options.only)
         if len(flaws) == size if size else options.only in name:
-            chosen.setdefault(flaws, []).append(name)
+            chosen.setdefault(flaws, []).append((name, flaws))
     outcomes = []
     options.out.mkdir(parents=True, exist_ok=True)
     with (
         tempfile.TemporaryDirectory() as work,
         (options.out / "study.jsonl").open("w", encoding="utf-8") as lines,
     ):
-        for flaws, kind in chosen.items():
-            for name in kind[: options.count]:
+        # One of each kind after the other: a study that is stopped has seen them all.
+        for turn in zip_longest(*(kind[: options.count] for kind in chosen.values())):
+            for name, flaws in filter(None, turn):
                 log = made(name, flaws, options.keep or Path(work))
                 outcomes.append(judged(log))
                 print(told(outcomes[-1]), flush=True)

@@ -53,7 +53,7 @@ FLAWS: Mapping[str, Flaw] = {
     "no_slow_speeds": Flaw(("slow", "mm/min", "extrapolat", "lowest speed", "low speeds")),
     "strokes_only": Flaw(("sine", "small moves", "pre-sliding", "reversal"), ("sines_only",)),
     "sines_only": Flaw(("constant speed", "plateau", "strokes"), ("no_slow_speeds", "one_way")),
-    "clipped": Flaw(("clip", "flat", "limit", "saturat")),
+    "clipped": Flaw(("clip", "cut off", "flat top", "saturat")),
     "warms_5": Flaw(("warm", "drift", "temperature", "repeat"), ("warms_30",)),
     "warms_30": Flaw(("warm", "drift", "temperature", "repeat")),
     "one_way": Flaw(("one direction", "both directions", "one way"), ("no_slow_speeds",)),

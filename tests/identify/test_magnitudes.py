@@ -54,6 +54,7 @@ def test_right_units_are_no_matter(tmp_path: Path) -> None:
         ("sigma_0", 0.3, "the bristles would give way after 0.017 m"),
         ("v_s", 0.6e-3, "v_s comes out as 0.0006 rad/s: 1.91e-06 m/s at the slide; plausible: 1e-05 to 1 m/s"),
         ("v_s", 600.0, "1.91 m/s"),
+        ("F_C", 1600.0, "F_C comes out as 1600 N.m: 5.03e+05 N at the slide"),
         ("J", 16.4, "J comes out as 16.4 kg.m2: 1.62e+06 kg"),
         ("J", 16.4e-6, "friction alone would brake with 311 m/s2"),
     ],

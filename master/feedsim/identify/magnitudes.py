@@ -29,6 +29,7 @@ PLAUSIBLE: Mapping[str, tuple[float, float, str]] = {
     "v_s": (10e-6, 1.0, "m/s"),
     "mass": (0.01, 1e6, "kg"),
     "braking": (1e-3, 100.0, "m/s2"),
+    "friction": (0.02, 1e5, "N"),
 }
 KNOWN = 0.3  # relative standard deviation up to which a value is a witness
 INERTIA = 10.0  # factor between an inertia that is given and that of accelerating parts
@@ -104,9 +105,15 @@ def _slide(estimates: Mapping[str, Estimate], I_P: float) -> Iterator[tuple[str,
     """Name of PLAUSIBLE, value at the slide in its unit, and words, of all that is known well."""
     known = {name: each for name, each in estimates.items() if _known(each)}
     told = {name: f"{name} comes out as {each.value:.4g} {each.unit}:" for name, each in known.items()}
-    if "sigma_0" in known:
-        deflection = estimates["F_C"].value / known["sigma_0"].value
-        yield "deflection", deflection * I_P, f"{told['sigma_0']} the bristles would give way after"
+    if "F_C" in known:
+        yield "friction", known["F_C"].value / I_P, told["F_C"]
+    level = known.get("F_C") or known.get("F_S")
+    if "sigma_0" in known and level is not None:
+        yield (
+            "deflection",
+            level.value / known["sigma_0"].value * I_P,
+            f"{told['sigma_0']} the bristles would give way after",
+        )
     if "v_s" in known:
         yield "v_s", known["v_s"].value * I_P, told["v_s"]
     if "J" in known:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -156,9 +157,7 @@ def test_too_little_of_a_trace_is_refused() -> None:
         circularity(bumpy(), Turn(("X", "Z"), CENTRE, RADIUS, 1, LAP, 1.5 * LAP))
 
 
-@pytest.mark.parametrize(
-    ("turns", "chosen", "number"), [(1, None, 1), (2, None, 2), (3, None, 2), (5, None, 3), (3, 3, 3)]
-)
+@pytest.mark.parametrize(("turns", "chosen", "number"), [(3, None, 2), (5, None, 3), (3, 2, 2), (5, 4, 4)])
 def test_task_is_the_chosen_or_the_middle_turn_of_the_last_circle(turns: int, chosen: int | None, number: int) -> None:
     circle = Circle(plane=("Z", "Y"), radius=0.01, feed=0.1, turns=turns, direction="clockwise")
     other = Circle(plane=("X", "Z"), radius=0.01, feed=0.1)
@@ -173,16 +172,58 @@ def test_task_is_the_chosen_or_the_middle_turn_of_the_last_circle(turns: int, ch
     assert (task.prefix, task.turn.axes, task.turn.sense) == ("ZY", ("Z", "Y"), -1)
 
 
+# turns, turn asked for, radius [m], feed [m/s] -> what is evaluated, or what to change
+WINDOWS: list[tuple[int, int | None, float, float, str]] = [
+    (1, None, 0.015, 0.05, r"turn 1 of 1 .* has its speed from 0\.03651 to 1\.885 s; give it turns: 3"),
+    (2, None, 0.015, 0.05, "last"),
+    (2, 2, 0.015, 0.05, "turn 2 of 2 .* leave 'turn' out"),
+    (3, 1, 0.015, 0.05, "turn 1 of 3 .* leave 'turn' out"),
+    (3, 3, 0.015, 0.05, "turn 3 of 3 .* leave 'turn' out"),
+    (3, None, 0.015, 0.05, "middle"),
+    (3, None, 0.002, 0.1, "give it turns: 4"),  # 0.13 s a turn: the run-in is none yet
+    (4, None, 0.002, 0.1, "last"),
+    (1, None, 0.001, 0.12, "too short to reach its path speed.* lower its feed, or give it more turns"),
+]
+
+
+@pytest.mark.parametrize("start_angle", [0.0, 0.7])
+@pytest.mark.parametrize("direction", ["counterclockwise", "clockwise"])
+@pytest.mark.parametrize("window", WINDOWS, ids=lambda window: "-".join(map(str, window[:4])))
+def test_turn_is_full_at_constant_speed_or_refused(
+    window: tuple[int, int | None, float, float, str], direction: Literal["counterclockwise", "clockwise"],
+    start_angle: float,
+) -> None:  # fmt: skip
+    turns, chosen, radius, feed, expected = window
+    motion = Circle(
+        plane=("X", "Z"), radius=radius, feed=feed, turns=turns, direction=direction, start_angle=start_angle
+    )
+    described = scenario(motion, Dwell(duration=0.3), evaluate=(CircleTest(turn=chosen),))
+    program = plan(described)
+    if expected not in ("last", "middle"):
+        with pytest.raises(InputError, match=expected):
+            tasks(described, program)
+        return
+    (task,) = tasks(described, program)
+    turn = task.turn  # type: ignore[union-attr]
+    assert turn.end - turn.begin == pytest.approx(2 * math.pi * radius / feed, rel=1e-9)
+    inside = (program.time > turn.begin - 0.2) & (program.time < turn.end)
+    speed = np.hypot(*(np.gradient(program.x_s[axis], program.time) for axis in "XZ"))
+    # differences over 2 ms of a circle: the chord is shorter than the arc by (angle)^2/24; and the spline through the
+    # interpolator's points begins to brake within the last of its cycles
+    assert np.abs(speed[inside] / feed - 1).max() < (2e-3 * feed / radius) ** 2 / 6 + 2e-5
+    assert (turn.begin == program.segments[0].geometry.turns[1][0]) == (expected == "middle")  # type: ignore[union-attr]
+
+
 def test_circle_can_be_chosen() -> None:
     small, large = (Circle(plane=("X", "Z"), radius=r, feed=0.1, turns=3) for r in (0.01, 0.02))
     described = scenario(
-        small, Dwell(duration=0.1), large, evaluate=(CircleTest(), CircleTest(motion=0), CircleTest(motion=2, turn=1))
+        small, Dwell(duration=0.1), large, evaluate=(CircleTest(), CircleTest(motion=0), CircleTest(motion=2, turn=2))
     )
     program = plan(described)
     found = tasks(described, program)
     assert [task.prefix for task in found] == ["XZ", "XZ#2", "XZ#3"]
     assert [task.turn.radius for task in found if isinstance(task, CircleTask)] == [0.02, 0.01, 0.02]
-    assert found[2].turn.begin == program.segments[2].start  # type: ignore[union-attr]
+    assert found[2].turn.begin == program.segments[2].geometry.turns[1][0]  # type: ignore[union-attr]
     with pytest.raises(ValidationError, match=r"motions\.1 \(dwell\) is not of kind circle"):
         scenario(small, Dwell(duration=0.1), evaluate=(CircleTest(motion=1),))
     with pytest.raises(ValidationError, match="turn 4 of a circle of 3 turns"):

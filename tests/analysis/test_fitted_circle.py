@@ -78,7 +78,9 @@ def test_recording_cut_in_motion_is_fitted_without_its_run_in(tmp_path: Path, se
 
 
 def test_what_is_given_is_not_fitted(tmp_path: Path) -> None:
-    motion = recording(tmp_path / "c.csv", planned(Circle(plane=("X", "Z"), radius=0.015, feed=0.05)), digits=6)
+    motion = recording(
+        tmp_path / "c.csv", planned(Circle(plane=("X", "Z"), radius=0.015, feed=0.05, turns=3)), digits=6
+    )
     centre = {"X": 0.785002, "Z": 0.1}
     found = turn_of(motion, CircleTest(centre=centre, radius=0.015001, plane=("Z", "X")))
     assert (found.axes, found.centre, found.radius) == (("Z", "X"), (0.1, 0.785002), 0.015001)
@@ -98,6 +100,13 @@ def test_task_reads_measured_positions_about_the_fitted_circle(tmp_path: Path) -
     assert task.prefix == "XZ"
     assert figures["mean"].value == pytest.approx(1.5, abs=1e-3)
     assert figures["G"].value == pytest.approx(0, abs=2e-3)
+
+
+def test_recorded_turn_that_brakes_is_refused(tmp_path: Path) -> None:
+    circle = planned(Circle(plane=("X", "Z"), radius=0.015, feed=0.05, turns=2))
+    motion = recording(tmp_path / "c.csv", circle)
+    with pytest.raises(InputError, match=r"turn 2 of 2 of the recorded setpoints is not driven at constant speed"):
+        turn_of(motion, CircleTest())
 
 
 def test_what_is_no_circle_is_refused(tmp_path: Path) -> None:

@@ -242,10 +242,29 @@ def test_passing_through_the_band_is_not_settling() -> None:
     assert values(positioning(whole, approach()))["settling_time"] == settled
 
 
+def test_overshoot_that_still_grows_is_not_determined() -> None:
+    """An axis that creeps past its target, or up to it: cut off 60 ms after the motion, its largest distance is no
+    overshoot unless it is at the target."""
+    for level, known in ((-30e-6, False), (30e-6, False), (-0.5e-6, True)):
+        t = np.arange(0.0, END + 0.0605, 1e-3)
+        x = np.where(t < END, 0.0, TARGET + level * (1 if level < 0 else t / t[-1]))
+        x = np.where(t < END, x, x + 1e-8 * (t - END))
+        found = values(positioning(Trace(t, {"Z.x_a": x}), approach()))["overshoot"]
+        assert math.isfinite(found) == known, level
+
+
+def test_torque_of_a_plateau_that_has_not_settled_is_not_determined() -> None:
+    for length, known in ((0.12, False), (0.13, True)):
+        steady = (0.1, 0.1 + length)
+        found = values(positioning(stop(), replace(approach(), steady=steady)))["plateau_torque"]
+        assert math.isfinite(found) == known
+
+
 def test_every_evaluation_that_is_not_possible_is_named_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "s.yaml"
     lines = [
-        "name: s", f"machine: {MACHINE}", "motions:", "  - {kind: circle, plane: [X, Z], radius: 9 mm, feed: 1 m/min}",
+        "name: s", f"machine: {MACHINE}", "motions:",
+        "  - {kind: circle, plane: [X, Z], radius: 9 mm, feed: 1 m/min, turns: 3}",
         "  - {kind: move, by: {Z: 1 mm}, feed: 1 m/min}", "evaluate:", "  - {kind: positioning, axis: X}",
         "  - {kind: circle}", "  - {kind: positioning, axis: Z, motion: 0}",
     ]  # fmt: skip

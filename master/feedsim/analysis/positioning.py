@@ -19,6 +19,7 @@ REST_DELAY = 1.0  # s after the end of the NC motion
 # An axis' ringing is 20 Hz and more (the default Z axis' 21 Hz): over one period of it the first swing, which makes the
 # overshoot, is seen whole, and an axis that stays within its band so long does not just pass through it.
 LEAST_REST = 0.050  # s
+SHORTEST_PLATEAU = 0.125  # s: 40 to 90 % of it then begin and last a period of a ringing of 20 Hz
 PLATEAU = (0.4, 0.9)  # share of the constant-speed phase: its begin still rings from the acceleration
 
 
@@ -52,7 +53,8 @@ class Approach:
 def positioning(trace: Trace, approach: Approach, *, band: float = 1e-6) -> dict[str, Figure]:
     """Figures of ``approach``: overshoot, settling time to ``band`` [m], ringing, torques; by scale and by tool point.
 
-    Overshoot, settling and ringing are NaN where less than LEAST_REST of the rest behind the motion is recorded. Torque
+    Overshoot, settling and ringing are NaN where less than LEAST_REST of the rest behind the motion is recorded,
+    overshoot also where the axis is still under way at its end; the plateau's torque where the plateau is short. Torque
     and tool-point figures are present where M_a, M_fr and tcp.x_<axis> are recorded. Raises InputError where the axis'
     position is not recorded, or not up to the end of the motion.
     """
@@ -110,7 +112,9 @@ def _stop(trace: Trace, approach: Approach, name: str, band: float, what: str) -
             f"positioning of axis {approach.axis}: nothing is recorded after the end of the motion at "
             f"{approach.end:.6g} s"
         )
-    seen = _rest_is_seen(time, approach, approach.end)
+    # a largest distance at the last instant may be outdone, unless the axis is at its target there
+    arrived = int(beyond.argmax()) < len(beyond) - 1 or abs(float(beyond[-1])) <= band
+    seen = _rest_is_seen(time, approach, approach.end) and arrived
     settled = max(last_outside(time[after], beyond[after], band), approach.end)
     width = f"{band * 1e6:g} um"
     return {
@@ -148,8 +152,9 @@ def _torques(trace: Trace, approach: Approach) -> dict[str, Figure]:
     if approach.steady is not None:
         begin, end = (approach.steady[0] + share * (approach.steady[1] - approach.steady[0]) for share in PLATEAU)
         inside = (trace.time >= begin) & (trace.time <= end)
+        long_enough = approach.steady[1] - approach.steady[0] >= SHORTEST_PLATEAU
         figures["plateau_torque"] = Figure(
-            float(torque[inside].mean()) if inside.any() else math.nan,
+            float(torque[inside].mean()) if inside.any() and long_enough else math.nan,
             "N.m",
             f"mean motor torque at constant speed, {begin:.3f} to {end:.3f} s",
         )

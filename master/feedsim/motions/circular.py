@@ -240,7 +240,12 @@ class CircularPath:
             sweep=self.sweep,
             turns=tuple(pairwise(instants.tolist())),
             steady=steady(profile, start),
+            turn_time=_turn_time(profile, 2 * math.pi * self.radius),
         )
+
+
+def _turn_time(profile: Profile, length: float) -> float:
+    return length / float(profile.velocity.max())
 
 
 @dataclass(frozen=True)
@@ -263,6 +268,8 @@ class Circular(Geometry):
     """Begin and end of every full turn [s], program time: where the path length is a multiple of 2 pi R."""
     steady: tuple[float, float] | None
     """Begin and end of the constant-speed phase [s], program time; None where there is none."""
+    turn_time: float | None
+    """Duration of a full turn at the highest speed of the path [s]; None where the path is known by its setpoints."""
 
     @property
     def text(self) -> str:

@@ -63,7 +63,7 @@ class CircleTest(Model):
 
     kind: Literal["circle"] = "circle"
     turn: Annotated[StrictInt, Field(ge=1)] | None = Field(
-        default=None, description="Turn evaluated, from 1 (default: the middle one)"
+        default=None, description="Turn evaluated, from 1 (default: the middle one, or the last at constant speed)"
     )
     motion: MotionIndex | None = Field(
         default=None, description="Place of the circle in motions, from 0 (default: the last circle)"

@@ -19,6 +19,7 @@ import yaml
 from feedsim.analysis import Figure, compensation
 from feedsim.cli import main
 from feedsim.errors import SimulationError
+from feedsim.findings import severity
 from feedsim.report.compensate.report import _um, table_csv
 from feedsim.trace import read_csv
 from report_helpers import Page, contents
@@ -119,6 +120,43 @@ def test_curves_can_be_read_back(done: tuple[Process, Path]) -> None:
     assert np.abs(torque["Z.M_ff"]).max() == pytest.approx(
         summary_of(done[1])["figures"]["Z.peak_feedforward"]["value"]
     )
+
+
+def test_worse_than_without_is_the_first_thing_said(fmus: Path, tmp_path: Path) -> None:
+    """Friction of Z 2.5 times too strong; X has the machine's own."""
+    strong = re.sub(r"(F_C|F_S|F_log|sigma_[012]): (\S+)", lambda m: f"{m[1]}: {2.5 * float(m[2]):g}", FRICTION_Z)
+    (tmp_path / "friction_z.yaml").write_text(strong, encoding="utf-8")
+    words = ["--friction", "Z=friction_z.yaml", "--no-table", "--out", "out"]
+    process = feedsim("compensate", CIRCLE, *words, fmus=fmus, cwd=tmp_path)
+    assert process.returncode == 0
+    found = "worse with compensation than without: G 8.19 -> 10"
+    assert process.stdout.startswith(f"WRONG: {found}")
+    first, *_, last = process.stderr.splitlines()
+    assert first.startswith(f"feedsim: WRONG: {found}")
+    assert "reversal Z+ 7.9 -> 10" in first
+    assert "reversal X" not in first
+    assert last.startswith("feedsim: note: axis X: model and machine have the same friction and delay")
+    findings = summary_of(tmp_path)["findings"]
+    assert [each["severity"] for each in findings] == ["wrong", "doubt", "note"]
+    assert "dip_Z -0.288 -> -" in findings[1]["text"]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert page.index('<p class="wrong"') < page.index("model and machine have the same") < page.index('class="keys"')
+
+
+def test_worse_is_judged_figure_by_figure() -> None:
+    def told(reversal: float = 0.1e-6, **after: float) -> list[str]:
+        before = {"G": 8.0, "G_ls": 8.0, "tool.G": 8.2, "glitch_Z": 7.9, "dip_Z": -0.3, "mean": 2.0}
+        figures = {f"before.{name}": Figure(value, "um", "") for name, value in before.items()}
+        figures |= {f"after.{name}": Figure(after.get(name, 0.05), "um", "") for name in before}
+        return compensation._worse(figures, {"Z+": 7.9e-6, "Z-": 7.9e-6}, {"Z+": reversal, "Z-": 0.1e-6})
+
+    assert told() == []
+    assert told(dip_Z=-0.37, mean=-2.07) == []  # less than a hundredth of G
+    assert told(dip_Z=-0.76) == ["larger with compensation than without: dip_Z -0.3 -> -0.76 um"]
+    for found in (told(G=8.2), told(**{"tool.G": 9.0}), told(reversal=9e-6), told(G=np.nan)):
+        assert [severity(each) for each in found] == ["wrong"]
+    assert "reversal Z+ 7.9 -> 9 um" in told(reversal=9e-6)[0]
+    assert "G 8 -> not determined" in told(G=np.nan)[0]
 
 
 def test_without_the_table_there_is_none(done: tuple[Process, Path]) -> None:

@@ -16,6 +16,7 @@ from feedsim.analysis.compensation import Compensation, Quality, circle_task, co
 from feedsim.cosim.feedforward import friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
+from feedsim.findings import severity
 from feedsim.linear.drive import LinearDrive
 from feedsim.report import compensate as report
 from feedsim.report.compensate.report import rows_of
@@ -145,7 +146,10 @@ def test_every_quadrant_within_reach(done: Compensation) -> None:
         assert figures[f"after.glitch_{crossing}"].value < REACH * 1e6
         assert figures[f"after.glitch_{crossing}"].value < LEFT * 1e6
     assert figures["after.G"].value < LEFT * 1e6
-    assert done.warnings == ()
+    (note,) = done.warnings
+    assert severity(note) == "note"
+    assert "axis X, Z: model and machine have the same friction and delay" in note
+    assert "leaves G up to 0.807 um (F_C, F_S -10 %)" in note
 
 
 def test_feedforward_is_ahead_by_the_lag_of_the_torque(done: Compensation) -> None:

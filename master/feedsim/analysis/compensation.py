@@ -15,8 +15,9 @@ from feedsim.cosim.feedforward import Lag, Law, friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.cosim.run import Run, run
 from feedsim.errors import InputError
+from feedsim.findings import Note, Wrong
 from feedsim.nc import Program
-from feedsim.scenario import CircleTest, Friction, Recording, Scenario
+from feedsim.scenario import CircleTest, Friction, Machine, Recording, Scenario
 from feedsim.trace import Trace
 
 Progress = Callable[[str, int, int], None]
@@ -26,6 +27,9 @@ DELAY_ERRORS = (-1e-3, -0.5e-3, -0.2e-3, 0.2e-3, 0.5e-3, 1e-3)  # s
 VARIED = (("F_C", "F_S"), ("sigma_0",), ("W",), ("gamma",), ("sigma_1",), ("v_s",))
 SHARE = 0.1
 RESTING = 1e-9  # m; what an axis that is held may move by, from rounding
+# A figure has become worse from this share of G without compensation on, and by this [m] at least.
+WORSE, LEAST_WORSE = 0.01, 1e-9
+REVERSAL = "reversal "
 OF_ENGAGING = ("W", "gamma")  # of no effect where W is 0
 
 
@@ -172,6 +176,8 @@ def compensate(
         after = run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
         variations = _table(scenario, program, turn, used, applied, law, fmus=fmus, progress=tell) if table else ()
     left_before, left_after = (quality(result.trace, turn) for result in (before, after))
+    figures = _circle_figures(turn, "before", "without", before, left_before)
+    figures |= _circle_figures(turn, "after", "with", after, left_after)
     T_c = machine.cycles.T_c
     feedforward = Trace(
         np.arange(len(next(iter(torque.values()))), dtype=np.float64) * T_c,
@@ -188,11 +194,15 @@ def compensate(
         after=after,
         left_before=left_before,
         left_after=left_after,
-        figures=_circle_figures(turn, "before", "without", before, left_before)
-        | _circle_figures(turn, "after", "with", after, left_after)
-        | _feedforward_figures(lags, applied, torque),
+        figures=figures | _feedforward_figures(lags, applied, torque),
         table=variations,
-        warnings=(*dict.fromkeys((*before.warnings, *after.warnings)), *_doubts(applied)),
+        warnings=(
+            *_worse(figures, _reversals(before.trace, turn), _reversals(after.trace, turn)),
+            *dict.fromkeys((*before.warnings, *after.warnings)),
+            *_doubts(applied),
+            *_not_judged(axes, turn),
+            *_same_model(machine, used, lags, variations),
+        ),
     )
 
 
@@ -204,6 +214,89 @@ def quality(trace: Trace, turn: Turn) -> Quality:
         peak={axis: max(g.height for g in measured.glitches if g.axis == axis) for axis in turn.axes},
         dip={axis: _dip(measured, axis) for axis in turn.axes},
     )
+
+
+def _reversals(trace: Trace, turn: Turn) -> dict[str, float]:
+    """Reversal, such as Z+ -> largest radius deviation to either side within +-45 deg of it, less the median [m]."""
+    measured = contour(trace, turn)
+    return {
+        glitch.name: float(
+            np.abs(measured.deviation[quadrant(measured.angle, glitch.crossing)] - measured.median).max()
+        )
+        for glitch in measured.glitches
+    }
+
+
+def _worse(figures: Mapping[str, Figure], before: Mapping[str, float], after: Mapping[str, float]) -> list[str]:
+    """What the compensation has made worse: wrong is more of G or of a reversal, of other figures it is a doubt.
+
+    before, after: as from `_reversals`.
+    """
+    pairs = {
+        name.removeprefix("before."): (figure.value, figures[f"after.{name.removeprefix('before.')}"].value)
+        for name, figure in figures.items()
+        if name.startswith("before.") and figure.unit == "um"
+    }
+    pairs |= {REVERSAL + name: (1e6 * value, 1e6 * after[name]) for name, value in before.items()}
+    least = max(WORSE * abs(pairs["G"][0]), LEAST_WORSE * 1e6)
+    # One that is no number with compensation is worse.
+    worse = {
+        name: (without, with_it)
+        for name, (without, with_it) in pairs.items()
+        if np.isfinite(without) and not _size(name, with_it) - _size(name, without) <= least
+    }
+    grave = {
+        name: both
+        for name, both in worse.items()
+        if name.rpartition(".")[2] in ("G", "G_ls") or name.startswith(REVERSAL)
+    }
+    rest = {name: both for name, both in worse.items() if name not in grave}
+    told = [Wrong(f"worse with compensation than without: {_listed(grave)}")] if grave else []
+    return told + ([f"larger with compensation than without: {_listed(rest)}"] if rest else [])
+
+
+def _size(name: str, value: float) -> float:
+    """How bad a figure is: outward extremes count outwards, inward ones inwards, all others either way; NaN stays."""
+    key = name.rpartition(".")[2]
+    if key == "F_min" or key.startswith("dip"):
+        return float(np.maximum(-value, 0.0))
+    if key == "F_max" or key.startswith("glitch"):
+        return float(np.maximum(value, 0.0))
+    return abs(value)
+
+
+def _listed(pairs: Mapping[str, tuple[float, float]]) -> str:
+    return ", ".join(
+        f"{name} {before:.3g} -> {f'{after:.3g} um' if np.isfinite(after) else 'not determined'}"
+        for name, (before, after) in pairs.items()
+    )
+
+
+def _not_judged(axes: Sequence[str], turn: Turn) -> list[str]:
+    others = [axis for axis in axes if axis not in turn.axes]
+    return [f"axis {', '.join(others)}: compensated, but no figure of the circle judges it"] if others else []
+
+
+def _same_model(
+    machine: Machine, used: Mapping[str, Friction], lags: Mapping[str, Lag], table: Sequence[Variation]
+) -> list[str]:
+    """That the compensation knows the machine exactly, as it never does a real one, and what errors would leave."""
+    same = [axis for axis, friction in used.items() if friction == machine.axes[axis].friction and axis in lags]
+    if not same:
+        return []
+    worst = max(table, key=lambda each: each.quality.G, default=None)
+    errors = "errors of it are not tried here (--no-table)"
+    if worst is not None:
+        errors = (
+            f"an error as in the table leaves G up to {1e6 * worst.quality.G:.3g} um "
+            f"({worst.what} {worst.change:+.3g} {worst.unit})"
+        )
+    return [
+        Note(
+            f"axis {', '.join(same)}: model and machine have the same friction and delay, so what is left is the least "
+            f"that can be reached, not what a real machine will show; {errors}"
+        )
+    ]
 
 
 def _dip(measured: Contour, axis: str) -> float:

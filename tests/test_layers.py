@@ -32,6 +32,7 @@ ORDER = [
     "variables",
     "units",
     "findings",
+    "owned",
     "errors",
 ]
 SOLE_USERS = {

@@ -216,7 +216,8 @@ class ExistingFile:
                 raise fault(f"{brief(value)} is no file name")
             path = Path(value)
             if not path.is_file():
-                raise fault(f"no such file: {value}" + (" (it is a folder)" if path.is_dir() else ""))
+                other = " (it is a folder)" if path.is_dir() else " (it is a pipe or a device)" if path.exists() else ""
+                raise fault(f"no such file: {value}{other}")
             return path
 
         return core_schema.with_info_plain_validator_function(

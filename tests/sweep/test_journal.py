@@ -17,7 +17,7 @@ import pytest
 
 from feedsim.errors import InputError
 from feedsim.sweep.design import Outcome
-from feedsim.sweep.journal import LOCK, NAME, Journal
+from feedsim.sweep.journal import NAME, Journal
 
 HEAD = {"study": "S", "fingerprint": "abc", "parts": {"plant.fmu": "1", "parameters": "2"}}
 RUNS = 50
@@ -132,18 +132,19 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
     code = f"""
         from pathlib import Path
         from feedsim.sweep.journal import Journal
-        from feedsim.errors import InputError
+        from feedsim.errors import OutputError
         try:
             Journal(Path({str(tmp_path)!r}), {HEAD!r}, {RUNS})
-        except InputError as error:
+        except OutputError as error:
             print(error)
     """
     with Journal(tmp_path, HEAD, RUNS):
         told = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True)
-        assert "another process" in told.stdout
+        assert f"{tmp_path}: another process" in told.stdout
+        assert f"process {os.getpid()} on " in told.stdout
     told = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True)
     assert told.stdout == ""
-    assert (tmp_path / LOCK).is_file()
+    assert [path.name for path in tmp_path.iterdir()] == [NAME]
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")

@@ -132,7 +132,7 @@ def test_restart_leaves_nothing_of_what_was_there(
     other = study(study().read_text().replace("seed: 7", "seed: 8"))
     assert main(["sweep", str(other), *arguments, "--restart"]) == 130
     left = sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
-    assert left == ["figures/own.png", "notes.txt", "runs.jsonl", "runs.lock"]
+    assert left == ["figures/own.png", "notes.txt", "runs.jsonl"]
 
 
 def test_a_report_where_all_runs_failed(study: Write, fmus: Path, tmp_path: Path) -> None:

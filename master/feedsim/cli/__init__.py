@@ -20,6 +20,8 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 from feedsim.cli import compare, compensate, files, frf, identify, machine, run, sweep
+from feedsim.cli.terminal import prepare_streams
+from feedsim.owned import remove_orphans
 
 EPILOG = """exit codes:
   0 done    1 internal error    2 bad input or usage    3 a unit failed    4 results cannot be written
@@ -96,7 +98,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout = None  # who read the output has gone; Python would flush into the closed pipe once more
         return 0
     except OSError as error:
-        print(f"feedsim: {error.filename or 'standard output'}: {error.strerror}", file=sys.stderr)
+        print(
+            f"feedsim: {error.filename or 'a temporary file (TMPDIR names the folder)'}: {error.strerror}",
+            file=sys.stderr,
+        )
         sys.stdout = None
         return 4
     return code if isinstance(code, int) else 0
@@ -118,4 +123,6 @@ def entry() -> None:
     # Most of what a command makes stays until it ends, so that looking for garbage finds little: with the usual 700
     # some 0.08 s of a run's 1.9 s. Left alone where main() is called: by a process that is not this program's own.
     gc.set_threshold(20_000, 20, 20)
+    prepare_streams()
+    remove_orphans()
     sys.exit(main())

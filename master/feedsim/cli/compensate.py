@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, QUIET, Command, Option, halves, out, quantity, settings
-from feedsim.cli.terminal import announce, finish, progress_bar
+from feedsim.cli.terminal import announce, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
     from feedsim.nc import Program
@@ -40,13 +40,15 @@ def compensate(options: Namespace) -> None:
     files, frictions = _frictions(options.frictions, program)
     delays = _delays(options.delays, program)
     _check_lags(plan, [axis for axis in analysis.moving_axes(program) if axis not in delays])
-    report.check_writable(directory, [*input_paths(plan), *files.values()])
-    with progress_bar(options.quiet, "it", shortened=True) as progress:
+    with (
+        results_in(directory, report.check_writable, [*input_paths(plan), *files.values()]),
+        progress_bar(options.quiet, "it", shortened=True) as progress,
+    ):
         result = analysis.compensate(
             plan, program, frictions=frictions, delays=delays, table=options.table, fmus=options.fmus,
             progress=progress,
         )  # fmt: skip
-    report.write(result, files, directory)
+        report.write(result, files, directory)
     head = f"{plan.name}: friction compensation -> {directory / 'report.html'}"
     finish(options.quiet, result.warnings, head, f"  {report.summary_line(result)}")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, QUIET, Command, Group, Option, names, out, quantity, settings
-from feedsim.cli.terminal import Progress, announce, finish, progress_bar
+from feedsim.cli.terminal import Progress, announce, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
     from feedsim.analysis.campaign import Plan
@@ -58,9 +58,11 @@ def frf(options: Namespace) -> None:
     overlays, warnings = _overlays(options.overlays, wanted)
     warnings += doubts
     inputs = [*(file for _, file in subject.files), *(overlay.file for overlay in overlays)]
-    report.check_writable(directory, inputs)
 
-    with progress_bar(options.quiet, " cycles", shortened=True) as progress:
+    with (
+        results_in(directory, report.check_writable, inputs),
+        progress_bar(options.quiet, " cycles", shortened=True) as progress,
+    ):
         progress("closed form", 0, 1)
         system = linear.LinearSystem(machine, modes)
         result = linear.evaluate(system, axes)
@@ -74,30 +76,30 @@ def frf(options: Namespace) -> None:
         campaign = None
         if not (options.no_measure or result.unstable_poles):
             campaign = run_campaign(machine, axes, plan, fmus=options.fmus, progress=progress)
-    figures = linear.figures(result)
-    if not options.tool:
-        figures = {name: figure for name, figure in figures.items() if not name.startswith("tool.")}
-    if full is not None:
-        figures |= truncation.figures(full, tuple(machine.axes), frequency, shown=axes, tool=options.tool)
-    if campaign is not None:
-        figures |= responses.agreement(system, campaign)
-        warnings += campaign.warnings
-        if plan.friction and plan.realisations == 1:
-            warnings.append(ONE_REALISATION)
-    found = responses.Responses(
-        machine=machine,
-        modes=modes,
-        axes=axes,
-        band=plan.band,
-        result=result,
-        closed=closed,
-        campaign=campaign,
-        overlays=tuple(overlays),
-        truncation=full,
-        figures=figures,
-        warnings=tuple(warnings),
-    )
-    report.write(subject, found, directory)
+        figures = linear.figures(result)
+        if not options.tool:
+            figures = {name: figure for name, figure in figures.items() if not name.startswith("tool.")}
+        if full is not None:
+            figures |= truncation.figures(full, tuple(machine.axes), frequency, shown=axes, tool=options.tool)
+        if campaign is not None:
+            figures |= responses.agreement(system, campaign)
+            warnings += campaign.warnings
+            if plan.friction and plan.realisations == 1:
+                warnings.append(ONE_REALISATION)
+        found = responses.Responses(
+            machine=machine,
+            modes=modes,
+            axes=axes,
+            band=plan.band,
+            result=result,
+            closed=closed,
+            campaign=campaign,
+            overlays=tuple(overlays),
+            truncation=full,
+            figures=figures,
+            warnings=tuple(warnings),
+        )
+        report.write(subject, found, directory)
     head = f"{subject.name}: frequency responses -> {directory / 'report.html'}"
     finish(options.quiet, warnings, head, report.summary_line(found))
 

@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, Command, Group, Option, names, out, quantity
-from feedsim.cli.terminal import finish, progress_bar
+from feedsim.cli.terminal import finish, progress_bar, results_in
 
 if TYPE_CHECKING:
     from feedsim.identify import Asked
@@ -50,13 +50,13 @@ def identify(options: Namespace) -> None:
         sources = tuple(each.provenance for each in recorded)
         known = asked.with_traces(sources, machine)
         directory: Path = options.out or Path("results") / f"identify_{known.axis.lower()}"
-        report.check_writable(directory, _inputs(options, subject))
         records = named_apart(recorded)
-        with FrictionLaw(options.fmus) as law:
-            found = identified_from(records, law, known, progress)
-    found = replace(found, seconds=reading | dict(found.seconds))
-    identified = Identified(found, records, sources, subject, _settings(options), date.today().isoformat())
-    report.write(identified, directory)
+        with results_in(directory, report.check_writable, _inputs(options, subject)):
+            with FrictionLaw(options.fmus) as law:
+                found = identified_from(records, law, known, progress)
+            found = replace(found, seconds=reading | dict(found.seconds))
+            identified = Identified(found, records, sources, subject, _settings(options), date.today().isoformat())
+            report.write(identified, directory)
     # Without the table, all warnings: it holds the reasons that some only repeat.
     warnings = identified.warnings if options.quiet else report.terminal_warnings(identified)
     finish(options.quiet, warnings, *report.terminal_lines(identified, directory))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, QUIET, Command, Option, out, settings
-from feedsim.cli.terminal import announce, finish, progress_bar, warn
+from feedsim.cli.terminal import announce, finish, progress_bar, results_in, warn
 from feedsim.errors import InputError, OutputError
 
 if TYPE_CHECKING:
@@ -41,8 +41,10 @@ def run(options: Namespace) -> None:
     with _subject(options) as (plan, program, fmus, worded, named):
         announce(plan.machine, fmus, named)
         analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
-        report.check_writable(directory, report.input_paths(plan))
-        with _rows_kept(report.growing(directory)) as recorded:
+        with (
+            results_in(directory, report.check_writable, report.input_paths(plan)),
+            _rows_kept(report.growing(directory)) as recorded,
+        ):
             with progress_bar(options.quiet, " cycles", shortened=True) as progress:
                 result = cosim.run(
                     plan, program=program, fmus=fmus, progress=progress.of(plan.name), scratch=recorded.scratch,

@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, QUIET, Command, Option, out, settings
-from feedsim.cli.terminal import announce, finish, progress_bar, warn
+from feedsim.cli.terminal import announce, finish, progress_bar, results_in, warn
 from feedsim.findings import WRONG, Wrong
 
 if TYPE_CHECKING:
@@ -54,37 +54,37 @@ def sweep(options: Namespace) -> int:
     if options.dry_run:
         return _dry_run(study, planned, options)
     directory: Path = options.out or Path("results") / options.study.stem
-    report.check_writable(directory, [study.file, study.scenario, *study.files])
-    begun = perf_counter()
-    last: list[Progress] = []
-    try:
-        with progress_bar(options.quiet, " runs") as bar:
+    with results_in(directory, report.check_writable, [study.file, study.scenario, *study.files]):
+        begun = perf_counter()
+        last: list[Progress] = []
+        try:
+            with progress_bar(options.quiet, " runs") as bar:
 
-            def progress(now: Progress) -> None:
-                last[:] = [now]
-                bar(study.name, now.done, now.total, now.resumed, f"{now.failed} failed" if now.failed else "")
+                def progress(now: Progress) -> None:
+                    last[:] = [now]
+                    bar(study.name, now.done, now.total, now.resumed, f"{now.failed} failed" if now.failed else "")
 
-            table = run(
-                study,
-                directory,
-                workers=options.workers,
-                scheduler=options.scheduler,
-                fmus=options.fmus,
-                progress=progress,
-                restart=options.restart,
-                format=options.format,
-                command=sys.argv,
-                say=None if options.quiet else lambda text: print(f"feedsim: {text}", file=sys.stderr),
-                discard=lambda: report.discard(directory),
-            )
-    except AllFailed as error:
-        report.write(error.table, study, planned, directory)  # which groups failures by what they have in common
-        raise
-    except KeyboardInterrupt:
-        done = f"{last[0].done} of {last[0].total} runs are done and kept in" if last else "what is done is kept in"
-        print(f"feedsim: interrupted; {done} {directory}; the same command continues", file=sys.stderr)
-        return 130
-    report.write(table, study, planned, directory)
+                table = run(
+                    study,
+                    directory,
+                    workers=options.workers,
+                    scheduler=options.scheduler,
+                    fmus=options.fmus,
+                    progress=progress,
+                    restart=options.restart,
+                    format=options.format,
+                    command=sys.argv,
+                    say=None if options.quiet else lambda text: print(f"feedsim: {text}", file=sys.stderr),
+                    discard=lambda: report.discard(directory),
+                )
+        except AllFailed as error:
+            report.write(error.table, study, planned, directory)  # which groups failures by what they have in common
+            raise
+        except KeyboardInterrupt:
+            done = f"{last[0].done} of {last[0].total} runs are done and kept in" if last else "what is done is kept in"
+            print(f"feedsim: interrupted; {done} {directory}; the same command continues", file=sys.stderr)
+            return 130
+        report.write(table, study, planned, directory)
     wrong = [str(text) for text in table["warnings"] if str(text).startswith(WRONG)]
     told = [Wrong(f"{len(wrong)} of {len(table)} runs, the first: {wrong[0].removeprefix(WRONG)}")] if wrong else []
     finish(options.quiet, told, _summary(study, last[0], perf_counter() - begun, directory))

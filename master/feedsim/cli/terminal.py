@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feedsim.findings import WRONG, ranked, severity
+from feedsim.owned import claimed
 
 if TYPE_CHECKING:
     from feedsim.scenario import Machine
@@ -40,6 +42,38 @@ class Progress:
         return lambda done, total: self(what, done, total)
 
 
+class _Standard(io.FileIO):
+    """Standard output or error. That nobody hears what is said on the latter is no reason to end."""
+
+    def write(self, data: Any) -> int:
+        try:
+            return super().write(data) or 0
+        except OSError as error:
+            if self.fileno() == 2:
+                return len(data)
+            error.filename = "standard output"
+            raise
+
+
+def prepare_streams() -> None:
+    """Make of the standard streams what can be printed to, whatever they are: closed, full, of few characters.
+
+    What cannot be shown comes as an escape. A closed stream is one whose reader has gone: what is printed is lost.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:  # else the next file that is opened has the number, and what prints to that writes into it
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        stream = getattr(sys, name)
+        if stream is None or isinstance(stream, io.TextIOWrapper):
+            buffer = io.BufferedWriter(_Standard(number, "w", closefd=False))
+            lines = number == 2 or stream is None or stream.line_buffering
+            encoding = stream.encoding if stream is not None else "utf-8"
+            setattr(sys, name, io.TextIOWrapper(buffer, encoding, "backslashreplace", line_buffering=lines))
+
+
 @contextmanager
 def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterator[Progress]:
     """A progress bar; none if ``quiet`` or where nobody watches. shortened: large numbers of the `unit` (12.3k)."""
@@ -47,6 +81,17 @@ def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Ite
 
     with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
         yield Progress(bar)
+
+
+@contextmanager
+def results_in(directory: Path, check: Callable[..., None], inputs: Sequence[Path] = ()) -> Iterator[None]:
+    """Have the folder of results to ourselves while they are made. check: of the report that will be written there.
+
+    OutputError: another process has it, or the results could not be written there.
+    """
+    with claimed(directory):
+        check(directory, inputs)
+        yield
 
 
 def warn(warnings: Iterable[str]) -> None:

@@ -6,7 +6,6 @@ And the modes that it has where the machine stands: the table's, or those of a c
 from __future__ import annotations
 
 import hashlib
-import tempfile
 import threading
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 from feedsim import units
 from feedsim.cosim.archive import Archive
 from feedsim.errors import FeedsimError, InputError
+from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import SAME_POSITION
 from feedsim.structure.modes import Modes, checked_modes
@@ -59,8 +59,8 @@ def _packed_for(machine: Machine, general: Path) -> Archive:
         raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
     pose = {axis: machine.pose[axis] for axis in machine.axes}
     key = hashlib.sha256(content).digest(), hashlib.sha256(modes).digest(), (*pose.items(),), machine.name, machine.note
-    with tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True) as folder:
-        packed = Path(folder) / "plant.fmu"
+    with TemporaryFolder() as folder:
+        packed = folder / "plant.fmu"
         with _PACKING:
             known = _PACKED.pop(key, None)
         if known is not None:

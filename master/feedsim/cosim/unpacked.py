@@ -9,12 +9,9 @@ from __future__ import annotations
 import atexit
 import hashlib
 import os
-import shutil
 import sys
-import tempfile
 import threading
 import time
-import weakref
 from collections.abc import Callable, Mapping
 from io import BufferedReader
 from pathlib import Path
@@ -22,6 +19,7 @@ from typing import IO, Any
 
 from feedsim.cosim import untrusted
 from feedsim.errors import InputError
+from feedsim.owned import TemporaryFolder
 
 KEPT = 8  # contents that no archive uses: the three units', and those of some machines or SSP files
 KEPT_SIZE = 64 << 20  # bytes; what is larger, such as the setpoints of a long program, goes with its last user
@@ -46,9 +44,8 @@ class Content:
     """
 
     def __init__(self) -> None:
-        self.directory = Path(tempfile.mkdtemp(prefix="feedsim-"))
-        # Also when a signal ends the program while the archive is being unpacked, or when nobody closed it.
-        self.remove_folder = weakref.finalize(self, _remove, str(self.directory), os.getpid())
+        self._folder = TemporaryFolder()
+        self.directory, self.remove_folder = self._folder.path, self._folder.close
         self.size = 0
         self.files: dict[Path, int] = {}
         self.description: Any = None
@@ -75,12 +72,6 @@ class Content:
         if unload is not None:
             unload()
         self.remove_folder()
-
-
-def _remove(folder: str, owner: int) -> None:
-    """A process that was forked off leaves its parent's folders alone."""
-    if os.getpid() == owner:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 class Store:

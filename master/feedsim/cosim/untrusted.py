@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import stat
 import unicodedata
 import zipfile
@@ -12,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from xml.parsers import expat
 
-from feedsim.errors import InputError
+from feedsim.errors import InputError, OutputError
 
 LARGEST = 4 << 30  # bytes that a file may unpack to; the setpoints of the longest program take less
 RATIO = 100  # to the file's own size; tables of setpoints reach some 10, files made to fill a disk 1000
@@ -132,10 +131,31 @@ def shortened(name: str) -> str:
 
 
 def copy(package: zipfile.ZipFile, entry: zipfile.ZipInfo, to: Path) -> None:
-    """Write an entry to the file `to`, whose folders are made; never more bytes than it says it has."""
-    to.parent.mkdir(parents=True, exist_ok=True)
-    with package.open(entry) as source, to.open("wb") as target:
-        shutil.copyfileobj(source, target, 1 << 20)
+    """Write an entry to the file `to`, whose folders are made; never more bytes than it says it has.
+
+    OutputError: it cannot be written, which is no fault of the archive.
+    """
+    with package.open(entry) as source:
+        with _written(to):
+            to.parent.mkdir(parents=True, exist_ok=True)
+            target = to.open("wb")
+        try:
+            while block := source.read(1 << 20):
+                with _written(to):
+                    target.write(block)
+        finally:
+            with _written(to):
+                target.close()
+
+
+@contextmanager
+def _written(to: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(
+            f"{to}: a temporary file cannot be written: {error.strerror or error}; TMPDIR names their folder"
+        ) from error
 
 
 @contextmanager

@@ -17,10 +17,12 @@ from typing import Any
 import yaml
 
 from feedsim.errors import InputError
+from feedsim.files.regular import content
 
 Place = tuple[str | int, ...]
 
 LARGEST = 100_000  # values in a file, aliases expanded
+LARGEST_FILE = 4_000_000  # bytes; people write some kB, and a long line of text is read at 0.3 MB/s
 _FAST_DEPTH = 2000
 # Where libyaml has a mind of its own: tabs, tags, byte order marks within a text, directives, "#" at the head of a
 # block of text, "?" within braces (which is looked for outside of lines that are comments).
@@ -89,15 +91,11 @@ def copied(data: Any) -> Any:
 
 
 def read(path: Path) -> Source:
-    """Read a YAML file. InputError (file, line): missing, not UTF-8, empty, bad syntax, duplicate key."""
-    try:
-        raw = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"no such file: {path}") from None
-    except IsADirectoryError:
-        raise InputError(f"{path} is a folder, not a file") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}") from None
+    """Read a YAML file.
+
+    InputError (file, line): missing, no regular file, too large, not UTF-8, empty, bad syntax, duplicate key.
+    """
+    raw = content(path, LARGEST_FILE)
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

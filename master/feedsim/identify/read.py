@@ -14,6 +14,7 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.fields import no_axis
 from feedsim.files.columns import Columns, Signal
+from feedsim.files.regular import content
 from feedsim.identify.inertia import inertia
 from feedsim.identify.magnitudes import check_slide, check_time
 from feedsim.identify.record import Array, Record, even_pieces
@@ -284,7 +285,7 @@ def _provenance(
         inertia = mapping.mass * (drive.pitch / (2 * pi)) ** 2
     return Provenance(
         file=path,
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        sha256=hashlib.sha256(content(path)).hexdigest(),
         axis=chosen.axis,
         columns=columns,
         position_at=chosen.channels["position"].at if "position" in chosen.channels else "",

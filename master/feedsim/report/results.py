@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import re
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from feedsim.errors import OutputError
+from feedsim.owned import claimed
 from feedsim.report.content import Report
 from feedsim.report.page import html
 from feedsim.report.provenance import to_json
 from feedsim.report.style import Picture
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
+SCRATCH = ".feedsim-"  # how the folder begins in which files are made
+MOVES = "moves.json"  # in it: name -> from where it is moved into the directory, null: it is removed
 # What a report of any kind leaves besides report.html and summary.json, which every one replaces; the next one takes
 # away what it does not write itself. Not friction.yaml: scenarios and machine files may name it.
 _OWN_FILE = re.compile(
@@ -33,20 +38,17 @@ def check_place(directory: Path | str, files: Sequence[str], inputs: Sequence[Pa
     called before a simulation, whose result would else be lost.
     """
     directory = Path(directory)
-    existing = _existing(directory)
-    if not existing.is_dir():
-        raise OutputError(f"{directory}: cannot be written, {existing} is a file; allowed: a directory")
-    for name in (*files, FIGURES):
-        if (directory / name).exists() and (directory / name).is_dir() != (name == FIGURES):
-            raise OutputError(
-                f"{directory / name}: is in the way of a result {'directory' if name == FIGURES else 'file'}"
-            )
-    for fate, names in (("replaced", files), ("removed", _stale(directory, files))):
-        for name in names:
-            if any(_same(directory / name, path) for path in inputs):
-                raise OutputError(f"{directory / name}: is an input and would be {fate}; take another directory")
-    with _as_output_error(directory), tempfile.TemporaryDirectory(prefix=".feedsim-", dir=existing):
-        pass
+    with claimed(directory), _as_output_error(directory):
+        _settle(directory)
+        for name in (*files, FIGURES):
+            if (directory / name).exists() and (directory / name).is_dir() != (name == FIGURES):
+                raise OutputError(
+                    f"{directory / name}: is in the way of a result {'directory' if name == FIGURES else 'file'}"
+                )
+        for fate, names in (("replaced", files), ("removed", _stale(directory, files))):
+            for name in names:
+                if any(_same(directory / name, path) for path in inputs):
+                    raise OutputError(f"{directory / name}: is an input and would be {fate}; take another directory")
 
 
 def write_results(
@@ -61,24 +63,23 @@ def write_results(
     fill: called with an empty directory, in which it makes ``files``, and with the names of all files and figures.
     grown: those of ``files`` that are there already, complete behind ``fill``, and where, on the same disk; they are
     moved from there, and back if moving fails.
-    Everything is made in a temporary directory beside the target and moved when complete; files of an earlier result,
-    of whatever kind, are replaced, those that this one has not are removed, and both are put back if moving fails. Only
-    friction.yaml of an identification stays: scenarios and machine files may name it. Raises OutputError.
+    Everything is made in a temporary directory in the target and moved when complete; files of an earlier result, of
+    whatever kind, are replaced, those that this one has not are removed, and both are put back if moving fails. Only
+    friction.yaml of an identification stays: scenarios and machine files may name it. Raises OutputError, also where
+    another process writes to the directory.
     """
     directory = Path(directory)
-    check_place(directory, files)
-    with (
-        _as_output_error(directory),
-        tempfile.TemporaryDirectory(prefix=".feedsim-", dir=_existing(directory)) as scratch,
-    ):
-        fresh = Path(scratch) / "fresh"
-        (fresh / FIGURES).mkdir(parents=True)
-        for picture in pictures:
-            (fresh / FIGURES / f"{picture.stem}.png").write_bytes(picture.png)
-        names = [*(f"{FIGURES}/{picture.stem}.png" for picture in pictures), *files]
-        fill(fresh, names)
-        sources = {name: fresh / name for name in names} | dict(grown or {})
-        _move(sources, directory, _stale(directory, names), Path(scratch) / "kept")
+    with claimed(directory), _as_output_error(directory):
+        check_place(directory, files)
+        with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=directory) as scratch:
+            fresh = Path(scratch) / "fresh"
+            (fresh / FIGURES).mkdir(parents=True)
+            for picture in pictures:
+                (fresh / FIGURES / f"{picture.stem}.png").write_bytes(picture.png)
+            names = [*(f"{FIGURES}/{picture.stem}.png" for picture in pictures), *files]
+            fill(fresh, names)
+            sources = {name: fresh / name for name in names} | dict(grown or {})
+            _move(sources, directory, _stale(directory, names), Path(scratch))
     return tuple(directory / name for name in names)
 
 
@@ -142,9 +143,29 @@ def write_text(file: Path, text: str) -> None:
     file.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _existing(directory: Path) -> Path:
-    """``directory``, or the nearest folder above it that is there already."""
-    return next(path for path in (directory.absolute(), *directory.absolute().parents) if path.exists())
+def _settle(directory: Path) -> None:
+    """Bring to its end what a process that has gone was just moving, and remove what else it has left.
+
+    For who has claimed the directory: whatever scratch is there belongs to nobody any more.
+    """
+    for scratch in directory.glob(f"{SCRATCH}*"):
+        try:
+            moves = json.loads((scratch / MOVES).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            moves = {}  # it was still being filled
+        for name, source in moves.items():
+            if not _inside(name) or not _inside(source or name):
+                continue  # nothing that we have noted
+            if source is None:
+                (directory / name).unlink(missing_ok=True)
+            elif (directory / source).exists():  # else it has been moved
+                (directory / name).parent.mkdir(exist_ok=True)
+                (directory / source).replace(directory / name)
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _inside(name: str) -> bool:
+    return not Path(name).is_absolute() and ".." not in Path(name).parts
 
 
 def _same(one: Path, other: Path) -> bool:
@@ -172,23 +193,38 @@ def _listed(directory: Path) -> list[str] | None:
         return None  # no earlier run, or a summary of something else: nothing of it is ours to remove
 
 
-def _move(sources: Mapping[str, Path], directory: Path, stale: Sequence[str], kept: Path) -> None:
-    """Move files into ``directory``, name -> from where, and ``stale`` ones away; on failure all are put back."""
-    folders = [path for path in (directory / FIGURES, directory, *directory.absolute().parents) if not path.exists()]
-    (directory / FIGURES).mkdir(parents=True, exist_ok=True)
+def _move(sources: Mapping[str, Path], directory: Path, stale: Sequence[str], scratch: Path) -> None:
+    """Move files into ``directory``, name -> from where, and ``stale`` ones away; on failure all are put back.
+
+    The summary goes first and comes last: where there is one, all files are of the same result. What is to be moved is
+    noted, so that the next process can bring it to its end if this one is killed.
+    """
+    folders = [directory / FIGURES] if not (directory / FIGURES).exists() else []
+    (directory / FIGURES).mkdir(exist_ok=True)
+    kept = scratch / "kept"
     (kept / FIGURES).mkdir(parents=True)
+    order = sorted(sources, key=SUMMARY.__eq__)
+    noted = {name: os.path.relpath(sources[name], directory) for name in order} | dict.fromkeys(stale)
+    write_text(scratch / "noted", json.dumps(noted))
+    (scratch / "noted").replace(scratch / MOVES)
     moves: list[tuple[Path, Path]] = []
 
     def move(path: Path, to: Path) -> None:
         moves.append((path, to))
         path.replace(to)
 
+    def put_away(name: str) -> None:
+        if (directory / name).exists():
+            move(directory / name, kept / name)
+
     try:
-        for name in (*sources, *stale):
-            if (directory / name).exists():
-                move(directory / name, kept / name)
-            if name in sources:
-                move(sources[name], directory / name)
+        if SUMMARY in sources:
+            put_away(SUMMARY)
+        for name in stale:
+            put_away(name)
+        for name in order:
+            put_away(name)
+            move(sources[name], directory / name)
         with contextlib.suppress(OSError):  # not empty, as a rule
             (directory / FIGURES).rmdir()
     except BaseException:

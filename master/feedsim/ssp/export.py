@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from feedsim.cosim.roles import RoleUnit, archive_path, filled
 from feedsim.cosim.system import plant_parameters
 from feedsim.cosim.unpacked import check_there
 from feedsim.nc import Program, plan
+from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.roles import DRIVE, FRICTION, Role
 from feedsim.ssp import archive, described, parameter_set, system_structure
@@ -55,9 +55,9 @@ def export(scenario: Scenario, out: Path, *, program: Program | None = None, fmu
     fmus = fmus or fmus_directory()
     warnings = check(scenario, program, fmus=fmus)
     sources = _sources(scenario.machine, fmus)
-    with tempfile.TemporaryDirectory(prefix="feedsim-") as folder, ExitStack() as stack:
-        content = _archives(scenario, program, fmus, sources, Path(folder))
-        archives = {name: stack.enter_context(Archive(Path(folder) / f"{name}.fmu")) for name in content}
+    with TemporaryFolder() as folder, ExitStack() as stack:
+        content = _archives(scenario, program, fmus, sources, folder)
+        archives = {name: stack.enter_context(Archive(folder / f"{name}.fmu")) for name in content}
         instances = _instances(scenario.machine, fmus, sources)
         files = _files(scenario, program, archives, instances)
         platforms = sorted(set.intersection(*(set(each.platforms) for each in archives.values())))

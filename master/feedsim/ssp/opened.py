@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from feedsim.files.references import closed
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment, plan
 from feedsim.nc.program import LONGEST
+from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Scenario, load
 from feedsim.ssp import archive, rebuilt, setpoints, system_structure
 from feedsim.ssp.described import STRUCTURE
@@ -77,11 +77,10 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
     """
     with (
         archive.read(path) as files,
-        tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True) as name,
+        TemporaryFolder() as folder,
         ExitStack() as stack,
     ):
         structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
-        folder = Path(name)
         archives = _archives(structure, files, folder, path, stack)
         found = roles(structure, archives, str(path))
         table = _table(archives[found.setpoint], f"{path}: {found.setpoint}")

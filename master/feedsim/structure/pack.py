@@ -6,12 +6,13 @@ and how the structure moves is data that the archive holds in resources/.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from feedsim.errors import InputError, OutputError
+from feedsim.owned import TemporaryFolder
 from feedsim.structure.modes import Modes, write_modes
 
 AXES_IN_ARCHIVE = "resources/axes.csv"
@@ -67,8 +68,8 @@ def pack(
     from feedsim_packager.resources import File
 
     if isinstance(modes, Modes):
-        with tempfile.TemporaryDirectory(prefix="feedsim-") as folder:
-            written = Path(folder) / "modes.csv"
+        with TemporaryFolder() as folder:
+            written = folder / "modes.csv"
             write_modes(written, modes)
             return pack(
                 base, out, modes=written, pose=pose, poses=poses, name=name, note=note, trial=trial, level=level
@@ -79,7 +80,8 @@ def pack(
             File.at(modes),
             File.at(poses) if poses is not None else None,
         )
-        done = repack(base, given, named(name, note), out, trial_run=trial, level=level)
+        with TemporaryFolder() if trial else nullcontext() as stage:
+            done = repack(base, given, named(name, note), out, trial_run=trial, level=level, stage=stage)
     except errors.OutputError as error:
         raise OutputError(str(error)) from error
     except errors.InputError as error:

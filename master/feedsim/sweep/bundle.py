@@ -24,6 +24,7 @@ from feedsim import analysis, cosim, units
 from feedsim.errors import FeedsimError, InputError
 from feedsim.findings import WRONG, ranked, severity
 from feedsim.nc import Program, plan
+from feedsim.owned import PREFIX, TemporaryFolder
 from feedsim.scenario import Base, Scenario
 from feedsim.scenario.study import Study
 from feedsim.sweep.design import Outcome, Task
@@ -120,8 +121,8 @@ class Workplace:
             fmus: archives and native cycle loop, by file name.
             within: where the folder is made; None: where the system keeps what is temporary.
         """
-        self._folder = tempfile.TemporaryDirectory(prefix="feedsim-", dir=within, ignore_cleanup_errors=True)
-        folder = Path(self._folder.name)
+        self._folder = TemporaryFolder(within)
+        folder = self._folder.path
         try:
             moved = {}
             for i, (name, content) in enumerate(files.items()):
@@ -141,7 +142,7 @@ class Workplace:
         self._planned: tuple[Any, Program] | None = None
         # Messages name the user's files, and are the same in every process.
         self._names = {str(file): name for name, file in moved.items()} | {f"{folder}{os.sep}": ""}
-        self._unpacked = re.compile(rf"{re.escape(str(Path(tempfile.gettempdir()) / 'feedsim-'))}\w+[/\\]?")
+        self._unpacked = re.compile(rf"{re.escape(str(Path(tempfile.gettempdir()) / PREFIX))}\w+[/\\]?")
 
     def run(self, task: Task) -> Outcome:
         """Make a run. Whatever goes wrong is told in the outcome, but for MemoryError: the machine's fault."""
@@ -178,7 +179,7 @@ class Workplace:
 
     def close(self) -> None:
         """Leave nothing behind."""
-        self._folder.cleanup()
+        self._folder.close()
 
 
 def _si(figure: analysis.Figure) -> tuple[float, str]:

@@ -7,12 +7,12 @@ import multiprocessing
 import os
 import re
 import signal
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from feedsim.errors import InputError
+from feedsim.owned import TemporaryFolder
 
 ANSWER = 10.0  # s that a scheduler has to answer
 JOIN = 30.0  # s that a scheduler without workers has to get one
@@ -56,7 +56,7 @@ def local(workers: int) -> Iterator[Any]:
 
     with ExitStack() as stack:
         stack.enter_context(_muted())
-        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="feedsim-", ignore_cleanup_errors=True))
+        folder = str(stack.enter_context(TemporaryFolder()))
         stack.enter_context(dask.config.set({**_QUIET, "temporary-directory": folder}))
         stack.enter_context(_environment(_ONE_THREAD))
         with _without_interrupts():

@@ -12,17 +12,17 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Self
+from typing import Any, Self
 
 from feedsim.cosim.signals import held
 from feedsim.errors import InputError, OutputError
+from feedsim.owned import claimed
 from feedsim.sweep.design import Outcome
 
 NAME = "runs.jsonl"
-LOCK = "runs.lock"
 _EXTENT = "runs"  # key of the lines that say how many
 FORMAT = 1
 SYNC = 1.0  # seconds after which what was written is on the disk at the latest
@@ -55,19 +55,16 @@ class Journal:
             consists of just those; its journal is then gone on with.
 
         Raises:
-            InputError: the journal is that of another study, or of more runs, or another process is at work on it.
-            OutputError: it cannot be written.
+            InputError: the journal is that of another study, or of more runs.
+            OutputError: it cannot be written, or another process has claimed the folder.
         """
         self.path = directory / NAME
         self.runs = runs
         self.done: set[int] = set()
         self.failed = 0
         self.damaged: tuple[int, ...] = ()
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-            self._lock = _locked(directory / LOCK)
-        except OSError as error:
-            raise OutputError(f"{directory} cannot be written: {error.strerror or error}") from error
+        self._claim = ExitStack()
+        self._claim.enter_context(claimed(directory))
         try:
             self._file = self.path.open("ab", buffering=0)
             self._synced = time.monotonic()
@@ -75,7 +72,7 @@ class Journal:
                 self._file.truncate(0)
             self._begin(head, first)
         except BaseException as error:
-            self._lock.close()
+            self._claim.close()
             if isinstance(error, OSError):
                 raise OutputError(f"{self.path} cannot be written: {error.strerror or error}") from error
             raise
@@ -170,7 +167,7 @@ class Journal:
         """Close the journal; another process may go on with it."""
         self.sync()
         self._file.close()
-        self._lock.close()
+        self._claim.close()
 
     def __enter__(self) -> Self:
         return self
@@ -256,21 +253,3 @@ def _number(value: Any) -> float:
     if isinstance(value, str) and value not in ("nan", "inf", "-inf"):
         raise ValueError(value)
     return float(value)
-
-
-def _locked(path: Path) -> IO[bytes]:
-    """A file that this process alone has locked. InputError: another has."""
-    file = path.open("ab")
-    try:
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            import msvcrt
-
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
-        else:
-            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        file.close()
-        raise InputError(f"{path.parent}: another process is making the runs of this folder") from None
-    return file

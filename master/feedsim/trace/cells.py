@@ -21,6 +21,7 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.files.regular import content
 from feedsim.trace.trace import Array, check_name, check_unit, suggest
 
 _HEADER = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?")
@@ -190,12 +191,7 @@ def _numbers(path: Path, head: str, header_line: int, rest: io.StringIO, separat
 
 
 def _text(path: Path) -> str:
-    try:
-        raw = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"no such file: {path}") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}") from None
+    raw = content(path, pipes=True)
     if raw.startswith(_SPREADSHEETS):
         raise InputError(
             f"{path} is a spreadsheet, or another packed file; save its sheet as CSV UTF-8 (in Excel: File, "

@@ -13,6 +13,7 @@ from tempfile import NamedTemporaryFile
 from typing import IO
 
 from feedsim.errors import OutputError
+from feedsim.owned import locked
 
 
 @contextmanager
@@ -26,19 +27,20 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
     disk.
     """
     try:
-        if _is_stream(path):
+        if is_stream(path):
             buffer = BytesIO()
             yield buffer
             _poured(path, buffer.getvalue())
             return
         target = Path(os.path.realpath(path))
-        with NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as file:
+        with _begun(target) as file:
             temporary = Path(file.name)
             try:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
-                file.close()
+                if os.name == "nt":  # it does not move what is open; elsewhere the lock goes with the name
+                    file.close()
                 temporary.chmod(0o666 & ~_umask())
                 temporary.replace(target)
             except BaseException:
@@ -50,7 +52,33 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
-def _is_stream(path: Path) -> bool:
+def _begun(target: Path) -> IO[bytes]:
+    """A file beside `target`, locked as long as it is open; what processes that have gone have left there is removed.
+
+    OSError: it cannot be made.
+    """
+    prefix, suffix = f".{target.name}.", ".feedsim"
+    with suppress(OSError):  # of folders that cannot be listed
+        for other in target.parent.iterdir():
+            if other.name.startswith(prefix) and other.name.endswith(suffix):
+                _remove_orphan(other)
+    while True:
+        file: IO[bytes] = NamedTemporaryFile(dir=target.parent, prefix=prefix, suffix=suffix, delete=False)  # noqa: SIM115
+        if locked(file.fileno()) is not False and Path(file.name).exists():
+            return file
+        file.close()  # taken for one that has been left
+
+
+def _remove_orphan(path: Path) -> None:
+    """Remove a file that nobody has locked."""
+    with suppress(OSError), path.open("r+b") as file:
+        if locked(file.fileno()):
+            if os.name == "nt":  # it does not remove what is open
+                file.close()
+            path.unlink()
+
+
+def is_stream(path: Path) -> bool:
     """Whether `path` takes what is written but holds no file. OSError: it is neither a stream nor a file."""
     if _descriptor(path) is not None:
         return True
@@ -81,7 +109,8 @@ def _poured(path: Path, content: bytes) -> None:
     if number is None:
         stream: IO[bytes] = path.open("wb")
     else:
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
         stream = os.fdopen(os.dup(number), "wb")
     with stream:
         stream.write(content)

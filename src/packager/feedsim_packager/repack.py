@@ -33,11 +33,13 @@ class Repacked:
 
 
 def repack(
-    base: Path, given: Resources, machine: Machine, out: Path, *, trial_run: bool = True, level: int = 9
-) -> Repacked:
+    base: Path, given: Resources, machine: Machine, out: Path, *, trial_run: bool = True, level: int = 9,
+    stage: Path | None = None,
+) -> Repacked:  # fmt: skip
     """Pack the unit of the archive `base` with the resources `given` into `out`, which may be `base` itself.
 
     `trial_run`: instantiate what was packed, where `base` has a binary for this platform. `level`: of compression.
+    `stage`: folder for the trial's files; None: where the system keeps what is temporary.
 
     Raises:
         InputError: `base` is no archive of this packager, or cannot hold the machine; or the unit refuses it.
@@ -69,7 +71,7 @@ def repack(
         machine=machine,
         experiment=given.experiment(),
     )
-    tried = trial_run and _try(packed, table.unit, guid, given)
+    tried = trial_run and _try(packed, table.unit, guid, given, stage)
     content = archive.pack(packed, level=level)
     archive.write(out, content)
     platforms = sorted({path.split("/")[1] for path in packed if re.match(r"binaries/[^/]+/", path)})
@@ -98,7 +100,7 @@ def _table(files: Mapping[str, bytes], base: Path) -> tuple[Table, str]:
     return table, version
 
 
-def _try(packed: Mapping[str, bytes], unit: str, guid: str, given: Resources) -> bool:
+def _try(packed: Mapping[str, bytes], unit: str, guid: str, given: Resources, stage: Path | None) -> bool:
     """Instantiate once; False where there is no binary for this platform."""
     try:
         target = compile.host_target()
@@ -107,7 +109,7 @@ def _try(packed: Mapping[str, bytes], unit: str, guid: str, given: Resources) ->
     path = f"binaries/{target.folder}/{unit}{target.suffix}"
     if path not in packed:
         return False
-    with tempfile.TemporaryDirectory(prefix="packager-", ignore_cleanup_errors=True) as temporary:
+    with tempfile.TemporaryDirectory(prefix="packager-", dir=stage, ignore_cleanup_errors=True) as temporary:
         library = Path(temporary) / Path(path).name
         library.write_bytes(packed[path])
         trial.check(library, unit, guid, given.files(), Path(temporary))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import Command, Option, halves, quantity
-from feedsim.cli.terminal import finish, warn
+from feedsim.cli.terminal import finish, results_in, warn
 from feedsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,15 +36,15 @@ def build(options: Namespace) -> None:
         raise InputError(
             f"{options.machine}: has no key structure; modes are computed from a structure file (docs/structure.md)"
         )
-    results.check_place(options.out, (MODES, RECORD))
-    found = figures(options, described, quiet=options.quiet)
-    content = machine_record.record(found, described.files)
+    with results_in(options.out, lambda out, _: results.check_place(out, (MODES, RECORD))):
+        found = figures(options, described, quiet=options.quiet)
+        content = machine_record.record(found, described.files)
 
-    def fill(folder: Path, names: Sequence[str]) -> None:
-        write_modes(folder / MODES, found.modes)
-        results.write_text(folder / RECORD, to_json(content))
+        def fill(folder: Path, names: Sequence[str]) -> None:
+            write_modes(folder / MODES, found.modes)
+            results.write_text(folder / RECORD, to_json(content))
 
-    results.write_results(options.out, (MODES, RECORD), (), fill)
+        results.write_results(options.out, (MODES, RECORD), (), fill)
     finish(options.quiet, (), f"{_built(found)} -> {options.out / MODES}")
 
 

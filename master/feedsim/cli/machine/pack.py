@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import sys
-import tempfile
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,8 @@ from feedsim.cli.machine.figures import AT, positions
 from feedsim.cli.options import Command, Option, given
 from feedsim.cli.terminal import progress_bar
 from feedsim.errors import InputError, OutputError
+from feedsim.owned import TemporaryFolder
+from feedsim.trace.files import written_whole
 
 if TYPE_CHECKING:
     from feedsim.scenario import Machine
@@ -38,27 +40,32 @@ def pack(options: Namespace) -> None:
     machine = scenario.load_machine(options.machine)
     base = options.base or cosim.fmus_directory() / "plant.fmu"
     pose = _pose_of(machine, options.at)
-    with tempfile.TemporaryDirectory(prefix="feedsim-") as folder:
-        modes = _modes_at(machine, pose, Path(folder) / "modes.csv") if options.at else machine.modes
+    with TemporaryFolder() as folder:
+        modes = _modes_at(machine, pose, folder / "modes.csv") if options.at else machine.modes
         checked_modes(machine.model_copy(update={"modes": modes}))  # what a run would refuse should not be packed
         if not options.at and (doubt := table_mismatch(machine)) is not None:
             raise InputError(f"{doubt}, or let the modes be computed: --at")
         poses, follows = None, ""
         if options.poses:
-            poses = Path(folder) / "poses.bin"
+            poses = folder / "poses.bin"
             follows = f"; {_write_grid(machine, pose, modes, options, poses)}"
+        # Packed apart: the file takes its name when it is whole, and nothing of one that is killed stays beside it.
         packed = archive.pack(
             base,
-            options.out,
+            folder / "plant.fmu",
             modes=modes,
             pose=pose,
             poses=poses,
             name=machine.name if options.name is None else options.name,
             note=machine.note if options.note is None else options.note,
         )
+        with suppress(OSError):  # what it is will be told
+            options.out.absolute().parent.mkdir(parents=True, exist_ok=True)
+        with written_whole(options.out) as file:
+            file.write(packed.path.read_bytes())
     where = ", ".join(f"{axis} at {position * 1e3:.9g} mm" for axis, position in pose.items())
     platforms = ", ".join(packed.platforms) or "no binaries"
-    print(f"{packed.path}: {where}{follows}; {packed.size / 1024:.0f} KiB, {platforms}, guid {packed.guid}")
+    print(f"{options.out}: {where}{follows}; {packed.size / 1024:.0f} KiB, {platforms}, guid {packed.guid}")
 
 
 def _pose_of(machine: Machine, texts: Sequence[str]) -> dict[str, float]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from feedsim.cli.machine.figures import QUIET, SOURCE, STEP, figures
 from feedsim.cli.options import Command, Option
-from feedsim.cli.terminal import finish
+from feedsim.cli.terminal import finish, results_in
 from feedsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -33,12 +33,12 @@ def show(options: Namespace) -> None:
             f"{options.machine}: has a table of modes alone, and no table says where things are; a picture needs a "
             "structure file (key structure, docs/structure.md)"
         )
-    report.check_writable(options.out)
-    found = figures(options, described, quiet=options.quiet)
-    chosen = list(dict.fromkeys(_mode(text, found.modes) for text in options.mode))
-    report.write(
-        described.structure, found, described.files, options.out, modes=chosen, scale=scale, animate=options.animate
-    )
+    with results_in(options.out, report.check_writable, [file for _, file in described.files]):
+        found = figures(options, described, quiet=options.quiet)
+        chosen = list(dict.fromkeys(_mode(text, found.modes) for text in options.mode))
+        report.write(
+            described.structure, found, described.files, options.out, modes=chosen, scale=scale, animate=options.animate
+        )
     shown = [f"mode {k}: {found.modes.frequency[k]:.2f} Hz, {found.moving[k]}" for k in chosen]
     finish(options.quiet, (), f"{found.title} -> {options.out / 'report.html'}", *shown)
 

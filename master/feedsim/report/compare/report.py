@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
@@ -16,14 +17,17 @@ from xml.etree import ElementTree
 
 from feedsim.compare import Comparison, Variable, percent
 from feedsim.errors import OutputError
+from feedsim.owned import claimed
 from feedsim.report.compare.plots import picture_of, reach_text
 from feedsim.report.content import Paragraph, Part, Report, Section, Span, Table, Text, Tile, code
 from feedsim.report.formatting import counted, display_unit, minus, powers
 from feedsim.report.page import html as as_html
 from feedsim.report.style import Picture
-from feedsim.trace import written_whole
+from feedsim.trace.files import is_stream, written_whole
 
 MOST_PICTURES = 12
+LOCK = ".feedsim-compare.lock"
+WAIT = 60.0  # s for others to write theirs, which takes none
 
 # Characters that XML 1.0 cannot hold.
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -51,25 +55,31 @@ def write(
     json: Path | None = None,
     durations: Sequence[float] = (),
 ) -> tuple[Path, ...]:
-    """Write the report, JUnit XML and JSON that are asked for; returns the paths. Folders are made. OutputError."""
+    """Write the report, JUnit XML and JSON that are asked for; returns the paths. Folders are made. OutputError.
+
+    They are of one comparison also where several processes write the same files: these wait for one another.
+    """
     contents: list[tuple[Path | None, Callable[[], bytes]]] = [
         (html, lambda: as_html(report_of(comparisons)).encode("utf-8")),
         (xml, lambda: junit(comparisons, durations)),
         (json, lambda: to_json(comparisons).encode("utf-8")),
     ]
-    written = []
-    for path, content in contents:
-        if path is None:
-            continue
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{path} cannot be written: {error.strerror or error}") from error
-        data = content()
-        with written_whole(path) as file:
-            file.write(data)
-        written.append(path)
-    return tuple(written)
+    made = [(path, content()) for path, content in contents if path is not None]
+    with ExitStack() as stack:
+        folders = set()
+        for path, _ in made:
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                if not is_stream(path):
+                    folders.add(path.resolve().parent)
+            except OSError as error:
+                raise OutputError(f"{path} cannot be written: {error.strerror or error}") from error
+        for folder in sorted(folders) if len(made) > 1 else ():
+            stack.enter_context(claimed(folder, LOCK, WAIT))
+        for path, data in made:
+            with written_whole(path) as file:
+                file.write(data)
+    return tuple(path for path, _ in made)
 
 
 def report_of(comparisons: Sequence[Comparison]) -> Report:

@@ -22,9 +22,12 @@ from feedsim.scenario.structure import Structure
 from feedsim.structure.info import MachineInfo
 
 
-def check_writable(directory: Path | str) -> None:
-    """Raise OutputError unless the pictures can be written to ``directory``; leaves nothing behind."""
-    check_place(directory, (REPORT, SUMMARY))
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the pictures can be written to ``directory`` without one of ``inputs`` being lost.
+
+    Leaves nothing behind.
+    """
+    check_place(directory, (REPORT, SUMMARY), inputs)
 
 
 def write(

@@ -1,0 +1,293 @@
+"""What belongs to one process as long as it lives: a folder of results, folders for temporary files, a file that grows.
+
+May use: errors. Start reading at claimed().
+
+A lock of the system on an open file tells whether its owner lives: it goes with the process, whatever has ended that.
+So nothing that a killed process has left keeps others waiting, and the next start removes it.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import platform
+import re
+import shlex
+import shutil
+import stat
+import sys
+import tempfile
+import threading
+import time
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+
+from feedsim.errors import OutputError
+
+PREFIX = "feedsim-"  # of folders for temporary files
+_NAME = re.compile(rf"{PREFIX}[a-z0-9_]{{8}}")  # as tempfile makes them
+LOCK = ".feedsim.lock"  # in a folder that belongs to a process
+WRITING = 2.0  # s for which processes that are just being ended may still write into a folder that is removed
+YOUNG = 60.0  # s within which a folder without a lock may be one that is just being made
+_HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what a lock that another has is told by
+_FAR = 1 << 30  # where Windows locks: there a locked byte cannot be read
+_LOOK = 0.02  # s between two looks at a lock that is waited for
+_ATTEMPTS = 100  # at what others may remove at the same moment
+_claims: set[tuple[str, int]] = set()  # lock and thread
+
+
+@contextmanager
+def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[None]:
+    """Have a folder alone, among all processes and threads that claim it; it is made where it is missing.
+
+    What is made is removed with the block if nothing is in it then. Blocks of one thread may stand in one another.
+
+    Args:
+        lock: name of the file that tells it.
+        wait: for others to end [s].
+
+    Raises:
+        OutputError: another has it, with who that is; or the folder cannot be written to.
+    """
+    key = os.path.realpath(directory / lock), threading.get_ident()
+    if key in _claims:
+        yield
+        return
+    existing = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        raise OutputError(f"{directory}: cannot be written, {existing} is a file; allowed: a directory")
+    made = [path for path in (directory.absolute(), *directory.absolute().parents) if not path.exists()]
+    try:
+        held = _taken(directory, lock, time.monotonic() + wait)
+        try:
+            _claims.add(key)
+            yield
+        finally:
+            _claims.discard(key)
+            for each in held:
+                each.release()
+    finally:
+        for path in made:
+            with suppress(OSError):  # not empty, as a rule
+                path.rmdir()
+
+
+def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
+    """The locks that make a folder ours. OutputError."""
+    attempts = 0
+    while True:
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            lock = _Lock(directory / name)
+        except OSError as error:
+            attempts += 1
+            if isinstance(error, FileNotFoundError) and attempts < _ATTEMPTS:  # removed by another just now
+                continue
+            raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error
+        held = [lock]
+        if lock.state is None:  # a file system without locks; that of temporary files has some, for this machine alone
+            told = lock.told()
+            if told and f" on {platform.node()} since " not in told:
+                lock.close()
+                raise OutputError(
+                    f"{directory}: another process writes its results there, as {lock.path} tells: {told}. If it is "
+                    "not at work any more, remove that file; or take another directory"
+                )
+            unique = hashlib.sha256(os.path.realpath(lock.path).encode("utf-8", "surrogateescape")).hexdigest()[:32]
+            with suppress(OSError):
+                held.append(_Lock(Path(tempfile.gettempdir()) / f"{PREFIX}{unique}.lock"))
+        if all(each.state is not False for each in held):
+            lock.tell(_self())
+            return held
+        told = lock.told()
+        for each in held:
+            each.close()
+        if time.monotonic() >= until:
+            who = f": {told}" if told else ""
+            raise OutputError(
+                f"{directory}: another process writes its results there{who}; wait until it has ended, or take another "
+                "directory"
+            )
+        time.sleep(_LOOK)
+
+
+def _self() -> str:
+    """This process, for those that meet its lock."""
+    words = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]) if sys.argv else "python"
+    shown = "".join(c if c.isprintable() else "?" for c in words)
+    since = time.strftime("%Y-%m-%d %H:%M:%S")
+    return f"process {os.getpid()} on {platform.node()} since {since}: {shown[:300]}"
+
+
+class _Lock:
+    """A file that is locked as long as it is open.
+
+    state: True; False: another has it; None: its file system has no locks.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        while True:
+            try:
+                self._file = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+            except PermissionError:  # another user's, who had the folder before
+                if not path.is_file():
+                    raise
+                self._file = os.open(path, os.O_RDONLY)
+            self.state = locked(self._file)
+            if self.state is not True or _is(path, self._file):
+                return
+            os.close(self._file)  # removed by who had it, between our opening and our locking it
+
+    def tell(self, text: str) -> None:
+        """Write into it for others."""
+        with suppress(OSError):
+            os.ftruncate(self._file, 0)
+            os.lseek(self._file, 0, os.SEEK_SET)
+            os.write(self._file, text.encode("utf-8", "replace"))
+
+    def told(self) -> str:
+        """What its owner has written into it."""
+        with suppress(OSError):
+            os.lseek(self._file, 0, os.SEEK_SET)
+            return os.read(self._file, 4096).decode("utf-8", "replace")
+        return ""
+
+    def close(self) -> None:
+        """Give it back, and leave the file."""
+        with suppress(OSError):
+            os.close(self._file)
+
+    def release(self) -> None:
+        """Remove the file and give it back; ahead of that where the system can, so that none is removed of another."""
+        with suppress(OSError):
+            if os.name != "nt" and _is(self.path, self._file):
+                self.path.unlink()
+        self.close()
+        if os.name == "nt":
+            with suppress(OSError):  # another has opened it meanwhile
+                self.path.unlink()
+
+
+def locked(file: int) -> bool | None:
+    """Lock an open file for this process; False: another has; None: its file system has no locks."""
+    try:
+        try:
+            import fcntl
+        except ImportError:  # Windows
+            import msvcrt
+
+            os.lseek(file, _FAR, os.SEEK_SET)
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+        else:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return False if error.errno in _HELD else None
+    return True
+
+
+def _is(path: Path, file: int) -> bool:
+    """Whether an open file is the one that has this name now."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(file))
+    except OSError:
+        return False
+
+
+class TemporaryFolder:
+    """A folder for temporary files, removed when it is closed, or at the latest with the process.
+
+    Attributes:
+        path: where it is.
+    """
+
+    def __init__(self, within: Path | None = None) -> None:
+        """within: where it is made; None: where the system keeps what is temporary.
+
+        OutputError: nothing can be written there.
+        """
+        try:
+            parent = within or Path(tempfile.gettempdir())
+            while True:
+                self.path = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+                try:
+                    file = os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o600)
+                except FileNotFoundError:  # taken for one that a killed process has left, while it was empty
+                    continue
+                if locked(file) is not False and _is(self.path / LOCK, file):
+                    break
+                os.close(file)
+        except OSError as error:
+            where = f"{within}: a folder" if within else "a folder for temporary files (TMPDIR)"
+            raise OutputError(f"{where} cannot be made: {error.strerror or error}") from error
+        # Also when a signal ends the program, or when nobody closes it.
+        self._end = weakref.finalize(self, _remove, str(self.path), file, os.getpid())
+
+    def close(self) -> None:
+        """Remove it with all that is in it."""
+        self._end()
+
+    def __enter__(self) -> Path:
+        return self.path
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+
+def _remove(folder: str, file: int, owner: int) -> None:
+    """A process that was forked off leaves its parent's folders alone."""
+    if os.getpid() != owner:
+        return
+    until = time.monotonic() + WRITING
+    while not _emptied(Path(folder)) and time.monotonic() < until:
+        time.sleep(_LOOK)
+    os.close(file)  # ahead of the rest: Windows does not remove what is open
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _emptied(folder: Path) -> bool:
+    """Remove what is in a folder, but for what tells whose it is: a folder that is half removed still has an owner."""
+    left = [path for path in folder.iterdir() if path.name != LOCK] if folder.is_dir() else []
+    for path in left:
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            with suppress(OSError):
+                path.unlink()
+    return not any(os.path.lexists(path) for path in left)
+
+
+def remove_orphans() -> None:
+    """Remove this user's folders for temporary files whose process has gone."""
+    folders: list[Path] = []
+    with suppress(OSError):
+        folders += Path(tempfile.gettempdir()).glob(f"{PREFIX}*")
+    for folder in folders:
+        with suppress(OSError):
+            found = folder.lstat()
+            if (
+                _NAME.fullmatch(folder.name)
+                and stat.S_ISDIR(found.st_mode)
+                and (not hasattr(os, "geteuid") or found.st_uid == os.geteuid())
+            ):
+                _remove_orphan(folder, time.time() - found.st_mtime)
+
+
+def _remove_orphan(folder: Path, age: float) -> None:
+    """Remove a folder whose lock is free, or which has none and is empty, `age` [s] after its last change. OSError."""
+    try:
+        file = os.open(folder / LOCK, os.O_RDWR)
+    except FileNotFoundError:
+        if age > YOUNG:
+            folder.rmdir()
+        return
+    try:
+        gone = locked(file) is True and _emptied(folder)
+    finally:
+        os.close(file)
+    if gone:
+        shutil.rmtree(folder, ignore_errors=True)

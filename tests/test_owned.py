@@ -1,0 +1,190 @@
+"""What belongs to one process: who has it, what is left when it is killed, and what others then may."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from feedsim import owned
+from feedsim.errors import OutputError
+from feedsim.owned import TemporaryFolder, claimed, remove_orphans
+from feedsim.trace import written_whole
+
+ROOT = Path(__file__).resolve().parents[1]
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+
+@contextmanager
+def another_process(code: str, folder: Path, *, kill: bool = False) -> Iterator[subprocess.Popen[str]]:
+    """A process that has run `code` and waits; killed before the block if so asked, else ended behind it."""
+    text = textwrap.dedent(code) + "\nprint('there', flush=True)\nsys.stdin.readline()\n"
+    head = (
+        "import sys\nfrom pathlib import Path\nfrom feedsim.owned import *\nfrom feedsim.trace import written_whole\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", head + text], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT / "master"), "TMPDIR": str(folder)},
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "there\n"
+        if kill:
+            process.kill()
+            process.wait(30)
+        yield process
+    finally:
+        process.communicate("\n", timeout=30)
+
+
+CLAIM = "claim = claimed(Path('out/below'))\nclaim.__enter__()"
+
+
+def test_a_folder_belongs_to_one_process(tmp_path: Path) -> None:
+    folder = tmp_path / "out" / "below"
+    with another_process(CLAIM, tmp_path) as process:
+        with pytest.raises(OutputError) as told, claimed(folder):
+            pass
+        words = str(told.value)
+        assert words.startswith(f"{folder}: another process writes its results there: process {process.pid} on ")
+        assert words.endswith("; wait until it has ended, or take another directory")
+    with claimed(folder):
+        pass
+
+
+def test_a_killed_process_keeps_nobody_waiting(tmp_path: Path) -> None:
+    folder = tmp_path / "out" / "below"
+    with another_process(CLAIM, tmp_path, kill=True):
+        assert [path.name for path in folder.iterdir()] == [owned.LOCK]
+        with claimed(folder):
+            (folder / "result").touch()
+        assert [path.name for path in folder.iterdir()] == ["result"]
+
+
+def test_what_is_made_goes_where_nothing_comes_of_it(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), claimed(tmp_path / "a" / "b"):
+        assert (tmp_path / "a" / "b").is_dir()
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_blocks_of_a_thread_may_stand_in_one_another_those_of_two_not(tmp_path: Path) -> None:
+    told: list[str] = []
+
+    def other() -> None:
+        try:
+            with claimed(tmp_path):
+                told.append("had it")
+        except OutputError as error:
+            told.append(str(error))
+
+    with claimed(tmp_path), claimed(tmp_path):
+        thread = threading.Thread(target=other)
+        thread.start()
+        thread.join()
+    assert len(told) == 1
+    assert "another process" in told[0]
+
+
+def test_many_take_turns_without_a_gap(tmp_path: Path) -> None:
+    """The file that tells it is removed and made all the time; nobody may have one that another cannot see."""
+    inside, most = [0], [0]
+    guard = threading.Lock()
+
+    def work() -> None:
+        for _ in range(30):
+            with claimed(tmp_path / "out", wait=60.0):
+                with guard:
+                    inside[0] += 1
+                    most[0] = max(most[0], inside[0])
+                with guard:
+                    inside[0] -= 1
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert most == [1]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("elsewhere", [True, False])
+def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, elsewhere: bool) -> None:
+    """The folder for temporary files has some, for this machine; another machine's word has to be believed."""
+    real, folder = owned.locked, tmp_path / "out"
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setattr(owned.tempfile, "tempdir", str(tmp_path / "tmp"))  # type: ignore[attr-defined]
+
+    def locked(file: int) -> bool | None:
+        return None if f"{folder}" in str(Path(f"/proc/self/fd/{file}").resolve()) else real(file)
+
+    if not Path("/proc/self/fd").is_dir():
+        pytest.skip("needs /proc")
+    monkeypatch.setattr(owned, "locked", locked)
+    with claimed(folder):
+        told: list[str] = []
+
+        def other() -> None:
+            with pytest.raises(OutputError) as error, claimed(folder):
+                pass
+            told.append(str(error.value))
+
+        thread = threading.Thread(target=other)
+        thread.start()
+        thread.join()
+        assert "another process" in told[0]
+    assert list((tmp_path / "tmp").iterdir()) == []
+    folder.mkdir()
+    host = "elsewhere" if elsewhere else owned.platform.node()  # type: ignore[attr-defined]
+    (folder / owned.LOCK).write_text(f"process 7 on {host} since 2020-01-01 00:00:00: feedsim run")
+    if elsewhere:
+        with pytest.raises(OutputError, match="not at work any more, remove that file"), claimed(folder):
+            pass
+    else:  # it has been killed: its lock on this machine is free
+        with claimed(folder):
+            pass
+
+
+def test_temporary_folders_go_with_their_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(owned.tempfile, "tempdir", str(tmp_path))  # type: ignore[attr-defined]
+    for name in ("feedsim-another", "feedsim-ab12cd34", "mine"):  # not of ours, older than all this, another's
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "file").touch()
+    (tmp_path / "feedsim-00000000").symlink_to(tmp_path / "mine")
+    (tmp_path / "mine" / owned.LOCK).touch()
+    there = set(tmp_path.iterdir())
+    make = "folder = TemporaryFolder()\n(folder.path / 'a').mkdir()\n(folder.path / 'a' / 'b').touch()"
+    with another_process(make, tmp_path):
+        remove_orphans()
+        assert len(set(tmp_path.iterdir()) - there) == 1, "its process lives"
+    assert set(tmp_path.iterdir()) == there
+    with another_process(make, tmp_path, kill=True):
+        assert len(set(tmp_path.iterdir()) - there) == 1
+        with TemporaryFolder() as own:
+            remove_orphans()
+            assert set(tmp_path.iterdir()) == {*there, own}
+    assert set(tmp_path.iterdir()) == there
+    assert (tmp_path / "mine" / "file").exists()
+
+
+def test_a_file_that_was_not_finished_goes_with_the_next(tmp_path: Path) -> None:
+    begin = "writer = written_whole(Path('x.csv'))\nfile = writer.__enter__()\nfile.write(b'half')\nfile.flush()"
+    (tmp_path / ".x.csv.original").write_text("mine")
+    with another_process(begin, tmp_path):
+        with written_whole(tmp_path / "x.csv") as file:
+            file.write(b"whole")
+        assert len(list(tmp_path.iterdir())) == 3, "its process lives"
+    with another_process(begin, tmp_path, kill=True):
+        assert len(list(tmp_path.iterdir())) == 3
+        with written_whole(tmp_path / "x.csv") as file:
+            file.write(b"again")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".x.csv.original", "x.csv"]
+    assert (tmp_path / "x.csv").read_bytes() == b"again"

@@ -69,9 +69,8 @@ def test_a_killed_process_keeps_nobody_waiting(tmp_path: Path) -> None:
 
 
 def test_what_is_made_goes_where_nothing_comes_of_it(tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), claimed(tmp_path / "a" / "b"):
+    with claimed(tmp_path / "a" / "b"):
         assert (tmp_path / "a" / "b").is_dir()
-        raise ZeroDivisionError
     assert list(tmp_path.iterdir()) == []
 
 
@@ -113,7 +112,7 @@ def test_many_take_turns_without_a_gap(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert most == [1]
-    assert list(tmp_path.iterdir()) == []
+    assert {*tmp_path.rglob("*")} <= {tmp_path / "out"}  # which goes with who has made it, unless another has it then
 
 
 @pytest.mark.parametrize("elsewhere", [True, False])

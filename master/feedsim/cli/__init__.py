@@ -30,7 +30,7 @@ EPILOG = """exit codes:
 
 examples:
   feedsim run scenarios/z_positioning.yaml --out results/z
-  feedsim run scenarios/xz_circle.yaml --set "machine.axes.*.friction.W=0 rad"
+  feedsim run scenarios/xz_circle.yaml --set "machine.axes.*.friction.W=0 rad" --out results/lugre
   feedsim validate scenarios/xz_circle.yaml
   feedsim machine info scenarios/machines/test_centre
   feedsim machine show scenarios/machines/test_centre --mode 21Hz --animate --out results/structure

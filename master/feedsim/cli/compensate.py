@@ -41,7 +41,7 @@ def compensate(options: Namespace) -> None:
     delays = _delays(options.delays, program)
     _check_lags(plan, [axis for axis in analysis.moving_axes(program) if axis not in delays])
     with (
-        results_in(directory, report.check_writable, [*input_paths(plan), *files.values()]),
+        results_in(directory, report.check_writable, [*input_paths(plan), *files.values()], options.overrides),
         progress_bar(options.quiet, "it", shortened=True) as progress,
     ):
         result = analysis.compensate(

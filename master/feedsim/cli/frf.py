@@ -60,7 +60,7 @@ def frf(options: Namespace) -> None:
     inputs = [*(file for _, file in subject.files), *(overlay.file for overlay in overlays)]
 
     with (
-        results_in(directory, report.check_writable, inputs),
+        results_in(directory, report.check_writable, inputs, options.overrides),
         progress_bar(options.quiet, " cycles", shortened=True) as progress,
     ):
         progress("closed form", 0, 1)

@@ -25,7 +25,7 @@ EPILOG = """examples:
       --machine scenarios/machines/test_centre
   feedsim identify record.mat --columns record.yaml --delay 0
   feedsim identify z.csv --axis Z --machine my_machine --hold "beta=1" --free v_log
-  feedsim run scenarios/xz_circle.yaml --set machine.axes.Z.friction=results/identify_z/friction.yaml
+  feedsim run scenarios/xz_circle.yaml --set machine.axes.Z.friction=results/identify_z/friction.yaml --out results/own
 """
 ESTIMATE = "estimate"  # of --inertia and --delay: whatever mapping and machine say
 
@@ -39,7 +39,7 @@ def identify(options: Namespace) -> None:
     from feedsim.report import identify as report
     from feedsim.scenario import load_subject
 
-    asked = _asked(options)
+    what = _asked(options)
     subject = load_subject(options.machine) if options.machine is not None else None
     machine = subject.machine if subject is not None else None
     mapping = load_columns(options.columns) if options.columns is not None else None
@@ -48,10 +48,11 @@ def identify(options: Namespace) -> None:
         recorded = read_traces(options.traces, mapping, options.axis, machine, progress)
         reading = {"reading": perf_counter() - begin}
         sources = tuple(each.provenance for each in recorded)
-        known = asked.with_traces(sources, machine)
+        known = what.with_traces(sources, machine)
         directory: Path = options.out or Path("results") / f"identify_{known.axis.lower()}"
         records = named_apart(recorded)
-        with results_in(directory, report.check_writable, _inputs(options, subject)):
+        asked = [f"{name}={value}" for name, value in _settings(options).items()]
+        with results_in(directory, report.check_writable, _inputs(options, subject), asked):
             with FrictionLaw(options.fmus) as law:
                 found = identified_from(records, law, known, progress)
             found = replace(found, seconds=reading | dict(found.seconds))

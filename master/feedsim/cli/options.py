@@ -96,10 +96,18 @@ def out(default: str) -> Option:
     return Option("--out", "DIR", f"where the results go (default: results/{default})", type=folder)
 
 
+def typed(text: str) -> str:
+    """What was typed, also under a locale of few characters, such as C: it is taken for UTF-8 there."""
+    try:
+        return text.encode("utf-8", "surrogateescape").decode("utf-8")
+    except UnicodeDecodeError:
+        raise ArgumentTypeError("not UTF-8") from None
+
+
 def settings(example: str = "machine.axes.Z.friction.F_C='1.8 N.m'") -> Option:
     """--set, with an example of KEY=VALUE."""
     told = f"override one entry, e.g. {example}; may be given several times"
-    return Option("--set", "KEY=VALUE", told, dest="overrides", many=True)
+    return Option("--set", "KEY=VALUE", told, dest="overrides", many=True, type=typed)
 
 
 @contextmanager

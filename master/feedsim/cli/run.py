@@ -42,7 +42,7 @@ def run(options: Namespace) -> None:
         announce(plan.machine, fmus, named)
         analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
         with (
-            results_in(directory, report.check_writable, report.input_paths(plan)),
+            results_in(directory, report.check_writable, report.input_paths(plan), options.overrides),
             _rows_kept(report.growing(directory)) as recorded,
         ):
             with progress_bar(options.quiet, " cycles", shortened=True) as progress:

@@ -54,7 +54,8 @@ def sweep(options: Namespace) -> int:
     if options.dry_run:
         return _dry_run(study, planned, options)
     directory: Path = options.out or Path("results") / options.study.stem
-    with results_in(directory, report.check_writable, [study.file, study.scenario, *study.files]):
+    inputs = [study.file, study.scenario, *study.files]
+    with results_in(directory, report.check_writable, inputs, options.overrides):
         begun = perf_counter()
         last: list[Progress] = []
         try:

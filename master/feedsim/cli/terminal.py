@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feedsim.findings import WRONG, ranked, severity
+from feedsim.findings import WRONG, Note, ranked, severity
 from feedsim.owned import claimed
 
 if TYPE_CHECKING:
@@ -84,13 +84,20 @@ def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Ite
 
 
 @contextmanager
-def results_in(directory: Path, check: Callable[..., None], inputs: Sequence[Path] = ()) -> Iterator[None]:
-    """Have the folder of results to ourselves while they are made. check: of the report that will be written there.
+def results_in(
+    directory: Path, check: Callable[..., None], inputs: Sequence[Path] = (), asked: Sequence[str] = ()
+) -> Iterator[None]:
+    """Have the folder of results to ourselves while they are made; say ahead where one of other parameters goes.
+
+    check: of the report that will be written there. inputs, asked: what the results are of, files and settings.
 
     OutputError: another process has it, or the results could not be written there.
     """
+    from feedsim.report.results import replaced
+
     with claimed(directory):
         check(directory, inputs)
+        warn(Note(text) for text in [replaced(directory, inputs, asked)] if text)
         yield
 
 

@@ -67,7 +67,7 @@ def _inputs(scenario: Scenario) -> list[tuple[str, Path]]:
 def hashed(files: Sequence[tuple[str, Path]]) -> list[InputFile]:
     """Files with what they are, each once, under what it is first."""
     once = {path.absolute(): (role, path) for role, path in reversed(files)}
-    return [InputFile(role, path.name, _sha256(path)) for role, path in reversed(once.values())]
+    return [InputFile(role, path.name, sha256(path)) for role, path in reversed(once.values())]
 
 
 def software() -> dict[str, str]:
@@ -135,7 +135,8 @@ def _units(model: Any) -> Iterator[tuple[str, str]]:
         yield from ((name, note.unit) for note in notes if isinstance(note, Quantity))
 
 
-def _sha256(path: Path) -> str | None:
+def sha256(path: Path) -> str | None:
+    """Of a file's bytes; None where it cannot be read."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError:

@@ -16,7 +16,7 @@ from feedsim.errors import OutputError
 from feedsim.owned import claimed
 from feedsim.report.content import Report
 from feedsim.report.page import html
-from feedsim.report.provenance import to_json
+from feedsim.report.provenance import sha256, to_json
 from feedsim.report.style import Picture
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
@@ -49,6 +49,25 @@ def check_place(directory: Path | str, files: Sequence[str], inputs: Sequence[Pa
             for name in names:
                 if any(_same(directory / name, path) for path in inputs):
                     raise OutputError(f"{directory / name}: is an input and would be {fate}; take another directory")
+
+
+def replaced(directory: Path, inputs: Sequence[Path], asked: Sequence[str]) -> str:
+    """What is lost where a result of other parameters is replaced, in a sentence; "" where it is none.
+
+    inputs: files that are read. asked: what was asked for besides, such as the texts of --set.
+    """
+    before = _summary(directory)
+    try:
+        files = {each["sha256"] for each in before["inputs"]}
+        settings = before.get("settings", {}).items()
+        subject: dict[str, Any] = next((before[name] for name in ("scenario", "subject") if name in before), {})
+        told = [*subject.get("overrides", ()), *(f"{name}={value}" for name, value in settings)]
+    except (KeyError, TypeError, AttributeError):
+        return ""  # none, or one whose inputs are not known
+    if told == [*asked] and {sha256(path) for path in inputs} <= files:
+        return ""
+    was = f" ({', '.join(told)})" if told else ""
+    return f"{directory}: its result is of other parameters{was} and will be replaced; --out takes another folder"
 
 
 def write_results(
@@ -139,8 +158,8 @@ def discard(directory: Path | str) -> None:
 
 
 def write_text(file: Path, text: str) -> None:
-    """Write text as UTF-8 with line feeds."""
-    file.write_text(text, encoding="utf-8", newline="\n")
+    """Write text as UTF-8 with line feeds; names of files that are none are written as escapes."""
+    file.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def _settle(directory: Path) -> None:
@@ -187,10 +206,18 @@ def _stale(directory: Path, names: Sequence[str]) -> list[str]:
 def _listed(directory: Path) -> list[str] | None:
     """What the summary of an earlier run in ``directory`` lists."""
     try:
-        listed = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))["files"]
-        return [name for name in listed if isinstance(name, str)]
-    except (OSError, ValueError, KeyError, TypeError):
+        return [name for name in _summary(directory)["files"] if isinstance(name, str)]
+    except (KeyError, TypeError):
         return None  # no earlier run, or a summary of something else: nothing of it is ours to remove
+
+
+def _summary(directory: Path) -> dict[str, Any]:
+    """The summary of an earlier run in ``directory``; empty where there is none."""
+    try:
+        found = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def _move(sources: Mapping[str, Path], directory: Path, stale: Sequence[str], scratch: Path) -> None:

@@ -188,4 +188,6 @@ def _remove(path: Path) -> None:
 
 def _write_record(path: Path, content: Mapping[str, Any]) -> None:
     with written_whole(path) as file:
-        file.write(json.dumps(content, indent=2, ensure_ascii=False, default=str).encode() + b"\n")
+        file.write(
+            json.dumps(content, indent=2, ensure_ascii=False, default=str).encode("utf-8", "backslashreplace") + b"\n"
+        )

@@ -60,9 +60,9 @@ def write(
     They are of one comparison also where several processes write the same files: these wait for one another.
     """
     contents: list[tuple[Path | None, Callable[[], bytes]]] = [
-        (html, lambda: as_html(report_of(comparisons)).encode("utf-8")),
+        (html, lambda: as_html(report_of(comparisons)).encode("utf-8", "backslashreplace")),
         (xml, lambda: junit(comparisons, durations)),
-        (json, lambda: to_json(comparisons).encode("utf-8")),
+        (json, lambda: to_json(comparisons).encode("utf-8", "backslashreplace")),
     ]
     made = [(path, content()) for path, content in contents if path is not None]
     with ExitStack() as stack:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.files import regular
 from feedsim.trace.trace import Array
 
 SUFFIX = ".json"
@@ -81,11 +82,7 @@ def read_capture(path: Path) -> Capture:
             stands still or runs back, values that are no numbers.
     """
     try:
-        content = json.loads(path.read_bytes())
-    except FileNotFoundError:
-        raise InputError(f"no such file: {path}") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
+        content = json.loads(regular.content(path))
     except ValueError as error:
         raise InputError(f"{path} is no JSON file that can be read: {error}") from None
     except RecursionError:

@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-processors test-importers test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all lint format reference check-reference bench worst-case pose-study identification-study identification-accuracy lock ansys clean
+.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all lint format reference check-reference bench worst-case pose-study identification-study identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -155,6 +155,10 @@ test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)
 # A file of tests stays together on one core: its fixtures are made once. Programs that packages bring (cmake) are found.
 test-python: fmus $(VENV)/.importers
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=25
+
+# What reads files, with files that are changed at random (ARGS="--seconds 3600 --seed 7").
+fuzz: fmus $(VENV)/.importers ## files changed at random into every reader, each in a process of its own
+	$(PY) tests/fuzz/readers.py $(ARGS)
 
 test-processors: fmus $(VENV)/.dev ## references, physics, identification as other processors round (ARGS=--all: all of them)
 	$(PY) tests/processors/run.py $(ARGS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,7 +23,7 @@ def _amount(value: Any) -> tuple[float, str]:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise fault(f"{brief(value)} is no tolerance; write for example {EXAMPLE}")
     if not isinstance(value, str):
-        number, unit = float(value), ""
+        number, unit = float(value) if abs(value) < 1e308 else inf, ""
     else:
         match = re.fullmatch(rf"\s*({units.NUMBER})\s*(.*)", value, re.DOTALL)
         if not match:

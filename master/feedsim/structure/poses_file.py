@@ -103,7 +103,7 @@ def read_grid(path: Path, axes: Sequence[str]) -> tuple[GridAxis, ...]:
     """
     try:
         return _grid(_content(path), axes)[0]
-    except (OSError, ValueError, IndexError) as error:
+    except (OSError, ValueError, IndexError, OverflowError) as error:
         raise InputError(f"{path}: cannot be read as a grid of poses: {error}") from error
 
 
@@ -126,10 +126,10 @@ def read_cell(path: Path, axes: Sequence[str], pose: Mapping[str, float]) -> tup
         ports = _ports(axes)
         width = 2 + len(ports)
         for _ in range(cell):
-            at += 1 + int(numbers[at]) * width
-        count = int(numbers[at])
+            at += 1 + _modes_at(numbers, at) * width
+        count = _modes_at(numbers, at)
         rows = numbers[at + 1 : at + 1 + count * width].reshape(count, width)
-    except (OSError, ValueError, IndexError) as error:
+    except (OSError, ValueError, IndexError, OverflowError) as error:
         raise InputError(f"{path}: cannot be read as a grid of poses: {error}") from error
     shapes = {port: rows[:, 2 + i].copy() for i, port in enumerate(ports)}
     return Modes(path, rows[:, 0].copy(), rows[:, 1].copy(), shapes), centre
@@ -143,11 +143,20 @@ def _content(path: Path) -> Floats:
     return np.frombuffer(content, "<f8", offset=len(MARK))
 
 
+def _modes_at(numbers: Floats, at: int) -> int:
+    """How many modes the cell at `at` has."""
+    if (count := int(numbers[at])) < 0:
+        raise ValueError(f"a cell has {count} modes")
+    return count
+
+
 def _grid(numbers: Floats, axes: Sequence[str]) -> tuple[tuple[GridAxis, ...], int]:
     """The grid axes, and where the first cell begins."""
     grid, at = [], 3
     for _ in range(int(numbers[1])):
         axis, count, hysteresis = int(numbers[at]), int(numbers[at + 1]), float(numbers[at + 2])
+        if not (0 <= axis < len(axes) and 0 < count <= len(numbers)):
+            raise ValueError(f"axis {axis} has {count} cells")
         centres, boundaries = np.split(numbers[at + 3 : at + 3 + 2 * count - 1], [count])
         grid.append(GridAxis(axes[axis], centres.copy(), boundaries.copy(), hysteresis))
         at += 3 + 2 * count - 1

@@ -225,6 +225,9 @@ def _read_csv(path: Path) -> Table:
     if not rows or "run" not in rows[0] or "status" not in rows[0]:
         raise InputError(f"{path}:1: not the table of a study: it has no columns run and status")
     heads = [_head(text) for text in rows[0]]
+    names = [name for name, _ in heads]
+    if doubled := [name for name in names if names.count(name) > 1]:
+        raise InputError(f"{path}:1: two columns are called {doubled[0]!r}")
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(heads):
             raise InputError(f"{path}:{number}: {len(row)} cells, {len(heads)} columns")
@@ -238,7 +241,7 @@ def _read_csv(path: Path) -> Table:
                 columns[name] = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
             else:
                 columns[name] = np.array(cells, dtype=object)
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
             raise InputError(f"{path}: column {name!r}: {error}") from None
     return _read_table(columns, dict(heads), _record(path.parent / RECORD))
 
@@ -251,11 +254,13 @@ def _head(text: str) -> tuple[str, str]:
 def _read_table(columns: dict[str, NDArray[Any]], units: dict[str, str], record: Mapping[str, Any]) -> Table:
     between = [name for name in columns if name not in FIRST + LAST]
     listed = record.get("parameters")
-    parameters = [entry["name"] for entry in listed] if isinstance(listed, list) else []
+    entries = listed if isinstance(listed, list) else []
+    parameters = [entry["name"] for entry in entries if isinstance(entry, dict) and "name" in entry]
     known = tuple(name for name in between if name in parameters)
     sampling = record.get("sampling")
     runs = sampling.get("runs") if isinstance(sampling, dict) else None
     figures = tuple(name for name in between if name not in known)
+    runs = runs if isinstance(runs, int) else 0
     return Table(columns, units, known, figures, runs or len(columns["run"]), record)
 
 
@@ -294,13 +299,17 @@ def _read_parquet(path: Path) -> Table:
         raise InputError(f"{path}: not the table of a study: it has no columns run and status")
     columns: dict[str, NDArray[Any]] = {}
     units: dict[str, str] = {}
-    for column in whole.schema:
-        values = whole.column(column.name)
-        if arrow.types.is_string(column.type):
-            columns[column.name] = np.array(values.to_pylist(), dtype=object)
-        else:
-            columns[column.name] = np.asarray(values.to_numpy(), dtype=np.int64 if column.name == "run" else np.float64)
-        units[column.name] = (column.metadata or {}).get(b"unit", b"").decode()
+    try:
+        for column in whole.schema:
+            values = whole.column(column.name)
+            if arrow.types.is_string(column.type):
+                columns[column.name] = np.array(values.to_pylist(), dtype=object)
+            else:
+                of_kind = np.int64 if column.name == "run" else np.float64
+                columns[column.name] = np.asarray(values.to_numpy(), dtype=of_kind)
+            units[column.name] = (column.metadata or {}).get(b"unit", b"").decode()
+    except (ValueError, TypeError, KeyError, OverflowError, arrow.ArrowException) as error:
+        raise InputError(f"{path}: cannot be read as the table of a study: {error}") from None
     try:
         record = json.loads((whole.schema.metadata or {}).get(_KEY, b"{}"))
     except ValueError:

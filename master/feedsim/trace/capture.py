@@ -159,7 +159,7 @@ def _rows(path: Path, messages: Sequence[Any], names: Sequence[str]) -> Array:
         raise InputError(f"{path}: {len(rows)} rows of HFData; at least 2 are needed")
     try:
         values = np.array(rows, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         values = np.array([[_number(cell) for cell in row] for row in rows])
     if (wrong := np.argwhere(~np.isfinite(values))).size:
         row, column = (int(index) for index in wrong[0])
@@ -168,7 +168,10 @@ def _rows(path: Path, messages: Sequence[Any], names: Sequence[str]) -> Array:
 
 
 def _number(cell: object) -> float:
-    return float(cell) if isinstance(cell, (int, float)) else np.nan
+    try:
+        return float(cell) if isinstance(cell, (int, float)) else np.nan
+    except OverflowError:
+        return np.inf
 
 
 def _unit(name: str, columns: Mapping[str, Array], rotary: set[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,11 @@ from scipy import sparse
 
 from feedsim.errors import InputError
 from feedsim.scenario.structure.matrices import MatrixMarketStructure
-from feedsim.structure.assembly import DEGREES, counted
+from feedsim.structure.assembly import DEGREES, Floats, counted
 from feedsim.structure.matrices.raw import Raw, from_both, from_triangle
 from feedsim.structure.matrices.tables import NodeTable, read_nodes
+
+LARGEST = 50_000_000  # rows
 
 
 def read(structure: MatrixMarketStructure) -> Raw:
@@ -42,32 +45,60 @@ def read_matrix(file: Path, what: str) -> sparse.csc_array:
     Raises:
         InputError: not a Matrix Market file of a square real matrix; an entry occurs twice.
     """
-    from scipy import io  # readers of many formats, which a run need not wait for
-
     try:
-        rows, columns, _, form, field, symmetry = io.mminfo(file)
-        if rows != columns:
-            raise InputError(f"{file}: {what} matrix has {rows} rows and {columns} columns; it must be square")
-        if field not in ("real", "double", "integer") or symmetry not in ("general", "symmetric"):
-            raise InputError(
-                f"{file}: {what} matrix is {field} {symmetry} by its first line; 'real symmetric' or 'real general' "
-                "is expected"
-            )
-        content = io.mmread(file, spmatrix=False)
-    except InputError:
-        raise
-    except (OSError, ValueError, OverflowError, TypeError, EOFError) as error:
-        raise InputError(f"{file}: cannot be read as a Matrix Market file: {error}") from error
+        rows, form, symmetry, numbers = _content(file, what)
+    except (OSError, ValueError) as error:
+        told = getattr(error, "strerror", None) or error
+        raise InputError(f"{file}: cannot be read as a Matrix Market file: {told}") from error
+    symmetric = symmetry == "symmetric"
     if form == "array":
-        return from_both(*_entries(sparse.coo_array(np.asarray(content, dtype=np.float64))), rows, file)
-    entries = content.tocoo()
-    if symmetry == "general":
-        return from_both(*_entries(entries), rows, file)
-    # The reader has mirrored the triangle that the file holds; one half is the file again.
-    row, column, value = _entries(entries)
-    half = row >= column
-    return from_triangle(row[half], column[half], value[half], rows, file)
+        # Column by column; of a symmetric matrix what stands on and below the diagonal.
+        column, row = np.triu_indices(rows) if symmetric else np.divmod(np.arange(rows**2), rows)
+        value = numbers
+    else:
+        entries = numbers.reshape(-1, 3)
+        row, column = (entries[:, i].astype(np.int64) - 1 for i in (0, 1))
+        value = entries[:, 2].copy()
+    return (from_triangle if symmetric else from_both)(row, column, value, rows, file)
 
 
-def _entries(matrix: sparse.coo_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return matrix.row.astype(np.int64), matrix.col.astype(np.int64), matrix.data.astype(np.float64)
+def _content(file: Path, what: str) -> tuple[int, str, str, Floats]:
+    """Rows, format and symmetry, and all numbers behind the size. ValueError: it is no such file.
+
+    Read here and not by SciPy, whose reader ends the interpreter on some files that are cut off.
+    """
+    content = file.read_bytes()
+    head, _, rest = content.partition(b"\n")
+    words = head.decode("ascii", "replace").lower().split()
+    if len(words) != 5 or words[:2] != ["%%matrixmarket", "matrix"] or words[2] not in ("coordinate", "array"):
+        raise ValueError("its first line is none like %%MatrixMarket matrix coordinate real symmetric")
+    _, _, form, field, symmetry = words
+    while not (line := (parts := rest.partition(b"\n"))[0].strip()) or line.startswith(b"%"):
+        rest = parts[2]
+        if not rest:
+            raise ValueError("it has no line with its size")
+    sizes = [int(word) for word in line.split()]
+    if len(sizes) != (3 if form == "coordinate" else 2) or min(sizes) < 0 or max(sizes[:2]) > LARGEST:
+        raise ValueError(f"its size is {line.decode('ascii', 'replace')[:60]!r}; at most {LARGEST} rows are read")
+    rows, columns = sizes[:2]
+    if rows != columns:
+        raise InputError(f"{file}: {what} matrix has {rows} rows and {columns} columns; it must be square")
+    if field not in ("real", "double", "integer") or symmetry not in ("general", "symmetric"):
+        raise InputError(
+            f"{file}: {what} matrix is {field} {symmetry} by its first line; 'real symmetric' or 'real general' "
+            "is expected"
+        )
+    told = 3 * sizes[2] if form == "coordinate" else rows * (rows + 1) // 2 if symmetry == "symmetric" else rows**2
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)  # text that is no number
+        try:
+            numbers = np.fromstring(parts[2].decode("ascii"), dtype=np.float64, sep=" ")
+        except DeprecationWarning:
+            raise ValueError("it holds text that is no number") from None
+    if numbers.size != told:
+        raise ValueError(f"it holds {numbers.size} numbers behind its size, which tells {told}")
+    if form == "coordinate":
+        places = numbers.reshape(-1, 3)[:, :2]
+        if not np.all((places == np.floor(places)) & (places >= 1) & (places <= rows)):
+            raise ValueError(f"an entry is in no row or column from 1 to {rows}")
+    return rows, form, symmetry, numbers

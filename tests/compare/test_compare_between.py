@@ -116,6 +116,27 @@ def test_the_least_covered_variable_counts() -> None:
     assert "same in 49 % of the rows" in found.line or "same in 50 % of the rows" in found.line
 
 
+def test_a_tolerance_as_wide_as_the_reference_is_told() -> None:
+    flat = changed(DENSE, Z__M_a=0 * DENSE.time)
+    found = compare(flat, DENSE, Tolerances.parse(["Z.M_a=3 N.m"]))
+    assert found.same
+    assert "Z.M_a: the tolerance is as wide as what the reference does: a constant would be the same too" in found.notes
+    late = compare(DENSE, DENSE, Tolerances.parse(["Z.x_a=1 s"]))
+    assert any(note.startswith("Z.x_a: the tolerance is as wide") for note in late.notes)
+    assert not any("as wide" in note for note in compare(DENSE, DENSE).notes)
+    assert not any("as wide" in note for note in compare(DENSE, flat, Tolerances.parse(["Z.M_a=3 N.m"])).notes)
+
+
+def test_files_that_are_not_compared_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("results/a.csv", "results/b.csv", "references/a.csv"):
+        written(tmp_path / name, DENSE)
+    assert main(["compare", str(tmp_path / "results"), str(tmp_path / "references")]) == 0
+    assert "results: 1 CSV files have no reference: b.csv" in capsys.readouterr().out
+    same = str(tmp_path / "results" / "a.csv")
+    assert main(["compare", same, same]) == 0
+    assert "note: result and reference are the same file" in capsys.readouterr().out
+
+
 def test_columns_and_time_that_are_left_out_are_told() -> None:
     more = Series(DENSE.time, {**DENSE.columns, "extra": DENSE.time})
     assert "3 of 4 columns" in compare(more, DENSE).line

@@ -157,7 +157,7 @@ def test_archives_stay_small(fmus: Path) -> None:
     for unit in UNITS:
         with zipfile.ZipFile(fmus / f"{unit}.fmu") as archive:
             added = sum(entry.compress_size for entry in archive.infolist() if entry.filename.startswith(ROOT))
-        assert 0 < added < 300_000, unit
+        assert 0 < added < 350_000, unit  # a quarter of it the bounds between the rows
 
 
 # --- archives of something else

@@ -55,7 +55,7 @@ def compare(options: Namespace) -> int:
             # Of many pairs those that are the same take one line.
             full = options.all or len(comparisons) == 1
             print("\n".join(_plain(line) for each in comparisons for line in _lines(each, options.all, full)))
-            for line in (*_unused(comparisons, options), *_sum(comparisons)):
+            for line in (*_unused(comparisons, options), *_unreferenced(comparisons, options), *_sum(comparisons)):
                 print(_plain(line))
             sys.stdout.flush()
     except OSError:
@@ -125,6 +125,8 @@ def _pair(options: Namespace, choice: Options, result: Path, reference: Path) ->
         notes = [shift.note]
     between = bounds_of(reference) if options.reference_columns is None else None
     found = compare_series(ours, theirs, tolerances, choice, between=between, names=(str(result), str(reference)))
+    if result.exists() and result.samefile(reference):
+        notes.append("result and reference are the same file")
     return replace(found, notes=(*notes, *found.notes))
 
 
@@ -272,6 +274,18 @@ def _unused(comparisons: list[Comparison], options: Namespace) -> list[str]:
         nowhere = [pattern for pattern in own if all(pattern in each for each in unused)]
         if nowhere and (options.tolerances is not None or nowhere == own):
             found.append(f"note: {file}: matches no column: {', '.join(map(repr, nowhere))}")
+    return found
+
+
+def _unreferenced(comparisons: list[Comparison], options: Namespace) -> list[str]:
+    """That files of a folder of results have no reference."""
+    compared = {Path(each.result) for each in comparisons}
+    found = []
+    for folder, reference in zip(options.files[::2], options.files[1::2], strict=True):
+        if folder.is_dir() and reference.is_dir():
+            more = sorted({path for path in folder.rglob("*.csv") if path.is_file()} - compared)
+            named = ", ".join(str(path.relative_to(folder)) for path in more[:3]) + (", ..." if len(more) > 3 else "")
+            found += [f"note: {folder}: {len(more)} CSV files have no reference: {named}"] if more else []
     return found
 
 

@@ -21,7 +21,7 @@ from feedsim.compare.options import (
     with_units,
 )
 from feedsim.compare.overlap import Overlap
-from feedsim.compare.tolerance import Tolerances, allowed
+from feedsim.compare.tolerance import OF_MAGNITUDE, Tolerances, allowed
 from feedsim.compare.tube import along, bounds
 from feedsim.compare.verdict import Comparison, Coverage, Curves, Variable, Verdict, percent
 from feedsim.errors import InputError
@@ -196,6 +196,8 @@ def _variable(
     beyond = (off > limit + guard) | ~np.isfinite(off)
     if scale != 1.0:
         off = np.where(off <= guard, 0.0, off)
+    if not beyond.any() and span > OF_MAGNITUDE * magnitude and np.max(low) - limit <= np.min(high) + limit:
+        remarks.append("the tolerance is as wide as what the reference does: a constant would be the same too")
     worst = int(np.argmax(off))
     expected = float(along(time, values, at[worst : worst + 1])[0])
     if 0 < off[worst] < inf:

@@ -205,3 +205,22 @@ def test_a_shape_that_leaves_scatter_is_told_by_the_sum_of_squares() -> None:
     found = stribeck.stationary([replace(plateau, sigma=plateau.sigma / 3) for plateau in plateaus])
     assert said(found, "the sum of squares falls to")
     assert said(found, "--free beta")
+
+
+@pytest.mark.parametrize("noise", [1e-5, 1e-3])
+@pytest.mark.parametrize("lowest", [350.0, 500.0, 1000.0])
+def test_what_no_plateau_tells_widens_what_hangs_on_it(lowest: float, noise: float) -> None:
+    speeds = np.geomspace(lowest, 20000.0, 10) / 60e3 / I_P
+    away = []
+    for seed in range(3):
+        found = stribeck.stationary(made(speeds, noise=noise, seed=seed))
+        told = [found.estimates[name] for name in ("F_C", "F_log", "sigma_2", "M_0")]
+        assert all(each.status == "estimated" for each in told)
+        away += [abs(each.value - TRUE[each.name]) / each.sigma for each in told]
+    assert np.mean(np.array(away) < 2.0) >= 0.9, away
+
+
+def test_a_direction_that_lacks_leaves_friction_and_load_open() -> None:
+    found = stribeck.stationary(made(p={**TRUE, "M_0": 3.0}, sides=(1.0,)))
+    F_C = found.estimates["F_C"]
+    assert F_C.interval[0] < TRUE["F_C"] < F_C.interval[1]

@@ -57,6 +57,7 @@ REFINEMENTS = (
 # Where all speeds are far above the usual v_log the logarithm is a constant to them, and what friction gains with speed
 # falls to sigma_2 alone. It then bends at a BEND-th of the typical speed.
 FAR_ABOVE, BEND = 10.0, 3.0
+OPEN_RISE = 1.2  # F_S over F_C to begin with, where stage 1 does not tell it
 ROUGH = 2.0  # times the deviation by the torque's noise that the motion's makes of it: worth a warning
 LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant load to be told apart
 
@@ -153,8 +154,11 @@ def _known(
         values |= {name: estimate.value for name, estimate in prior.estimates.items() if name in KINDS}
         unknown = {"J"}
         for name, estimate in prior.estimates.items():
-            if estimate.status != "estimated" and name in KINDS and name not in free:
+            # What stage 1 cannot tell is free here: held, it would bend what hangs on it.
+            if estimate.status not in ("estimated", "undetermined") and name in KINDS and name not in free:
                 held[name] = estimate.status, estimate.reason or "as in stage 1"
+            elif estimate.status == "undetermined" and name == "F_S" and name not in hold:
+                values["F_S"] = OPEN_RISE * values["F_C"]
         names = tuple(name for name in prior.correlation.names if name not in held and name not in hold)
         places = [prior.correlation.names.index(name) for name in names]
         if names:
@@ -208,7 +212,6 @@ def _base(known: _Known, with_prior: bool, with_delay: bool) -> list[str]:
     if with_prior:
         wanted += [*(name for name in PRE_SLIDING if name not in wanted), *STATIONARY]
         wanted += [name for name in USUAL if name in known.told]
-        wanted = [name for name in wanted if name not in STATIONARY or name in known.told]
     else:
         wanted += ["F_C", "sigma_2", "M_0", *(name for name in USUAL if name not in known.held)]
     return [name for name in wanted if name not in known.held]

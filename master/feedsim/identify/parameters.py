@@ -129,6 +129,15 @@ BETA = 0.2, 4.0  # flatter, the peak has no end within decades of speed; steeper
 ASYMMETRY = -0.5, 0.5  # beyond, it plays the constant load's part
 MOST_TORQUE = 2.0  # of the largest measured: no part of the friction, and no load, is more
 LEAST_F_C = 1e-3  # of the largest torque: what is reported is relative to it
+# What may be there though no plateau tells it, of the friction: standard deviations of values that pass for usual. A
+# Stribeck effect that no plateau shows is over by the lowest speed, which is UNSEEN times v_s at least.
+HIDDEN: Mapping[str, float] = {EXCESS: 0.3, "F_log": 0.3, "sigma_2": 0.3, "asymmetry": 0.05, "M_0": 2.0}
+UNSEEN = 2.0
+
+
+def hidden(name: str, friction: float, fast: float) -> float:
+    """Standard deviation that a parameter may have which no plateau tells: friction [N.m], highest speed [rad/s]."""
+    return HIDDEN[name] * (1.0 if name == "asymmetry" else friction / fast if name == "sigma_2" else friction)
 
 
 def plateau_ranges(slow: float, fast: float, top: float) -> dict[str, Range]:

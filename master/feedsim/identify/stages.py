@@ -108,7 +108,10 @@ class _Run:
         check_found(estimates, options.I_P)
         prior = self.prior or second is None
         # Doubts of a stage 1 that the estimates do not rest on would be doubts about nothing.
-        self.warnings += first.warnings if first is not None and prior else ()
+        if first is not None and prior:
+            # Nor is what stage 1 could not tell, but stage 2 does.
+            told = [f"{name} is not estimated" for name, each in estimates.items() if each.status == "estimated"]
+            self.warnings += [text for text in first.warnings if not text.startswith(tuple(told))]
         self.warnings += second.warnings if second is not None else ()
         self.advice += second.advice if second is not None else ()
         return Identification(

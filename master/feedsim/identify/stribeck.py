@@ -10,15 +10,18 @@ from scipy.stats import chi2, f
 
 from feedsim.errors import InputError
 from feedsim.identify import stribeck_identifiability as identifiability
-from feedsim.identify.fit import Fit, Parameter, correlation, fit
+from feedsim.identify.fit import Fit, Parameter, correlation, fit, inverse
 from feedsim.identify.parameters import (
     CONSTANT_SPEED,
     EXCESS,
+    HIDDEN,
     NO_EFFECT,
+    UNSEEN,
     USUAL,
     check_held,
     curve,
     estimate,
+    hidden,
     inner,
     inner_to_outer,
     outer,
@@ -168,6 +171,33 @@ class _Problem:
 
         return fit(residuals, [self.parameter(name, begin[name]) for name in left], starts=starts, seed=self.seed)
 
+    def marginal(self, found: Fit, reasons: Mapping[str, str], extra: float) -> Array:
+        """Covariance of what was found. What is held because the plateaus do not tell it is not known: it adds what the
+        rest would move by if it had another usual value, as far as the plateaus allow that one, and what it moves by if
+        it has the value that suits them best."""
+        points, values = self.points, self.inner(found.mapping(), reasons)
+        if "v_s" in reasons:
+            values["v_s"] = float(points.speeds[0]) / UNSEEN
+        names = [name for name in reasons if name in HIDDEN]
+        if not names:
+            return found.covariance
+        weight = 1.0 / np.hypot(points.sigma, extra * np.abs(points.torque))
+        columns = [found.jacobian]
+        for name in names:
+            size = hidden(name, float(np.mean(points.friction()[0])), float(points.speeds[-1]))
+            ends = ({**values, name: values[name] + side * size} for side in (0.5, -0.5))
+            up, down = (torque({**end, "F_S": end["F_C"] + end[EXCESS]}, points.speed) for end in ends)
+            columns.append(((down - up) * weight)[:, None])
+        count = len(found.names)
+        # In units of what may be: a row of unit variance for each that is hidden.
+        usual = np.eye(len(names), count + len(names), count)
+        whole = np.vstack([np.hstack(columns), usual])
+        scale = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+        covariance, _ = inverse(whole / scale)
+        covariance = covariance / np.outer(scale, scale)
+        moved = covariance @ whole.T @ np.concatenate([found.residuals, np.zeros(len(names))])
+        return np.asarray((covariance + np.outer(moved, moved))[:count, :count])
+
     def parameter(self, name: str, start: float) -> Parameter:
         """Bounds and the range of further starts, from what the plateaus span."""
         points = self.points
@@ -249,7 +279,7 @@ def _conclude(
     values = problem.inner(found.mapping(), reasons)
     names = tuple(map(outer, found.names))
     turn = inner_to_outer(found.names, names)
-    covariance = turn @ found.covariance @ turn.T
+    covariance = turn @ problem.marginal(found, reasons, extra) @ turn.T
     matrix = correlation(covariance)
     sigma = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
     told = {outer(name): reason for name, reason in reasons.items()}

@@ -1,7 +1,7 @@
 """Frequency responses measured on the units against closed forms of the modal structure and the sampled drives.
 
 Two oracles: the sum over the modes, each with the first-order hold that the plant has (written here, from the mode
-table alone), and the closed form of the whole coupled system (feedsim.analysis.linear).
+table alone), and the closed form of the whole coupled system (feedsim.linear).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from scipy.linalg import expm
 from feedsim.analysis import estimate
 from feedsim.cosim.excite import Measurement, measure, usual_rms
 from feedsim.errors import InputError
+from feedsim.linear.loops import speed_gain
 from feedsim.linear.system import LinearSystem
 from feedsim.nc.excitation import binary_sequence, multisine
 from feedsim.structure import checked_modes
@@ -111,6 +112,19 @@ def test_measured_against_closed_form(excited: Measure, axis: str) -> None:
     assert figures[compliance][0] < ROUNDING
     assert figures[compliance][1] < 10 * ROUNDING
     print("\n" + "\n".join(f"{name}: {dB:.1e} dB, {deg:.1e} deg" for name, (dB, deg) in figures.items()))  # pytest -s
+
+
+def test_open_loop_gain_is_that_of_one_axis_measured_and_the_others_held(excited: Measure) -> None:
+    """The control's own way: n_a/n_s = (S/C) L/(1 + L), measured with the others under position control, gives L."""
+    found = estimate.measured(excited("Z", "n_add", seeds=(0,), **SPARSE), [("Z.n_a", "Z.n_s")])
+    f, reference = found.frequency, found["Z.n_a/Z.n_s"]
+    s, drive = 2j * np.pi * f, CLOSED.drives[CLOSED.axes.index("Z")]
+    from_measured = reference / (drive.from_setpoint(s) / drive.from_speed(s) - reference)
+    gain = speed_gain(CLOSED, "Z", s)
+    # where L is large, its inverse is a small difference that takes the motor's products along
+    np.testing.assert_allclose(from_measured, gain, rtol=100 * MOTOR)
+    every_open = speed_gain(CLOSED.closing("speed"), "Z", s)
+    assert np.abs(20 * np.log10(np.abs(every_open / gain))).max() > 0.2
 
 
 def test_other_axes_are_part_of_what_is_measured(excited: Measure) -> None:

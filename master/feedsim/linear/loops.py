@@ -107,13 +107,14 @@ def position_reference(system: LinearSystem, axis: str, frequency: Floats, *, fe
 
 
 def speed_gain(system: LinearSystem, axis: str, s: Complexes) -> Complexes:
-    """Open-loop gain of the speed loop at s (F,) [rad/s]: cut at the speed ahead of the speed controller; every
-    position loop open, the other axes' speed loops as they are. A gain margin is the factor that K_p stands."""
+    """Open-loop gain of the speed loop at s (F,) [rad/s]: cut at the speed ahead of the speed controller, the axis's
+    position loop open, other loops as they are: what a control finds that measures one axis and holds the others. A
+    gain margin is the factor that K_p stands."""
     i = _index(system, axis)
     cut = system.closing({axis: "none"})
     drive = system.drives[i]
     axes = len(system.axes)
-    per_torque = cut.speed_level(s)[:, :, 2 * axes + i]
+    per_torque = cut.at(s)[:, :, 2 * axes + i]
     n_a = per_torque[:, i]
     V = drive.speed_of_position(s)
     n = n_a if V is None else V * per_torque[:, axes + i]

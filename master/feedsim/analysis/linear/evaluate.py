@@ -24,7 +24,7 @@ from feedsim.linear.margins import (
 )
 from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
 from feedsim.linear.stability import unstable_poles
-from feedsim.linear.system import Closed, LinearSystem
+from feedsim.linear.system import LinearSystem
 
 LOWEST = 1.0  # [Hz]
 LOW_BAND = 5.0  # [Hz] up to here the axis is its inertia
@@ -36,14 +36,14 @@ BELOW_MIRROR = 0.999  # of 1/(2 T): at the mirror frequency itself a sampled loo
 
 @dataclass(frozen=True)
 class SpeedLoop:
-    """The speed loop of an axis, its position loop open.
+    """The speed loop of an axis, its position loop open, other loops as they are.
 
     Attributes:
         bandwidth: -3 dB of n_a/n_s.
         peak: highest maximum of |n_a/n_s| [dB]; None where there is none.
         delay: of n_a behind n_s at low frequencies [s].
         margins: of the open-loop gain.
-        unstable_poles: of the system with every position loop open.
+        unstable_poles: of the system with the position loop of the axis open.
     """
 
     bandwidth: Bandwidth
@@ -156,15 +156,12 @@ def _speed(system: LinearSystem, axis: str) -> SpeedLoop:
     def reference(f: Floats) -> Complexes:
         return loops.speed_reference(system, axis, f)
 
-    open_position: dict[str, Closed] = {
-        each: "none" if loop == "none" else "speed" for each, loop in system.loops.items()
-    }
     return SpeedLoop(
         bandwidth=bandwidth(reference, frequency),
         peak=peak(lambda f: _decibels(reference(f)), frequency),
         delay=delay(reference, DELAY_AT),
         margins=margins(lambda f: loops.speed_gain(system, axis, _s(f)), frequency),
-        unstable_poles=unstable_poles(system.closing(open_position)),
+        unstable_poles=unstable_poles(system.closing({axis: "speed"})),
     )
 
 
@@ -259,7 +256,7 @@ def _speed_figures(loop: SpeedLoop) -> dict[str, Figure]:
         **_peak_figures(loop.peak, "|n_a/n_s|"),
         "delay": Figure(1e3 * loop.delay, "ms", "delay of n_a behind n_s at low frequencies; 2 D/omega_0 + T_ref"),
         **_margin_figures(loop.margins, "speed loop", "K_p"),
-        "unstable_poles": Figure(float(loop.unstable_poles), "1", "growing solutions, every position loop open"),
+        "unstable_poles": Figure(float(loop.unstable_poles), "1", "growing solutions, the axis' position loop open"),
     }
 
 

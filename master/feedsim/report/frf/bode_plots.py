@@ -94,7 +94,8 @@ def loop_pictures(
 ) -> list[Picture]:
     """Open-loop gain of the speed or the position loop per axis, its margins marked."""
     cut = {
-        "speed": "cut at the motor speed, the position loop open; the gain margin is the factor that K_p stands",
+        "speed": "cut at the motor speed, the axis' position loop open, others closed; the gain margin is the factor "
+        "that K_p stands",
         "position": "cut at the scale's position as the controller samples it; the gain margin is the factor that K_v "
         "stands",
     }[loop]

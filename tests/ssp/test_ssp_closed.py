@@ -219,3 +219,9 @@ def test_a_file_that_includes_others(exported: Path, tmp_path: Path, baits: list
             with watched() as seen, pytest.raises(InputError, match=r"leads out of the archive|is no file name"):
                 list(_cards(tmp_path / "mesh.inp"))
             assert not outside(seen, tmp_path)
+
+
+def test_a_pipe_that_is_called_an_ssp(tmp_path: Path, capsys: Any) -> None:
+    os.mkfifo(tmp_path / "x.ssp")
+    assert refuses_to_look(["validate"], tmp_path / "x.ssp") == "2"
+    assert "is no regular file" in capsys.readouterr().err

@@ -76,11 +76,13 @@ def read(path: Path) -> Iterator[Files]:
             (:func:`feedsim.cosim.untrusted.entries`); it unpacks to more than it may.
     """
     with untrusted.readable(f"{path} cannot be read"):
-        folder, there = path.is_dir(), path.exists()
+        folder, there, regular = path.is_dir(), path.exists(), path.is_file()
     if folder:
         raise InputError(f"{path} is a folder, not an SSP file")
     if not there:
         raise InputError(f"no such file: {path}")
+    if not regular:
+        raise InputError(f"{path} is no regular file, and no SSP file")
     with untrusted.readable(f"{path}: not a readable SSP, which is a zip file"):
         package = zipfile.ZipFile(path)
     with package:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError
+from feedsim.files import regular
 
 LARGEST = 2 << 30  # bytes that the variables of a file may inflate to,
 RATIO = 100  # nor more than this many times the file's own size,
@@ -53,14 +54,7 @@ def read_mat(path: Path) -> dict[str, Value]:
 
     Raises InputError: no such file, none of these versions, damaged, or one that inflates to more than is allowed.
     """
-    try:
-        if not path.is_file() and path.exists():
-            raise InputError(f"{path} is no regular file, and no MAT file that can be read")
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"no such file: {path}") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
+    content = regular.content(path, pipes=True)
     try:
         return _variables(content)
     except NotImplementedError:

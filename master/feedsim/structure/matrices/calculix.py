@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from feedsim.errors import InputError
+from feedsim.files import regular
 from feedsim.files.references import referred
 from feedsim.scenario.structure.matrices import CalculixStructure
 from feedsim.structure.assembly import Integers
@@ -200,9 +201,9 @@ class _Reader:
 def _cards(file: Path, depth: int = 0) -> Iterator[tuple[str, str]]:
     """Lines without comments, with file:line; included files where they are named."""
     try:
-        content = file.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error}") from error
+        content = regular.content(file).decode("utf-8", "replace")
+    except InputError as error:
+        raise InputError(f"{file}: cannot be read: {error}") from None
     for number, line in enumerate(content.splitlines(), start=1):
         text = line.strip()
         if not text or text.startswith("**"):

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from feedsim.errors import InputError
+from feedsim.files import regular
 from feedsim.scenario.structure.matrices import MatrixMarketStructure
 from feedsim.structure.assembly import DEGREES, Floats, counted
 from feedsim.structure.matrices.raw import Raw, from_both, from_triangle
@@ -47,9 +48,8 @@ def read_matrix(file: Path, what: str) -> sparse.csc_array:
     """
     try:
         rows, form, symmetry, numbers = _content(file, what)
-    except (OSError, ValueError) as error:
-        told = getattr(error, "strerror", None) or error
-        raise InputError(f"{file}: cannot be read as a Matrix Market file: {told}") from error
+    except ValueError as error:
+        raise InputError(f"{file}: cannot be read as a Matrix Market file: {error}") from error
     symmetric = symmetry == "symmetric"
     if form == "array":
         # Column by column; of a symmetric matrix what stands on and below the diagonal.
@@ -67,7 +67,7 @@ def _content(file: Path, what: str) -> tuple[int, str, str, Floats]:
 
     Read here and not by SciPy, whose reader ends the interpreter on some files that are cut off.
     """
-    content = file.read_bytes()
+    content = regular.content(file)
     head, _, rest = content.partition(b"\n")
     words = head.decode("ascii", "replace").lower().split()
     if len(words) != 5 or words[:2] != ["%%matrixmarket", "matrix"] or words[2] not in ("coordinate", "array"):

@@ -146,6 +146,7 @@ def test_what_is_recorded_and_told(units: Path, fmus: Path) -> None:
         "drive acme_drive.fmu: no variable stands for voltage_limited",
         "friction acme_friction.fmu: knows no slope of its speed nor of its torque",
         "how steeply another maker's friction rises with the speed is not known",
+        "axis X: whether the loops are stable is not judged, the drive is another maker's",
     ):
         assert told.count(words) == 1, words
     assert done.units["controller_X"]["name"] == "acme_drive"

@@ -13,7 +13,9 @@ import pytest
 import ssp_helpers
 from feedsim import analysis, cosim, nc, scenario, ssp
 from feedsim.cosim import Run
+from feedsim.findings import Wrong
 from feedsim.scenario.structure.load import load_structure
+from feedsim.ssp.opened import Opened
 from ssp_helpers import ROOT, STRUCTURE, edited, short_scenario
 
 
@@ -446,3 +448,10 @@ def test_written_anew_by_another_tool(exported: Path, tmp_path: Path) -> None:
     one, other = run_ssp(exported), run_ssp(ssp_helpers.write(tmp_path / "anew.ssp", files))
     assert_same(one, other)
     assert one.scenario.evaluate == other.scenario.evaluate
+
+
+def test_what_is_wrong_stays_so_in_an_ssp() -> None:
+    file = Path("a.ssp")
+    found = Opened(None, None, file, Path("there"), (), {"plant.fmu": "resources/plant.fmu"})  # type: ignore[arg-type]
+    (told,) = found.told([Wrong(f"{Path('there') / 'plant.fmu'}: bad")])
+    assert (type(told), told) == (Wrong, "a.ssp: resources/plant.fmu: bad")

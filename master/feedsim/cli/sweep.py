@@ -87,7 +87,8 @@ def sweep(options: Namespace) -> int:
             return 130
         report.write(table, study, planned, directory)
     wrong = [str(text) for text in table["warnings"] if str(text).startswith(WRONG)]
-    told = [Wrong(f"{len(wrong)} of {len(table)} runs, the first: {wrong[0].removeprefix(WRONG)}")] if wrong else []
+    first = wrong[0].removeprefix(WRONG).split(" | ")[0] if wrong else ""
+    told = [Wrong(f"{len(wrong)} of {len(table)} runs, the first: {first}")] if wrong else []
     finish(options.quiet, told, _summary(study, last[0], perf_counter() - begun, directory))
     return 0
 

@@ -81,9 +81,10 @@ def _control(machine: Machine, program: Program, loops: Sequence[Loop]) -> list[
         met = any(loop.growing and (loop.state == "at rest" or _moves(program, axis)) for loop in unstable)
         found.append(Wrong(text) if met else text)
     if unknown := [name for name, axis in machine.axes.items() if isinstance(axis.drive, ForeignUnit)]:
+        others = "; the other axes are judged with its motor free" if loops else ""
         found.append(
-            f"axis {', '.join(unknown)}: whether the loops are stable is not judged, the drive is another maker's; the "
-            "other axes are judged with its motor free"
+            f"axis {', '.join(unknown)}: whether the loops are stable is not judged, the drive is another maker's"
+            + others
         )
     return found
 

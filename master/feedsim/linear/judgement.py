@@ -85,8 +85,9 @@ def judge(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
 
     The friction of another maker is left out at rest as well: what it does there is not known.
     """
-    system = _Sampled.of(machine, modes)
-    return system.judged() if system.axes else ()
+    if not any(isinstance(axis.drive, Drive) for axis in machine.axes.values()):
+        return ()
+    return _Sampled.of(machine, modes).judged()
 
 
 def _judged(axis: str, kind: Kind, state: State, gain: float, L: Complexes, growing: int, closed: int) -> Loop:

@@ -61,9 +61,10 @@ class Opened:
 
     def named(self, text: str) -> str:
         """A text that speaks of the file's parts by their names in it."""
+        found = text
         for place, source in self.sources.items():
-            text = text.replace(str(self.fmus / place), f"{self.path}: {source}")
-        return _named(text, self.path, self.fmus)
+            found = found.replace(str(self.fmus / place), f"{self.path}: {source}")
+        return type(text)(_named(found, self.path, self.fmus))  # what is wrong stays so
 
 
 @contextmanager
@@ -285,6 +286,6 @@ def _own_names(path: Path, folder: Path) -> Iterator[None]:
         ) from None
 
 
-def _named(warning: str, path: Path, folder: Path) -> str:
-    text = re.sub(rf"{re.escape(str(folder / 'scenario.yaml'))}(:\d+)?", lambda _: str(path), warning)
-    return type(warning)(text.replace(str(folder / "x")[:-1], f"{path}: "))
+def _named(text: str, path: Path, folder: Path) -> str:
+    text = re.sub(rf"{re.escape(str(folder / 'scenario.yaml'))}(:\d+)?", lambda _: str(path), text)
+    return text.replace(str(folder / "x")[:-1], f"{path}: ")

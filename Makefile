@@ -157,7 +157,8 @@ test-python: fmus $(VENV)/.importers
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=25
 
 # What reads files, with files that are changed at random (ARGS="--seconds 3600 --seed 7").
-fuzz: fmus $(VENV)/.importers ## files changed at random into every reader, each in a process of its own
+fuzz: fmus $(VENV)/.importers ## bytes as calls of the units, changed files into every reader (ARGS="--seconds N --seed S")
+	$(PY) tests/fuzz/units.py $(ARGS)
 	$(PY) tests/fuzz/readers.py $(ARGS)
 
 test-processors: fmus $(VENV)/.dev ## references, physics, identification as other processors round (ARGS=--all: all of them)
@@ -195,7 +196,7 @@ identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good 
 
 # --- keep ----------------------------------------------------------------------------------------------------------
 
-C_FILES := $(foreach folder,src/fmi2 src/exchange $(UNITS:%=src/%_fmu) tests/unit_c tests/unit_c/toy_unit tests/platforms \
+C_FILES := $(foreach folder,src/fmi2 src/exchange $(UNITS:%=src/%_fmu) tests/unit_c tests/unit_c/toy_unit tests/fuzz tests/platforms \
     tests/reference/monolithic benchmarks benchmarks/floor,$(wildcard $(folder)/*.[ch]))
 
 lint: $(VENV)/.dev ## style, types, formatting

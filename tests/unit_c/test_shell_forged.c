@@ -91,46 +91,9 @@ static void failed_initial_values_can_be_saved(void) {
     fmi2FreeInstance(c);
 }
 
-/* Random bytes, a few or all, under a checksum that fits: refused, or lived with. */
-static void forged_bytes_do_no_harm(void) {
-    static char own[IMAGE_SIZE], bad[IMAGE_SIZE];
-    size_t size;
-    uint64_t random = 1;
-    int accepted = 0;
-    fmi2Component c = toy_in(PHASE_STEPPING, NULL);
-    fmi2FMUstate saved = NULL;
-    image_of(c, own, &size);
-    CHECK(fmi2GetFMUstate(c, &saved) == fmi2OK);
-    for (int k = 0; k < 3000; k++) {
-        fmi2FMUstate state = NULL;
-        memcpy(bad, own, size);
-        const size_t changes = k % 4 == 0 ? size : (size_t)(k % 4);
-        for (size_t i = 0; i < changes; i++) {
-            random = random * 6364136223846793005u + 1442695040888963407u;
-            bad[88 + (size_t)(random >> 33) % (size - 88)] = (char)(random >> 56);
-        }
-        sign(bad, size);
-        const bool good = fmi2DeSerializeFMUstate(c, bad, size, &state) == fmi2OK;
-        if (good && fmi2SetFMUstate(c, state) == fmi2OK) {
-            Header header;
-            memcpy(&header, bad + 88, sizeof header);
-            fmi2DoStep(c, header.time, 0.1, fmi2True);
-            fmi2DoStep(c, header.time + 0.1, 0.1, fmi2True);
-            CHECK(fmi2SetFMUstate(c, saved) == fmi2OK);
-            accepted++;
-        }
-        CHECK(same_image(c, own, size));
-        CHECK(fmi2FreeFMUstate(c, &state) == fmi2OK);
-    }
-    CHECK(accepted > 100 && accepted < 2900);
-    CHECK(fmi2FreeFMUstate(c, &saved) == fmi2OK);
-    fmi2FreeInstance(c);
-}
-
 int main(void) {
     forged_contents_are_refused();
     failed_initial_values_can_be_saved();
-    forged_bytes_do_no_harm();
     CHECK(memory.held == 0);
     return CHECK_RESULT;
 }

@@ -1,0 +1,20 @@
+"""A minute of the units' fuzzer, always the same one: the kept inputs, then changed ones (units.py)."""
+
+import platform
+from pathlib import Path
+
+import pytest
+
+from fuzz import units
+
+SECONDS = 12  # of each of the four units; the rest of the minute compiles them
+
+
+@pytest.mark.skipif(platform.system() == "Windows", reason="the driver maps files as POSIX has it")
+@pytest.mark.parametrize("unit", units.UNITS)
+def test_units_withstand_what_a_fuzzer_makes_up(unit: str, fmus: Path, tmp_path: Path) -> None:
+    program = units.build(unit, fmus, tmp_path)
+    (tmp_path / "found").mkdir()
+    outcome = units.fuzz(program, [tmp_path / "found", units.CORPUS / unit], SECONDS, seed=1)
+    assert outcome.finding is None, f"{outcome.report}\nthe input: {outcome.finding}"
+    assert outcome.calls > 10_000  # of the kept inputs alone

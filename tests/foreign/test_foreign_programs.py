@@ -152,3 +152,18 @@ def test_whose_programs_they_are(fmus: Path, tmp_path: Path) -> None:
     os.link(tmp_path / "other.fmu", named)
     with Archive(named) as archive:
         assert not binaries.is_shipped(archive)
+
+
+def test_archives_that_are_named_apart(
+    fmus: Path, mark: Path, marking: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The base of a packed plant is tried, and the friction law called: both are said ahead where they are not ours."""
+    shipped = contents(fmus / "plant.fmu")
+    own = {name: marking if name.startswith("binaries/") else content for name, content in shipped.items()}
+    base = write(tmp_path / "plant.fmu", own)
+    machine = str(ROOT / "scenarios" / "machines" / "test_centre")
+    cli.main(["machine", "pack", machine, "--base", str(base), "--out", str(tmp_path / "packed.fmu")])
+    digest = hashlib.sha256(marking).hexdigest()
+    said = capsys.readouterr().err
+    assert f"executes {base} as the packed plant's trial: binaries/{folders()[0]}/plant.so, SHA-256 {digest}" in said
+    assert binaries.executing(fmus / "friction.fmu", "friction law") == []

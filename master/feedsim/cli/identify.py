@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FMUS, Command, Group, Option, names, out, quantity
-from feedsim.cli.terminal import finish, progress_bar, results_in
+from feedsim.cli.terminal import announce_archive, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
     from feedsim.identify import Asked
@@ -53,6 +53,7 @@ def identify(options: Namespace) -> None:
         records = named_apart(recorded)
         asked = [f"{name}={value}" for name, value in _settings(options).items()]
         with results_in(directory, report.check_writable, _inputs(options, subject), asked):
+            announce_archive(options.fmus and options.fmus / "friction.fmu", "friction law")
             with FrictionLaw(options.fmus) as law:
                 found = identified_from(records, law, known, progress)
             found = replace(found, seconds=reading | dict(found.seconds))

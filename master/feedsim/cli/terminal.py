@@ -119,6 +119,14 @@ def announce(machine: Machine, fmus: Path | None, named: Callable[[str], str] = 
         print(f"feedsim: {named(sentence)}", file=sys.stderr)
 
 
+def announce_archive(path: Path | None, who: str) -> None:
+    """The same of one archive that a user names; None: a shipped one."""
+    from feedsim import cosim
+
+    for sentence in cosim.executing(path, who) if path is not None else ():
+        print(f"feedsim: {sentence}", file=sys.stderr)
+
+
 def finish(quiet: bool, warnings: Iterable[str], *lines: str) -> None:
     """How a command ends: with its warnings, and with what it has made unless it is to be quiet.
 

@@ -4,13 +4,13 @@ May use nc, structure and what is below them; sole user of fmpy, of ctypes and o
 Start with run.py: ``run``; then schedule.py, which says once what a control cycle is, and system.py, on which units.
 """
 
-from feedsim.cosim.binaries import executed, fmus_directory
+from feedsim.cosim.binaries import executed, executing, fmus_directory
 from feedsim.cosim.loop import Progress
 from feedsim.cosim.run import Run, check, logged, run
 from feedsim.cosim.schedule import SCHEMES, Scheme
 from feedsim.cosim.trust import Crossings, PoseUse
 
 __all__ = [
-    "SCHEMES", "Crossings", "PoseUse", "Progress", "Run", "Scheme", "check", "executed", "fmus_directory", "logged",
-    "run",
+    "SCHEMES", "Crossings", "PoseUse", "Progress", "Run", "Scheme", "check", "executed", "executing", "fmus_directory",
+    "logged", "run",
 ]  # fmt: skip

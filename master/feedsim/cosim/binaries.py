@@ -53,19 +53,23 @@ def executed(machine: Machine, fmus: Path | None) -> list[str]:
     for axis in machine.axes:
         for role in (DRIVE, FRICTION):
             parts.setdefault(archive_path(machine, axis, role, folder), []).append(f"{role.name} of {axis}")
-    told = []
-    for path, who in parts.items():
-        if _is_ours(path):
-            continue
-        with suppress(InputError), Archive(path) as archive:
-            if not is_shipped(archive):
-                told += [f"executes {path} as {', '.join(who)}: {name}, SHA-256 {digest}"
-                         for name, digest in programs(archive).items()]  # fmt: skip
+    told = [sentence for path, who in parts.items() for sentence in executing(path, ", ".join(who))]
     loop, ours = folder / exchange.NAME, fmus_directory() / exchange.NAME
     with suppress(OSError):
         if folder != fmus_directory() and (digest := _digest(loop.read_bytes())) != _digest(ours.read_bytes()):
             told.append(f"executes {loop} as cycle loop, SHA-256 {digest}")
     return told
+
+
+def executing(path: Path, who: str) -> list[str]:
+    """The same of one archive, for the part that it plays; nothing of a shipped one."""
+    if _is_ours(path):
+        return []
+    with suppress(InputError), Archive(path) as archive:
+        if not is_shipped(archive):
+            found = programs(archive)
+            return [f"executes {path} as {who}: {name}, SHA-256 {digest}" for name, digest in found.items()]
+    return []
 
 
 def _is_ours(path: Path) -> bool:

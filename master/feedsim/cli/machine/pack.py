@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from feedsim.cli.machine.figures import AT, positions
 from feedsim.cli.options import Command, Option, given
-from feedsim.cli.terminal import progress_bar
+from feedsim.cli.terminal import announce_archive, progress_bar
 from feedsim.errors import InputError, OutputError
 from feedsim.owned import TemporaryFolder
 from feedsim.trace.files import written_whole
@@ -38,6 +38,7 @@ def pack(options: Namespace) -> None:
     if options.out.is_dir():
         raise OutputError(f"cannot write {options.out}: Is a directory; name the archive, e.g. --out machine.fmu")
     machine = scenario.load_machine(options.machine)
+    announce_archive(options.base, "the packed plant's trial")
     base = options.base or cosim.fmus_directory() / "plant.fmu"
     pose = _pose_of(machine, options.at)
     with TemporaryFolder() as folder:

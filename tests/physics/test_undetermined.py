@@ -10,8 +10,10 @@ import pytest
 
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.identify import Options, identify
+from feedsim.identify.inertia import contradiction, inertia
 from feedsim.identify.parameters import estimate
 from feedsim.identify.record import Record
+from feedsim.identify.stages import transitions
 from identify_records import FINE, I_P, TRUE, J, constant_speeds, friction, noisy
 
 H = 2e-3
@@ -55,3 +57,56 @@ def test_no_slow_speeds(law: FrictionLaw, noise: float) -> None:
         # 1 %: what the spline between the samples takes off; held at F_C, F_S put sigma_0 17 % and gamma 80 % off.
         assert each.value == pytest.approx(TRUE[name], abs=max(3.5 * each.sigma, 0.01 * TRUE[name])), name
     assert not any("is not estimated" in text for text in found.warnings)
+
+
+WEIGHT = {**TRUE, "M_0": 6.0}
+
+
+def way(name: str, speeds: list[float], side: float) -> Record:
+    """Strokes in one direction alone, of an axis with weight."""
+    one = constant_speeds(WEIGHT, speeds, [0.4] * len(speeds), ringing=0.0, both=False, acceleration=1500.0)
+    assert one.angle is not None
+    assert one.speed is not None
+    torque = side * (one.torque - 6.0) + 6.0
+    rest = 0.02 * np.random.default_rng(3).standard_normal(len(one))
+    return Record(name, one.time, torque + rest, side * one.angle, side * one.speed)
+
+
+def joined(first: Record, second: Record) -> Record:
+    """One after the other."""
+    assert first.angle is not None
+    assert first.speed is not None
+    assert second.angle is not None
+    assert second.speed is not None
+    torque, speed = np.append(first.torque, second.torque), np.append(first.speed, second.speed)
+    angle = np.append(first.angle, first.angle[-1] + second.angle)
+    return Record("both", np.arange(len(torque)) * H, torque, angle, speed)
+
+
+@pytest.mark.parametrize("files", [1, 2])
+def test_fast_up_and_slowly_down_tells_friction_from_weight(law: FrictionLaw, files: int) -> None:
+    up, down = way("up", [60.0, 90.0], 1.0), way("down", [1.0, 1.5], -1.0)  # 1.7 % of the highest speed
+    records = [up, down] if files == 2 else [joined(up, down)]
+    assert len(transitions(records)) == files
+    found = identify(records, law, Options("Z", I_P))
+    assert found.estimates["M_0"].value == pytest.approx(6.0, abs=0.4)
+    # Coulomb friction stands for the Stribeck curve about these speeds here.
+    assert 1.4 < found.estimates["F_C"].value < 2.3
+    assert found.estimates["J"].value == pytest.approx(J, rel=0.02)
+
+
+def test_what_contradicts_the_rigid_axis_is_not_offered(law: FrictionLaw, monkeypatch: pytest.MonkeyPatch) -> None:
+    records = [joined(way("up", [60.0, 90.0], 1.0), way("down", [30.0, 50.0], -1.0))]
+    rigid = inertia(records)
+    found = identify(records, law, Options("Z", I_P))
+    assert contradiction(rigid, found.estimates) == ""
+    for name, wrong in (("F_C", 20.0), ("M_0", 0.0), ("sigma_2", 0.2), ("J", 3 * J)):
+        changed = {**found.estimates, name: estimate(name, wrong, 0.01)}
+        changed["F_S"] = estimate("F_S", max(changed["F_C"].value, changed["F_S"].value))
+        assert "rigid axis" in contradiction(rigid, changed), name
+    monkeypatch.setattr("feedsim.identify.stages.contradiction", lambda rigid, estimates: "nonsense")
+    doubted = identify(records, law, Options("Z", I_P))
+    assert not [each.name for each in doubted.estimates.values() if each.status == "estimated"]
+    assert doubted.estimates["F_C"].value == doubted.rigid["F_C"].value
+    assert doubted.estimates["M_0"].value == doubted.rigid["M_0"].value
+    assert doubted.warnings[0].startswith("no parameter is offered as estimated: the fit went astray: it says nonsense")

@@ -19,7 +19,7 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.identify.averages import white
 from feedsim.identify.fit import correlation
-from feedsim.identify.parameters import RIGID, estimate
+from feedsim.identify.parameters import RIGID, estimate, torque
 from feedsim.identify.record import Array, Record, runs
 from feedsim.identify.result import Correlation, Estimate
 
@@ -39,6 +39,7 @@ class Inertia:
     Attributes:
         estimates: J, sigma_2, F_C, M_0; the last three of the simple friction model, as they are good to start from.
         covariance: in the order of correlation.names, with the residuals' autocorrelation accounted for.
+        speeds: (K,) that are usual in either direction [rad/s].
         rms: residual of the filtered torque [N.m]. rows: filtered rows. window: length of the low-pass [s].
     """
 
@@ -49,6 +50,7 @@ class Inertia:
     rows: int
     window: float
     warnings: tuple[str, ...]
+    speeds: Array
 
     @property
     def J(self) -> Estimate:
@@ -57,6 +59,10 @@ class Inertia:
 
 
 LEAST_ROWS = 20
+USUAL = (0.05, 0.5, 0.95)  # quantiles of the speeds that count as usual
+APART = 0.5  # of the friction, or of the inertia: by how much line and curve may differ, besides
+CERTAIN = 4.0  # standard deviations of the line
+SIMPLE = "a rigid axis with simple friction"
 LEAST_SHARE = 0.05  # of the torque (rms) that accelerates, below which the friction model's faults may pass for J
 VAGUE = 0.1  # relative standard deviation of J that is worth a warning
 
@@ -210,7 +216,33 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
         len(torque),
         length,
         tuple(said),
+        np.concatenate([np.quantile(columns[columns[:, 2] == side, 1], USUAL) for side in np.unique(columns[:, 2])]),
     )
+
+
+def contradiction(found: Inertia, estimates: Mapping[str, Estimate]) -> str:
+    """Where an axis with these parameters needs quite another torque than the rigid axis, or has another inertia.
+
+    The simple friction of the rigid axis is no more than a straight line through a curve, but it is a linear least
+    square: it cannot go astray. Empty where both agree as well as line and curve do.
+    """
+    line, values = found.estimates, {name: each.value for name, each in estimates.items()}
+    if not line["F_C"].value > 0:
+        return ""
+    for n in map(float, found.speeds):
+        side = np.sign(n)
+        friction = line["F_C"].value + line["sigma_2"].value * abs(n)
+        straight = line["M_0"].value + side * friction
+        row = np.array([{"J": 0.0, "sigma_2": n, "F_C": side, "M_0": 1.0}[name] for name in found.correlation.names])
+        margin = APART * friction + CERTAIN * float(np.sqrt(row @ found.covariance @ row))
+        curved = float(torque(values, np.array([n]))[0])
+        if abs(curved - straight) > margin:
+            return f"{curved:.3g} N.m at {n:.3g} rad/s, where {SIMPLE} needs {straight:.3g} N.m"
+    J = estimates.get("J")
+    margin = APART * line["J"].value + CERTAIN * line["J"].sigma
+    if J is not None and J.status == "estimated" and abs(J.value - line["J"].value) > margin:
+        return f"an inertia of {J.value:.3g} kg.m2, where {SIMPLE} has {line['J'].value:.3g}"
+    return ""
 
 
 def _scatter(stretches: Sequence[_Stretch], columns: Array, residuals: Array) -> Array:

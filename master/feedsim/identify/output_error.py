@@ -24,6 +24,7 @@ from feedsim.identify.identifiability import (
     turnover_rows,
     verdict,
 )
+from feedsim.identify.inertia import SLOW
 from feedsim.identify.motion import noise_of
 from feedsim.identify.parameters import FIXED, KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
 from feedsim.identify.record import Array, Record
@@ -196,14 +197,15 @@ def _known(
 
 
 def _both_directions(fine: Sequence[RecordTorque]) -> bool:
-    fast = _sliding(fine)
+    # A slow way back counts as well as a fast one there: it is friction that both tell apart from the load.
+    fast = _sliding(fine, SLOW)
     return LEAST_SHARE < float(np.mean(fast > 0)) < 1 - LEAST_SHARE
 
 
-def _sliding(fine: Sequence[RecordTorque]) -> Array:
-    """Speeds [rad/s] at the rows that are not near a reversal."""
+def _sliding(fine: Sequence[RecordTorque], share: float = 0.05) -> Array:
+    """Speeds [rad/s] at the rows that are not near a reversal: above a share of the highest."""
     speed = np.concatenate([model.moved(0.0)[1] for model in fine])
-    return np.asarray(speed[np.abs(speed) > 0.05 * np.max(np.abs(speed))])
+    return np.asarray(speed[np.abs(speed) > share * np.max(np.abs(speed))])
 
 
 def _base(known: _Known, with_prior: bool, with_delay: bool) -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.identify.clipping import without_clipped
-from feedsim.identify.inertia import Inertia, inertia
+from feedsim.identify.inertia import Inertia, contradiction, inertia
 from feedsim.identify.magnitudes import check_found, check_inertia, check_size
 from feedsim.identify.motion import Part, motion, parts
 from feedsim.identify.open_loop import balanced
@@ -36,6 +36,7 @@ ORDER = (*FRICTION, "M_0", "J", "delay")
 # Pre-sliding of an axis without a word from its records: bristles that give 5 mrad at break-away and relax in 2.5 ms.
 USUAL_DEFLECTION, USUAL_RELAXATION = 5e-3, 2.5e-3
 INERTIA_OFF, CERTAIN = 0.1, 4.0  # relative, standard deviations: a given inertia that is off by both is worth a warning
+NOTHING_TOLD = Correlation((), np.zeros((0, 0)))
 SLIDING = 1.0  # [rad], some 20 times a usual pre-sliding: amplitude above which a sine is mostly sliding
 
 
@@ -105,6 +106,7 @@ class _Run:
                 balance = balanced(transitions(self.records), self.law, estimates, hold=options.hold)
                 estimates = balance.estimates
                 self.progress("open loop", 1, 1)
+        estimates, believed = self._believed(estimates, rigid)
         check_found(estimates, options.I_P)
         prior = self.prior or second is None
         # Doubts of a stage 1 that the estimates do not rest on would be doubts about nothing.
@@ -118,7 +120,7 @@ class _Run:
             axis=options.axis,
             I_P=options.I_P,
             estimates=estimates,
-            correlation=merged_correlation(first if prior else None, second),
+            correlation=merged_correlation(first if prior else None, second) if believed else NOTHING_TOLD,
             stationary=first,
             dynamic=second,
             warnings=tuple(dict.fromkeys(self.warnings)),
@@ -128,6 +130,36 @@ class _Run:
             balance=balance,
             prior=prior,
         )
+
+    def _believed(
+        self, estimates: Mapping[str, Estimate], rigid: Inertia | None
+    ) -> tuple[Mapping[str, Estimate], bool]:
+        """The estimates, unless they contradict the rigid axis beyond doubt: then nothing of them is offered, and the
+        values are those of the rigid axis."""
+        if rigid is None or not self._slides():
+            return estimates, True
+        reason = contradiction(rigid, estimates)
+        if not reason:
+            return estimates, True
+        reason = f"the fit went astray: it says {reason}"
+        self.warnings.insert(0, f"no parameter is offered as estimated: {reason}; look at signs, units and known load")
+        line = {name: each.value for name, each in rigid.estimates.items()}
+        line |= {"F_S": line["F_C"], "F_log": 0.0, "asymmetry": 0.0, "sigma_0": line["F_C"] / USUAL_DEFLECTION}
+        line |= {"sigma_1": line["sigma_0"] * USUAL_RELAXATION, "W": NO_EFFECT["W"], "gamma": NO_EFFECT["gamma"]}
+        line["sigma_2"] = max(line["sigma_2"], 0.0)
+        doubtful = ("estimated", "undetermined")
+        return {
+            name: replace(each, value=line.get(name, each.value), sigma=nan, status="undetermined", reason=reason)
+            if each.status in doubtful
+            else each
+            for name, each in estimates.items()
+        }, False
+
+    def _slides(self) -> bool:
+        """Whether anything moves by more than small sines: else the rigid axis's simple friction does not hold, whose
+        pre-sliding passes for less inertia."""
+        every = (part for record in self.records for part in _parts(record))
+        return any(part.kind != "sine" or part.amplitude > SLIDING for part in every)
 
     def _plateaus(self, J: float) -> tuple[Plateau, ...]:
         found: list[Plateau] = []
@@ -222,9 +254,7 @@ class _Run:
             return
         away = rigid.J.value - given.value
         far = abs(away) > max(INERTIA_OFF * given.value, CERTAIN * rigid.J.sigma)
-        if far and any(
-            part.kind != "sine" or part.amplitude > SLIDING for record in self.records for part in _parts(record)
-        ):
+        if far and self._slides():
             check_inertia(given, rigid.J)
             self.warnings.append(
                 f"the inertia is given as {given.value:.4g} kg.m2, accelerating parts of the records say "
@@ -301,7 +331,13 @@ def transitions(records: Sequence[Record]) -> tuple[Record, ...]:
     """Records that stage 2 is fitted to: those with sines, else those in which the axis reverses."""
     found = {id(record): _parts(record) for record in records}
     sines = tuple(r for r in records if any(part.kind == "sine" for part in found[id(r)]))
-    return sines or tuple(r for r in records if _reverses(r, found[id(r)]))
+    if sines:
+        return sines
+    ways = {id(record): _directions(record, found[id(record)]) for record in records}
+    reversing = tuple(r for r in records if len(ways[id(r)]) > 1)
+    # Strokes of one direction each, of which one file is up and the other down, tell both together.
+    both = len(set().union(*ways.values())) > 1
+    return reversing or tuple(r for r in records if both and ways[id(r)])
 
 
 def merged_correlation(first: Stationary | None, second: Dynamic | None) -> Correlation:
@@ -325,9 +361,9 @@ def _parts(record: Record) -> tuple[Part, ...]:
         return ()
 
 
-def _reverses(record: Record, found: Sequence[Part]) -> bool:
-    """Whether the axis moves in both directions, within a stretch or from one to the next."""
+def _directions(record: Record, found: Sequence[Part]) -> set[float]:
+    """Signs of the directions in which the axis moves, within a stretch or from one to the next."""
     if any(part.reversals for part in found):
-        return True
-    speed = motion(record).coarse()
-    return len({float(np.sign(np.sum(speed[part.rows]))) for part in found}) > 1
+        return {-1.0, 1.0}
+    speed = motion(record).coarse() if found else None
+    return set() if speed is None else {float(np.sign(np.sum(speed[part.rows]))) for part in found}

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from feedsim.findings import WRONG, Wrong
 from feedsim.report import sweep as report
 from feedsim.report.formatting import scale
 from feedsim.report.page import html
@@ -153,9 +154,11 @@ def test_a_figure_that_some_runs_do_not_have_is_counted(tmp_path: Path) -> None:
 
 def test_warnings_of_runs_are_told_once(tmp_path: Path) -> None:
     study, plan = study_of(tmp_path, "{method: latin_hypercube, runs: 20}", SAMPLED)
-    told = {k: f"residual {k}.5 J" for k in range(5)}
+    told = {k: f"residual {k}.5 J" for k in range(5)} | {7: f"{WRONG}axis Z: the position loop is unstable"}
     account = Account(table_of(study, plan, {"XZ.G": ("m", glitch(plan))}, warned=told), study, plan)
     assert "5 of 20 runs warn: residual 0.5 J" in account.warnings
+    (wrong,) = (each for each in account.warnings if isinstance(each, Wrong))
+    assert wrong == "1 of 20 runs: axis Z: the position loop is unstable"
 
 
 def test_too_many_failures_for_indices_leave_rank_correlations(tmp_path: Path) -> None:

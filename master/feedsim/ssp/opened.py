@@ -86,6 +86,8 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
         found = roles(structure, archives, str(path))
         table = _table(archives[found.setpoint], f"{path}: {found.setpoint}")
         given = values(structure, files, archives, found.foreign, str(path))
+        if problems := rebuilt.lacking(found, given, str(path)):
+            raise InputError.of(str(path), problems)
         own = rebuilt.annotation(structure.scenario, files, str(path))
         T_c, T_pos, guessed = rebuilt.cycles(found, archives, given, table, own, structure.step, str(path))
         parts = Parts(found, archives, given, table, T_c, T_pos)

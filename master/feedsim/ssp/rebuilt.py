@@ -75,6 +75,14 @@ def cycles(
     return table.cycle, table.cycle, "the interval of the setpoints"
 
 
+def lacking(roles: Roles, values: Mapping[str, Mapping[str, Value]], where: str) -> list[str]:
+    """Parameters that a scenario cannot do without, and an archive that calls itself shipped does not have."""
+    needed = [(control, name) for control in roles.shipped_drives for name in ("T_c", "T_pos", "I_P")]
+    needed += [(roles.plant, f"{axis}.{name}") for axis in roles.axes for name in ("x_0", "M_0")]
+    return [f"{where}: {component}: its archive has no Real parameter {name}"
+            for component, name in needed if not isinstance(values[component].get(name), float)]  # fmt: skip
+
+
 def faults(parts: Parts, where: str) -> list[str]:
     """What does not fit together although each part is right."""
     roles, values = parts.roles, parts.values
@@ -230,7 +238,7 @@ def _axis(parts: Parts, axis: str, told: Mapping[str, Any], folder: Path) -> dic
 def _shipped_drive(parts: Parts, control: str) -> dict[str, Any]:
     drive = _group(parts, control, leave=("T_c", "T_pos", "I_P"))
     for key, inner in drive.items():
-        if key.startswith("filter_") and isinstance(inner, dict):
+        if key.startswith("filter_") and isinstance(inner, dict) and "type" in inner:
             inner["type"] = FILTER_NAMES.get(inner["type"], inner["type"])
             if inner["type"] == "off":  # what it would be is no part of the machine, unless somebody said so
                 started = {

@@ -231,7 +231,7 @@ def _signed_pitch(number: str, columns: Mapping[str, Array]) -> float | None:
         residual = float(np.sqrt(max(0.0, 1.0 - fitted * fitted / (weight * scatter))))
         if residual < best:
             best, found = residual, 2 * np.pi * weight / fitted
-    return found
+    return found if found is not None and 1e-9 < abs(found) < 1e9 else None  # beyond that it is no pitch in mm
 
 
 def _marks(messages: Sequence[Any], first: float, interval: float) -> list[Mark]:

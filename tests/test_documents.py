@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,15 @@ def test_relative_links_exist(document: Path) -> None:
     for target in re.findall(r"\]\(([^)#\s]+)", document.read_text(encoding="utf-8")):
         if "://" not in target:
             assert (document.parent / target).exists(), f"{document.name} links to {target}"
+
+
+def test_no_document_names_a_registry_of_packages() -> None:
+    """What a tool is, its own project says; where one gets it from is everybody's own."""
+    hosts = r"pypi\.org|pythonhosted\.|npmjs\.|crates\.io|golang\.org/dl|repo1?\.maven|anaconda\.org"
+    kinds = ("*.md", "*.py", "*.c", "*.h", "*.toml", "*.lock", "*.yaml", "Makefile")
+    listed = subprocess.run(["git", "ls-files", *kinds], cwd=ROOT, capture_output=True, text=True).stdout.split()
+    found = [name for name in listed if re.search(hosts, (ROOT / name).read_text(encoding="utf-8"))]
+    assert found in ([], ["tests/test_documents.py"])
 
 
 def test_the_walk_through_the_house_meets_files_that_are_there() -> None:

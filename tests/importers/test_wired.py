@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from feedsim import nc, scenario
 from importers import document, loops, with_ecos, with_fmpy, with_libcosim, z_move
 from importers.loops import Master
 from importers.registry import IMPORTERS, Importer
@@ -22,6 +23,13 @@ def _same(a: Result, b: Result, move: z_move.Move) -> None:
     x, torque = z_move.differences(a, b, move)
     assert x <= SAME_X, f"{x} nm"
     assert torque <= SAME_M, f"{torque} mN.m"
+
+
+def test_the_page_tells_how_many_steps_it_compares_and_its_commands_make(move: z_move.Move) -> None:
+    whole = round(nc.plan(scenario.load(z_move.SCENARIO)).duration / z_move.STEP)
+    page = " ".join(document.PAGE.read_text(encoding="utf-8").split())
+    told = f"{move.experiment.steps:,} steps of 125 us (whole, as the commands below run it, {whole:,})"
+    assert told in page
 
 
 def test_our_master_in_parallel_is_the_plain_loop(move: z_move.Move, system: System, parallel: Result) -> None:

@@ -63,6 +63,20 @@ def test_it_runs_as_the_scenario_does(short: Path, exported: Path, fmus: Path, o
     assert here.scenario.motions == there.scenario.motions
 
 
+def test_names_and_master_are_as_omsimulator_reads_them(exported: Path) -> None:
+    """Its expression for identifiers, and the first annotation of the system, by the prefixes that it compares."""
+    text = ssp_helpers.contents(exported)["SystemStructure.ssd"].decode()
+    names = re.findall(r'<ssd:(?:SystemStructureDescription|System|Component) [^>]*?\bname="([^"]*)"', text)
+    assert len(names) == 2 + 8
+    assert all(re.fullmatch(r"[a-zA-Z][a-zA-Z0-9_-]*", name) for name in names), names
+    system = text[text.index("<ssd:System ") : text.index("</ssd:System>")]
+    opening = r'<ssd:Annotations> <ssc:Annotation type="([^"]*)"> <oms:Annotations> <oms:SimulationInformation> '
+    master = r'<oms:FixedStepMaster description="oms-ma" stepSize="([^"]*)"'
+    first = re.search(opening + master, " ".join(system.split()))
+    assert first is not None
+    assert (first[1], float(first[2])) == ("org.openmodelica", 125e-6)
+
+
 def test_two_writings_are_the_same_bytes(exported: Path, short: Path, fmus: Path, tmp_path: Path) -> None:
     again = tmp_path / "again.ssp"
     ssp.export(scenario.load(short), again, fmus=fmus)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -157,7 +158,7 @@ def _files(
         box = _box(instance, axes)
         components.append(Component(instance, f"{RESOURCES}/{name}.fmu", connectors, bindings, box))
     structure = Structure(
-        name=scenario.name,
+        name=_identifier(scenario.name),
         components=tuple(components),
         links=links,
         units=_definitions(
@@ -166,7 +167,7 @@ def _files(
         stop=program.duration,
         step=machine.cycles.T_c,
         scenario=described.text(scenario),
-        description=" ".join(filter(None, (scenario.note, machine.note))),
+        description=" ".join(filter(None, (f"{scenario.name}.", scenario.note, machine.note))),
         tool="feedsim",
     )
     return {archive.STRUCTURE: system_structure.to_bytes(structure), **files}
@@ -179,6 +180,11 @@ def _box(instance: str, axes: tuple[str, ...]) -> tuple[float, float, float, flo
     left = (WIDTH + GAP) * (SETPOINT, "controller", wiring.PLANT, "friction").index(kind)
     first, last = (rows[instance],) * 2 if instance in rows else (0, len(axes) - 1)
     return left, -(HEIGHT + GAP) * last - HEIGHT, left + WIDTH, -(HEIGHT + GAP) * first
+
+
+def _identifier(name: str) -> str:
+    """A name as OMSimulator takes one: a letter, then letters, digits and _; the readable one is in the description."""
+    return re.sub(r"[^A-Za-z0-9]+", "_", re.sub(r"^[^A-Za-z]+", "", name)).strip("_") or "system"
 
 
 def _connectors(unit: Archive, connected: set[str]) -> tuple[Connector, ...]:

@@ -12,6 +12,7 @@ from feedsim.ssp.parameter_set import ParameterSet, from_element, number
 from feedsim.ssp.xml import append_units, read_units
 
 ALGORITHM = "com.opensimulationplatform"  # annotation in which libcosim looks for the step size
+MASTER = "org.openmodelica"  # annotation of the system in which OMSimulator looks for its master
 SCENARIO = "feedsim.scenario"  # annotation with what the units cannot know: motions, evaluation, limits
 FMU = "application/x-fmu-sharedlibrary"
 
@@ -62,8 +63,8 @@ class Link:
 
 @dataclass(frozen=True)
 class Structure:
-    """A system. `step` [s] is for libcosim, and for files whose drives tell no control cycle; `scenario` is the content
-    of the annotation of that name."""
+    """A system. `step` [s] is for libcosim and OMSimulator, and for files whose drives tell no control cycle;
+    `scenario` is the content of the annotation of that name."""
 
     name: str
     components: tuple[Component, ...]
@@ -93,6 +94,11 @@ def to_bytes(structure: Structure) -> bytes:
     for link in structure.links:
         names = {"startElement": link.start[0], "startConnector": link.start[1]}
         xml.child(connections, "ssd:Connection", names | {"endElement": link.end[0], "endConnector": link.end[1]})
+    if structure.step is not None:
+        place = xml.child(xml.child(system, "ssd:Annotations"), "ssc:Annotation", {"type": MASTER})
+        master = xml.child(xml.child(place, "oms:Annotations"), "oms:SimulationInformation")
+        told = {"description": "oms-ma", "stepSize": repr(structure.step), "relativeTolerance": "0.0001"}
+        xml.child(master, "oms:FixedStepMaster", told)  # the tolerance is for masters whose step varies
     append_units(root, "ssd:Units", structure.units)
     experiment = xml.child(root, "ssd:DefaultExperiment", {"startTime": repr(structure.start)})
     if structure.stop is not None:

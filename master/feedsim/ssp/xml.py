@@ -15,9 +15,10 @@ SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
+OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 OWN = "urn:feedsim:ssp"
-# ecos and libcosim compare the prefixed text, not the namespace: the prefixes are part of the format for them.
-PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "feedsim": OWN}
+# ecos, libcosim and OMSimulator compare the prefixed text, not the namespace: to them, prefixes are of the format.
+PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS, "feedsim": OWN}
 
 Element = ET.Element
 

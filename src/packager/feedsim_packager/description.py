@@ -49,20 +49,18 @@ TYPES = {
 def capabilities(variables: Iterable[Variable]) -> dict[str, bool | int]:
     """What the shell in src/fmi2 can do, with such variables."""
     reals = [variable.row for variable in variables if variable.row.kind == "REAL"]
-    inputs = any(row.causality == "input" for row in reals)
-    outputs = any(row.causality == "output" for row in reals)
     continuous = any(row.causality == "output" and row.variability == "continuous" for row in reals)
     return {
         "needsExecutionTool": False,
         "canHandleVariableCommunicationStepSize": True,
-        "canInterpolateInputs": inputs,
+        "canInterpolateInputs": True,  # where there are none, all of them: some tools ask every unit of a system
         "maxOutputDerivativeOrder": 1 if continuous else 0,  # values that are held have none (it would be told as 0)
         "canRunAsynchronuously": False,  # spelled so in the standard
         "canBeInstantiatedOnlyOncePerProcess": False,
         "canNotUseMemoryManagementFunctions": False,
         "canGetAndSetFMUstate": True,
         "canSerializeFMUstate": True,
-        "providesDirectionalDerivative": inputs and outputs,
+        "providesDirectionalDerivative": True,
     }
 
 

@@ -11,7 +11,8 @@ from identification_study import BY_CHANCE, Outcome, judged, summary, told
 
 # Of the kinds that cost least; the study has them all.
 KINDS = (
-    "good", "position_only_1um", "no_slow_speeds", "strokes_only", "clipped", "warms_30", "wrong_time", "wrong_length",
+    "good", "position_only_1um", "no_slow_speeds", "strokes_only", "clipped", "warms_30", "one_way", "wrong_time",
+    "wrong_length",
 )  # fmt: skip
 
 

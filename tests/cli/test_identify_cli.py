@@ -265,7 +265,7 @@ def test_stages_are_merged(calls: dict[str, Any]) -> None:
     assert calls["stage 1"]["hold"] == {"beta": 1.2}
     assert calls["stage 2"]["hold"] == {"beta": 1.2, "W": 0.0}
     assert calls["stage 2"]["records"] == ["sine.csv"]
-    assert found.advice == dynamic(estimates()).advice
+    assert set(dynamic(estimates()).advice) <= set(found.advice)
     assert set(found.correlation.names) == {
         name for name, each in found.estimates.items() if each.status == "estimated"
     }

@@ -224,3 +224,18 @@ def test_a_direction_that_lacks_leaves_friction_and_load_open() -> None:
     found = stribeck.stationary(made(p={**TRUE, "M_0": 3.0}, sides=(1.0,)))
     F_C = found.estimates["F_C"]
     assert F_C.interval[0] < TRUE["F_C"] < F_C.interval[1]
+
+
+@pytest.mark.parametrize(("warm", "noise"), [(0.0, 1e-4), (0.0, 1e-3), (0.05, 1e-4), (0.3, 1e-4), (0.3, 1e-3)])
+def test_friction_that_drifts_between_repeated_speeds_is_told(warm: float, noise: float) -> None:
+    """Viscous friction falls evenly from stroke to stroke; the four fastest speeds are driven once more at the end."""
+    speeds = [*SPEEDS, *SPEEDS[8:]]
+    found = []
+    for k, speed in enumerate(speeds):
+        p = {**TRUE, "sigma_2": TRUE["sigma_2"] * (1 - warm * k / (len(speeds) - 1))}
+        found += [replace(each, begin=2.0 * k) for each in made([speed], p, noise=noise, seed=k)]
+    told = stribeck.stationary(found)
+    assert said(told, "drifts") == (warm > 0)
+    for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2"):
+        each = told.estimates[name]
+        assert abs(each.value - TRUE[name]) < (4 if warm == 0 else 2.5) * each.sigma, name

@@ -23,7 +23,7 @@ from feedsim.identify.parameters import CONSTANT_SPEED, FIXED, FRICTION, NO_EFFE
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Correlation, Dynamic, Estimate, Identification, Plateau, Stationary
-from feedsim.identify.stribeck import stationary
+from feedsim.identify.stribeck import repeats, stationary
 from feedsim.identify.stribeck_identifiability import FEW_SPEEDS, Points
 from feedsim.identify.structure_torque import with_structure
 
@@ -182,6 +182,11 @@ class _Run:
             return None
         self.progress("stage 1: Stribeck curve", 0, 1)
         hold, free = self._held(CONSTANT_SPEED)
+        if not repeats(found):
+            self.advice.append(
+                "no speed comes back later in the records, so that friction that drifts with temperature is not told: "
+                "repeat one of the fastest strokes at the end, or warm the axis up first"
+            )
         try:
             return stationary(found, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
         except InputError as error:

@@ -29,14 +29,16 @@ from feedsim.identify.parameters import (
     torque,
 )
 from feedsim.identify.record import Array
-from feedsim.identify.result import Correlation, Plateau, Stationary, Status
-from feedsim.identify.stribeck_identifiability import Points
+from feedsim.identify.result import NORMAL_95, Correlation, Plateau, Stationary, Status
+from feedsim.identify.stribeck_identifiability import SAME_SPEED, Points
 
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6
 DOUBTFUL = 0.95  # probability of a smaller chi^2 from which on plateaus count as scattering more than their noise
 CLEAR = 0.99  # the same, of the drop that a Stribeck effect, or a shape that is else held, must bring
 HALF = 0.5  # of the sum of squares: what lies below is worth to free a parameter that is held by default
+SAME = 0.02  # relative difference up to which a speed counts as repeated
+CERTAIN, LEAST_DRIFT = 4.0, 2e-3  # standard deviations, and share of the friction, that a drift must have
 SHAPED: Mapping[str, str] = {"beta": "v_s", "v_log": "F_log"}  # held by default -> without which it has no effect
 
 # The fit moves F_C and F_S - F_C >= 0 in place of F_S.
@@ -280,6 +282,8 @@ def _conclude(
     names = tuple(map(outer, found.names))
     turn = inner_to_outer(found.names, names)
     covariance = turn @ problem.marginal(found, reasons, extra) @ turn.T
+    drift, drifts = _drift(plateaus, values, names)
+    covariance = covariance + np.diag(drift)
     matrix = correlation(covariance)
     sigma = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
     told = {outer(name): reason for name, reason in reasons.items()}
@@ -290,6 +294,7 @@ def _conclude(
         estimates[name] = estimate(name, values[name], float(sigma.get(name, nan)), status, reason)
     said = identifiability.warnings(points, found, matrix, names, I_P)
     said += [f"{name} is not estimated but held at {values[name]:.4g}: {reason}" for name, reason in told.items()]
+    said += drifts
     if extra > 0:
         said.append(
             f"plateaus scatter about the curve by {100 * extra:.2g} % of their torque beyond their own noise (friction "
@@ -311,6 +316,46 @@ def _conclude(
         float(np.max(np.abs(away) / curve(values, points.speed))),
         tuple(said),
     )
+
+
+def repeats(plateaus: Sequence[Plateau]) -> list[tuple[int, int]]:
+    """The first and the last plateau of each direction and speed that came back after another speed."""
+    found = []
+    for k, first in enumerate(plateaus):
+        like = [m for m, other in enumerate(plateaus) if abs(other.speed - first.speed) <= SAME * abs(first.speed)]
+        between = (abs(abs(other.speed) - abs(first.speed)) for other in plateaus[k : like[-1]])
+        if like[0] == k and any(away > SAME_SPEED * abs(first.speed) for away in between):
+            found.append((k, like[-1]))
+    return found
+
+
+def _drift(
+    plateaus: Sequence[Plateau], values: Mapping[str, float], names: Sequence[str]
+) -> tuple[Array, tuple[str, ...]]:
+    """(P,) variance of `names` by friction that was another when a speed came back, and a sentence about it."""
+    variance, worst = np.zeros(len(names)), 0.0
+    said: tuple[str, ...] = ()
+    for k, m in repeats(plateaus):
+        first, last = plateaus[k], plateaus[m]
+        n = np.array([first.speed, last.speed])
+        before, after = np.array([first.torque, last.torque]) - torque(values, n)
+        change, friction, size = float(after - before), float(curve(values, n[:1])[0]), abs(first.speed)
+        if abs(change) < max(CERTAIN * float(np.hypot(first.sigma, last.sigma)), LEAST_DRIFT * friction):
+            continue
+        # What each would have to change by to make the difference alone, from the first plateau to the last one of all.
+        reach = {"sigma_2": size, "F_log": float(np.log1p(size / values["v_log"])), "F_C": 1.0, "F_S": 1.0}
+        whole = change * (len(plateaus) - 1) / (m - k)
+        moved = np.array([whole / reach[name] if name in reach else 0.0 for name in names])
+        variance = np.maximum(variance, (moved / NORMAL_95) ** 2)
+        if abs(change) / friction > worst:
+            worst = abs(change) / friction
+            way = "fell" if change * first.speed < 0 else "rose"
+            said = (
+                f"friction at {size:.3g} rad/s {way} by {100 * worst:.2g} % between {first.begin:.4g} s "
+                f"({first.record}) and {last.begin:.4g} s ({last.record}): it drifts, as with temperature; the "
+                "parameters are a mean, and their intervals hold the drift; warm the axis up and record again",
+            )
+    return variance, said
 
 
 def _band(problem: _Problem, found: Fit, reasons: Mapping[str, str], speeds: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,14 @@ import pytest
 from numpy.typing import NDArray
 
 from feedsim.cosim.friction_law import FrictionLaw
+from feedsim.identify import Options, identify
 from feedsim.identify.identifiability import reversals, turnover_rows
 from feedsim.identify.output_error import dynamic
 from feedsim.identify.record import Record
-from feedsim.identify.result import Dynamic, Estimate
+from feedsim.identify.result import NORMAL_95, Dynamic, Estimate
 from feedsim.identify.search import Solution
 from feedsim.identify.torque import RecordTorque
+from identify_records import constant_speeds, noisy
 
 Floats = NDArray[np.float64]
 
@@ -70,6 +73,11 @@ def strokes(interval: float, count: int) -> Floats:
     return angle[: (len(angle) - 1) // FINE * FINE + 1]
 
 
+def asked(log: Record) -> Record:
+    """With the setpoint: steps of 1 um hide where a small sine begins."""
+    return replace(log, setpoint=sines()[::FINE])
+
+
 def fitted(law: FrictionLaw, log: Record, delay: float | None = 0.0) -> Dynamic:
     return dynamic([log], law, J=INERTIA, delay=delay, I_P=I_P, hold={"F_log": 0.0, "sigma_2": 0.006})
 
@@ -117,6 +125,46 @@ def test_rows_of_a_reversal_are_counted(law: FrictionLaw) -> None:
     assert turnover_rows([model], solution) == pytest.approx(
         expected, abs=2
     )  # rows are whole, the start is one of them
+
+
+@pytest.mark.parametrize("step", [1e-6, 3e-7])
+def test_the_intervals_hold_what_steps_of_the_position_and_their_smoothing_do(law: FrictionLaw, step: float) -> None:
+    """Damping and delay of a log of positions alone, which stand for each other in small sines."""
+    found = fitted(law, asked(record(law, sines(), 2e-3, TRUE, step)), None)
+    for name, true in (("sigma_0", 300.0), ("sigma_1", 0.8), ("W", 0.04), ("gamma", 0.35), ("delay", 0.0)):
+        each = found.estimates[name]
+        assert each.status == "undetermined" or abs(each.value - true) < NORMAL_95 * each.sigma, name
+    assert any("steps of the recorded position limit" in text for text in found.warnings)
+
+
+def test_strokes_alone_tell_the_curve_as_their_plateaus_do(law: FrictionLaw) -> None:
+    """The plateaus' curve goes into the fit of the reversals between them."""
+    true = {**TRUE, "F_S": 2.1, "F_log": 0.4, "M_0": 0.0}
+    log = noisy(constant_speeds(true, np.geomspace(10, 10000, 9) / 60e3 / I_P, ringing=0.0, inertia=J), 0.01, 3)
+    found = identify([log], law, Options(axis="Z", I_P=I_P, J=INERTIA))
+    for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2", "sigma_0", "sigma_1", "W", "gamma"):
+        each = found.estimates[name]
+        assert each.status == "estimated", name
+        assert abs(each.value - true[name]) < 3 * each.sigma, name
+    assert found.estimates["F_C"].value == pytest.approx(1.6, rel=0.01)
+    assert abs(found.estimates["delay"].value) < 1e-4
+
+
+def test_sines_alone_offer_no_curve_that_they_leave_open(law: FrictionLaw) -> None:
+    true = {**TRUE, "F_S": 2.1, "F_log": 0.4}
+    found = dynamic([asked(record(law, sines(), 2e-3, true, 3e-7))], law, J=INERTIA, delay=0.0, I_P=I_P)
+    for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2"):
+        assert found.estimates[name].status == "undetermined", name
+    assert any("mm/min, their highest speed: above it is extrapolated" in text for text in found.warnings)
+    assert found.estimates["sigma_0"].value == pytest.approx(300, abs=NORMAL_95 * found.estimates["sigma_0"].sigma)
+
+
+def test_a_torque_rows_ahead_of_its_motion_is_no_delay(law: FrictionLaw) -> None:
+    log = record(law, sines(), 2e-3, TRUE)
+    early = Record("early", log.time, np.roll(log.torque, -2), angle=log.angle)
+    delay = fitted(law, early, None).estimates["delay"]
+    assert (delay.status, delay.value) == ("undetermined", 0.0)
+    assert "no control does" in delay.reason
 
 
 @pytest.mark.parametrize(("count", "told"), [(2, False), (8, True)])

@@ -101,6 +101,22 @@ def _complete(judged: Verdict, free: Collection[str], values: Mapping[str, float
     return Verdict(held, judged.name, judged.reason)
 
 
+def no_delay(models: Sequence[RecordTorque], solution: Solution, free: Collection[str]) -> Verdict | None:
+    """On a delay that the records leave open by more than a row, or that makes the torque earlier than a control can: a
+    command that is held from its instant on leads by half of that, and no row stands for more than its interval."""
+    if "delay" not in free:
+        return None
+    interval = max(model.record.interval for model in models)
+    delay, reach = solution.values["delay"], NORMAL_95 * solution.sigma("delay")
+    if delay + reach < -interval:
+        why = f"the fit makes the torque {-1e3 * delay:.2g} ms earlier than the motion, which no control does"
+    elif reach > interval:
+        why = f"known to +-{1e3 * reach:.2g} ms only (95 %), which is more than a row"
+    else:
+        return None
+    return Verdict({"delay": 0.0}, "delay", f"{why}: give it by --delay")
+
+
 LEAST_EXPLAINED = 0.01  # of the torque's rms: interpolation, ripple and held commands are not modelled to better
 LEAST_ROWS = 5.0  # of the log from a reversal until the bristles have turned over, to tell damping or engaging zone
 LEAST_REVERSALS = 4  # to tell the delay of the torque: at each it could also be the bristles'

@@ -89,12 +89,15 @@ def noise_of(values: Array) -> float:
     return float(np.median(away)) / 0.6745 / sqrt(comb(2 * DIFFERENCES, DIFFERENCES))
 
 
-def quiet(values: Array, interval: float, order: int) -> Array:
+def quiet(values: Array, interval: float, order: int, smoother: float = 1.0) -> Array:
     """Samples (N,) with so much of their noise taken away that their derivative of `order` is usable.
 
     A low-pass run forwards and backwards (no lag), with the highest cut-off at which the acceleration's noise is a
     hundredth of the acceleration. Samples that are that quiet already stay untouched: reversals are sharp, and every
     low-pass rounds them.
+
+    smoother: factor by which the cut-off lies lower than that; above 1 untouched samples pass just below their
+    Nyquist frequency.
     """
     noise, rate = noise_of(values), 1 / interval
     rough = sosfiltfilt(butter(2, ROUGH, fs=rate, output="sos"), values) if rate > 4 * ROUGH else values
@@ -108,14 +111,16 @@ def quiet(values: Array, interval: float, order: int) -> Array:
         return float(noise * (2 * pi * cutoff) ** order * sqrt(2 * cutoff / rate / (2 * order + 1)))
 
     highest = rate / 2
-    if allowed == 0 or acceleration_noise(highest) <= allowed:
+    cutoff = 0.45 * rate
+    if allowed > 0 and acceleration_noise(highest) > allowed:
+        cutoff = min(max(highest * (allowed / acceleration_noise(highest)) ** (1 / (order + 0.5)), LOWEST), cutoff)
+        cutoff /= smoother
+    elif smoother == 1:
         return values
-    cutoff = highest * (allowed / acceleration_noise(highest)) ** (1 / (order + 0.5))
-    cutoff = min(max(cutoff, LOWEST), 0.45 * rate)
     return np.asarray(sosfiltfilt(butter(2, cutoff, fs=rate, output="sos"), values), dtype=np.float64)
 
 
-def motion(record: Record, source: Source | None = None) -> Motion:
+def motion(record: Record, source: Source | None = None, *, smoother: float = 1.0) -> Motion:
     """Motion of a record.
 
     From samples of the speed: the cubic spline through them. From positions: the derivative of the cubic spline
@@ -125,6 +130,7 @@ def motion(record: Record, source: Source | None = None) -> Motion:
 
     Args:
         source: what to make it from; default: as said.
+        smoother: as in :func:`quiet`.
 
     Raises InputError: too few rows, or the record lacks what `source` names.
     """
@@ -136,12 +142,12 @@ def motion(record: Record, source: Source | None = None) -> Motion:
     time = record.time[0] + interval * np.arange(len(record))
     found: dict[Source, tuple[PPoly, float]] = {}
     if record.speed is not None and source != "angle":
-        found["speed"] = CubicSpline(time, quiet(record.speed, interval, 1)), noise_of(record.speed)
+        found["speed"] = CubicSpline(time, quiet(record.speed, interval, 1, smoother)), noise_of(record.speed)
     if record.angle is not None and source != "speed":
         # sqrt(3)/interval: what the derivative of a cubic spline at its knots makes of white noise, within some per
         # cent (sum over its weights 3 (sqrt(3) - 2)^k / interval).
         noise = noise_of(record.angle) * sqrt(3) / interval
-        path = quiet(record.angle - record.angle[0], interval, 2)
+        path = quiet(record.angle - record.angle[0], interval, 2, smoother)
         found["angle"] = CubicSpline(time, path).derivative(), noise
     # 3: the motor's own speed is preferred unless the scale is clearly quieter.
     best = min(found, key=lambda name: (found[name][1] * (1 if name == "speed" else 3), name))

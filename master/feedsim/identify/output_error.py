@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import isfinite, nan
 from typing import TYPE_CHECKING
 
@@ -20,16 +20,26 @@ from feedsim.identify.identifiability import (
     Verdict,
     explained,
     has_sines,
+    no_delay,
     reversals,
     turnover_rows,
     verdict,
 )
 from feedsim.identify.inertia import SLOW
 from feedsim.identify.motion import noise_of
-from feedsim.identify.parameters import FIXED, KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
+from feedsim.identify.parameters import FIXED, KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate, inner
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
-from feedsim.identify.search import Search, Solution, grid, joined, motion_covariance, sliding, spread
+from feedsim.identify.search import (
+    Search,
+    Solution,
+    disagreement,
+    grid,
+    joined,
+    motion_covariance,
+    sliding,
+    spread,
+)
 from feedsim.identify.torque import RecordTorque, deflection, models
 
 if TYPE_CHECKING:
@@ -37,8 +47,8 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, float], None]
 
-# Of the record's RMS torque: what the model itself is not better than (interpolation between the samples, modes of the
-# structure). Without it the quietest move of a record without noise would count for all.
+# Of the record's RMS torque, and of the inertia: what the model itself is not better than (interpolation between the
+# samples, modes of the structure). Without it the quietest move of a record without noise would count for all.
 FLOOR = 1e-3
 STARTS = 3  # of the grid's best that are followed
 FIRST, FINAL = 1e-3, 1e-9  # tolerances of cost and step: to compare starts, and for the result
@@ -59,18 +69,34 @@ REFINEMENTS = (
 # falls to sigma_2 alone. It then bends at a BEND-th of the typical speed.
 FAR_ABOVE, BEND = 10.0, 3.0
 OPEN_RISE = 1.2  # F_S over F_C to begin with, where stage 1 does not tell it
+AT_ODDS = 3.0  # times the deviation by noise that stretches which contradict each other make of it: worth a warning
+WORTH_A_WORD, LEAST_DELAY = 0.01, 2e-5  # of the value, and [s]: deviations that are worth it
 ROUGH = 2.0  # times the deviation by the torque's noise that the motion's makes of it: worth a warning
+CURVE = ("F_C", "F_S", "v_s", "F_log", "sigma_2")  # friction over speed, of which each stands for a missing other
 LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant load to be told apart
 
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """What is known before the fit: start values, which parameters the prior tells, which are held or given."""
+    """What is known before the fit: start values, which parameters the prior tells, which are held or given.
+
+    open: names that are held though the records do not rule out other values -> the variance that the rest (inner
+        names) has about its values then, from the fit with them free.
+    """
+
+    def leave_open(self, names: Collection[str], free: Solution, held: Solution) -> None:
+        """free: the fit with `names`. held: the one without."""
+        self.open[tuple(sorted(names))] = {
+            name: free.sigma(name) ** 2 + (free.fit[name] - held.fit[name]) ** 2
+            for name in held.fit.names
+            if name in free.fit.names and isfinite(free.sigma(name))
+        }
 
     values: dict[str, float]
     prior: Prior
     told: tuple[str, ...]
     held: dict[str, tuple[Status, str]]
+    open: dict[tuple[str, ...], dict[str, float]] = field(default_factory=dict)
 
 
 def dynamic(
@@ -132,7 +158,14 @@ def dynamic(
     tell("final fit", 0.9)
     found = search.solve(found.values, found.states, base, tolerance=FINAL, limit=40)
     found, base = _told(search, found, base, known, held)
-    result = _result(fine, search, found, base, held, I_P, prior)
+    honest = _honest(search, found, known)
+    # The delay first: without it damping is told that both together leave open.
+    while (judged := no_delay(fine, honest.solution, base) or verdict(honest.solution, base, known.told)) is not None:
+        found, base = _without(search, found, base, judged, known, held)
+        honest = _honest(search, found, known)
+    if prior is None and has_sines(fine):
+        held |= _left_with(known, base)
+    result = _result(fine, search, honest, base, held, I_P, prior)
     tell("done", 1.0)
     return result
 
@@ -240,19 +273,26 @@ def _told(
 ) -> tuple[Solution, list[str]]:
     """Without what the data do not tell, one after the other."""
     while (judged := verdict(found, base, known.told)) is not None:
-        found, base = _without(search, found, base, judged, held)
+        found, base = _without(search, found, base, judged, known, held)
     return found, base
 
 
 def _without(
-    search: Search, found: Solution, base: list[str], judged: Verdict, held: dict[str, tuple[Status, str]]
+    search: Search,
+    found: Solution,
+    base: list[str],
+    judged: Verdict,
+    known: _Known,
+    held: dict[str, tuple[Status, str]],
 ) -> tuple[Solution, list[str]]:
     held |= {name: ("undetermined", reason) for name, reason in judged.reasons.items()}
     values = {**found.values, **judged.held}
     left = [name for name in base if name not in judged.held]
     if not left:
         raise InputError(f"stage 2: these records tell no parameter at all; last {judged.name}: {judged.reason}")
-    return search.solve(values, found.states, left, tolerance=FINAL, limit=40), left
+    without = search.solve(values, found.states, left, tolerance=FINAL, limit=40)
+    known.leave_open(judged.held, found, without)
+    return without, left
 
 
 def _refined(
@@ -299,10 +339,12 @@ def _refined(
     if judged is None and gain >= WORTH * len(added) and share >= LEAST_EXPLAINED:
         for name in added:
             held.pop(name, None)
+        known.open.pop(tuple(sorted(added)), None)
         return tried, [*base, *added]
     if judged is not None:
         rest = f"{GOES_WITH} {judged.name}"
         reasons = dict.fromkeys(added, rest) | judged.reasons
+        known.leave_open(added, tried, found)
     else:
         with_it = f"with {' and '.join(added)}" if len(added) > 1 else "with it"
         little = (
@@ -313,25 +355,66 @@ def _refined(
     return found, base
 
 
+def _left_with(known: _Known, base: list[str]) -> dict[str, tuple[Status, str]]:
+    """Friction over speed where sines alone leave a part of it open: that part is in all others, which are taken out of
+    what is told. Their values stay, as together they are what the sines show."""
+    missing = [name for name in CURVE if any(name in names for names in known.open)]
+    if not missing:
+        return {}
+    reason = f"sines alone leave {', '.join(missing)} open, for which it stands; strokes at constant speed tell it"
+    left = [name for name in CURVE if name in base]
+    base[:] = [name for name in base if name not in left]
+    return {name: ("undetermined", reason) for name in left}
+
+
+@dataclass(frozen=True, eq=False)
+class _Honest:
+    """A solution with all in its covariance that the scatter of the torque does not tell.
+
+    torque: its standard deviations by that scatter alone; motion: by errors of the recorded motion; at_odds: factors by
+    which stretches and prior contradict each other; all by inner name.
+    """
+
+    solution: Solution
+    torque: Mapping[str, float]
+    motion: Mapping[str, float]
+    at_odds: Mapping[str, float]
+
+
+def _honest(search: Search, found: Solution, known: _Known) -> _Honest:
+    """Stretches that contradict each other or stage 1; errors of the recorded motion; and what the rest would be with a
+    parameter free that the records leave open, which is held here."""
+    fit = found.fit
+    factor = disagreement(search.models, fit)
+    motion = motion_covariance(search.models, fit, found.values, found.states, search.weights)
+    covariance = np.where(np.isfinite(fit.covariance), fit.covariance * np.outer(factor, factor), fit.covariance)
+    covariance = covariance + motion
+    if "J" in fit.names:
+        covariance[fit.names.index("J"), fit.names.index("J")] += (FLOOR * found.values["J"]) ** 2
+    variance = np.diag(covariance)
+    most = [
+        max(float(v), *(each.get(n, 0.0) for each in known.open.values()), 0.0)
+        for n, v in zip(fit.names, variance, strict=True)
+    ]
+    usable = np.isfinite(variance) & (variance > 0)
+    wider = np.sqrt(np.where(usable, most, 1.0) / np.where(usable, variance, 1.0))
+    covariance = np.where(np.isfinite(covariance), covariance * np.outer(wider, wider), covariance)
+    by_name = [dict(zip(fit.names, map(float, each), strict=True)) for each in (np.sqrt(np.diag(motion)), factor)]
+    return _Honest(replace(found, fit=replace(fit, covariance=covariance)), fit.sigma, *by_name)
+
+
 def _result(
     fine: Sequence[RecordTorque],
     search: Search,
-    found: Solution,
+    honest: _Honest,
     base: list[str],
     held: Mapping[str, tuple[Status, str]],
     I_P: float | None,
     prior: Stationary | None,
 ) -> Dynamic:
     names = tuple(name for name in KINDS if name in base)
-    by_torque = np.sqrt(np.diag(found.covariance(names)))
-    more = motion_covariance(fine, found.fit, found.values, found.states, search.weights)
-    found = replace(found, fit=replace(found.fit, covariance=found.fit.covariance + more))
+    found = honest.solution
     covariance = found.covariance(names)
-    rough = [
-        name
-        for name, sigma, alone in zip(names, np.sqrt(np.diag(covariance)), by_torque, strict=True)
-        if name in PRE_SLIDING and sigma > ROUGH * alone
-    ]
     sigma = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     estimates = {}
     for name in KINDS:
@@ -357,18 +440,50 @@ def _result(
         rms,
         without,
         advice(pieces, estimates, without, deflection(found.values), I_P),
-        (*_doubts(held, prior), *_rough(rough, fine)),
+        (*_doubts(held, prior), *_rough(honest, names, fine), *_at_odds(honest, names), *_speeds(fine, prior, I_P)),
     )
 
 
-def _rough(names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
+def _matters(honest: _Honest, name: str) -> bool:
+    """Whether a parameter's deviation is worth a word."""
+    value = LEAST_DELAY if name == "delay" else WORTH_A_WORD * abs(honest.solution.values[name])
+    return honest.solution.sigma(inner(name)) > value
+
+
+def _rough(honest: _Honest, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
     """A warning where the recorded motion, not the torque, limits what is told."""
-    if not names:
+    told = [name for name in names if name in (*PRE_SLIDING, "delay") and _matters(honest, name)]
+    rough = [name for name in told if np.hypot(1, honest.motion[name] / honest.torque[name]) > ROUGH]
+    if not rough:
         return ()
     sources = sorted({"position" if model.motion.source == "angle" else "speed" for model in fine})
     return (
-        f"noise or steps of the recorded {' and '.join(sources)} limit {', '.join(names)}, more than the torque's; "
-        "smoothing them rounds reversals, which the intervals do not hold",
+        f"noise or steps of the recorded {' and '.join(sources)} limit {', '.join(rough)}, more than the torque's; "
+        "the intervals hold them, and what smoothing them takes off the reversals as far as more smoothing shows it",
+    )
+
+
+def _at_odds(honest: _Honest, names: Sequence[str]) -> tuple[str, ...]:
+    """A warning where parts of the records ask for different values."""
+    odd = [name for name in names if honest.at_odds[inner(name)] > AT_ODDS and _matters(honest, name)]
+    if not odd:
+        return ()
+    return (
+        f"stretches of the records contradict each other, or stage 1, about {', '.join(odd)} by more than noise "
+        "explains: friction that drifts with temperature or depends on the position, a torque that is clipped, or a "
+        "motion that is too coarse; the intervals hold it",
+    )
+
+
+def _speeds(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float | None) -> tuple[str, ...]:
+    """A warning where sines alone tell the friction over speed."""
+    if prior is not None or not has_sines(fine):
+        return ()
+    top = max(float(np.max(np.abs(model.moved(0.0)[1]))) for model in fine)
+    shown = f"{top:.3g} rad/s" if I_P is None else f"{60e3 * top * I_P:.3g} mm/min"
+    return (
+        f"the records of sines tell the friction up to {shown}, their highest speed: above it is extrapolated and not "
+        "to be relied on; strokes at constant speed tell the curve",
     )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from feedsim.identify.averages import resolution
 from feedsim.identify.motion import SHORTEST, Motion, Part, motion, noise_of, parts
 from feedsim.identify.parameters import FRICTION
 from feedsim.identify.record import Array, Record
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 STARTS = ("z", "c")  # state at a record's begin, as shares
 START_PRIOR = {"z": 3**-0.5, "c": 12**-0.5}  # standard deviation of what may lie anywhere within its range
+COARSE = 0.1  # of the noise: steps of samples that are drawn as such; finer ones are white noise
 KEPT = 4  # results of the law kept per record: a difference quotient of another record's start asks for the same again
 
 
@@ -116,15 +118,29 @@ class RecordTorque:
         return self.friction_model(values, z, c) - self.friction_measured(values)
 
     def disturbed(self, rng: np.random.Generator) -> RecordTorque | None:
-        """The same rows of the record with as much noise on the motion again; None where it has none."""
+        """The same rows, had the motion that is taken for true been recorded with the record's noise and in its steps;
+        None where it has neither."""
         source = self.motion.source
         samples = getattr(self.record, source)
-        noise = noise_of(samples)
+        noise, step = noise_of(samples), resolution(samples)
         if noise == 0:
             return None
-        again = replace(self.record, **{source: samples + noise * rng.standard_normal(len(samples))})
+        path = self.motion.speed if source == "speed" else self.motion.speed.antiderivative()
+        true = np.asarray(path(self.motion.time), dtype=np.float64)
+        # Of steps above the noise the steps are drawn: where the axis is slow, their errors hang together in time.
+        seen = true + np.sqrt(max(noise**2 - step**2 / 12, 0.0)) * rng.standard_normal(len(true))
+        if step > COARSE * noise:
+            first = rng.uniform(0, step)
+            seen = np.round((seen + first) / step) * step - first
+        return self._by(motion(replace(self.record, **{source: seen}), source))
+
+    def smoother(self, factor: float) -> RecordTorque:
+        """The same rows with the motion smoothed by a low-pass whose cut-off is lower by the factor."""
+        return self._by(motion(self.record, self.motion.source, smoother=factor))
+
+    def _by(self, other: Motion) -> RecordTorque:
         moved = copy(self)
-        moved.motion = motion(again, source)
+        moved.motion = other
         moved._law, moved._moved = {}, {}
         return moved
 

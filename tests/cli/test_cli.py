@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from feedsim.owned import LOCK
 from feedsim.trace import read_csv
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -184,9 +185,14 @@ def test_signals_leave_no_result(name: str, fmus: Path, tmp_path: Path) -> None:
         "run",
         ROOT / "scenarios" / "xz_circle.yaml",
     ]
-    with subprocess.Popen([*map(str, words), "--out", "out"], cwd=tmp_path, env=environment) as process:
-        while process.poll() is None and not any(scratch.iterdir()):
-            time.sleep(0.01)  # until the archives are unpacked
+    with subprocess.Popen(
+        [*map(str, words), "--out", "out"],
+        cwd=tmp_path,
+        env=environment,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's job in the background ignores it
+    ) as process:
+        while process.poll() is None and not any(path.name != LOCK for path in scratch.glob("*/*")):
+            time.sleep(0.01)  # until archives are being unpacked
         process.send_signal(number)
         assert process.wait(60) == {"SIGTERM": 143, "SIGINT": 130}[name]
     assert not list(scratch.iterdir())

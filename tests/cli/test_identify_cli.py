@@ -23,8 +23,9 @@ from feedsim.identify import Options, identify, stages
 from feedsim.identify.friction_file import Line, friction_text
 from feedsim.identify.read import distinct
 from feedsim.identify.record import Record
-from feedsim.identify.result import Correlation, Estimate
+from feedsim.identify.result import Correlation, Estimate, Plateau
 from feedsim.identify.stages import ORDER, merged_correlation, transitions
+from feedsim.identify.torque import RecordTorque
 from feedsim.scenario import load_machine
 from feedsim.scenario.load import read_friction
 from feedsim.trace import write_csv
@@ -320,12 +321,14 @@ def test_a_given_inertia_is_held_against_the_records(calls: dict[str, Any]) -> N
     assert any("the inertia is given as 0.0328" in text for text in twice.warnings)
 
 
-def test_no_record_counts_twice(calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Plateaus of the record that stage 2 takes are no prior to it."""
+@pytest.mark.parametrize("speeds", [7, 8])
+def test_no_row_counts_twice(calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch, speeds: int) -> None:
+    """Of the record that stage 2 takes, plateaus of a few speeds are no prior to it; of more they are, and stage 2
+    leaves their rows out."""
     own = stationary(estimates())
     shared = replace(
         own,
-        plateaus=tuple(replace(p, record="sine.csv") for p in own.plateaus),
+        plateaus=tuple(replace(p, record="sine.csv") for p in own.plateaus[: 2 * speeds]),
         estimates={**own.estimates, "F_C": replace(own.estimates["F_C"], value=7.0)},
     )
     monkeypatch.setattr(stages, "stationary", lambda *words, **more: shared)
@@ -337,23 +340,31 @@ def test_no_record_counts_twice(calls: dict[str, Any], monkeypatch: pytest.Monke
 
     monkeypatch.setattr(stages, "dynamic", second)
     found = identify(records(), no_law, options())
-    assert calls["stage 2"]["prior"] is None
+    assert (calls["stage 2"]["prior"] is None) == (speeds < 8)
+    if speeds == 8:
+        counted = RecordTorque(records()[1], no_law, without=[Plateau("sine.csv", 0.5, 1.0, 1.0, 1.0, 0.1, 100)])
+        whole, left = records()[1].time[RecordTorque(records()[1], no_law).rows], records()[1].time[counted.rows]
+        assert np.array_equal(left, whole[(whole < 0.5) | (whole > 1.0)])
+        assert len(left) < len(whole)
+        return
     assert found.estimates["F_C"].value == 1.6
     assert found.correlation.names == tuple(name for name in ORDER if name in alone.correlation.names)
 
 
-@pytest.mark.parametrize("record", ["sine.csv", "constant.csv"])
+@pytest.mark.parametrize(
+    ("record", "speeds", "used"), [("sine.csv", 7, False), ("sine.csv", 8, True), ("constant.csv", 7, True)]
+)
 def test_doubts_of_stage_1_count_where_it_is_used(
-    calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch, record: str
+    calls: dict[str, Any], monkeypatch: pytest.MonkeyPatch, record: str, speeds: int, used: bool
 ) -> None:
     own = stationary(estimates())
-    plateaus = tuple(replace(p, record=record) for p in own.plateaus)
+    plateaus = tuple(replace(p, record=record) for p in own.plateaus[: 2 * speeds])
     doubtful = replace(own, plateaus=plateaus, warnings=("3 speeds only",))
     monkeypatch.setattr(stages, "stationary", lambda *words, **more: doubtful)
     alone = replace(dynamic(estimates()), estimates=estimates(), warnings=("gamma: vague",))
     monkeypatch.setattr(stages, "dynamic", lambda *words, **more: alone)
     found = identify(records(), no_law, options())
-    assert found.prior == (record == "constant.csv")
+    assert found.prior == used
     assert ("3 speeds only" in found.warnings) == found.prior
     assert "gamma: vague" in found.warnings
     assert found.stationary is doubtful

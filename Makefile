@@ -156,7 +156,7 @@ test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)
 test-python: fmus $(VENV)/.importers
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=25
 
-# What reads files, with files that are changed at random (ARGS="--seconds 3600 --seed 7").
+# Calls of the units made of bytes, and what reads files with files that are changed at random (ARGS="--seconds 3600 --seed 7").
 fuzz: fmus $(VENV)/.importers ## bytes as calls of the units, changed files into every reader (ARGS="--seconds N --seed S")
 	$(PY) tests/fuzz/units.py $(ARGS)
 	$(PY) tests/fuzz/readers.py $(ARGS)

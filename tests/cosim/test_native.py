@@ -240,7 +240,7 @@ def with_library(folder: Path, tmp_path: Path, content: bytes | None) -> Path:
     for archive in folder.glob("*.fmu"):
         (tmp_path / archive.name).symlink_to(archive.resolve())
     if content is not None:
-        (tmp_path / exchange._LIBRARY).write_bytes(content)
+        (tmp_path / exchange.NAME).write_bytes(content)
     return tmp_path
 
 
@@ -283,11 +283,11 @@ def test_library_that_is_none_is_left_alone(folder: Path, tmp_path: Path, caplog
 
 def test_a_copy_of_a_library_is_not_loaded_again(folder: Path, tmp_path: Path) -> None:
     """Workers get one with each study, and nothing unloads it."""
-    content = (folder / exchange._LIBRARY).read_bytes()
+    content = (folder / exchange.NAME).read_bytes()
     copies = []
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / exchange._LIBRARY).write_bytes(content)
+        (tmp_path / name / exchange.NAME).write_bytes(content)
         copies.append(exchange.library(tmp_path / name))
     assert copies[0] is not None
     assert copies[0] is copies[1]
@@ -300,7 +300,7 @@ def test_stale_library_is_left_alone(folder: Path, tmp_path: Path, caplog: pytes
         '#include <stdlib.h>\nconst char *exchange_interface(void) { return "0: step"; }\n'
         "int exchange_run(void) { abort(); }\n"
     )
-    library = tmp_path / exchange._LIBRARY
+    library = tmp_path / exchange.NAME
     compiler = shlex.split(os.environ.get("CC", "cc"))
     subprocess.run([*compiler, "-shared", "-fPIC", str(source), "-o", str(library)], check=True)
     stale = with_library(folder, tmp_path, None)

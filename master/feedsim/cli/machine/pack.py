@@ -15,7 +15,6 @@ from feedsim.cli.options import Command, Option, given
 from feedsim.cli.terminal import announce_archive, progress_bar
 from feedsim.errors import InputError, OutputError
 from feedsim.owned import TemporaryFolder
-from feedsim.trace.files import written_whole
 
 if TYPE_CHECKING:
     from feedsim.scenario import Machine
@@ -62,6 +61,8 @@ def pack(options: Namespace) -> None:
         )
         with suppress(OSError):  # what it is will be told
             options.out.absolute().parent.mkdir(parents=True, exist_ok=True)
+        from feedsim.trace.files import written_whole
+
         with written_whole(options.out) as file:
             file.write(packed.path.read_bytes())
     where = ", ".join(f"{axis} at {position * 1e3:.9g} mm" for axis, position in pose.items())

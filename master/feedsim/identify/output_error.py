@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import isfinite, nan
 from typing import TYPE_CHECKING
 
@@ -27,29 +27,25 @@ from feedsim.identify.identifiability import (
 )
 from feedsim.identify.inertia import SLOW
 from feedsim.identify.motion import noise_of
-from feedsim.identify.parameters import FIXED, KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate, inner
+from feedsim.identify.parameters import FIXED, KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
 from feedsim.identify.search import (
     Search,
     Solution,
-    disagreement,
     grid,
     joined,
-    motion_covariance,
     sliding,
     spread,
 )
 from feedsim.identify.torque import RecordTorque, deflection, models
+from feedsim.identify.uncertainty import FLOOR, Uncertainty, limits, uncertainty
 
 if TYPE_CHECKING:
     from feedsim.cosim.friction_law import FrictionLaw
 
 Progress = Callable[[str, float], None]
 
-# Of the record's RMS torque, and of the inertia: what the model itself is not better than (interpolation between the
-# samples, modes of the structure). Without it the quietest move of a record without noise would count for all.
-FLOOR = 1e-3
 STARTS = 3  # of the grid's best that are followed
 FIRST, FINAL = 1e-3, 1e-9  # tolerances of cost and step: to compare starts, and for the result
 WORTH = 12.0  # least fall of the sum of squares (of unit variance) per parameter more: significant beyond 99.9 %
@@ -69,9 +65,6 @@ REFINEMENTS = (
 # falls to sigma_2 alone. It then bends at a BEND-th of the typical speed.
 FAR_ABOVE, BEND = 10.0, 3.0
 OPEN_RISE = 1.2  # F_S over F_C to begin with, where stage 1 does not tell it
-AT_ODDS = 3.0  # times the deviation by noise that stretches which contradict each other make of it: worth a warning
-WORTH_A_WORD, LEAST_DELAY = 0.01, 2e-5  # of the value, and [s]: deviations that are worth it
-ROUGH = 2.0  # times the deviation by the torque's noise that the motion's makes of it: worth a warning
 CURVE = ("F_C", "F_S", "v_s", "F_log", "sigma_2")  # friction over speed, of which each stands for a missing other
 LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant load to be told apart
 
@@ -84,6 +77,12 @@ class _Known:
         names) has about its values then, from the fit with them free.
     """
 
+    values: dict[str, float]
+    prior: Prior
+    told: tuple[str, ...]
+    held: dict[str, tuple[Status, str]]
+    open: dict[tuple[str, ...], dict[str, float]] = field(default_factory=dict)
+
     def leave_open(self, names: Collection[str], free: Solution, held: Solution) -> None:
         """free: the fit with `names`. held: the one without."""
         self.open[tuple(sorted(names))] = {
@@ -91,12 +90,6 @@ class _Known:
             for name in held.fit.names
             if name in free.fit.names and isfinite(free.sigma(name))
         }
-
-    values: dict[str, float]
-    prior: Prior
-    told: tuple[str, ...]
-    held: dict[str, tuple[Status, str]]
-    open: dict[tuple[str, ...], dict[str, float]] = field(default_factory=dict)
 
 
 def dynamic(
@@ -158,11 +151,11 @@ def dynamic(
     tell("final fit", 0.9)
     found = search.solve(found.values, found.states, base, tolerance=FINAL, limit=40)
     found, base = _told(search, found, base, known, held)
-    honest = _honest(search, found, known)
+    honest = uncertainty(search, found, known.open.values())
     # The delay first: without it damping is told that both together leave open.
     while (judged := no_delay(fine, honest.solution, base) or verdict(honest.solution, base, known.told)) is not None:
         found, base = _without(search, found, base, judged, known, held)
-        honest = _honest(search, found, known)
+        honest = uncertainty(search, found, known.open.values())
     if prior is None and has_sines(fine):
         held |= _left_with(known, base)
     result = _result(fine, search, honest, base, held, I_P, prior)
@@ -367,46 +360,10 @@ def _left_with(known: _Known, base: list[str]) -> dict[str, tuple[Status, str]]:
     return {name: ("undetermined", reason) for name in left}
 
 
-@dataclass(frozen=True, eq=False)
-class _Honest:
-    """A solution with all in its covariance that the scatter of the torque does not tell.
-
-    torque: its standard deviations by that scatter alone; motion: by errors of the recorded motion; at_odds: factors by
-    which stretches and prior contradict each other; all by inner name.
-    """
-
-    solution: Solution
-    torque: Mapping[str, float]
-    motion: Mapping[str, float]
-    at_odds: Mapping[str, float]
-
-
-def _honest(search: Search, found: Solution, known: _Known) -> _Honest:
-    """Stretches that contradict each other or stage 1; errors of the recorded motion; and what the rest would be with a
-    parameter free that the records leave open, which is held here."""
-    fit = found.fit
-    factor = disagreement(search.models, fit)
-    motion = motion_covariance(search.models, fit, found.values, found.states, search.weights)
-    covariance = np.where(np.isfinite(fit.covariance), fit.covariance * np.outer(factor, factor), fit.covariance)
-    covariance = covariance + motion
-    if "J" in fit.names:
-        covariance[fit.names.index("J"), fit.names.index("J")] += (FLOOR * found.values["J"]) ** 2
-    variance = np.diag(covariance)
-    most = [
-        max(float(v), *(each.get(n, 0.0) for each in known.open.values()), 0.0)
-        for n, v in zip(fit.names, variance, strict=True)
-    ]
-    usable = np.isfinite(variance) & (variance > 0)
-    wider = np.sqrt(np.where(usable, most, 1.0) / np.where(usable, variance, 1.0))
-    covariance = np.where(np.isfinite(covariance), covariance * np.outer(wider, wider), covariance)
-    by_name = [dict(zip(fit.names, map(float, each), strict=True)) for each in (np.sqrt(np.diag(motion)), factor)]
-    return _Honest(replace(found, fit=replace(fit, covariance=covariance)), fit.sigma, *by_name)
-
-
 def _result(
     fine: Sequence[RecordTorque],
     search: Search,
-    honest: _Honest,
+    honest: Uncertainty,
     base: list[str],
     held: Mapping[str, tuple[Status, str]],
     I_P: float | None,
@@ -440,38 +397,7 @@ def _result(
         rms,
         without,
         advice(pieces, estimates, without, deflection(found.values), I_P),
-        (*_doubts(held, prior), *_rough(honest, names, fine), *_at_odds(honest, names), *_speeds(fine, prior, I_P)),
-    )
-
-
-def _matters(honest: _Honest, name: str) -> bool:
-    """Whether a parameter's deviation is worth a word."""
-    value = LEAST_DELAY if name == "delay" else WORTH_A_WORD * abs(honest.solution.values[name])
-    return honest.solution.sigma(inner(name)) > value
-
-
-def _rough(honest: _Honest, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
-    """A warning where the recorded motion, not the torque, limits what is told."""
-    told = [name for name in names if name in (*PRE_SLIDING, "delay") and _matters(honest, name)]
-    rough = [name for name in told if np.hypot(1, honest.motion[name] / honest.torque[name]) > ROUGH]
-    if not rough:
-        return ()
-    sources = sorted({"position" if model.motion.source == "angle" else "speed" for model in fine})
-    return (
-        f"noise or steps of the recorded {' and '.join(sources)} limit {', '.join(rough)}, more than the torque's; "
-        "the intervals hold them, and what smoothing them takes off the reversals as far as more smoothing shows it",
-    )
-
-
-def _at_odds(honest: _Honest, names: Sequence[str]) -> tuple[str, ...]:
-    """A warning where parts of the records ask for different values."""
-    odd = [name for name in names if honest.at_odds[inner(name)] > AT_ODDS and _matters(honest, name)]
-    if not odd:
-        return ()
-    return (
-        f"stretches of the records contradict each other, or stage 1, about {', '.join(odd)} by more than noise "
-        "explains: friction that drifts with temperature or depends on the position, a torque that is clipped, or a "
-        "motion that is too coarse; the intervals hold it",
+        (*_doubts(held, prior), *limits(honest, names, fine), *_speeds(fine, prior, I_P)),
     )
 
 

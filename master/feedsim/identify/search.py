@@ -13,9 +13,6 @@ from feedsim.identify.parameters import EXCESS, inner, inner_to_outer, reversal_
 from feedsim.identify.record import Array
 from feedsim.identify.torque import START_PRIOR, STARTS, RecordTorque
 
-DRAWS = 8  # their mean square is known to within a half, their root to a quarter: an order of magnitude is wanted
-BY_CHANCE = 6.63  # variances that one stretch pulls by chance, 99 % (chi^2): a few stretches that agree tell no more
-SMOOTHER = 1.5  # times lower a cut-off: what it takes off more is about what the first one did
 REACH = {"z": 1.0, "c": 0.5}
 
 
@@ -118,59 +115,6 @@ class Search:
         )
         point, shares = full(found.mapping())
         return Solution(point, shares, found)
-
-
-def motion_covariance(
-    models: Sequence[RecordTorque], fit: Fit, values: dict[str, float], states: Array, weights: Sequence[Array]
-) -> Array:
-    """(P, P) covariance of the fit's parameters by errors of the recorded motion: mean squares, bias included.
-
-    The fit takes the motion for exact and all scatter for the torque's. A position in steps of 1 um is not exact: the
-    law answers to motion that was not there, the same way in every fit of the record, so that the residuals do not show
-    it. The smoothed motion is therefore recorded once more, with the noise and in the steps that its samples have, and
-    the linearised fit tells how far the parameters move with that (parametric bootstrap). What smoothing takes off the
-    reversals, or the samples lack, is not in it: a motion smoothed by as much more tells how far that goes.
-
-    weights: those that the fit was made with.
-    """
-    reach = fit.covariance @ fit.jacobian.T
-    known = np.all(np.isfinite(reach), axis=1)
-    total, smoothed = np.zeros_like(fit.covariance), np.zeros(len(fit.names))
-    first = 0
-    for k, (model, weight) in enumerate(zip(models, weights, strict=True)):
-        rows = slice(first, first + len(model.rows))
-        first = rows.stop
-        z, c = (float(share) for share in states[k])
-        before = model.residual(values, z, c)
-        others = [model.disturbed(np.random.default_rng([k, draw])) for draw in range(DRAWS)]
-        moved = [each.residual(values, z, c) for each in (*others, model.smoother(SMOOTHER)) if each is not None]
-        changes = (np.stack(moved) - before) / weight[model.stretch]
-        shifts = np.where(known, changes @ reach[:, rows].T, 0.0)
-        total += shifts[:-1].T @ shifts[:-1] / DRAWS
-        smoothed += shifts[-1]
-    return np.asarray(total + np.outer(smoothed, smoothed), dtype=np.float64)
-
-
-def disagreement(models: Sequence[RecordTorque], fit: Fit) -> Array:
-    """(P,) factors by which stretches and prior pull parameters more than noise explains; 1 where it may be chance.
-
-    At the optimum the pulls of all stretches and of the prior balance. Where the model is right each is noise, and the
-    sum of their squares is the variance; where they contradict each other, it is larger (sandwich covariance by
-    clusters; H. White, Econometrica 48, 1980).
-    """
-    reach = fit.covariance @ fit.jacobian.T
-    known = np.all(np.isfinite(reach), axis=1)
-    reach = np.where(known[:, None], reach, 0.0)
-    stretches = []
-    first = 0
-    for model in models:
-        stretches.append(first + model.stretch)
-        first += len(model.parts)
-    of = np.concatenate(stretches)
-    pulls = np.stack([reach[:, of == k] @ fit.residuals[of == k] for k in range(first)])
-    squares = np.sum(pulls**2, axis=0) + np.sum(pulls, axis=0) ** 2
-    ratio = squares / np.where(known, np.diag(fit.covariance), 1.0)
-    return np.asarray(np.where(known & (ratio > BY_CHANCE), np.sqrt(ratio), 1.0), dtype=np.float64)
 
 
 def spread(residual: Array) -> float:

@@ -26,6 +26,13 @@ def test_relative_links_exist(document: Path) -> None:
             assert (document.parent / target).exists(), f"{document.name} links to {target}"
 
 
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_prose_has_lines_that_an_editor_shows(document: Path) -> None:
+    """Tables and what programs print have none to break."""
+    prose = re.sub(r"^( *)```.*?^\1```", "", document.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    assert not [line for line in prose.splitlines() if len(line) > 200 and not line.lstrip().startswith("|")]
+
+
 def test_no_document_names_a_registry_of_packages() -> None:
     """What a tool is, its own project says; where one gets it from is everybody's own."""
     hosts = r"pypi\.org|pythonhosted\.|npmjs\.|crates\.io|golang\.org/dl|repo1?\.maven|anaconda\.org"

@@ -159,7 +159,7 @@ test-python: fmus $(VENV)/.importers
 # Calls of the units made of bytes, and what reads files with files that are changed at random (ARGS="--seconds 3600 --seed 7").
 fuzz: fmus $(VENV)/.importers ## bytes as calls of the units, changed files into every reader (ARGS="--seconds N --seed S")
 	$(PY) tests/fuzz/units.py $(ARGS)
-	$(PY) tests/fuzz/readers.py $(ARGS)
+	PYTHONPATH=tests $(PY) -m fuzz.readers $(ARGS)
 
 test-processors: fmus $(VENV)/.dev ## references, physics, identification as other processors round (ARGS=--all: all of them)
 	$(PY) tests/processors/run.py $(ARGS)

@@ -14,7 +14,6 @@ SECONDS = 12  # of each of the four units; the rest of the minute compiles them
 @pytest.mark.parametrize("unit", units.UNITS)
 def test_units_withstand_what_a_fuzzer_makes_up(unit: str, fmus: Path, tmp_path: Path) -> None:
     program = units.build(unit, fmus, tmp_path)
-    (tmp_path / "found").mkdir()
-    outcome = units.fuzz(program, [tmp_path / "found", units.CORPUS / unit], SECONDS, seed=1)
+    outcome = units.fuzz(program, units.kept_inputs(unit, tmp_path), SECONDS, seed=1)
     assert outcome.finding is None, f"{outcome.report}\nthe input: {outcome.finding}"
     assert outcome.calls > 10_000  # of the kept inputs alone

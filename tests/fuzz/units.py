@@ -3,7 +3,8 @@
     python tests/fuzz/units.py [--seconds N] [--seed S] [--unit UNIT ...]
     python tests/fuzz/units.py --unit UNIT FILE ...      these inputs once: to look at a finding
 
-The inputs in corpus/UNIT are run first, then changed ones, for N seconds of all units together. Where there is a clang
+The inputs of corpus/UNIT.zip, which reach what has been reached, and the findings of the past in corpus/UNIT are run
+first, then changed ones, for N seconds of all units together. Where there is a clang
 with libFuzzer it drives, else driver.c does. The exit code is 1 where something was found; the input is kept then.
 """
 
@@ -99,6 +100,15 @@ def build(unit: str, fmus: Path, out: Path) -> Path:
     return program
 
 
+def kept_inputs(unit: str, out: Path) -> list[Path]:
+    """Folders of inputs to begin with; the first one, empty, is for those that are found."""
+    found, reached = out / "found", out / "reached"
+    found.mkdir(exist_ok=True)
+    with zipfile.ZipFile(CORPUS / f"{unit}.zip") as archive:
+        archive.extractall(reached)
+    return [found, reached, CORPUS / unit]
+
+
 def fuzz(program: Path, inputs: Sequence[Path], seconds: float, seed: int) -> Outcome:
     """Run `inputs` (folders; files are run once, and nothing else) and what becomes of them by changes.
 
@@ -152,8 +162,7 @@ def main(words: Sequence[str]) -> int:
     def run(unit: str) -> Outcome:
         out = (options.build / unit).resolve()
         program = build(unit, options.fmus, out)
-        (out / "found").mkdir(exist_ok=True)
-        inputs = [each.resolve() for each in options.inputs] or [out / "found", CORPUS / unit]
+        inputs = [each.resolve() for each in options.inputs] or kept_inputs(unit, out)
         return fuzz(program, inputs, options.seconds * cores / len(units), options.seed)
 
     with ThreadPoolExecutor(cores) as pool:

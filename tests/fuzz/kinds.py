@@ -1,0 +1,222 @@
+"""Kinds of files that feedsim reads, what reads them, and whole ones of each, from which others are made."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from feedsim import cosim, scenario, ssp, trace
+from feedsim.analysis import check as check_evaluation
+from feedsim.cosim.archive import Archive, folders
+from feedsim.cosim.roles import foreign
+from feedsim.errors import FeedsimError
+from feedsim.files.columns import load_columns
+from feedsim.files.tolerances import load_tolerances
+from feedsim.scenario.load import load_machine, read_friction
+from feedsim.scenario.roles import DRIVE
+from feedsim.scenario.structure.load import load_structure
+from feedsim.scenario.study import load_study
+from feedsim.structure.matrices import calculix, market
+from feedsim.structure.modes import read_modes
+from feedsim.structure.poses_file import read_cell, read_grid
+from feedsim.sweep.table import read_table
+from feedsim.trace.response_files import read_response
+from feedsim.trace.series import read_series
+from fuzz.changes import entries, packed
+
+ROOT = Path(__file__).resolve().parents[2]
+MACHINE = ROOT / "scenarios" / "machines" / "test_centre"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How files of a kind are called and read; `whole`: files of it that can be read."""
+
+    suffix: str
+    read: Callable[[Path], object]
+    whole: Sequence[bytes]
+
+
+def _all(recording: trace.Recording) -> None:
+    with suppress(FeedsimError):
+        recording.read(recording.names)
+    for name in recording.names[:3]:
+        recording.read([name])
+
+
+def _open_archive(path: Path) -> None:
+    with Archive(path) as archive:
+        unit = scenario.ForeignUnit.model_construct(
+            fmu=path, inputs=_Names({"x_s": "PosSetpoint", "x_a": "PosActual"}), outputs=_Names({"M_a": "Torque"}),
+            parameters={"Kv": "40 1/s", "Tn": 30},
+        )  # fmt: skip
+        _ = archive.unit_definitions, archive.platforms, archive.version
+        for name in archive.variables:
+            archive.unit_of(name)
+        with suppress(FeedsimError):
+            archive.library()
+        if "x_s" not in archive.variables and "tool.F_X" not in archive.variables:  # not one of ours
+            foreign(DRIVE, "Z", unit, archive)
+
+
+class _Names:
+    """What a mapping says, whatever the model."""
+
+    def __init__(self, names: Mapping[str, str]) -> None:
+        self._names = names
+
+    def model_dump(self, **_: object) -> Mapping[str, str]:
+        return self._names
+
+
+def _judge(path: Path) -> None:
+    with ssp.opened(path) as found:
+        check_evaluation(found.scenario, found.program)
+        cosim.check(found.scenario, found.program, fmus=found.fmus)
+
+
+def _poses(path: Path) -> None:
+    read_grid(path, ("X", "spindle_2", "W"))
+    read_cell(path, ("X", "spindle_2", "W"), {"X": 0.8, "spindle_2": 0.3, "W": 0.1})
+
+
+def kinds(folder: Path, fmus: Path) -> dict[str, Kind]:
+    """Every kind of file that feedsim reads, with files that can be read; made in `folder`."""
+    from fmu.pose_file import Grid
+
+    rows = "\n".join(f"{0.001 * i:.3f},{np.sin(0.1 * i):.6g},{i % 7}" for i in range(60))
+    commas = "\n".join(f"{i};{0.5 * i:.3f};{np.cos(i):.5f}".replace(".", ",") for i in range(40))
+    traces = [
+        f"time [s],Z.x_a [mm],Z.M_a [N.m]\n{rows}\n".encode(),
+        f"t (ms);x (mm);i_q (A)\n{commas}\n".encode("utf-16"),
+    ]
+    response = "\n".join(f"{1.5**i:.4g},{1 / (1 + i):.5g},{-10 * i},0.99" for i in range(20))
+    responses = [f"frequency [Hz],Z magnitude [m/N],Z phase [deg],Z coherence [1]\n{response}\n".encode()]
+    machines = ROOT / "scenarios" / "machines"
+    structure = (machines / "one_axis" / "structure.yaml").read_bytes()
+    emps = (machines / "emps" / "machine.yaml").read_text(encoding="utf-8")
+    machine = re.sub(r"(?m)^modes: .*$", f"modes: {machines / 'emps' / 'modes.csv'}", emps).encode()
+    columns = (machines / "emps" / "columns.yaml").read_bytes()
+    friction = (b"F_C: 1.8 N.m\nF_S: 2.3 N.m\nv_s: 2 rad/s\nsigma_0: 300 N.m/rad\nsigma_1: 0.3 N.m.s/rad\n"
+                b"sigma_2: 0.01 N.m.s/rad\nW: 0 rad\n")  # fmt: skip
+    tolerances = (b'name: Z move\nvalue: 1e-6\ntime: 125 us\nvariables:\n  "*.x_a": 2 nm\n  "*.M_a": {value: 1e-3 N.m, '
+                  b'time: 1 ms}\n  "*.limited": {hold: true, time: &a 1 ms}\n  "Y.*": ignore\n')  # fmt: skip
+    z = (ROOT / "scenarios" / "z_positioning.yaml").read_text(encoding="utf-8")
+    plan = re.sub(r"(?m)^machine: .*$", f"machine: {MACHINE}", z).encode()
+    (folder / "plan.yaml").write_bytes(plan + b"\nset: {machine.structure: null}\n")
+    study = (
+        f"name: s\nscenario: {folder / 'plan.yaml'}\nsampling: {{method: latin_hypercube, runs: 5, seed: 1}}\n"
+        "parameters:\n  jerk: {key: machine.path.jerk, from: 50 m/s^3, to: 400 m/s^3}\n"
+        "  W: {key: machine.axes.*.friction.W, values: [0 rad, 1 rad]}\nfigures: [Z.overshoot]\n"
+    ).encode()
+    table = "run,seed,Z.F_C [N.m],status,seconds\n" + "\n".join(f"{i},1,{0.1 * i},ok,0.5" for i in range(9))
+    matrix = "%%MatrixMarket matrix coordinate real symmetric\n4 4 5\n1 1 2.0\n2 1 -1\n2 2 2\n3 3 1\n4 4 1e3\n"
+    dense = "%%MatrixMarket matrix array real general\n2 2\n1\n0\n0\n1\n"
+    nodes = "*NODE, NSET=all\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n"
+    mesh = f"{nodes}*ELEMENT, TYPE=C3D4, ELSET=bed\n1, 1, 2, 3, 4\n"
+    return {
+        "csv": Kind(".csv", lambda path: _all(trace.read_recording(path)), traces),
+        "trace": Kind(".csv", trace.read_csv, traces[:1]),
+        "series": Kind(".csv", read_series, traces),
+        "setpoints": Kind(".csv", lambda path: trace.read_setpoints(path, {"Z": ("Z.x_a", None)}), traces[:1]),
+        "response": Kind(".csv", read_response, responses),
+        "mat": Kind(".mat", lambda path: _all(trace.read_recording(path)), _mat()),
+        "capture": Kind(".json", lambda path: _all(trace.read_recording(path)), [_capture()]),
+        "uff": Kind(".uff", read_response, _uff(folder)),
+        "scenario": Kind(".yaml", scenario.load, [plan]),
+        "machine": Kind(".yaml", load_machine, [machine]),
+        "structure": Kind(".yaml", load_structure, [structure]),
+        "study": Kind(".yaml", load_study, [study]),
+        "friction": Kind(".yaml", read_friction, [friction]),
+        "columns": Kind(".yaml", load_columns, [columns]),
+        "tolerances": Kind(".yaml", load_tolerances, [tolerances]),
+        "modes": Kind(".csv", lambda path: read_modes(path, ("X", "Y", "Z")), [(MACHINE / "modes.csv").read_bytes()]),
+        "poses": Kind(".bin", _poses, [Grid().content()]),
+        "matrix": Kind(".mtx", lambda path: market.read_matrix(path, "mass"), [matrix.encode(), dense.encode()]),
+        "mesh": Kind(".inp", lambda path: list(calculix._cards(path)), [mesh.encode()]),
+        "table": Kind(".csv", read_table, [table.encode()]),
+        "fmu": Kind(".fmu", _open_archive, _fmus(fmus)),
+        "ssp": Kind(".ssp", _judge, [_ssp(folder, fmus)]),
+    }
+
+
+def _mat() -> list[bytes]:
+    from scipy.io import savemat
+
+    content = {"t": np.arange(20) / 500, "n": np.arange(20, dtype=np.int16), "k": 2.5, "q": np.eye(3)}
+    more = {
+        "s": {"a": np.ones(4), "b": {"c": 1.0}},
+        "text": "x",
+        "c": np.array([1, "y"], dtype=object),
+        "z": np.ones(3) * 1j,
+    }
+    found = []
+    for form, compressed in (("4", False), ("5", False), ("5", True)):
+        buffer = io.BytesIO()
+        savemat(buffer, content if form == "4" else content | more, format=form, do_compression=compressed)
+        found.append(buffer.getvalue())
+    return found
+
+
+def _capture() -> bytes:
+    signals = ("CYCLE", "DES_POS|2", "ENC_POS|2", "TORQUE|2", "POWER|2", "CMD_SPEED|2")
+    listed = [{"Name": name, "Type": "DOUBLE", "Axis": "Y1", "Address": name} for name in signals]
+    rows = [[100 + i, *(float(np.sin(0.2 * i + k)) for k in range(5))] for i in range(30)]
+    event = {"HFBlockEvent": {"GCode": "G1 Y10", "HFProbeCounter": 110}}
+    return json.dumps(
+        {"Header": {"CycleTimeMs": 2, "SignalListHFData": listed}, "Payload": [{"HFData": rows}, event]}
+    ).encode()
+
+
+def _uff(folder: Path) -> list[bytes]:
+    import pyuff
+
+    found = []
+    for binary in (0, 1):
+        file = folder / f"seed{binary}.uff"
+        x = np.arange(1.0, 9.0)
+        pyuff.UFF(str(file)).write_sets(
+            [{
+                "type": 58, "func_type": 4, "rsp_node": 12, "rsp_dir": 3, "ref_node": 7, "ref_dir": -1,
+                "data": (1 + 1j) / x, "x": x, "binary": binary, "id1": "NONE",
+                "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
+                "abscissa_spacing": binary, "abscissa_min": 1.0, "abscissa_inc": 1.0, "abscissa_spec_data_type": 18,
+                "ordinate_spec_data_type": 8, "ordinate_axis_units_lab": "m", "orddenom_spec_data_type": 13,
+                "orddenom_axis_units_lab": "N",
+            }], mode="add",
+        )  # fmt: skip
+        found.append(file.read_bytes())
+    return found
+
+
+def _fmus(fmus: Path) -> list[bytes]:
+    """A drive of another maker without a program in it, and shipped archives without theirs."""
+    from foreign import acme
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = acme.archive(Path(folder) / "acme.fmu", "drive", b"none", acme.DRIVE)
+        found = [path.read_bytes()]
+    return [*found, *(_without_programs((fmus / f"{name}.fmu").read_bytes()) for name in ("controller", "plant"))]
+
+
+def _without_programs(content: bytes) -> bytes:
+    kept = {
+        name: data for name, data in entries(content).items() if name.startswith(("modelDescription", "resources/"))
+    }
+    return packed({**kept, **{name: b"" for name in entries(content) if name.startswith(f"binaries/{folders()[0]}/")}})
+
+
+def _ssp(folder: Path, fmus: Path) -> bytes:
+    from ssp_helpers import export_short
+
+    (folder / "ssp").mkdir()
+    content = entries(export_short(folder / "ssp", fmus).read_bytes())
+    return packed({name: _without_programs(data) if name.endswith(".fmu") else data for name, data in content.items()})

@@ -189,7 +189,6 @@ def test_signals_leave_no_result(name: str, fmus: Path, tmp_path: Path) -> None:
         [*map(str, words), "--out", "out"],
         cwd=tmp_path,
         env=environment,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's job in the background ignores it
     ) as process:
         while process.poll() is None and not any(path.name != LOCK for path in scratch.glob("*/*")):
             time.sleep(0.01)  # until archives are being unpacked

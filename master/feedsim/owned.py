@@ -85,7 +85,8 @@ def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
             lock = _Lock(directory / name)
         except OSError as error:
             attempts += 1
-            if isinstance(error, FileNotFoundError) and attempts < _ATTEMPTS:  # removed by another just now
+            between = isinstance(error, (FileNotFoundError, FileExistsError))  # made or removed by another just now
+            if between and attempts < _ATTEMPTS:
                 continue
             raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error
         held = [lock]

@@ -93,11 +93,11 @@ $(VARIABLES): $(VENV)/.run $(COMPILER) $(PACKAGER) src/fmi2/table.h $(foreach un
 
 # The native cycle loop lies beside the archives.
 EXCHANGE := exchange$(if $(filter Windows_NT,$(OS)),.dll,$(if $(filter Darwin,$(shell uname -s)),.dylib,.so))
-EXCHANGE_SOURCES := $(wildcard src/exchange/*.[ch] src/exchange/*.py) $(addprefix src/packager/feedsim_packager/,checkout.py compile.py toolchain.py)
+EXCHANGE_SOURCES := $(wildcard src/exchange/*.[ch]) $(addprefix src/packager/feedsim_packager/,exchange.py checkout.py compile.py toolchain.py)
 
 fmus: fmus/$(EXCHANGE)
 fmus/$(EXCHANGE): $(VENV)/.run $(COMPILER) $(EXCHANGE_SOURCES)
-	$(PY) src/exchange/build.py --out $(@D)
+	$(PY) -m feedsim_packager exchange --out $(@D)
 
 fmus/friction.fmu: $(wildcard src/friction_fmu/*.*)
 fmus/controller.fmu: $(wildcard src/controller_fmu/*.*)
@@ -144,7 +144,7 @@ $(SANITIZED)/%.fmu: fmus/%.fmu
 	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) -m feedsim_packager build $* --out $@ --build-dir $(SANITIZED)
 
 $(SANITIZED)/$(EXCHANGE): fmus/$(EXCHANGE)
-	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) src/exchange/build.py --out $(@D)
+	FEEDSIM_CFLAGS="-fsanitize=address,undefined -fno-sanitize-recover=all -g" $(PY) -m feedsim_packager exchange --out $(@D)
 
 test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)/%.fmu) $(SANITIZED)/$(EXCHANGE)) ## a scenario on units with sanitisers
 	@if [ -z "$(ASAN_RUNTIME)" ]; then echo "the compiler has no AddressSanitizer runtime: scenario under sanitisers left out"; else \

@@ -57,12 +57,13 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if _up_to_date([folder / f"{unit}.fmu" for unit in UNITS]):
         return folder
 
-    from feedsim_packager import build, toolchain
+    from feedsim_packager import build, exchange, toolchain
 
     folder = tmp_path_factory.mktemp("fmus")
     compiler = toolchain.find_compiler()
     for unit in UNITS:
         build.build(build.load(build.unit_directory(unit), compiler), folder / f"{unit}.fmu", compiler)
+    exchange.build(folder, compiler)
     return folder
 
 

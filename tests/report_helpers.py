@@ -33,6 +33,7 @@ class FakeRun:
     pose: PoseUse | None = None
     warnings: tuple[str, ...] = ()
     log: Trace | None = None
+    native: bool = True
 
 
 def run_of(described: Scenario, **changes: Any) -> FakeRun:

@@ -25,6 +25,7 @@ ORDER = [
     "structure",
     "nc",
     "scenario",
+    "examples",
     "motions",
     "trace",
     "files",
@@ -34,6 +35,7 @@ ORDER = [
     "findings",
     "owned",
     "errors",
+    "installation",
 ]
 SOLE_USERS = {
     "fmpy": {"cosim/archive.py", "cosim/unit.py"},

@@ -17,6 +17,7 @@ from typing import Any
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.installation import mend
 
 NAMES = ("Coulomb", "Stribeck")  # of persons: they stay as they are within a sentence
 FILE = Path(__file__).with_name("variables.json")
@@ -70,5 +71,5 @@ def _read() -> dict[str, dict[str, dict[str, Any]]]:
     try:
         content: dict[str, dict[str, dict[str, Any]]] = json.loads(FILE.read_bytes())
     except FileNotFoundError:
-        raise InputError(f"{FILE} is missing; `make fmus` makes it from the tables of the units") from None
+        raise InputError(f"{FILE} is missing; {mend('it from the tables of the units')}") from None
     return content

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import shlex
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -27,7 +25,10 @@ from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Port
 from feedsim.errors import InputError, SimulationError
+from feedsim.findings import severity
 from feedsim.nc.excitation import multisine
+from feedsim_packager import toolchain
+from feedsim_packager.exchange import build as build_loop
 from scenario_helpers import default_machine
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -48,8 +49,7 @@ def folder(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("native")
     for archive in fmus.glob("*.fmu"):
         (folder / archive.name).symlink_to(archive.resolve())
-    build = [sys.executable, str(ROOT / "src" / "exchange" / "build.py"), "--out", str(folder)]
-    subprocess.run(build, check=True, capture_output=True)
+    build_loop(folder, toolchain.find_compiler())
     return folder
 
 
@@ -182,7 +182,7 @@ def test_refused_input_is_told_alike_with_the_time(unit: str, variable: str, aft
         with System(loaded.machine, folder) as system:
             cycle = Cycle(system, SCHEMES["extrapolated"], 125e-6, 2)
             send = set_real(Port(system.units[unit], [variable]), values)
-            loop = Loop(cycle, [] if after else send, send if after else [], exchange.chosen(native, folder))
+            loop = Loop(cycle, [] if after else send, send if after else [], exchange.chosen(native, folder)[0])
             system.initialise(program, stop=1.0)
             loop.run(1000)
 
@@ -262,23 +262,33 @@ def test_archives_from_elsewhere_use_the_built_loop(folder: Path, tmp_path: Path
         assert cosim.run(loaded, fmus=with_library(folder, tmp_path, None)).native
 
 
-def test_without_a_library_python_serves(folder: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def told_of_loop(run: Run) -> list[str]:
+    return [each for each in run.warnings if "cycle loop ran in Python" in each]
+
+
+def test_without_a_library_python_serves_and_says_so(folder: Path, tmp_path: Path) -> None:
     bare = with_library(folder, tmp_path, None)
-    with caplog.at_level(logging.DEBUG, logger="feedsim"):
-        assert not run_short(bare).native
-        assert not run_short(bare).native
-    assert [record.levelno for record in caplog.records] == [logging.DEBUG], "told once"
-    with pytest.raises(InputError, match="no native cycle loop that fits this version; `make fmus` builds it"):
+    run = run_short(bare)
+    assert not run.native
+    (told,) = told_of_loop(run)
+    assert severity(told) == "note"
+    assert f"slower than the native one, same bits: {exchange.NAME}: no such file beside the archives" in told
+    assert str(bare) not in told
+    assert not told_of_loop(run_short(bare, native=False)), "Python was asked for"
+    with pytest.raises(InputError, match=r"no native cycle loop that fits this version: .* `make fmus` builds"):
         run_short(bare, native=True)
-    assert run_short(folder).native, "where there is one it works, unasked"
+    unasked = run_short(folder)
+    assert unasked.native
+    assert not told_of_loop(unasked)
 
 
-def test_library_that_is_none_is_left_alone(folder: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_library_that_is_none_is_left_alone(folder: Path, tmp_path: Path) -> None:
     broken = with_library(folder, tmp_path, b"no library at all")
-    assert not run_short(broken).native
-    (record,) = caplog.records
-    assert record.levelno == logging.WARNING
-    assert "cannot be used" in record.getMessage()
+    run = run_short(broken)
+    assert not run.native
+    (told,) = told_of_loop(run)
+    assert "cannot be used" in told
+    assert str(broken) not in told
 
 
 def test_a_copy_of_a_library_is_not_loaded_again(folder: Path, tmp_path: Path) -> None:
@@ -289,11 +299,11 @@ def test_a_copy_of_a_library_is_not_loaded_again(folder: Path, tmp_path: Path) -
         (tmp_path / name).mkdir()
         (tmp_path / name / exchange.NAME).write_bytes(content)
         copies.append(exchange.library(tmp_path / name))
-    assert copies[0] is not None
+    assert not isinstance(copies[0], str)
     assert copies[0] is copies[1]
 
 
-def test_stale_library_is_left_alone(folder: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_stale_library_is_left_alone(folder: Path, tmp_path: Path) -> None:
     """Built from sources with another interface; its loop would do something else."""
     source = tmp_path / "stale.c"
     source.write_text(
@@ -304,7 +314,7 @@ def test_stale_library_is_left_alone(folder: Path, tmp_path: Path, caplog: pytes
     compiler = shlex.split(os.environ.get("CC", "cc"))
     subprocess.run([*compiler, "-shared", "-fPIC", str(source), "-o", str(library)], check=True)
     stale = with_library(folder, tmp_path, None)
-    assert not run_short(stale).native
-    (record,) = caplog.records
-    assert record.levelno == logging.WARNING
-    assert "built from other sources (its interface is '0: step'" in record.getMessage()
+    run = run_short(stale)
+    assert not run.native
+    (told,) = told_of_loop(run)
+    assert "built from other sources (its interface is '0: step'" in told

@@ -19,7 +19,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from feedsim.cli import compare, compensate, files, frf, identify, machine, run, sweep
+from feedsim.cli import compare, compensate, example, files, frf, identify, machine, run, sweep
 from feedsim.cli.terminal import prepare_streams
 from feedsim.owned import remove_orphans
 
@@ -29,6 +29,7 @@ EPILOG = """exit codes:
   feedsim compare: 0 same    1 different    2 unusable
 
 examples:
+  feedsim example xz_circle && feedsim run xz_circle.yaml
   feedsim run scenarios/z_positioning.yaml --out results/z
   feedsim run scenarios/xz_circle.yaml --set "machine.axes.*.friction.W=0 rad" --out results/lugre
   feedsim validate scenarios/xz_circle.yaml
@@ -46,8 +47,8 @@ examples:
 
 
 COMMANDS = (
-    run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, compensate.COMMAND, run.SSP, sweep.COMMAND,
-    compare.COMMAND, files.SCHEMA, files.CONVERT,
+    example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, compensate.COMMAND, run.SSP,
+    sweep.COMMAND, compare.COMMAND, files.SCHEMA, files.CONVERT,
 )  # fmt: skip
 
 

@@ -87,7 +87,7 @@ def folder(text: str) -> Path:
     return Path(text)
 
 
-FMUS = Option("--fmus", "DIR", "folder of the archives (default: $FEEDSIM_FMUS, else fmus/)", type=Path)
+FMUS = Option("--fmus", "DIR", "folder of the archives (default: $FEEDSIM_FMUS, else those that come along)", type=Path)
 QUIET = Option("--quiet", "", "no progress bar and no summary")
 
 

@@ -18,6 +18,7 @@ from feedsim.cosim import exchange
 from feedsim.cosim.archive import Archive, folders
 from feedsim.cosim.roles import archive_path
 from feedsim.errors import InputError
+from feedsim.installation import shipped
 from feedsim.scenario import Machine
 from feedsim.scenario.roles import DRIVE, FRICTION
 
@@ -26,9 +27,9 @@ Programs = Mapping[str, str]  # path inside the archive -> SHA-256, of all files
 
 
 def fmus_directory() -> Path:
-    """Folder of the built archives: FEEDSIM_FMUS, else `fmus/` of the checkout this package runs from."""
+    """Folder of the archives: FEEDSIM_FMUS, else `fmus/` of the checkout, else those inside the installed package."""
     named = os.environ.get("FEEDSIM_FMUS")
-    return Path(named) if named else Path(__file__).resolve().parents[3] / "fmus"
+    return Path(named) if named else shipped("fmus")
 
 
 def is_shipped(archive: Archive) -> bool:

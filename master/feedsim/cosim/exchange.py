@@ -1,14 +1,13 @@
 """The native cycle loop (``src/exchange``): finding its library, and operations executed by it.
 
 It is built into the folder of the archives and is no part of any result: without it, or with one that was built from
-other sources than this package, the loop runs in Python and gives the same bits.
+other sources than this package, the loop runs in Python, which takes longer, says so, and gives the same bits.
 """
 
 from __future__ import annotations
 
 import ctypes
 import hashlib
-import logging
 import sys
 from collections.abc import Sequence
 from dataclasses import fields
@@ -21,6 +20,8 @@ from numpy.typing import NDArray
 
 from feedsim.cosim.operations import Bond, Executor, Operation
 from feedsim.errors import InputError
+from feedsim.findings import Note
+from feedsim.installation import mend
 
 # src/exchange/exchange.h, word for word.
 VERSION = 3
@@ -44,8 +45,6 @@ _TYPES = {"int32_t": np.int32, "int64_t": np.int64, "double": np.float64, "funct
 _OPERATION = np.dtype([(name, _TYPES[kind]) for kind, name in FIELDS], align=True)
 NAME = {"win32": "exchange.dll", "darwin": "exchange.dylib"}.get(sys.platform, "exchange.so")
 
-_log = logging.getLogger(__name__)
-
 Native = ctypes.CDLL  # the loaded library
 
 
@@ -58,15 +57,9 @@ _loaded: dict[bytes, Native] = {}
 
 
 @cache
-def library(folder: Path) -> Native | None:
-    """The native loop beside the archives in `folder`; None where there is none that fits this package.
-
-    Told once per folder: at debug level that there is none, as a warning that there is one that does not fit.
-    """
+def library(folder: Path) -> Native | str:
+    """The native loop beside the archives in `folder`, or why none there can be used, without the folder's name."""
     path = folder.resolve() / NAME
-    if not path.is_file():
-        _log.debug("%s: no such file; the cycle loop runs in Python, `make fmus` builds the native one", path)
-        return None
     try:
         digest = hashlib.sha256(path.read_bytes()).digest()
         if (known := _loaded.get(digest)) is not None:
@@ -75,15 +68,12 @@ def library(folder: Path) -> Native | None:
         interface = loaded.exchange_interface
         interface.restype = ctypes.c_char_p
         found = (interface() or b"").decode(errors="replace")
+    except FileNotFoundError:
+        return f"{NAME}: no such file beside the archives"
     except (OSError, AttributeError) as error:
-        _log.warning("%s: cannot be used: %s; the cycle loop runs in Python, `make fmus` builds it anew", path, error)
-        return None
+        return f"{NAME}: cannot be used: {str(error).replace(str(path), NAME)}"
     if found != INTERFACE:
-        _log.warning(
-            "%s: built from other sources (its interface is %r, wanted is %r); the cycle loop runs in Python, `make "
-            "fmus` builds it anew", path, found, INTERFACE,
-        )  # fmt: skip
-        return None
+        return f"{NAME}: built from other sources (its interface is {found!r}, wanted is {INTERFACE!r})"
     run = loaded.exchange_run
     run.restype = ctypes.c_int
     run.argtypes = (
@@ -93,19 +83,25 @@ def library(folder: Path) -> Native | None:
     return loaded
 
 
-def chosen(wanted: bool | None, *folders: Path) -> Native | None:
-    """The native loop in the first of `folders` that has one. `wanted` None: where there is one that fits; False: not
-    wanted.
+def chosen(wanted: bool | None, *folders: Path) -> tuple[Native | None, tuple[Note, ...]]:
+    """The native loop in the first of `folders` that has one; without one, unless it is not wanted, what that costs.
+
+    wanted: None: where there is one that fits; False: Python is to work.
 
     Raises:
         InputError: it is wanted, and there is none that fits.
     """
-    found = None if wanted is False else next(filter(None, map(library, dict.fromkeys(folders))), None)
-    if wanted and found is None:
-        raise InputError(
-            f"{', '.join(map(str, folders))}: no native cycle loop that fits this version; `make fmus` builds it"
-        )
-    return found
+    if wanted is False:
+        return None, ()
+    reasons = []
+    for found in map(library, dict.fromkeys(folders)):
+        if not isinstance(found, str):
+            return found, ()
+        reasons.append(found)
+    why = f"{'; '.join(dict.fromkeys(reasons))}; {mend('the native loop')}"
+    if wanted:
+        raise InputError(f"{', '.join(map(str, folders))}: no native cycle loop that fits this version: {why}")
+    return None, (Note(f"the cycle loop ran in Python, some 30 times slower than the native one, same bits: {why}"),)
 
 
 class Exchange(Executor):

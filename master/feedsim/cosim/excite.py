@@ -123,7 +123,7 @@ def measure(
     kept = first * ratio + settle * rows
     total = kept + periods * rows
     fmus = fmus or fmus_directory()
-    library = chosen(native, fmus)
+    library, told = chosen(native, fmus)
     with System(machine, fmus, friction=friction) as system:
         cycle = Cycle(system, SCHEMES["extrapolated"], cycles.T_c, 1)
         record = _Record(system, periods * rows, When(first=kept))
@@ -151,7 +151,7 @@ def measure(
             unsettled=unsettled,
             wall_time=wall_time,
             units=system.archives,
-            warnings=(*system.warnings, *_doubts(trace, axis, friction, offset_speed, unsettled)),
+            warnings=(*system.warnings, *_doubts(trace, axis, friction, offset_speed, unsettled), *told),
         )
 
 

@@ -16,6 +16,7 @@ from feedsim.cosim.archive import Archive
 from feedsim.cosim.binaries import fmus_directory
 from feedsim.cosim.unit import Floats, Unit
 from feedsim.errors import InputError, SimulationError
+from feedsim.installation import mend
 
 RESPONSE = "friction_response"  # src/friction_fmu/response.h
 FREE_AXIS = "friction_free_axis"  # src/friction_fmu/free_axis.h
@@ -59,8 +60,8 @@ class FrictionLaw:
             for name in (RESPONSE, FREE_AXIS):
                 if not hasattr(library, name):
                     raise InputError(
-                        f"{self._archive.path}: its library has no function {name}; it was built from older sources, "
-                        "`make fmus` builds it anew"
+                        f"{self._archive.path}: its library has no function {name}; it was built from older sources: "
+                        f"{mend('it')}"
                     )
             self._response = _RESPONSE((RESPONSE, library))
             self._free_axis = _FREE_AXIS((FREE_AXIS, library))

@@ -97,7 +97,7 @@ def run(
     every = round(scenario.recording.interval / cycles.T_c)
     total = (len(program.time) - 1) * ratio
     fmus = fmus or fmus_directory()
-    library = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
+    library, told = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
     with System(scenario.machine, fmus) as system:
         cycle = Cycle(system, SCHEMES[scenario.coupling.scheme], cycles.T_c, scenario.coupling.substeps)
         recording = Recording(cycle, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
@@ -137,6 +137,7 @@ def run(
                 *trust.foreseen(scenario, modes, program, loops),
                 *pose.warnings,
                 *trust.found(scenario, cycle, recording, loops),
+                *told,
             ),
             fine=fine,
             log=None

@@ -21,7 +21,9 @@ from pathlib import Path
 from typing import Any
 
 from feedsim import analysis, cosim, units
-from feedsim.errors import FeedsimError, InputError
+from feedsim.cosim.exchange import NAME as NATIVE
+from feedsim.cosim.unpacked import check_there
+from feedsim.errors import FeedsimError
 from feedsim.findings import WRONG, ranked, severity
 from feedsim.nc import Program, plan
 from feedsim.owned import PREFIX, TemporaryFolder
@@ -34,7 +36,6 @@ from feedsim.sweep.provenance import UNITS, read
 _TABLE_UNITS = ("m", "s")
 # Of an axis, what its motion does not depend on.
 _NO_MOTION = {"M_0", "friction", "drive"}
-_NATIVE = {"win32": "exchange.dll", "darwin": "exchange.dylib"}.get(sys.platform, "exchange.so")
 
 
 @dataclass(frozen=True)
@@ -71,11 +72,8 @@ class Bundle:
         fmus = fmus or cosim.fmus_directory()
         archives = {f"{unit}.fmu": fmus / f"{unit}.fmu" for unit in UNITS}
         for file in archives.values():
-            if not file.is_file():
-                raise InputError(
-                    f"{file}: no such file; `make fmus` builds the archives, FEEDSIM_FMUS names their folder"
-                )
-        native = fmus / _NATIVE
+            check_there(file)
+        native = fmus / NATIVE
         return cls(
             base=base.to_json(),
             files={str(file): read(file) for file in sorted(set(files))},
@@ -99,7 +97,7 @@ class Bundle:
         """Lay it out in a folder of its own in `within`, None: where the system keeps what is temporary."""
         fmus = dict(self.fmus)
         if self.native is not None and self.native[1] == this_platform():
-            fmus[_NATIVE] = self.native[0]
+            fmus[NATIVE] = self.native[0]
         return Workplace(Base.from_json(self.base), self.files, fmus, within)
 
 

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import archive, build, checkout, declared, kinds, repack, table, targets
+from . import archive, build, checkout, declared, exchange, kinds, repack, table, targets
 from .compile import EXTRA_FLAGS
 from .errors import InputError, PackagerError
 from .machine import named
@@ -51,6 +51,10 @@ def _parser() -> argparse.ArgumentParser:
     declaring = commands.add_parser("variables", help="write the tables of all units as one JSON file")
     declaring.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
     declaring.add_argument("--out", type=Path, required=True, help="file to write")
+    looping = commands.add_parser("exchange", help="compile the master's native cycle loop")
+    looping.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
+    looping.add_argument("--platform", choices=targets.ALL, help="compile for this platform (default: this machine)")
+    looping.add_argument("--out", type=Path, required=True, help="folder of the archives")
     repacking = commands.add_parser("repack", help="pack another machine or motion into an archive; needs no compiler")
     repacking.add_argument("base", type=Path, metavar="BASE.fmu", help="archive whose binaries and sources are taken")
     _add_resources(repacking)
@@ -72,7 +76,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit code."""
     options = _parser().parse_args(arguments)
     try:
-        {"describe": _describe, "build": _build, "variables": _variables, "repack": _repack}[options.command](options)
+        {"describe": _describe, "build": _build, "variables": _variables, "exchange": _exchange, "repack": _repack}[
+            options.command
+        ](options)
     except PackagerError as error:
         print(f"error: {error}", file=sys.stderr)
         return error.exit_code
@@ -106,6 +112,11 @@ def _variables(options: argparse.Namespace) -> None:
     found = [table.read(path, (checkout.SHELL, checkout.STANDARD), compiler) for path in checkout.unit_folders()]
     archive.write(options.out, declared.dump(found))
     print(f"{options.out}: tables of {', '.join(each.unit for each in found)}")
+
+
+def _exchange(options: argparse.Namespace) -> None:
+    target = None if options.platform is None else targets.ALL[options.platform]
+    print(exchange.build(options.out, find_compiler(options.cc), target))
 
 
 def _build(options: argparse.Namespace) -> None:

@@ -52,17 +52,45 @@ def compile_library(
         CompilerError: the compiler refused the sources or cannot make code for `target`, or the library lacks a
             function of the FMI.
     """
-    output.mkdir(parents=True, exist_ok=True)
-    library = output.resolve() / f"{unit}{target.suffix}"
+    library = output / f"{unit}{target.suffix}"
     extra = shlex.split(os.environ.get(EXTRA_FLAGS, ""))
+    functions, own = portable.fmi_functions(), portable.own_functions(unit, sources)
+    content = shared_library(
+        unit, sources, names, library, compiler, target, functions, own=own, for_others=for_others, extra=extra
+    )
+    return Library(f"binaries/{target.folder}/{library.name}", content, bool(extra), newest_glibc(content))
+
+
+def shared_library(
+    what: str,
+    sources: Path,
+    names: Sequence[str],
+    library: Path,
+    compiler: Sequence[str],
+    target: Target,
+    functions: frozenset[str],
+    *,
+    own: frozenset[str] = frozenset(),
+    for_others: bool = False,
+    extra: Sequence[str] = (),
+) -> bytes:
+    """Compile `names` in the folder `sources` into the file `library`, with a part for each processor of `target`.
+
+    It must export `functions`, and may export its `own` besides; with `extra` flags (instruments) nobody looks.
+
+    Raises:
+        CompilerError: as for :func:`compile_library`; the message begins with `what` it is.
+    """
+    output = library.parent.resolve()
+    output.mkdir(parents=True, exist_ok=True)
     if not toolchain.is_zig(compiler) and target != host_target():
         raise CompilerError(
-            f"{unit}, {target.folder}: {shlex.join(compiler)} compiles for this machine alone; zig compiles for all "
+            f"{what}, {target.folder}: {shlex.join(compiler)} compiles for this machine alone; zig compiles for all "
             "(make fmus-all, or --cc 'python -m ziglang cc')"
         )
     parts = []
     for processor in target.zig:
-        part = output.resolve() / processor / library.name if len(target.zig) > 1 else library
+        part = output / processor / library.name if len(target.zig) > 1 else output / library.name
         part.parent.mkdir(exist_ok=True)
         command = [*toolchain.for_target(compiler, processor), *FLAGS]
         command += [f"-ffile-prefix-map={sources.resolve()}=sources", f"-I{portable.HEADER.parent}"]
@@ -72,15 +100,17 @@ def compile_library(
         toolchain.run(command, sources)
         parts.append(part.read_bytes())
     content = universal.join(parts) if len(parts) > 1 else parts[0]
-    library.write_bytes(content)
+    if len(parts) > 1:
+        library.write_bytes(content)
     if not extra:
-        own = portable.own_functions(unit, sources)
-        machine = [str(sources.resolve()), str(output.resolve())]
+        machine = [str(sources.resolve()), str(output)]
         if Path.home().parent != Path.home():  # where compilers keep what they have compiled
             machine.append(f"{Path.home()}{os.sep}")
-        if problems := portable.problems(content, target, own=own, for_others=for_others, machine=machine):
-            raise CompilerError("\n  ".join((f"{unit}, {target.folder}: no library that importers can use", *problems)))
-    return Library(f"binaries/{target.folder}/{library.name}", content, bool(extra), newest_glibc(content))
+        if problems := portable.problems(
+            content, target, functions=functions, own=own, for_others=for_others, machine=machine
+        ):
+            raise CompilerError("\n  ".join((f"{what}, {target.folder}: no library that others can use", *problems)))
+    return content
 
 
 def _link_flags(compiler: Sequence[str], target: Target, name: str, stripped: bool) -> list[str]:

@@ -45,37 +45,39 @@ def problems(
     content: bytes,
     target: Target,
     *,
+    functions: frozenset[str] | None = None,
     own: frozenset[str] = frozenset(),
     for_others: bool = True,
     machine: Sequence[str] = (),
 ) -> list[str]:
-    """What is wrong with the library `content` for `target`; nothing where importers there can use it.
+    """What is wrong with the library `content` for `target`; nothing where it can be used there.
 
-    Without `for_others` only whether it is for the target and has every function of the FMI. `own`: functions that the
-    unit means to export besides. `machine`: paths of this machine, which must not be in the library.
+    Without `for_others` only whether it is for the target and exports all `functions`, those of the FMI where none are
+    given. `own`: what it may export besides. `machine`: paths of this machine, which must not be in the library.
     """
     try:
         found = binary.read(content)
     except binary.Unreadable as error:
         return [str(error)]
+    functions = fmi_functions() if functions is None else functions
     expected = [name.partition("-")[0] for name in target.zig]
     told = []
     if [part.processor for part in found] != expected or {part.format for part in found} != {_FORMATS[target.suffix]}:
         kinds = ", ".join(f"{part.format} for {part.processor}" for part in found)
         told.append(f"is {kinds}; needed is {_FORMATS[target.suffix]} for {', '.join(expected)}")
     for part in found:
-        if missing := sorted(fmi_functions() - part.exported):
+        if missing := sorted(functions - part.exported):
             told.append(f"{part.processor}: does not export {', '.join(missing)}")
         if for_others:
-            told += [f"{part.processor}: {problem}" for problem in _not_for_others(part, own)]
+            told += [f"{part.processor}: {problem}" for problem in _not_for_others(part, functions | own)]
     told += [f"holds a path of this machine: {path}" for path in machine if path.encode() in content]
     return told
 
 
-def _not_for_others(part: Binary, own: frozenset[str]) -> list[str]:
+def _not_for_others(part: Binary, meant: frozenset[str]) -> list[str]:
     told = []
-    if stray := sorted(part.exported - fmi_functions() - own - _LINKERS):
-        told.append(f"exports more than the functions of the FMI and its own: {', '.join(stray)}")
+    if stray := sorted(part.exported - meant - _LINKERS):
+        told.append(f"exports more than it is meant to: {', '.join(stray)}")
     foreign = [name for name in part.libraries if not re.fullmatch(_SYSTEM[part.format], name, re.IGNORECASE)]
     if foreign:
         told.append(f"needs libraries that are no part of the system: {', '.join(foreign)}")

@@ -236,6 +236,7 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
         "performance": {
             "wall_time": quantity(run.wall_time, "s"),
             "real_time_factor": quantity(real_time_factor(run), "1"),
+            "cycle_loop": "native" if run.native else "Python",
         },
         "files": list(files),
     }

@@ -1,0 +1,39 @@
+"""feedsim example: scenarios and machines that come along, listed or copied."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from feedsim.cli.options import Command, Option, folder
+
+
+def example(options: Namespace) -> None:
+    """feedsim example."""
+    from feedsim import examples
+
+    if options.names:
+        written = examples.copy(options.names, options.to)
+        print("\n".join(map(str, written)) or "all there already")
+        return
+    kind = ""
+    for each in examples.examples():
+        if each.kind != kind:
+            kind = each.kind
+            print(f"{kind}:")
+        print(f"  {each.name:21} {each.about}")
+    print("\nfeedsim example NAME copies one into the working folder, with the files that it names")
+
+
+COMMAND = Command(
+    "example",
+    "list the scenarios, studies and machines that come along, or copy some into your folder",
+    example,
+    (
+        Option("names", "NAME", "what to copy, with the files that it names; without a name all are listed", nargs="*"),
+        Option("--to", "DIR", "folder to copy into (default: the working folder)", type=folder, default=Path()),
+    ),
+    description="List the scenarios, studies, machines and structures that come along, or copy some into a folder of "
+    "yours to begin with. The numbers of the machines are synthetic, but for EMPS. Nothing is overwritten.",
+    epilog="example:\n  feedsim example xz_circle && feedsim run xz_circle.yaml",
+)

@@ -1,0 +1,152 @@
+"""Scenarios, studies, machines and structures that come along, and copies of them for the user to change.
+
+May use: files, installation, errors. Start reading at copy().
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+from feedsim.errors import InputError, OutputError
+from feedsim.files.source import at, places, read
+from feedsim.installation import mend, shipped
+
+# Kind -> the file that stands for one, in the folder of all of them; of a kind whose files lie in a folder each, that
+# folder is the example.
+_KINDS = {
+    "scenario": "*.yaml",
+    "study": "studies/*.yaml",
+    "machine": "machines/*/machine.yaml",
+    "structure": "structures/*/structure.yaml",
+}
+
+
+@dataclass(frozen=True)
+class Example:
+    """Something that can be copied.
+
+    Attributes:
+        name: by which it is asked for.
+        kind: "scenario", "study", "machine" or "structure".
+        file: what stands for it.
+        about: its first sentence.
+    """
+
+    name: str
+    kind: str
+    file: Path
+    about: str
+
+
+def examples() -> list[Example]:
+    """All that there are, by kind and name.
+
+    >>> [each.name for each in examples() if each.kind == "machine"]
+    ['emps', 'one_axis', 'test_centre']
+    """
+    root = shipped("scenarios")
+    found = [
+        Example(file.stem if kind in ("scenario", "study") else file.parent.name, kind, file, _about(file))
+        for kind, pattern in _KINDS.items()
+        for file in sorted(root.glob(pattern))
+    ]
+    if not found:
+        raise InputError(f"{root}: has no scenarios; {mend('them')}")
+    return found
+
+
+def copy(names: Iterable[str], folder: str | Path = ".") -> list[Path]:
+    """Copy examples into a folder, with all files that they name, in the same layout; returns the files written.
+
+    A file that is there with the same content stays; a scenario and the machine of the same name come both.
+
+    Raises:
+        InputError: there is no such example.
+        OutputError: a file is there with another content, or cannot be written. Nothing is written then.
+    """
+    root, folder = shipped("scenarios"), Path(folder)
+    contents = {folder / file.relative_to(root): file.read_bytes() for file in _needed(_asked(names), root)}
+    if changed := [path for path in contents if _exists(path) and not _holds(path, contents[path])]:
+        raise OutputError(
+            f"{', '.join(map(str, changed))}: there already, with another content; nothing is overwritten, "
+            "--to takes another folder"
+        )
+    written: list[Path] = []
+    try:
+        for path, content in contents.items():
+            if not _exists(path):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                with path.open("xb") as file:
+                    written.append(path)
+                    file.write(content)
+    except OSError as error:
+        for path in written:
+            with suppress(OSError):
+                path.unlink()
+        raise OutputError(f"{error.filename or folder}: cannot be written: {error.strerror}") from None
+    return written
+
+
+def _asked(names: Iterable[str]) -> list[Example]:
+    known = examples()
+    found: list[Example] = []
+    for name in names:
+        if not (meant := [each for each in known if each.name == name.removesuffix(".yaml")]):
+            others = sorted({each.name for each in known})
+            near = "".join(f", did you mean {other}?" for other in get_close_matches(name, others, 1))
+            raise InputError(f"{name}: no such example{near} (there are: {', '.join(others)})")
+        found += meant
+    return found
+
+
+def _needed(asked: Iterable[Example], root: Path) -> list[Path]:
+    """What stands for the examples, and every file that one of them names, or that lies in a folder that it names."""
+    waiting = [each.file for each in asked]
+    found: dict[Path, None] = {}
+    while waiting:
+        file = waiting.pop()
+        if file in found:
+            continue
+        found[file] = None
+        if file.name in ("machine.yaml", "structure.yaml"):
+            waiting += [other for other in file.parent.iterdir() if other.is_file()]
+        if file.suffix == ".yaml":
+            for named in _named(file):
+                inside = [named] if named.is_file() else [other for other in named.rglob("*") if other.is_file()]
+                waiting += [other for other in inside if other.is_relative_to(root)]
+    return sorted(found)
+
+
+def _named(file: Path) -> Iterator[Path]:
+    """Files and folders that texts of a YAML file name."""
+    data = read(file).data
+    for place in places(data):
+        text = at(data, place)
+        if isinstance(text, str) and re.fullmatch(r"[\w./-]+", text) and (file.parent / text).exists():
+            yield (file.parent / text).resolve()
+
+
+def _about(file: Path) -> str:
+    """The first sentence of the comment that a file begins with."""
+    comment: list[str] = []
+    for line in file.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("# "):
+            break
+        comment.append(line[2:])
+    return re.split(r"(?<=[.?])\s(?=[A-Z])", " ".join(comment), maxsplit=1)[0]
+
+
+def _exists(path: Path) -> bool:
+    return path.exists() or path.is_symlink()
+
+
+def _holds(path: Path, content: bytes) -> bool:
+    try:
+        return path.read_bytes() == content
+    except OSError:
+        return False

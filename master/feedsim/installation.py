@@ -1,0 +1,31 @@
+"""What this installation has besides its Python files: archives and native cycle loop, scenarios and machines.
+
+May use: nothing. Start reading at shipped().
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parent
+INSIDE = "shipped"  # folder within the package
+
+
+@cache
+def checkout() -> Path | None:
+    """The checkout that this package runs from; None where it is installed."""
+    root = PACKAGE.parents[1]
+    return root if (root / "src" / "fmi2").is_dir() and (root / "Makefile").is_file() else None
+
+
+def shipped(name: str) -> Path:
+    """The folder `name` ("fmus", "scenarios"): of the checkout, where make fills it, else inside the package."""
+    return (checkout() or PACKAGE / INSIDE) / name
+
+
+def mend(what: str) -> str:
+    """What to do where `what` (such as "the archives") is missing or does not fit."""
+    if checkout():
+        return f"`make fmus` builds {what}"
+    return f"installing feedsim anew brings {what} along"

@@ -1,0 +1,85 @@
+"""What a wheel holds besides Python: the four archives, the native cycle loop, scenarios and machines."""
+
+import platform
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from feedsim_packager import build, checkout, declared, exchange, table, targets
+from feedsim_packager.errors import InputError
+
+from .project import PROJECT, files
+
+PLACE = "feedsim/shipped/"  # where feedsim.installation looks
+SCENARIOS = "scenarios"
+# Folder under binaries/ -> what pip calls a platform that such a binary runs on. glibc 2.17 and macOS 11 as in targets.
+TAGS = {
+    "linux64": "manylinux_2_17_x86_64.manylinux2014_x86_64",
+    "aarch64-linux": "manylinux_2_17_aarch64.manylinux2014_aarch64",
+    "win64": "win_amd64",
+    "darwin64": "macosx_11_0_universal2",
+}
+ANY = "any"
+
+
+@dataclass(frozen=True)
+class Shipped:
+    """Files by their paths in the wheel, and the platforms that pip may install them on."""
+
+    files: dict[str, bytes]
+    platform: str
+
+
+def for_this_machine(compiler: Sequence[str]) -> Shipped:
+    """By a compiler that makes code for this machine alone, as `make fmus` does."""
+    tag = sysconfig.get_platform().replace("-", "_").replace(".", "_").replace("universal2", platform.machine())
+    return Shipped(_archives(compiler, None) | _loop(compiler, None) | _plain(compiler), tag)
+
+
+def for_platform(name: str, compiler: Sequence[str], archives: Path | None = None) -> Shipped:
+    """For another machine, by zig: archives for all platforms, native loop for one, or none at all for "any".
+
+    archives: folder that has them already, for all platforms.
+    """
+    if name not in (*TAGS, ANY):
+        raise InputError(f"platform {name}: no wheel is made for it (known: {', '.join(TAGS)}, {ANY})")
+    held = _archives(compiler, targets.named("all")) if archives is None else _taken(archives)
+    loop = {} if name == ANY else _loop(compiler, targets.ALL[name])
+    return Shipped(held | loop | _plain(compiler), TAGS.get(name, ANY))
+
+
+def _taken(folder: Path) -> dict[str, bytes]:
+    names = [f"{path.name.removesuffix('_fmu')}.fmu" for path in checkout.unit_folders()]
+    if missing := [name for name in names if not (folder / name).is_file()]:
+        raise InputError(f"{folder}: has no {', '.join(missing)}; make fmus-all builds them")
+    return {f"{PLACE}fmus/{name}": (folder / name).read_bytes() for name in names}
+
+
+def _archives(compiler: Sequence[str], platforms: Sequence[targets.Target] | None) -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        for path in checkout.unit_folders():
+            unit = build.load(path, compiler)
+            build.build(unit, folder / f"{unit.table.unit}.fmu", compiler, targets=platforms)
+        return _taken(folder)
+
+
+def _loop(compiler: Sequence[str], target: targets.Target | None) -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as scratch:
+        library = exchange.build(Path(scratch), compiler, target)
+        return {f"{PLACE}fmus/{library.name}": library.read_bytes()}
+
+
+def _plain(compiler: Sequence[str]) -> dict[str, bytes]:
+    """Scenarios, and what the master knows of the units' variables."""
+    tables = [table.read(path, (checkout.SHELL, checkout.STANDARD), compiler) for path in checkout.unit_folders()]
+    found = {PLACE + path.relative_to(PROJECT).as_posix(): path.read_bytes() for path in files(SCENARIOS)}
+    return found | {"feedsim/variables.json": declared.dump(tables)}
+
+
+def zig() -> tuple[str, ...]:
+    """The compiler for all platforms."""
+    return (sys.executable, "-m", "ziglang", "cc")

@@ -126,7 +126,7 @@ def kinds(folder: Path, fmus: Path) -> dict[str, Kind]:
         "csv": Kind(".csv", lambda path: _all(trace.read_recording(path)), traces),
         "trace": Kind(".csv", trace.read_csv, traces[:1]),
         "series": Kind(".csv", read_series, traces),
-        "setpoints": Kind(".csv", lambda path: trace.read_setpoints(path, {"Z": ("Z.x_a", None)}), traces[:1]),
+        "setpoints": Kind(".csv", lambda path: trace.read_signals(path, {"Z": ("Z.x_a", None)}, "m"), traces[:1]),
         "response": Kind(".csv", read_response, responses),
         "mat": Kind(".mat", lambda path: _all(trace.read_recording(path)), _mat()),
         "capture": Kind(".json", lambda path: _all(trace.read_recording(path)), [_capture()]),

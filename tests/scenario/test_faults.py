@@ -95,6 +95,38 @@ def test_motions(refused: Refused, motion: str, message: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        ("motor, axis: Q, file: s.yaml, column: F", ".axis: the machine has no axis 'Q'; it has X, Y, Z"),
+        ("tool, direction: x, file: s.yaml, column: F", ".direction: 'x' is not allowed here; did you mean 'X'?"),
+        ("spindle, file: s.yaml", ": unknown kind 'spindle'; allowed: motor, tool"),
+        ("tool, direction: X, file: none.csv, column: F", ".file: no such file: "),
+        ("tool, direction: X", ": a load is in a 'file' with its 'column', or in a 'table' of 'time'"),
+        ("tool, direction: X, file: s.yaml, column: F, table: {time: [0 s, 1 s], values: [0 N, 1 N]}",
+         ": a load is in a 'file' with its 'column', or in a 'table' of 'time' and 'values'; both are given"),
+        ("tool, direction: X, file: s.yaml", ": a 'file' needs the 'column' of the load, and only a file has one"),
+        ("tool, direction: X, column: F, table: {time: [0 s, 1 s], values: [0 N, 1 N]}",
+         ": a 'file' needs the 'column' of the load, and only a file has one"),
+        ("tool, direction: X, table: {time: [0 s, 1 s], values: [0 N]}",
+         ".table: 2 instants and 1 values; each instant needs a value"),
+        ("tool, direction: X, table: {time: [1 s, 1 s], values: [0 N, 0 N]}", ".table.time: 1 s follows 1 s; the time"),
+        ("tool, direction: X, table: {time: [0 s, 1 s], values: [0 N.m, 1 N]}",
+         ".table.values.0: '0 N.m' is a torque; a force is expected, for example 100 N"),
+        ("motor, axis: X, table: {time: [0 s, 1 s], values: [0 N.m, 1]}",
+         ".table.values.1: 1 has no unit; a torque is expected, for example 2 N.m"),
+        ("motor, axis: X, file: s.yaml, column: F, factor: 0", ".factor: 0 leaves nothing of the load"),
+        ("motor, axis: X, file: s.yaml, column: {column: F, unit: furlong}", ".column.unit: unknown unit 'furlong'"),
+        ("motor, axis: X, file: s.yaml, column: F, motion: 1",
+         ".motion: 1 is no entry of motions (entries: 0 only, counted from 0)"),
+    ],
+)  # fmt: skip
+def test_loads(refused: Refused, load: str, message: str) -> None:
+    found = refused(MOVE, "loads:", f"  - {{kind: {load}}}")
+    assert f"s.yaml:5: loads.0{message}" in found
+    assert "\n" not in found
+
+
+@pytest.mark.parametrize(
     ("lines", "message"),
     [
         (

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from feedsim.errors import InputError, OutputError
-from feedsim.trace import Trace, convert, read_csv, read_setpoints, write_csv, written_whole
+from feedsim.trace import Trace, convert, read_csv, read_signals, write_csv, written_whole
 
 
 def trace(rows: int = 5) -> Trace:
@@ -267,19 +267,19 @@ def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
     assert stat.S_IMODE((tmp_path / "t.csv").stat().st_mode) == stat.S_IMODE((tmp_path / "plain").stat().st_mode)
 
 
-# --- recorded setpoints ---------------------------------------------------------------------------------------------
+# --- recorded signals -----------------------------------------------------------------------------------------------
 
 RECORDING = "t [ms];q [mm];y\n" + "".join(f"{k};{k * k},5;{k}\n" for k in range(10, 20))
 
 
-def test_setpoints_are_si_and_begin_at_zero(tmp_path: Path) -> None:
+def test_signals_are_si_over_the_recorded_time(tmp_path: Path) -> None:
     path = file(tmp_path, RECORDING)
-    setpoints = read_setpoints(path, {"Z": ("q", None), "X": ("y", "um")}, time=("t", None))
-    np.testing.assert_allclose(setpoints.time, np.arange(10) * 1e-3, atol=1e-17)  # rounding of a difference of 0.02
+    setpoints = read_signals(path, {"Z": ("q", None), "X": ("y", "um")}, "m", time=("t", None))
+    np.testing.assert_allclose(setpoints.time, np.arange(10, 20) * 1e-3, rtol=3e-16)
     np.testing.assert_allclose(setpoints["Z"], (np.arange(10, 20) ** 2 + 0.5) * 1e-3, rtol=3e-16)
     np.testing.assert_allclose(setpoints["X"], np.arange(10, 20) * 1e-6, rtol=3e-16)
     assert setpoints.unit("Z") == "m"
-    part = read_setpoints(path, {"Z": ("q", "mm")}, time=("t", None), between=(0.012, 0.016))
+    part = read_signals(path, {"Z": ("q", "mm")}, "m", time=("t", None), between=(0.012, 0.016))
     assert len(part) == 5
     assert part["Z"][0] == 0.1445
 
@@ -298,11 +298,11 @@ def test_setpoints_are_si_and_begin_at_zero(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_setpoints_that_are_refused(
+def test_signals_that_are_refused(
     tmp_path: Path, columns: dict[str, tuple[str, str | None]], between: tuple[float, float] | None, message: str
 ) -> None:
     with pytest.raises(InputError) as caught:
-        read_setpoints(file(tmp_path, RECORDING), columns, time=("t", None), between=between)
+        read_signals(file(tmp_path, RECORDING), columns, "m", time=("t", None), between=between, fewest=4)
     assert message in str(caught.value)
 
 
@@ -381,7 +381,7 @@ def test_measured_reference_of_a_real_axis(tmp_path: Path) -> None:
     out = tmp_path / "emps.csv"
     convert(os.environ["FEEDSIM_EMPS"], [("t", "time", "s"), ("qg", "Z.x_s", "m")], out)
     # Facts of the data set: 24.84 s at 1 kHz, a stroke of 246.36 mm.
-    setpoints = read_setpoints(out, {"Z": ("Z.x_s", None)})
+    setpoints = read_signals(out, {"Z": ("Z.x_s", None)}, "m")
     assert len(setpoints) == 24841
     assert setpoints.time[-1] == pytest.approx(24.84, abs=1e-6)
     assert setpoints["Z"].max() - setpoints["Z"].min() == pytest.approx(0.24636, abs=1e-5)

@@ -11,6 +11,7 @@ from feedsim.cosim import trust
 from feedsim.cosim.binaries import fmus_directory
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.feedforward import TorqueFeedforward, feeders
+from feedsim.cosim.loads import Loads, Work, acting
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
 from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.recording import Recording, Sink, recorded_columns
@@ -40,6 +41,7 @@ class Run:
         native: whether the native loop has executed it.
         units: per instance, GUID and version of its archive.
         pose: how far the motion leaves the plant's pose, or how the plant followed it.
+        loads: what each of the scenario's loads has done.
         warnings: what a user should know before believing the result, a sentence each.
         fine: the log's signals, and the setpoints of its axes, at the control cycle; None without a log. Other logs can
             be made of it: :func:`feedsim.cosim.logged`.
@@ -54,6 +56,7 @@ class Run:
     units: Mapping[str, Mapping[str, str]]
     pose: PoseUse
     warnings: tuple[str, ...]
+    loads: tuple[Work, ...] = ()
     fine: Trace | None = None
     log: Trace | None = None
     native: bool = False
@@ -85,12 +88,14 @@ def run(
             interrupted it has got all rows up to there when the exception arrives.
 
     Raises:
-        InputError: the motion violates a limit, the archives do not fit the machine, `native` without such a loop.
+        InputError: the motion violates a limit, a load cannot be read, the archives do not fit the machine, `native`
+            without such a loop.
         SimulationError: a unit failed; the message names the unit, the time and the unit's reason.
         OutputError: a file without a name cannot be written.
     """
     program = program or plan(scenario, scratch=scratch)
     recorded = recorded_columns(scenario)
+    loads = acting(scenario, program)
     modes = checked_modes(scenario.machine)
     cycles = scenario.machine.cycles
     ratio = round(cycles.T_pos / cycles.T_c)
@@ -100,15 +105,18 @@ def run(
     library, told = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
     with System(scenario.machine, fmus) as system:
         cycle = Cycle(system, SCHEMES[scenario.coupling.scheme], cycles.T_c, scenario.coupling.substeps)
-        recording = Recording(cycle, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
+        recording = Recording(cycle, scenario, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
         recordings, at_full_rate = [recording], None
         if scenario.logging:
-            at_full_rate = Recording(cycle, program, total, ratio, 1, full_rate_columns(scenario), scratch=scratch)
+            columns = full_rate_columns(scenario)
+            at_full_rate = Recording(cycle, scenario, program, total, ratio, 1, columns, scratch=scratch)
             recordings.append(at_full_rate)
-        drives = Setpoints(system, program, ratio)
-        before = [*drives.operations, *(operation for each in recordings for operation in each.operations)]
+        drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
+        # What is recorded of a cycle is the load that acts in it.
+        before = [*drives.operations, *loading.operations]
+        before += (operation for each in recordings for operation in each.operations)
         before += feeders(system, torque_feedforward or {}, total + 1)
-        loop = Loop(cycle, before, (), library, (drives, *recordings))
+        loop = Loop(cycle, before, (), library, (drives, loading, *recordings))
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
         try:
@@ -119,6 +127,7 @@ def run(
         for each in recordings:
             each.record(total)
             each.collect(total + 1)
+        loading.finish(total)
         wall_time = time.perf_counter() - begun - recording.sinking
         loops = judge(scenario.machine, modes)
         pose = pose_use(scenario.machine, program, system)
@@ -134,11 +143,12 @@ def run(
             warnings=(
                 *system.warnings,
                 *cycle.warnings,
-                *trust.foreseen(scenario, modes, program, loops),
+                *trust.foreseen(scenario, modes, program, loops, loads),
                 *pose.warnings,
-                *trust.found(scenario, cycle, recording, loops),
+                *trust.found(scenario, cycle, recording, loops, loading.work),
                 *told,
             ),
+            loads=loading.work,
             fine=fine,
             log=None
             if fine is None or scenario.logging is None
@@ -157,13 +167,14 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
         InputError: what :func:`run` would refuse before its first step.
     """
     recorded_columns(scenario)
+    loads = acting(scenario, program)
     modes = checked_modes(scenario.machine)
     with System(scenario.machine, fmus or fmus_directory(), only_shipped=True) as system:
         system.initialise(program, stop=float(program.time[-1]))
         pose = pose_use(scenario.machine, program, system)
         cycles, coupling = scenario.machine.cycles, scenario.coupling
         cycle = Cycle(system, SCHEMES[coupling.scheme], cycles.T_c, coupling.substeps)
-        told = trust.foreseen(scenario, modes, program, judge(scenario.machine, modes))
+        told = trust.foreseen(scenario, modes, program, judge(scenario.machine, modes), loads)
         return (*system.warnings, *cycle.warnings, *told, *pose.warnings)
 
 

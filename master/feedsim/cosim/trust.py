@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim import units
+from feedsim.cosim.loads import Acting, Work, at_motor
 from feedsim.cosim.recording import Recording
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
 from feedsim.findings import Wrong
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop
 from feedsim.nc import Program
-from feedsim.scenario import ForeignUnit, Machine, Scenario
+from feedsim.scenario import Drive, ForeignUnit, Friction, Machine, Scenario
 from feedsim.structure import Modes
 from feedsim.structure.pack import POSES_IN_ARCHIVE
 from feedsim.structure.pose_change import NEAR, PoseChange, pose_change, warnings
@@ -29,6 +30,11 @@ TRUSTED_SHARE, TRUSTED_ENERGY = 3e-4, 1e-3
 GAIN = {"speed": ("K_p", "N.m.s/rad", "N.m.s/rad"), "position": ("K_v", "1/s", "(m/min)/mm")}
 STATE = {"moving": "while the axis slides", "at rest": "at rest, where friction holds it like a spring"}
 LOAD_TAKEN_UP = 1.0  # s; position and speed controller together settle in some tenths of it
+# Of F_C: a load that never exceeds it is lost in what friction itself is known to. Newtons read as kilonewtons are.
+FELT = 1e-2
+# A load that drives: the share of its work that it does on the machine and not the machine on it, net, and the least
+# share of the friction work that makes it matter.
+DRIVING, MATTERS = 0.5, 0.05
 
 
 def energies(system: System, cycle: Cycle) -> dict[str, float]:
@@ -38,16 +44,22 @@ def energies(system: System, cycle: Cycle) -> dict[str, float]:
     return {f"{axis}.{kind}": float(kinds[kind][i]) for i, axis in enumerate(system.axes) for kind in kinds}
 
 
-def foreseen(scenario: Scenario, modes: Modes, program: Program, loops: Sequence[Loop]) -> tuple[str, ...]:
-    """What the parameters alone tell a user to doubt, a sentence each."""
+def foreseen(
+    scenario: Scenario, modes: Modes, program: Program, loops: Sequence[Loop], loads: Sequence[Acting] = ()
+) -> tuple[str, ...]:
+    """What the parameters and the loads alone tell a user to doubt, a sentence each."""
     return (
-        *_control(scenario.machine, program, loops), *_stability(scenario, modes), *_unbalanced_loads(scenario)
+        *_control(scenario.machine, program, loops), *_stability(scenario, modes),
+        *_unbalanced_loads(scenario, loads), *_sizes_of_loads(scenario.machine, program, loads),
     )  # fmt: skip
 
 
-def found(scenario: Scenario, cycle: Cycle, recording: Recording, loops: Sequence[Loop]) -> tuple[str, ...]:
+def found(
+    scenario: Scenario, cycle: Cycle, recording: Recording, loops: Sequence[Loop], loads: Sequence[Work] = ()
+) -> tuple[str, ...]:
     """What the run itself tells a user to doubt, a sentence each."""
-    return (*_energy(scenario, cycle.system, cycle, loops), *_limits(recording))
+    lost = _energy(scenario, cycle.system, cycle, loops)
+    return (*lost, *_limits(recording), *_driving_loads(scenario, cycle, loads))
 
 
 def _control(machine: Machine, program: Program, loops: Sequence[Loop]) -> list[str]:
@@ -139,15 +151,62 @@ def _stability(scenario: Scenario, modes: Modes) -> list[str]:
     return warnings
 
 
-def _unbalanced_loads(scenario: Scenario) -> list[str]:
+def _unbalanced_loads(scenario: Scenario, loads: Sequence[Acting]) -> list[str]:
     """The drive's integrators start empty: an axis under load sags before it holds."""
     if scenario.motions[0].held >= LOAD_TAKEN_UP:
         return []
-    return [
-        f"axis {name}: the constant load of {axis.M_0:g} N.m is not carried at the start, the axis sags while the "
-        f"drive takes it up; put a dwell of {LOAD_TAKEN_UP:g} s ahead of the first motion"
-        for name, axis in scenario.machine.axes.items()
+    machine, start = scenario.machine, np.array([0.0, scenario.machine.cycles.T_c])
+    sagging = (
+        f"is not carried at the start, the axis sags while the drive takes it up; put a dwell of {LOAD_TAKEN_UP:g} s "
+        "ahead of the first motion"
+    )
+    told = [
+        f"axis {name}: the constant load of {axis.M_0:g} N.m {sagging}"
+        for name, axis in machine.axes.items()
         if axis.M_0 != 0
+    ]
+    for each in loads:
+        torque = at_motor(each.load, float(each.means(start)[0]), machine)
+        friction = machine.axes[each.load.axis_name].friction if torque is not None else None
+        # Friction alone holds what is below F_C.
+        if torque is not None and isinstance(friction, Friction) and abs(torque) > friction.F_C:
+            told.append(f"{each.place}: the load of {torque:.3g} N.m at the motor of {each.load.axis_name} {sagging}")
+    return told
+
+
+def _sizes_of_loads(machine: Machine, program: Program, loads: Sequence[Acting]) -> list[str]:
+    """Loads that the drive cannot hold, and such that nothing feels: of another unit or at another place than meant."""
+    told = []
+    for each in loads:
+        peak, name = each.peak(program.duration), each.load.axis_name
+        torque = at_motor(each.load, peak, machine)
+        if torque is None:
+            continue
+        drive, friction = machine.axes[name].drive, machine.axes[name].friction
+        at_the_motor = "" if each.load.UNIT == "N.m" else f", {abs(torque):.4g} N.m at the motor of {name}"
+        size = f"{each.place}: the load {each.load.words} reaches {peak:.4g} {each.load.UNIT}{at_the_motor}"
+        if isinstance(drive, Drive) and abs(torque) > drive.M_max:
+            told.append(
+                f"{size}, {abs(torque) / drive.M_max:.3g} times the drive's M_max, {drive.M_max:.4g} N.m: the axis "
+                "cannot hold it; are unit, kind and factor right?"
+            )
+        elif isinstance(friction, Friction) and abs(torque) < FELT * friction.F_C:
+            told.append(
+                f"{size}, {abs(torque) / friction.F_C:.2g} of the Coulomb friction F_C, {friction.F_C:.4g} N.m: next "
+                "to nothing feels it; are unit, kind and factor right?"
+            )
+    return told
+
+
+def _driving_loads(scenario: Scenario, cycle: Cycle, loads: Sequence[Work]) -> list[str]:
+    """By the energy: a load that drives the machine, where forces of a process resist its motion."""
+    friction = float(np.abs(cycle.bond.dissipated).sum())
+    return [
+        f"{scenario.at('loads', work.load)}: the load {work.words} drives the machine: it has done {work.given:.3g} J "
+        f"of work on it and taken {work.taken:.3g} J from it (friction: {friction:.3g} J). The force of a process "
+        "resists the motion: if this is one, its sign is wrong, and factor: -1 turns it"
+        for work in loads
+        if work.net > DRIVING * (work.given + work.taken) and work.net > MATTERS * friction
     ]
 
 

@@ -19,6 +19,8 @@ from feedsim.fields import AxisName, File, Model, Quantity, fault
 from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Start, whole_cycles
 from feedsim.motions.profile import SpeedChange, speed_change
 
+FEWEST_ROWS = 4  # a cubic needs them
+
 
 class Column(Model):
     """A column of a CSV file; in short just its name."""
@@ -84,16 +86,19 @@ class MeasuredSetpoints(MotionKind):
         # Loaded where a recording is read: splines take longer to load than all of the fields.
         from scipy.interpolate import CubicSpline
 
-        from feedsim.trace import read_setpoints
+        from feedsim.trace import read_signals
 
-        rows = read_setpoints(
+        rows = read_signals(
             self.file,
             {axis: (column.column, column.unit) for axis, column in self.columns.items()},
+            "m",
             time=(self.time.column, self.time.unit),
             between=self.between,
+            fewest=FEWEST_ROWS,
         )
-        length, cycle = float(rows.time[-1]), start.T_pos
-        splines = {axis: CubicSpline(rows.time, rows[axis] - rows[axis][0]) for axis in self.columns}
+        since = rows.time - rows.time[0]
+        length, cycle = float(since[-1]), start.T_pos
+        splines = {axis: CubicSpline(since, rows[axis] - rows[axis][0]) for axis in self.columns}
         into = {axis: _change(float(spline(0.0, 1)), start) for axis, spline in splines.items()}
         out = {axis: _change(float(spline(length, 1)), start) for axis, spline in splines.items()}
         # Whole cycles, so that rows recorded at the position cycle stay on it.
@@ -120,7 +125,7 @@ class MeasuredSetpoints(MotionKind):
             target={axis: float(x[-1]) for axis, (x, _) in setpoints.items()},
             absolute=not self.relative,
             moving=tuple(axis for axis, (x, _) in setpoints.items() if np.any(x != start.position[axis])),
-            geometry=Recorded(begin=begin, end=begin + length, file=self.file, axes=self.axes),
+            geometry=Recorded(begin, begin + length, float(rows.time[0]), self.file, self.axes),
         )
 
 
@@ -135,10 +140,12 @@ class Recorded(Geometry):
     """Recorded setpoints.
 
     begin, end: instants [s] of the recording's first and last row; a run-in lies ahead, a run-out behind.
+    first: time [s] of its first row by its own clock.
     """
 
     begin: float
     end: float
+    first: float
     file: Path
     axes: tuple[str, ...]
     """Axes with a column of their own."""

@@ -45,7 +45,7 @@ class ArchiveUse:
 
 
 def input_files(scenario: Scenario) -> list[InputFile]:
-    """Scenario, machine and further YAML files, table of modes, recordings; each once."""
+    """Scenario, machine and further YAML files, table of modes, recordings, loads; each once."""
     return hashed(_inputs(scenario))
 
 
@@ -61,6 +61,7 @@ def _inputs(scenario: Scenario) -> list[tuple[str, Path]]:
         named.append(("plant archive", scenario.machine.plant))
     named += [(f"{unit.role.name} of {axis}", unit.fmu) for axis, unit in scenario.machine.foreign_units]
     named += [("recorded setpoints", path) for motion in scenario.motions for path in motion.files.values()]
+    named += [("load", load.file) for load in scenario.loads if load.file is not None]
     return named
 
 

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, StrictInt, StrictStr, V
 from feedsim.fields import AxisName, Model, Quantity, Reading, fault, no_axis
 from feedsim.files.source import Place
 from feedsim.motions import Circle, MeasuredSetpoints, Motion
+from feedsim.scenario.loads import Load, MotionIndex
 from feedsim.scenario.logging import Logging, interval_fault, on_the_grid
 from feedsim.scenario.machine import Machine
 
@@ -40,9 +41,6 @@ class Recording(Model):
     variables: Annotated[tuple[Annotated[StrictStr, Field(min_length=1)], ...], Field(min_length=1)] | None = Field(
         default=None, description='Names or patterns such as "Z.*" (default: everything)'
     )
-
-
-MotionIndex = Annotated[StrictInt, Field(ge=0)]
 
 
 class Positioning(Model):
@@ -91,6 +89,7 @@ class Scenario(Model):
     motions: Annotated[tuple[Motion, ...], Field(min_length=1)] = Field(
         description="What the machine does, in this order"
     )
+    loads: tuple[Load, ...] = Field(default=(), description="Torques and forces that act on the axes and at the tool")
     coupling: Coupling = Coupling()
     recording: Recording
     logging: Logging | None = Field(default=None, description="A log as a control records it, log.csv")
@@ -194,21 +193,39 @@ def _logging_faults(scenario: Scenario) -> Iterator[tuple[Place, str]]:
                 yield ("logging", group, signal), f"{signal} is not logged; signals: {', '.join(logging.signals)}"
 
 
+def _load_faults(scenario: Scenario) -> Iterator[tuple[Place, str]]:
+    """Place and message of what does not fit the axes and the motions."""
+    for i, load in enumerate(scenario.loads):
+        if load.kind == "motor" and load.axis not in scenario.machine.axes:
+            yield ("loads", i, "axis"), no_axis(load.axis, scenario.machine.axes)
+        if load.motion is not None and (message := _motion_fault(scenario, load.motion)):
+            yield ("loads", i, "motion"), message
+
+
+def _motion_fault(scenario: Scenario, index: int) -> str | None:
+    """Why there is no motion of that index; None where there is one."""
+    known = len(scenario.motions)
+    if index < known:
+        return None
+    there = f"0 to {known - 1}" if known > 1 else "0 only"
+    return f"{index} is no entry of motions (entries: {there}, counted from 0)"
+
+
 def contradictions(scenario: Scenario) -> Iterator[tuple[Place, str]]:
     """Place and message of everything in a scenario that cannot go together."""
     machine = scenario.machine
     if message := interval_fault(scenario.recording.interval, machine.cycles.T_c):
         yield ("recording", "interval"), message
     yield from _logging_faults(scenario)
+    yield from _load_faults(scenario)
     for i, motion in enumerate(scenario.motions):
         for axis in motion.axes:
             if axis not in machine.axes:
                 yield ("motions", i), no_axis(axis, machine.axes)
     for i, item in enumerate(scenario.evaluate):
-        chosen, known = item.motion, len(scenario.motions)
-        if chosen is not None and chosen >= known:
-            there = f"0 to {known - 1}" if known > 1 else "0 only"
-            yield ("evaluate", i, "motion"), f"{chosen} is no entry of motions (entries: {there}, counted from 0)"
+        chosen = item.motion
+        if chosen is not None and (message := _motion_fault(scenario, chosen)):
+            yield ("evaluate", i, "motion"), message
             continue
         motions = scenario.motions if chosen is None else scenario.motions[chosen : chosen + 1]
         if item.kind == "positioning":

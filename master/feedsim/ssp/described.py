@@ -26,6 +26,7 @@ STRUCTURE = "resources/structure.yaml"
 def text(scenario: Scenario) -> str:
     """The JSON text for `scenario`; recordings it names are where :func:`recordings` puts them."""
     whole = plain(scenario)
+    del whole["loads"]  # there are none
     machine = whole["machine"]
     places = {path: name for name, path in recordings(scenario).items()}
     for motion, data in zip(scenario.motions, whole["motions"], strict=True):

@@ -13,6 +13,7 @@ from feedsim.cosim.archive import Archive, UnitDefinition
 from feedsim.cosim.roles import RoleUnit, archive_path, filled
 from feedsim.cosim.system import plant_parameters
 from feedsim.cosim.unpacked import check_there
+from feedsim.errors import InputError
 from feedsim.nc import Program, plan
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine, Scenario
@@ -49,9 +50,15 @@ def export(scenario: Scenario, out: Path, *, program: Program | None = None, fmu
         fmus: folder with the archives of the four units; default :func:`feedsim.cosim.fmus_directory`.
 
     Raises:
-        InputError: the motion violates a limit, an archive is missing, or a unit refuses its parameters.
+        InputError: the motion violates a limit, an archive is missing, a unit refuses its parameters, or there are
+            loads, which no unit of an SSP plays.
         OutputError: `out` cannot be written.
     """
+    if scenario.loads:
+        raise InputError(
+            f"{scenario.at('loads')}: an SSP file holds no loads; leave them out with --set loads=[], and connect the "
+            "plant's inputs there"
+        )
     program = program or plan(scenario)
     fmus = fmus or fmus_directory()
     warnings = check(scenario, program, fmus=fmus)

@@ -227,7 +227,7 @@ def _with_motions(
         origin={axis: float(program.x_s[axis][0]) for axis in axes},
         target={axis: float(program.x_s[axis][-1]) for axis in axes},
         axes=tuple(axis for axis in axes if np.any(program.x_s[axis] != program.x_s[axis][0])),
-        geometry=Recorded(begin=0.0, end=program.duration, file=path, axes=axes),
+        geometry=Recorded(begin=0.0, end=program.duration, first=0.0, file=path, axes=axes),
     )
     return scenario, Program(program.time, program.x_s, program.n_ffw, (segment,)), tuple(warnings)
 

@@ -5,7 +5,7 @@ Start with trace.py (the Trace), then cells.py and csv.py (how a file becomes on
 response.py and response_files.py.
 """
 
-from feedsim.trace.csv import read_csv, read_setpoints, write_csv
+from feedsim.trace.csv import read_csv, read_signals, write_csv
 from feedsim.trace.files import written_whole
 from feedsim.trace.recording import Recording, convert, read_recording
 from feedsim.trace.series import Series, as_series, read_series
@@ -14,6 +14,6 @@ from feedsim.trace.trace import Array, Trace, matches, matching
 
 __all__ = [
     "Array", "Recording", "Series", "Table", "Trace", "as_series", "convert", "least_and_largest", "matches",
-    "matching", "read_csv", "read_recording", "read_series", "read_setpoints", "release", "stretches", "write_csv",
+    "matching", "read_csv", "read_recording", "read_series", "read_signals", "release", "stretches", "write_csv",
     "written_whole",
 ]  # fmt: skip

@@ -20,7 +20,6 @@ from feedsim.trace.table import stretches
 from feedsim.trace.trace import Array, Trace, first_not_finite
 
 TIME_NAMES = ("time", "t")
-FEWEST_ROWS = 4  # of setpoints: a cubic needs them
 ROWS = 1 << 12  # that are written at a time
 
 
@@ -54,21 +53,25 @@ def read_csv(
         raise InputError(f"{table.head}: {error}") from None
 
 
-def read_setpoints(
+def read_signals(
     path: str | Path,
     columns: Mapping[str, tuple[str, str | None]],
+    unit: str,
     *,
     time: tuple[str, str | None] = ("time", None),
     between: tuple[float, float] | None = None,
+    fewest: int = 2,
 ) -> Trace:
-    """Positions over time from a recording.
+    """Signals of one dimension over time from a recording.
 
-    columns  axis -> (column name, unit or None for that of the header)
+    columns  signal -> (column name, unit or None for that of the header)
+    unit     SI unit of the signals
     time     (column name, unit or None); without any unit: s
     between  part to read, first and last recorded time [s]
+    fewest   rows that are needed
 
-    Returns a trace with a column [m] per axis whose time begins at 0. Raises InputError: what read_csv() refuses, a
-    unit that is missing, contradicts the header or is no length, fewer than 4 rows in the part.
+    Returns a trace with a column per signal, over the time as recorded. Raises InputError: what read_csv() refuses, a
+    unit that is missing, contradicts the header or is of another dimension, too few rows in the part.
     """
     path = Path(path)
     time_name, time_unit = time
@@ -77,27 +80,28 @@ def read_setpoints(
     whole = trace
     if between is not None:
         trace = trace.between(*between)
-    if len(trace) < FEWEST_ROWS:
+    if len(trace) < fewest:
         part = f" between {between[0]:.9g} and {between[1]:.9g} s" if between else ""
         raise InputError(
-            f"{path}: {len(trace)} row{'s'[: len(trace) != 1]}{part}; at least {FEWEST_ROWS} are needed "
+            f"{path}: {len(trace)} row{'s'[: len(trace) != 1]}{part}; at least {fewest} are needed "
             f"(the file runs from {whole.time[0]:.9g} to {whole.time[-1]:.9g} s)"
         )
     values = {}
-    for axis, (name, unit) in columns.items():
+    for signal, (name, told) in columns.items():
         known = trace.unit(name)
-        if unit and known and units.unit(unit).factor != units.unit(known).factor:
-            raise InputError(f"{path}:1: column {name!r} is in {known} by its header, in {unit} by the scenario")
-        if not (given := unit or known):
+        if told and known and units.unit(told).factor != units.unit(known).factor:
+            raise InputError(f"{path}:1: column {name!r} is in {known} by its header, in {told} by the scenario")
+        if not (given := told or known):
+            example = {"m": "mm"}.get(unit, unit)
             raise InputError(
-                f"{path}:1: column {name!r} has no unit; write '{name} [mm]' in the header or give the unit"
+                f"{path}:1: column {name!r} has no unit; write '{name} [{example}]' in the header or give the unit"
             )
         try:
-            factor = units.factor(given, "m")
+            factor = units.factor(given, unit)
         except InputError as error:
             raise InputError(f"{path}:1: column {name!r}: {error}") from None
-        values[axis] = trace[name] * float(factor)
-    return Trace(np.asarray(trace.time - trace.time[0]), values, dict.fromkeys(values, "m"))
+        values[signal] = trace[name] * float(factor)
+    return Trace(trace.time, values, dict.fromkeys(values, unit))
 
 
 def write_csv(path: str | Path, trace: Trace) -> None:

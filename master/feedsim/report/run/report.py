@@ -108,7 +108,13 @@ def report_of(run: Run, figures: Mapping[str, Figure], pictures: Sequence[Pictur
         warnings=run.warnings,
         notes=(machine.note, scenario.note),
         tiles=[tile(name, figure) for name, figure in figures.items() if is_leading(name, HEADER)],
-        main=[*pictures, sections.figures_section(figures), motions_section(run), pose_section(run.pose)],
+        main=[
+            *pictures,
+            sections.figures_section(figures),
+            motions_section(run),
+            loads_section(run),
+            pose_section(run.pose),
+        ],
         provenance=provenance(run),
         footer=sections.figures_footer(footer) if figures else footer,
     )
@@ -168,6 +174,18 @@ def motions_section(run: Run) -> Section:
     return Section("Motions", [Table("rllrr", ("No.", "Motion", "Path", "Start [s]", "End [s]"), rows, note)])
 
 
+def loads_section(run: Run) -> Section | None:
+    """What every load has done; None without one."""
+    rows = [
+        (str(work.load), work.words, work.input, f"{number(work.peak, 4)} {typeset(work.unit)}",
+         *(number(value, 3) for value in (work.given, work.taken)))
+        for work in run.loads
+    ]  # fmt: skip
+    heads = ("No.", "Where it acts", "Column", "Largest", "Work on the machine [J]", "Work taken from it [J]")
+    note = "A load acts as its mean over each control cycle. A process takes work from the machine."
+    return Section("Loads", [Table("rllrrr", heads, rows, note)]) if rows else None
+
+
 def provenance(run: Run) -> Section:
     """Inputs, units, coupling, and the parameters of every axis."""
     scenario, machine = run.scenario, run.scenario.machine
@@ -224,6 +242,16 @@ def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> di
                 for segment in run.program.segments
             ],
         },
+        "loads": [
+            {
+                "acts": work.words,
+                "input": work.input,
+                "largest": quantity(work.peak, work.unit),
+                "work_on_machine": quantity(work.given, "J"),
+                "work_taken": quantity(work.taken, "J"),
+            }
+            for work in run.loads
+        ],
         "machine": machine_part(machine),
         "pose": pose_part(run.pose),
         "inputs": inputs_part(input_files(scenario)),

@@ -1,0 +1,152 @@
+"""Loads: torques and forces over time that act on the axes and at the tool, from a recording or a table.
+
+Each acts at one input of the plant; which, in which unit and with which sign, is said here alone.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, StrictBool, StrictInt, field_validator, model_validator
+
+from feedsim.fields import AxisName, File, Model, Quantity, fault
+from feedsim.motions import Column
+
+MotionIndex = Annotated[StrictInt, Field(ge=0)]
+Direction = Literal["X", "Y", "Z"]
+
+
+class Table(Model):
+    """A load over time in the scenario file itself."""
+
+    time: Annotated[tuple[Annotated[float, Quantity("s", example="0 s")], ...], Field(min_length=2)] = Field(
+        description="Instants, increasing"
+    )
+    values: tuple[float, ...] = Field(description="The load at each instant")
+
+    @field_validator("time")
+    @classmethod
+    def _increasing(cls, time: tuple[float, ...]) -> tuple[float, ...]:
+        for before, after in pairwise(time):
+            if after <= before:
+                raise fault(f"{after:.9g} s follows {before:.9g} s; the time must increase")
+        return time
+
+    @model_validator(mode="after")
+    def _a_value_each(self) -> Self:
+        if len(self.time) != len(self.values):
+            raise fault(f"{len(self.time)} instants and {len(self.values)} values; each instant needs a value")
+        return self
+
+
+class TorqueTable(Table):
+    """A torque over time."""
+
+    values: tuple[Annotated[float, Quantity("N.m", example="2 N.m")], ...] = Field(description="Torque at each instant")
+
+
+class ForceTable(Table):
+    """A force over time."""
+
+    values: tuple[Annotated[float, Quantity("N", example="100 N")], ...] = Field(description="Force at each instant")
+
+
+class LoadCourse(Model):
+    """What all loads have in common: where their course over time is from."""
+
+    UNIT: ClassVar[str]
+
+    file: File | None = Field(default=None, description="CSV file with the load over time, relative to this file")
+    column: Column | None = Field(default=None, description="Column of the load in the file")
+    time: Column = Field(default=Column(column="time"), description="Column of the time in the file")
+    table: Table | None = None
+    held: StrictBool = Field(
+        default=False, description="Each value holds until the next instant; false: linear in between"
+    )
+    factor: Annotated[float, Quantity("1")] = Field(
+        default=1.0, description="By which all values are multiplied; -1 turns the sign"
+    )
+    motion: MotionIndex | None = Field(
+        default=None,
+        description="Place of the motion in motions, from 0, with which the load's time runs: the recorded time of "
+        "recorded setpoints, else the time since the motion began (default: the time of the run)",
+    )
+
+    @field_validator("factor")
+    @classmethod
+    def _not_zero(cls, factor: float) -> float:
+        if factor == 0:
+            raise fault("0 leaves nothing of the load")
+        return factor
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.file is None) == (self.table is None):
+            found = "neither is given" if self.table is None else "both are given"
+            raise fault(f"a load is in a 'file' with its 'column', or in a 'table' of 'time' and 'values'; {found}")
+        if (self.file is None) != (self.column is None):
+            raise fault("a 'file' needs the 'column' of the load, and only a file has one")
+        return self
+
+    @property
+    def input(self) -> str:
+        """The plant's variable at which it acts."""
+        raise NotImplementedError
+
+    @property
+    def words(self) -> str:
+        """Where it acts, for people."""
+        raise NotImplementedError
+
+    @property
+    def axis_name(self) -> str:
+        """The axis whose motor mostly carries it, if there is one of that name."""
+        raise NotImplementedError
+
+
+class MotorLoad(LoadCourse):
+    """A torque at the motor of an axis, counted against the motor torque like constant_load, to which it adds."""
+
+    UNIT = "N.m"
+
+    kind: Literal["motor"] = "motor"
+    axis: AxisName
+    table: TorqueTable | None = Field(default=None, description="The load over time, in place of a file")
+
+    @property
+    def input(self) -> str:
+        return f"{self.axis}.M_0"
+
+    @property
+    def words(self) -> str:
+        return f"at the motor of {self.axis}"
+
+    @property
+    def axis_name(self) -> str:
+        return self.axis
+
+
+class ToolLoad(LoadCourse):
+    """A force on the tool in a direction of the machine's frame, with its reaction on the workpiece."""
+
+    UNIT = "N"
+
+    kind: Literal["tool"] = "tool"
+    direction: Direction = Field(description="X, Y or Z, positive as in the machine's frame")
+    table: ForceTable | None = Field(default=None, description="The load over time, in place of a file")
+
+    @property
+    def input(self) -> str:
+        return f"tool.F_{self.direction}"
+
+    @property
+    def words(self) -> str:
+        return f"on the tool in {self.direction}"
+
+    @property
+    def axis_name(self) -> str:
+        return self.direction
+
+
+Load = Annotated[MotorLoad | ToolLoad, Field(discriminator="kind")]

@@ -4,12 +4,24 @@ May use cosim, structure, nc, scenario and trace.
 Start with evaluate.py, which finds the figures that a scenario asks for; circularity.py is one of them, whole.
 """
 
+from feedsim.analysis.circle import Diagnosis, answer
 from feedsim.analysis.circularity import Contour, Glitch, Turn, circularity, contour
-from feedsim.analysis.evaluate import CircleTask, PositioningTask, Result, Task, check, evaluate, tasks
+from feedsim.analysis.evaluate import (
+    CircleTask,
+    PositioningTask,
+    Result,
+    Task,
+    check,
+    diagnoses,
+    doubts,
+    evaluate,
+    tasks,
+)
 from feedsim.analysis.figures import Figure, Figures
 from feedsim.analysis.positioning import Approach, deviation, positioning
 
 __all__ = [
-    "Approach", "CircleTask", "Contour", "Figure", "Figures", "Glitch", "PositioningTask", "Result", "Task", "Turn",
-    "check", "circularity", "contour", "deviation", "evaluate", "positioning", "tasks",
+    "Approach", "CircleTask", "Contour", "Diagnosis", "Figure", "Figures", "Glitch", "PositioningTask", "Result",
+    "Task", "Turn", "answer", "check", "circularity", "contour", "deviation", "diagnoses", "doubts", "evaluate",
+    "positioning", "tasks",
 ]  # fmt: skip

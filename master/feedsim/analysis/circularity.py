@@ -98,13 +98,20 @@ def circularity(trace: Trace, turn: Turn) -> dict[str, Figure]:
 
 def least_squares_deviation(angle: Array, deviation: Array, radius: float) -> float:
     """Circular deviation G about the least-squares circle [m]: range of the distance from its centre."""
+    centre = fitted_centre(angle, deviation, radius)
+    x, y = (radius + deviation) * np.cos(angle), (radius + deviation) * np.sin(angle)
+    return float(np.ptp(np.hypot(x - centre[0], y - centre[1])))
+
+
+def fitted_centre(angle: Array, deviation: Array, radius: float) -> Array:
+    """Centre (2,) of the least-squares circle [m]."""
     x, y = (radius + deviation) * np.cos(angle), (radius + deviation) * np.sin(angle)
     centre = np.zeros(2)
     for _ in range(4):  # Gauss-Newton; an offset of d leaves d^2/R after one pass, nothing after three
         distance = np.hypot(x - centre[0], y - centre[1])
         normal = np.column_stack([(x - centre[0]) / distance, (y - centre[1]) / distance, np.ones(len(x))])
         centre += np.linalg.lstsq(normal, distance - radius, rcond=None)[0][:2]
-    return float(np.ptp(np.hypot(x - centre[0], y - centre[1])))
+    return centre
 
 
 def quadrant(angle: Array, crossing: float) -> NDArray[np.bool_]:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from feedsim.analysis.circle import Diagnosis
+from feedsim.analysis.circle_figures import bidirectional, cause_figures, diagnosed, misleading
 from feedsim.analysis.circularity import EVEN, Turn, axis_letters, circularity, recorded_circle, speed_change
 from feedsim.analysis.figures import Figure
 from feedsim.analysis.positioning import LEAST_REST, Approach, positioning
 from feedsim.errors import InputError
+from feedsim.findings import Note
 from feedsim.motions.circular import Circular
 from feedsim.motions.move import Straight
 from feedsim.motions.setpoints import Recorded
@@ -54,10 +58,18 @@ class PositioningTask:
 
 @dataclass(frozen=True)
 class CircleTask:
-    """A turn to evaluate; ``prefix`` of its figures."""
+    """A turn to evaluate; ``prefix`` of its figures; ``back``: the same circle in the other sense, where it is driven;
+    ``pitch`` of the plane's axes [m]."""
 
     prefix: str
     turn: Turn
+    back: Turn | None = None
+    pitch: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def turns(self) -> tuple[Turn, ...]:
+        """The turn, and that in the other sense if there is one."""
+        return (self.turn,) if self.back is None else (self.turn, self.back)
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -66,7 +78,16 @@ class CircleTask:
 
     def figures(self, trace: Trace) -> dict[str, Figure]:
         """Figures of the task, without prefix."""
-        return circularity(trace, self.turn)
+        found = circularity(trace, self.turn)
+        if self.back is not None:
+            found |= bidirectional(trace, self.turn, self.back)
+            found |= {f"clockwise.{name}": figure for name, figure in circularity(trace, self.back).items()}
+        diagnosis = self.diagnosis(trace)
+        return found | (cause_figures(diagnosis) if diagnosis is not None else {})
+
+    def diagnosis(self, trace: Trace) -> Diagnosis | None:
+        """Why the circle is not round; None where it has too few samples to tell."""
+        return diagnosed(trace, self.turns, self.pitch)
 
 
 Task = PositioningTask | CircleTask
@@ -81,7 +102,7 @@ def tasks(scenario: Scenario, program: Program) -> tuple[Task, ...]:
     problems: list[str] = []
     for i, item in enumerate(scenario.evaluate):
         try:
-            task = _stop(item, program) if isinstance(item, Positioning) else _turn(item, program)
+            task = _stop(item, program) if isinstance(item, Positioning) else _turn(item, scenario, program)
         except InputError as error:
             problems += [f"{scenario.at('evaluate', i)}: {problem}" for problem in error.problems]
             continue
@@ -112,6 +133,22 @@ def check(scenario: Scenario, program: Program) -> None:
         problems += [f"{scenario.at('evaluate', i)}: {problem}" for problem in found]
     if problems:
         raise InputError.of(f"{scenario.file}: the evaluation is not possible", problems)
+
+
+def diagnoses(result: Result) -> dict[str, Diagnosis]:
+    """Why its circles are not round: prefix of a circle's figures -> what it is made of."""
+    circles = [task for task in tasks(result.scenario, result.program) if isinstance(task, CircleTask)]
+    found = {task.prefix: task.diagnosis(result.trace) for task in circles}
+    return {prefix: diagnosis for prefix, diagnosis in found.items() if diagnosis is not None}
+
+
+def doubts(figures: Mapping[str, Figure], diagnoses: Mapping[str, Diagnosis]) -> tuple[Note, ...]:
+    """Figures that do not mean what their names say, of this result."""
+    found = []
+    for prefix, diagnosis in diagnoses.items():
+        own = {name.removeprefix(f"{prefix}."): f for name, f in figures.items() if name.startswith(f"{prefix}.")}
+        found += [Note(f"{prefix}: {sentence}") for sentence in misleading(diagnosis, own)]
+    return tuple(found)
 
 
 def evaluate(result: Result) -> dict[str, Figure]:
@@ -159,14 +196,15 @@ def _chosen(program: Program, motion: int | None) -> tuple[Segment, ...]:
     return program.segments if motion is None else program.segments[motion : motion + 1]
 
 
-def _turn(item: CircleTest, program: Program) -> CircleTask:
+def _turn(item: CircleTest, scenario: Scenario, program: Program) -> CircleTask:
     circle = _circle(item, _chosen(program, item.motion), program)
     turns = len(circle.turns)
     if (item.turn or 0) > turns:
         raise InputError(f"circularity: turn {item.turn} of a circle of {turns} turn{'s'[: turns != 1]}")
     begin, end = _even_turn(circle, item.turn, program)
     turn = Turn(circle.axes, circle.centre, circle.radius, circle.sense, begin, end)
-    return CircleTask(axis_letters(circle.axes), turn)
+    pitch = {axis: 2 * math.pi * scenario.machine.axes[axis].I_P for axis in circle.axes}
+    return CircleTask(axis_letters(circle.axes), turn, pitch=pitch)
 
 
 def _even_turn(circle: Circular, number: int | None, program: Program) -> tuple[float, float]:

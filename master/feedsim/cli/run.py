@@ -52,8 +52,15 @@ def run(options: Namespace) -> None:
                 )  # fmt: skip
             result = replace(result, warnings=worded(result.warnings))
             figures = analysis.evaluate(result)
-            report.write(result, figures, directory, recorded)
-    finish(options.quiet, result.warnings, f"{plan.name}: {report.summary_line(result, figures)} -> {directory}")
+            causes = analysis.diagnoses(result)
+            report.write(result, figures, directory, recorded, causes)
+    warnings = (*result.warnings, *analysis.doubts(figures, causes))
+    finish(
+        options.quiet,
+        warnings,
+        *report.answers(causes),
+        f"{plan.name}: {report.summary_line(result, figures)} -> {directory}",
+    )
 
 
 @contextmanager

@@ -128,7 +128,8 @@ class Report:
     """A report of any kind, in the order in which it is read; what is None or empty is left out.
 
     Attributes:
-        warnings: above everything else, what is wrong first (`feedsim.findings`). notes: what the numbers are
+        answer: ahead of everything else, what the result is, what it means, and what to do next.
+        warnings: below it, what is wrong first (`feedsim.findings`). notes: what the numbers are
             worth, each once.
         tiles: leading numbers.
         main: sections, tables and pictures.
@@ -140,6 +141,7 @@ class Report:
     main: Sequence[Part | None]
     footer: Text
     provenance: Section | None = None
+    answer: Sequence[str] = ()
     warnings: Sequence[str] = ()
     notes: Sequence[str] = ()
     tiles: Sequence[Tile] = ()

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from feedsim.analysis import Figure, PositioningTask, tasks
+from feedsim.analysis import Diagnosis, Figure, PositioningTask, answer, diagnoses, doubts, tasks
 from feedsim.cosim import Run
 from feedsim.report import sections
 from feedsim.report.content import Report, Section, Table, Tile, tile_value
@@ -26,6 +26,7 @@ from feedsim.report.provenance import (
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
+from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
 from feedsim.report.run.pose import pose_part, pose_section
 from feedsim.report.style import Picture
 from feedsim.scenario import Level, Logging
@@ -71,13 +72,18 @@ def growing(directory: Path | str) -> Partial:
 
 
 def write(
-    run: Run, figures: Mapping[str, Figure], directory: Path | str, recorded: Partial | None = None
+    run: Run,
+    figures: Mapping[str, Figure],
+    directory: Path | str,
+    recorded: Partial | None = None,
+    causes: Mapping[str, Diagnosis] | None = None,
 ) -> tuple[Path, ...]:
     """Write result.csv, summary.json, report.html, figures/*.png and log.csv, if there is one; returns their paths.
 
     figures: as from ``analysis.evaluate``. recorded: the run's rows where they have been written already, in the same
     directory; the file becomes result.csv, or stays as it is where the results cannot be written. Files of an earlier
-    run are replaced. Raises OutputError.
+    run are replaced. causes: as from ``analysis.diagnoses``, which is asked where they are not given. Raises
+    OutputError.
     """
 
     def result(path: Path) -> Path | None:
@@ -90,11 +96,16 @@ def write(
     files: dict[str, Content] = {RESULT: result}
     if run.log is not None:
         files[LOG] = partial(write_csv, trace=run.log)
-    return write_report(directory, report_of(run, figures, draw(run, figures)), partial(summary, run, figures), files)
+    causes = diagnoses(run) if causes is None else causes
+    report = report_of(run, figures, draw(run, figures), causes)
+    return write_report(directory, report, partial(summary, run, figures, causes=causes), files)
 
 
-def report_of(run: Run, figures: Mapping[str, Figure], pictures: Sequence[Picture]) -> Report:
-    """Content of the report."""
+def report_of(
+    run: Run, figures: Mapping[str, Figure], pictures: Sequence[Picture], causes: Mapping[str, Diagnosis] | None = None
+) -> Report:
+    """Content of the report. causes: prefix of a circle's figures -> why it is not round."""
+    causes = causes or {}
     scenario, machine = run.scenario, run.scenario.machine
     factor = real_time_factor(run)
     speed = f" ({factor:.2g} times real time)" if factor is not None else ""
@@ -105,11 +116,13 @@ def report_of(run: Run, figures: Mapping[str, Figure], pictures: Sequence[Pictur
     return Report(
         scenario.name,
         f"{machine.name} · {len(scenario.motions)} motion(s), {run.program.duration:.4g} s",
-        warnings=run.warnings,
+        answer=[typeset(line) for line in answers(causes)],
+        warnings=(*run.warnings, *doubts(figures, causes)),
         notes=(machine.note, scenario.note),
         tiles=[tile(name, figure) for name, figure in figures.items() if is_leading(name, HEADER)],
         main=[
             *pictures,
+            *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
             sections.figures_section(figures),
             motions_section(run),
             loads_section(run),
@@ -120,10 +133,17 @@ def report_of(run: Run, figures: Mapping[str, Figure], pictures: Sequence[Pictur
     )
 
 
+def answers(causes: Mapping[str, Diagnosis]) -> list[str]:
+    """What the circles are, why, and what to do: a line each."""
+    return [f"{prefix}: {answer(diagnosis)}" for prefix, diagnosis in causes.items()]
+
+
 def tile(name: str, figure: Figure) -> Tile:
     """A figure with its name in words."""
     prefix, _, key = name.partition(".")
-    label = f"quadrant glitch, {key[7:]} reverses" if key.startswith("glitch_") else TILES.get(key, key)
+    label = f"reversal peak, {key[5:]} reverses" if key.startswith("peak_") else TILES.get(key, key)
+    if key.startswith("glitch_"):
+        label = f"quadrant glitch, {key[7:]} reverses"
     return Tile(tile_value(figure), f"{prefix.replace('#', ' no. ')}: {label}", typeset(figure.meaning))
 
 
@@ -216,13 +236,18 @@ def _coupling(coupling: Mapping[str, float]) -> Section | None:
     return Section("Coupling", [Table("lrrr", heads, rows, note)]) if rows else None
 
 
-def summary(run: Run, figures: Mapping[str, Figure], files: Sequence[str]) -> dict[str, Any]:
+def summary(
+    run: Run, figures: Mapping[str, Figure], files: Sequence[str], causes: Mapping[str, Diagnosis] | None = None
+) -> dict[str, Any]:
     """Content of summary.json; a figure that could not be determined has the value null."""
+    causes = causes or {}
     scenario, machine = run.scenario, run.scenario.machine
     return {
         "format": FORMAT,
-        "warnings": list(run.warnings),
+        "answer": answers(causes),
+        "warnings": [*run.warnings, *doubts(figures, causes)],
         "figures": figures_part(figures),
+        "diagnosis": {prefix: diagnosis_part(diagnosis) for prefix, diagnosis in causes.items()},
         "scenario": {
             "name": scenario.name,
             "file": scenario.file.name,

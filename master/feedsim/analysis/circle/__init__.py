@@ -1,0 +1,22 @@
+"""Why a circle is not round: the radial deviation of one direction or of both taken apart into causes.
+
+May use analysis.figures. Knows nothing of scenarios: simulated circles and recorded ones are the same to it.
+Start with model.py, the terms and their fit; diagnosis.py says what share of G each of them has.
+"""
+
+from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, Vibration, diagnose
+from feedsim.analysis.circle.model import CircleUnderTest, TurnedPath
+from feedsim.analysis.circle.words import answer, name, sentence
+
+__all__ = [
+    "CircleUnderTest",
+    "Diagnosis",
+    "Peak",
+    "Term",
+    "TurnedPath",
+    "Vibration",
+    "answer",
+    "diagnose",
+    "name",
+    "sentence",
+]

@@ -1,0 +1,322 @@
+"""A circle taken apart: the terms of the fitted model in their own units, what friction makes where an axis reverses,
+vibration, what remains, and the share that each has of G."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.analysis.circle.model import CircleUnderTest, Fit, TurnedPath, fit
+from feedsim.analysis.figures import Array
+
+# A peak is seen where its mean over this angle [deg] exceeds this multiple of what noise makes of such means and of the
+# fitted rest below them.
+SEEN, OVER = 5.0, 1.0
+# Noise may change a height by this share: over so many samples it is averaged, and no more.
+BLUR = 0.015
+FLOOR = 1e-9  # a deviation of less [m] is not worth a word
+# Lines of the spectrum that belong to one vibration, and how far their mean stands out of what is around them.
+LINES, AROUND, STANDS_OUT = 7, 101, 5.0
+FIRST_ORDER = 13  # below it is form
+FORM = (3, 4, 5)
+
+
+@dataclass(frozen=True)
+class Term:
+    """One cause.
+
+    Attributes:
+        key: "offset", "radius", "scale", "squareness", "servo", "squareness_or_servo", "lost_motion", "peaks", "pitch"
+            or "rest". axis: the one it belongs to; "" where to the pair.
+        value: in ``unit`` (SI); scale, servo: what the first axis travels further, answers later than the second.
+        half: half of its interval of 95 %; NaN where it has none.
+        size: difference of the largest and the smallest radial deviation that it makes alone [m].
+        share: of G: what it contributes where the deviation is largest, less where it is smallest, over G [1].
+    """
+
+    key: str
+    axis: str
+    value: float
+    half: float
+    unit: str
+    size: float
+    share: float
+
+    @property
+    def told(self) -> bool:
+        """Whether it is told from zero, and not by rounding alone."""
+        size = abs(self.value) if self.key == "radius" else self.size
+        return size > FLOOR and (math.isnan(self.half) or abs(self.value) > self.half)
+
+
+@dataclass(frozen=True)
+class Peak:
+    """What stands out behind a reversal: name of the half axis ("X+"), the axis that reverses, sense of the turn,
+    height over the fitted rest [m] (positive outside) with half of its interval, its angle [rad], its width at half the
+    height and the time in which it falls to 1/e of it [s].
+
+    Height 0, width and decay NaN where nothing stands out of the noise; half is then what would have."""
+
+    name: str
+    axis: str
+    sense: int
+    height: float
+    half: float
+    angle: float
+    width: float
+    decay: float
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """Frequency at this path speed [Hz] and amplitude [m] of what swings, with half of its interval [m]."""
+
+    frequency: float
+    amplitude: float
+    half: float
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """A circle taken apart.
+
+    Attributes:
+        circle, senses: what was tested, and in which senses.
+        G: largest less smallest radial deviation of all turns [m].
+        terms: by their share of G, the largest first. peaks: of all reversals, in the order of the turns.
+        vibration: the strongest; None where none stands out.
+        form: order -> amplitude of it in what remains [m].
+        noise: standard deviation of what remains outside the windows behind the reversals [m].
+        left_out: axes for whose pitch the circle is too small.
+        rest: of every turn, what the model says without peaks: angle (N,) [rad], deviation (N,) [m].
+    """
+
+    circle: CircleUnderTest
+    senses: tuple[int, ...]
+    G: float
+    terms: tuple[Term, ...]
+    peaks: tuple[Peak, ...]
+    vibration: Vibration | None
+    form: dict[int, float]
+    noise: float
+    left_out: tuple[str, ...]
+    rest: tuple[tuple[Array, Array], ...]
+
+    def __getitem__(self, key: str) -> Term:
+        """The term "servo", or "lost_motion X"; KeyError where the turns do not tell it."""
+        for term in self.terms:
+            if key == f"{term.key} {term.axis}".strip():
+                return term
+        raise KeyError(key)
+
+    @property
+    def both(self) -> bool:
+        """Whether both senses were driven."""
+        return len(set(self.senses)) == 2
+
+
+def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: bool = False) -> Diagnosis:
+    """Take turns of one sense or of both apart.
+
+    centred: the centre is that of the measurement's set-up and no error of the machine; G is then about the fitted one.
+    """
+    paths = [path.thinned() for path in paths]
+    found = fit(circle, paths)
+    curves = _curves(found, paths, circle)
+    total = [path.deviation for path in paths]
+    if centred:
+        offset = curves.pop("offset ")
+        total = [e - part for e, part in zip(total, offset, strict=True)]
+    e = np.concatenate(total)
+    parts = {key: np.concatenate(part) for key, part in curves.items()}
+    parts["rest "] = e - sum(parts.values())
+    G, high, low = float(np.ptp(e)), int(e.argmax()), int(e.argmin())
+    peaks = tuple(peak for k, path in enumerate(paths) for peak in _peaks(circle, found, k, path.sense))
+    terms = []
+    for name, part in parts.items():
+        key, _, axis = name.partition(" ")
+        value, half, unit = _value(circle, found, peaks, key, axis)
+        if key == "rest":
+            value = float(np.ptp(part))
+        share = float(part[high] - part[low]) / G if G > 0 else 0.0
+        terms.append(Term(key, axis, value, half, unit, float(np.ptp(part)), share))
+    if centred:
+        value, half, unit = _value(circle, found, peaks, "offset", "")
+        terms.append(Term("offset", "", value, half, unit, 2 * value, 0.0))
+    return Diagnosis(
+        circle=circle,
+        senses=tuple(path.sense for path in paths),
+        G=G,
+        terms=tuple(sorted(terms, key=lambda term: (-term.share if term.told else 1.0, -term.size))),
+        peaks=peaks,
+        vibration=_vibration(circle, found, [path.sense for path in paths]),
+        form=_form(found),
+        noise=found.noise,
+        left_out=found.left_out,
+        rest=tuple(
+            (path.angle, path.deviation - residual) for path, residual in zip(paths, found.residual, strict=True)
+        ),
+    )
+
+
+def _curves(found: Fit, paths: Sequence[TurnedPath], circle: CircleUnderTest) -> dict[str, list[Array]]:
+    """ "term axis" -> radial deviation that it makes, of every path."""
+    curves: dict[str, list[Array]] = {}
+    of = dict(zip(found.names, found.values, strict=True))
+    for k in range(len(paths)):
+        made = {name: of[name] * column for name, column in found.columns[k].items()}
+        named = {
+            "offset ": made["offset_0"] + made["offset_1"],
+            "radius ": made["radius"],
+            "scale ": made["scale"],
+            ("squareness " if "servo" in made else "squareness_or_servo "): made["squareness"],
+        }
+        if "servo" in made:
+            named["servo "] = made["servo"]
+        for i, axis in enumerate(circle.axes):
+            named[f"lost_motion {axis}"] = made[f"lost_{i}"]
+            if f"pitch_{i}_cos" in made:
+                named[f"pitch {axis}"] = made[f"pitch_{i}_cos"] + made[f"pitch_{i}_sin"]
+            own = (found.reversal[k] >= 0) & (found.reversal[k] % 2 == i)
+            named[f"peaks {axis}"] = np.where(own, found.residual[k], 0.0)
+        for name, curve in named.items():
+            curves.setdefault(name, []).append(curve)
+    return curves
+
+
+def _value(circle: CircleUnderTest, found: Fit, peaks: Sequence[Peak], key: str, axis: str) -> tuple[float, float, str]:
+    """Value of a term, half of its interval, and their unit."""
+    number = circle.axes.index(axis) if axis else 0
+    if key == "peaks":
+        own = max((peak for peak in peaks if peak.axis == axis), key=lambda peak: abs(peak.height))
+        return own.height, own.half, "m"
+    if key == "rest":
+        return math.nan, math.nan, "m"
+    names, factor, unit = {
+        "offset": (("offset_0", "offset_1"), 1.0, "m"),
+        "radius": (("radius",), 1.0, "m"),
+        "scale": (("scale",), 2 / circle.radius, "1"),
+        "squareness": (("squareness",), 2 / circle.radius, "rad"),
+        "squareness_or_servo": (("squareness",), 1.0, "m"),
+        "servo": (("servo",), 2 / circle.speed, "s"),
+        "lost_motion": ((f"lost_{number}",), 1.0, "m"),
+        "pitch": ((f"pitch_{number}_cos", f"pitch_{number}_sin"), 1.0, "m"),
+    }[key]
+    value = math.hypot(found[names[0]], found[names[1]]) if len(names) == 2 else found[names[0]]
+    return factor * value, factor * found.half(*names), unit
+
+
+def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak]:
+    """What stands out behind every reversal of path ``k``."""
+    rate = circle.speed / circle.radius
+    rest_error = found.rest_error
+    peaks = []
+    for which in range(4):
+        axis = circle.axes[which % 2]
+        name = f"{axis}{'+' if which < 2 else '-'}"
+        own = np.flatnonzero(found.reversal[k] == which)
+        own = own[np.argsort(found.since[k][own])]
+        at_crossing = which * math.pi / 2
+        per_sample = float(np.ptp(found.since[k][own])) / max(len(own) - 1, 1)
+        # Between two samples nobody knows on which side of a step of lost motion one is.
+        own = own[np.abs(found.since[k][own]) > 1.5 * per_sample]
+        if len(own) < 5:
+            peaks.append(Peak(name, axis, sense, 0.0, math.nan, at_crossing, math.nan, math.nan))
+            continue
+        since, off = found.since[k][own], found.residual[k][own]
+        wide = max(1, round(math.radians(OVER) / per_sample))
+        smooth = _averaged(off, wide)
+        most = float(np.abs(smooth).max())
+        level = max(SEEN * math.hypot(found.noise / math.sqrt(wide), rest_error), FLOOR)
+        if most < level:
+            peaks.append(Peak(name, axis, sense, 0.0, level, at_crossing, math.nan, math.nan))
+            continue
+        enough = min(wide, max(1, math.ceil((found.noise / (BLUR * most)) ** 2)))
+        curve = _averaged(off, enough)
+        at = int(np.abs(curve).argmax())
+        height = float(curve[at])
+        half = math.hypot(found.quantile * found.noise / math.sqrt(enough), found.quantile * rest_error)
+        relative = curve / height
+        begin, end = _falls(since, relative, at, 0.5, -1), _falls(since, relative, at, 0.5, 1)
+        width, decay = (end - begin) / rate, (_falls(since, relative, at, 1 / math.e, 1) - since[at]) / rate
+        angle = float(found.angle[k][own[at]])
+        peaks.append(Peak(name, axis, sense, height, half, angle, float(width), float(decay)))
+    return peaks
+
+
+def _falls(since: Array, relative: Array, at: int, level: float, way: int) -> float:
+    """Angle at which a peak falls to ``level`` of its height, on one side (``way`` +-1) of its top ``at``; NaN: never.
+
+    Interpolated between two samples.
+    """
+    side = np.arange(at, len(since) if way > 0 else -1, way)
+    below = np.flatnonzero(relative[side] < level)
+    if len(below) == 0:
+        return math.nan
+    out, before = side[below[0]], side[below[0] - 1]
+    share = (relative[before] - level) / (relative[before] - relative[out])
+    return float(since[before] + share * (since[out] - since[before]))
+
+
+def _averaged(values: Array, count: int) -> Array:
+    """Mean over ``count`` neighbours; fewer at the ends."""
+    ones = np.ones(min(count, len(values)))
+    return np.asarray(np.convolve(values, ones, "same") / np.convolve(np.ones(len(values)), ones, "same"))
+
+
+def _vibration(circle: CircleUnderTest, found: Fit, senses: Sequence[int]) -> Vibration | None:
+    """The strongest vibration in what remains outside the windows, over all paths."""
+    best: Vibration | None = None
+    for k, sense in enumerate(senses):
+        order = np.argsort(sense * found.angle[k] % (2 * math.pi))
+        angle, off = (sense * found.angle[k] % (2 * math.pi))[order], found.residual[k][order]
+        free = (found.reversal[k] < 0)[order]
+        even = np.arange(len(angle)) * (2 * math.pi / len(angle))
+        still = np.interp(even, angle, np.where(free, off, 0.0), period=2 * math.pi)
+        power = np.abs(np.fft.rfft(still)) ** 2
+        usable = power[FIRST_ORDER:]
+        if len(usable) < 2 * AROUND:
+            continue
+        mean = _averaged(usable, LINES)
+        around = _floor(usable)
+        stands = mean / np.maximum(around, 1e-300)
+        at = int(np.argmax(np.where(stands > STANDS_OUT, mean, 0.0)))
+        if stands[at] <= STANDS_OUT:
+            continue
+        lines = np.arange(max(at - LINES // 2, 0), min(at + LINES // 2 + 1, len(usable)))
+        centre = float(usable[lines] @ (lines + FIRST_ORDER) / usable[lines].sum())
+        amplitude = _swing(angle[free], off[free], round(centre))
+        if best is None or amplitude > best.amplitude:
+            frequency = centre * circle.speed / (2 * math.pi * circle.radius)
+            half = found.quantile * found.noise * math.sqrt(2 / max(int(free.sum()), 1))
+            best = Vibration(frequency, amplitude, half)
+    return best if best is not None and best.amplitude > FLOOR else None
+
+
+def _floor(power: Array) -> Array:
+    """Mean power of the lines around each, if they are noise: their median is ln 2 of it."""
+    edges = np.arange(0, len(power), AROUND // 2)
+    middle = [float(np.median(power[max(edge - AROUND // 2, 0) : edge + AROUND // 2 + 1])) for edge in edges]
+    return np.asarray(np.interp(np.arange(len(power)), edges, middle)) / math.log(2)
+
+
+def _swing(angle: Array, off: Array, order: int) -> float:
+    """Amplitude of the orders about one, which an axis' vibration makes on its way round: of the mean power."""
+    beside = range(max(order - LINES // 2, 1), order + LINES // 2 + 1)
+    matrix = np.column_stack([wave(n * angle) for n in beside for wave in (np.cos, np.sin)])
+    values = np.linalg.lstsq(matrix, off, rcond=None)[0]
+    return math.sqrt(2 * float(np.mean((matrix @ values) ** 2)))
+
+
+def _form(found: Fit) -> dict[int, float]:
+    """Amplitude of the orders of FORM in what remains outside the windows [m]."""
+    free: list[NDArray[np.bool_]] = [which < 0 for which in found.reversal]
+    angle = np.concatenate([a[keep] for a, keep in zip(found.angle, free, strict=True)])
+    off = np.concatenate([r[keep] for r, keep in zip(found.residual, free, strict=True)])
+    matrix = np.column_stack([wave(n * angle) for n in FORM for wave in (np.cos, np.sin)])
+    values = np.linalg.lstsq(matrix, off, rcond=None)[0]
+    return {n: float(np.hypot(*values[2 * i : 2 * i + 2])) for i, n in enumerate(FORM)}

@@ -1,0 +1,139 @@
+"""What a diagnosis says, in words that somebody at the machine acts on."""
+
+from __future__ import annotations
+
+import math
+
+from feedsim.analysis.circle.diagnosis import Diagnosis, Term
+
+# Of a cause that makes less of G, and of the largest deviation, there is no sentence.
+WORTH = 0.05
+# Noise that is this share of G leaves little to diagnose.
+NOISY = 0.3
+# Of a cause that lies elsewhere than where G is measured there is, if it alone makes so much of it.
+BESIDES = 0.25
+
+
+def answer(diagnosis: Diagnosis) -> str:
+    """Why the circle is not round, in a sentence or two: what it means, whether it can be trusted, what to do next."""
+    told = worth_telling(diagnosis)
+    G = f"G {_um(diagnosis.G)}"
+    if not told:
+        return f"{G}: no single cause stands out; what remains is {_um(_rest(diagnosis).size)}."
+    first = f"{G}, {'mostly: ' if told[0].share > 0.5 else 'first: '}{sentence(diagnosis, told[0])}"
+    more = [f"then {sentence(diagnosis, term)}" for term in told[1:3]]
+    return "; ".join([first, *more]) + "." + _trust(diagnosis)
+
+
+def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
+    """Every term with its sentence, those that are told from zero first, by their share of G."""
+    return [(term, sentence(diagnosis, term)) for term in diagnosis.terms]
+
+
+def worth_telling(diagnosis: Diagnosis) -> list[Term]:
+    """Causes that somebody can act on, the largest first."""
+    able = [term for term in diagnosis.terms if term.told and term.key not in ("rest", "radius")]
+    found = [term for term in able if term.share >= WORTH and term.size >= WORTH * diagnosis.G]
+    besides = [term for term in able if term not in found and term.size >= BESIDES * diagnosis.G]
+    return [*sorted(found, key=lambda term: -term.share), *sorted(besides, key=lambda term: -term.size)]
+
+
+def sentence(diagnosis: Diagnosis, term: Term) -> str:
+    """A cause in words, with its amount and where to look."""
+    first, second = diagnosis.circle.axes
+    value, axis = term.value, term.axis
+    amount = abs(value)
+    if not term.told and term.key not in ("rest", "peaks"):
+        return f"{name(term)}: not told from zero"
+    match term.key:
+        case "offset":
+            return f"the centre lies {_um(amount)} off: set-up of the measurement, or drift since the centre was set"
+        case "radius":
+            return (
+                f"the radius is {_um(amount)} too {'large' if value > 0 else 'small'}: path lag without "
+                "speed feedforward, symmetry filter T_sym, or a scale of both axes"
+            )
+        case "scale":
+            more, less = (first, second) if value > 0 else (second, first)
+            return (
+                f"{more} travels {_digits(amount * 1e6)} um/m more than {less}: scale, temperature or pitch "
+                "compensation, or an unlike decrease of the amplitude by path lag"
+            )
+        case "squareness":
+            return (
+                f"the angle between {first}+ and {second}+ is {_digits(amount * 1e6)} um/m "
+                f"{'less' if value > 0 else 'more'} than 90 deg: squareness of the guideways, or its compensation"
+            )
+        case "servo":
+            late, early = (first, second) if value > 0 else (second, first)
+            return f"{late} answers {_digits(amount * 1e3)} ms later than {early}: K_v, speed feedforward or T_dyn"
+        case "squareness_or_servo":
+            sense = diagnosis.senses[0]
+            delay = 2 * amount / diagnosis.circle.speed * 1e3
+            late, early = (first, second) if sense * value > 0 else (second, first)
+            return (
+                f"an ellipse along {'+' if value > 0 else '-'}45 deg of {_um(amount)} amplitude: servo mismatch "
+                f"({late} answers {_digits(delay)} ms later than {early}) or squareness "
+                f"({_digits(2 * amount / diagnosis.circle.radius * 1e6)} um/m); one direction cannot tell which, "
+                "the other one will"
+            )
+        case "lost_motion":
+            what = (
+                "backlash or wind-up; backlash compensation"
+                if value > 0
+                else "too much backlash compensation, or friction at rest"
+            )
+            return f"{axis} {'loses' if value > 0 else 'gains'} {_um(amount)} where it reverses: {what}"
+        case "peaks":
+            return _peaks(diagnosis, term)
+        case "pitch":
+            return f"{axis} errs by {_um(amount)} (amplitude) with every pitch of its drive: screw, or motor encoder"
+    form = ", ".join(f"{n}. order {_um(a)}" for n, a in diagnosis.form.items())
+    return f"what no cause explains: {_um(term.size)} from peak to valley ({form})"
+
+
+def _peaks(diagnosis: Diagnosis, term: Term) -> str:
+    own = [peak for peak in diagnosis.peaks if peak.axis == term.axis]
+    largest = max(own, key=lambda peak: abs(peak.height))
+    if largest.height == 0:
+        limit = max((peak.half for peak in own if math.isfinite(peak.half)), default=math.nan)
+        return f"where {term.axis} reverses nothing stands out" + (f" (above {_um(limit)})" if limit > 1e-8 else "")
+    where = "stays behind for a moment" if largest.height > 0 else "jumps ahead for a moment"
+    wide = f", {largest.width * 1e3:.3g} ms wide" if math.isfinite(largest.width) else ""
+    remedy = "friction; friction compensation" if largest.height > 0 else "too much friction compensation"
+    return f"{term.axis} {where} where it reverses, {_um(abs(largest.height))}{wide}: {remedy}"
+
+
+def _trust(diagnosis: Diagnosis) -> str:
+    if diagnosis.noise > NOISY * diagnosis.G:
+        return f" Noise of {_um(diagnosis.noise)} hides much: measure again, or more slowly."
+    rest = _rest(diagnosis)
+    if abs(rest.share) > 0.5:
+        return " The model explains less than half of G: look at the picture before acting on it."
+    return ""
+
+
+def _rest(diagnosis: Diagnosis) -> Term:
+    return diagnosis["rest"]
+
+
+def name(term: Term) -> str:
+    """What a term is called."""
+    names = {
+        "offset": "centre offset", "radius": "mean radius", "scale": "scale mismatch", "squareness": "squareness",
+        "servo": "servo mismatch", "squareness_or_servo": "squareness or servo mismatch",
+        "lost_motion": f"lost motion of {term.axis}", "pitch": f"pitch error of {term.axis}",
+        "peaks": f"reversal peaks of {term.axis}", "rest": "rest",
+    }  # fmt: skip
+    return names[term.key]
+
+
+def _um(value: float) -> str:
+    return f"{_digits(value * 1e6)} um"
+
+
+def _digits(value: float) -> str:
+    """Three digits that matter, and none after the third place behind the point."""
+    if abs(value) >= 100:
+        return f"{value:.0f}"
+    return f"{round(value, 3):.3g}"

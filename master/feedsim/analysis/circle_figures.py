@@ -1,0 +1,129 @@
+"""Figures that need more of a circle than its radii: why it is not round, and both directions together.
+
+Definitions: docs/figures.md. Here recorded turns meet feedsim.analysis.circle, which takes them apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from feedsim.analysis.circle import CircleUnderTest, Diagnosis, Term, TurnedPath, diagnose, name
+from feedsim.analysis.circularity import Turn, axis_letters, contour, fitted_centre
+from feedsim.analysis.figures import Array, Figure
+from feedsim.trace import Trace
+
+# Samples of a turn below which there is no telling its parts apart: three per degree would show a peak's shape.
+LEAST = 180
+# A glitch by its old definition is misleading where it differs from the peak by this share of it, and this much [m].
+MISLEADING, LEAST_MISLEADING = 0.2, 1e-6
+UNITS = {"s": (1e3, "ms"), "m": (1e6, "um"), "1": (1e6, "um/m"), "rad": (1e6, "um/m")}
+ORDER = (
+    "peaks", "servo", "squareness", "squareness_or_servo", "scale", "lost_motion", "pitch", "radius", "offset", "rest",
+)  # fmt: skip
+ANGLES = 720  # at which two directions are compared: every half degree
+
+
+def diagnosed(trace: Trace, turns: Sequence[Turn], pitch: Mapping[str, float]) -> Diagnosis | None:
+    """Turns of one circle taken apart; None where they have too few samples for that. pitch: axis -> [m]."""
+    turn = turns[0]
+    paths = []
+    for each in turns:
+        measured = contour(trace, each)
+        if len(measured.angle) < LEAST:
+            return None
+        paths.append(TurnedPath(measured.angle, measured.deviation, each.sense))
+    speed = 2 * math.pi * turn.radius / (turn.end - turn.begin)
+    return diagnose(CircleUnderTest(turn.axes, turn.radius, speed, pitch), paths)
+
+
+def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
+    """Figures of what makes the circle not round."""
+    found = {}
+    first, second = diagnosis.circle.axes
+    meanings = {
+        "offset": "distance of the centre from the programmed one",
+        "radius": "mean radius deviation without peaks",
+        "scale": f"scale mismatch: how much further {first} travels than {second}",
+        "squareness": f"squareness: how much the angle between {first}+ and {second}+ is below 90 deg",
+        "servo": f"servo mismatch: how much later {first} answers than {second}",
+        "squareness_or_servo": "amplitude of the ellipse along 45 deg, of squareness or servo mismatch: one direction "
+        "cannot tell",
+        "lost_motion": "lost motion: step where {axis} reverses",
+        "peaks": "reversal peak where {axis} reverses, the largest one over the fitted rest",
+        "pitch": "amplitude of the error of {axis} that repeats with its pitch",
+        "rest": "what no cause explains, from peak to valley",
+    }  # fmt: skip
+    for term in sorted(diagnosis.terms, key=lambda each: (ORDER.index(each.key), each.axis)):
+        factor, unit = UNITS[term.unit]
+        found[figure_name(term)] = Figure(factor * term.value, unit, meanings[term.key].format(axis=term.axis))
+    vibration = diagnosis.vibration
+    amplitude, frequency = (vibration.amplitude * 1e6, vibration.frequency) if vibration else (0.0, math.nan)
+    found["vibration"] = Figure(amplitude, "um", "amplitude of the strongest vibration; 0 where none stands out")
+    found["vibration_frequency"] = Figure(frequency, "Hz", "frequency of that vibration")
+    return found
+
+
+def figure_name(term: Term) -> str:
+    """Name of a term's figure, without the plane's."""
+    names = {"servo": "servo_mismatch", "scale": "scale_mismatch", "peaks": "peak", "radius": "radius_change"}
+    return f"{names.get(term.key, term.key)}{'_' if term.axis else ''}{term.axis}"
+
+
+def misleading(diagnosis: Diagnosis, glitches: Mapping[str, Figure]) -> list[str]:
+    """A sentence for every axis whose quadrant glitch, largest deviation in the quadrant, is not friction's peak."""
+    found = []
+    for axis in diagnosis.circle.axes:
+        peak, old = diagnosis[f"peaks {axis}"], glitches[f"glitch_{axis}"]
+        off = abs(old.value * 1e-6 - peak.value)
+        if off > max(MISLEADING * abs(peak.value), LEAST_MISLEADING):
+            largest = max(
+                (term for term in diagnosis.terms if term.key not in ("peaks", "rest")), key=lambda each: each.size
+            )
+            found.append(
+                f"glitch_{axis}, {old}, is the largest deviation in the quadrant whatever its cause; what stands out "
+                f"where {axis} reverses is peak_{axis}, {peak.value * 1e6:.3g} um. The rest is form, most of it "
+                f"{name(largest)}"
+            )
+    return found
+
+
+def bidirectional(trace: Trace, turn: Turn, back: Turn) -> dict[str, Figure]:
+    """ISO 230-4's figures of two turns in opposite senses, about the centre of the circle fitted to both."""
+    measured = [contour(trace, each) for each in (turn, back)]
+    centre = fitted_centre(
+        np.concatenate([m.angle for m in measured]), np.concatenate([m.deviation for m in measured]), turn.radius
+    )
+    around = []
+    for m in measured:
+        x = (turn.radius + m.deviation) * np.cos(m.angle) - centre[0]
+        y = (turn.radius + m.deviation) * np.sin(m.angle) - centre[1]
+        around.append((np.arctan2(y, x), np.hypot(x, y) - turn.radius))
+    even: Array = np.arange(ANGLES, dtype=np.float64) * (2 * math.pi / ANGLES) - math.pi
+    there, again = (_at(even, angle, deviation) for angle, deviation in around)
+    letters = axis_letters(turn.axes)
+    both = np.concatenate([deviation for _, deviation in around])
+
+    def um(value: float, meaning: str) -> Figure:
+        return Figure(value * 1e6, "um", f"{meaning}, by the linear scales")
+
+    apart = np.abs(there - again)
+    return {
+        "G_b": um(
+            float(np.ptp(both)),
+            f"ISO 230-4 bidirectional circular deviation G(b)_{letters}, about the centre of the least-squares circle "
+            "of both turns",
+        ),
+        "D": um(float(there.mean() + again.mean()) / 2, f"ISO 230-4 mean bidirectional radial deviation D_{letters}"),
+        "H": um(
+            float(apart.max()),
+            f"ISO 230-4 circular hysteresis H_{letters}: largest distance of the two turns at an angle",
+        ),
+    }
+
+
+def _at(wanted: Array, angle: Array, deviation: Array) -> Array:
+    order = np.argsort(angle)
+    return np.asarray(np.interp(wanted, angle[order], deviation[order], period=2 * math.pi))

@@ -1,0 +1,110 @@
+"""Why a circle is not round, as a section of a report and as part of summary.json."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, name, sentence
+from feedsim.analysis.circle_figures import UNITS
+from feedsim.report.content import Section, Table
+from feedsim.report.formatting import minus, number, typeset
+from feedsim.report.provenance import finite, quantity
+
+
+def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
+    """Every cause with its interval, what it makes alone, its share of G and what it means; and the reversal peaks."""
+    rows = [
+        (
+            name(term)[:1].upper() + name(term)[1:],
+            _value(term),
+            _um(term.size),
+            _share(term),
+            typeset(sentence(diagnosis, term)),
+        )
+        for term in diagnosis.terms
+    ]
+    note = (
+        "± is half of an interval of 95 %. Alone: from peak to valley of the radial deviation that the cause makes "
+        "alone. Share of G: what it contributes where the deviation is largest, less where it is smallest; the shares "
+        "add up to 100 %, and one that makes G smaller is negative."
+    )
+    if diagnosis.left_out:
+        axes = " and ".join(diagnosis.left_out)
+        note += f"\nThe circle is too small to tell errors that repeat with the pitch of {axes}."
+    if (vibration := diagnosis.vibration) is not None:
+        frequency = number(vibration.frequency, 3)
+        note += (
+            f"\nStrongest vibration between the reversals: {_um(vibration.amplitude)} µm (amplitude) at {frequency} Hz."
+        )
+    heads = ("Cause", "Amount", "Alone [µm]", "Share of G [%]", "What it means, where to look")
+    peaks = [(minus(peak.name), _direction(peak.sense), *_peak(peak)) for peak in diagnosis.peaks]
+    peak_heads = ("Reversal at", "Direction", "Peak [µm]", "±", "Width at half the height [ms]", "Falls to 1/e in [ms]")
+    peak_note = "Peaks stand over the fitted rest of the circle; 0: nothing stands out of the noise."
+    return Section(
+        f"{prefix}: why the circle is not round",
+        [Table("lrrrp", heads, rows, note), Table("llrrrr", peak_heads, peaks, peak_note)],
+    )
+
+
+def _direction(sense: int) -> str:
+    return "counterclockwise" if sense > 0 else "clockwise"
+
+
+def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
+    """The diagnosis in summary.json, in SI."""
+    vibration = diagnosis.vibration
+    return {
+        "answer": answer(diagnosis),
+        "directions": [_direction(sense) for sense in diagnosis.senses],
+        "G": quantity(diagnosis.G, "m"),
+        "causes": [
+            {
+                "name": name(term),
+                **quantity(term.value, term.unit),
+                "half_interval": finite(term.half),
+                "alone": quantity(term.size, "m"),
+                "share": term.share,
+                "told_from_zero": term.told,
+                "meaning": sentence(diagnosis, term),
+            }
+            for term in diagnosis.terms
+        ],
+        "peaks": [
+            {
+                "at": peak.name,
+                "direction": _direction(peak.sense),
+                "height": quantity(peak.height, "m"),
+                "half_interval": finite(peak.half),
+                "width": quantity(peak.width, "s"),
+                "decay": quantity(peak.decay, "s"),
+            }
+            for peak in diagnosis.peaks
+        ],
+        "vibration": None
+        if vibration is None
+        else {"frequency": quantity(vibration.frequency, "Hz"), "amplitude": quantity(vibration.amplitude, "m")},
+        "form": {str(order): quantity(amplitude, "m") for order, amplitude in diagnosis.form.items()},
+        "noise": quantity(diagnosis.noise, "m"),
+    }
+
+
+def _value(term: Term) -> str:
+    factor, unit = UNITS[term.unit]
+    interval = f" ± {number(factor * term.half, 2)}" if math.isfinite(term.half) else ""
+    return f"{minus(number(factor * term.value, 3))}{interval} {typeset(unit)}"
+
+
+def _um(value: float) -> str:
+    return minus(f"{value * 1e6:.2f}")
+
+
+def _share(term: Term) -> str:
+    return minus(f"{100 * term.share:.1f}").replace("−0.0", "0.0")
+
+
+def _peak(peak: Peak) -> tuple[str, str, str, str]:
+    def ms(value: float) -> str:
+        return f"{value * 1e3:.1f}" if math.isfinite(value) else "–"
+
+    return _um(peak.height), _um(peak.half) if math.isfinite(peak.half) else "–", ms(peak.width), ms(peak.decay)

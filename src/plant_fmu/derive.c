@@ -12,10 +12,10 @@ static const double pi = 3.14159265358979323846;
 
 /* Memory for `cells` modal systems of up to `modes` modes, and the scratch that their steps need. */
 static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
-    const size_t inputs = plant_inputs(plant), ports = plant_ports(plant), size = modal_padded(modes);
+    const size_t ports = plant_ports(plant), size = modal_padded(modes);
     const size_t system = modal_memory(modes, ports);
     const size_t crossing = cells_scratch(plant->axes, size);
-    const size_t scratch = 2 * inputs + 2 * ports + plant->axes + crossing + inputs + 2 * size;
+    const size_t scratch = 4 * ports + plant->axes + crossing + ports + 2 * size;
     Modal *modal = unit_alloc(unit, cells, sizeof *modal);
     double *systems = modal != NULL ? unit_alloc(unit, cells, system * sizeof *systems) : NULL;
     double *memory = systems != NULL ? unit_alloc(unit, scratch, sizeof *memory) : NULL;
@@ -36,8 +36,8 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
         modal_place(&modal[i], systems + i * system, modes, ports);
     }
     plant->u = memory;
-    plant->du = plant->u + inputs;
-    plant->y = plant->du + inputs;
+    plant->du = plant->u + ports;
+    plant->y = plant->du + ports;
     plant->y_before = plant->y + ports;
     plant->x = plant->y_before + ports;
     plant->carried = plant->x + plant->axes;

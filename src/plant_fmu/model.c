@@ -1,14 +1,14 @@
 /* plant: the mechanical structure of a machine with its feed drives, reduced to modes.
  *
  *   q_k'' + 2 zeta_k omega_k q_k' + omega_k^2 q_k = f_k                                per mode k, mass-normalised
- *   f_k   = sum over axes A of n_kA (M_a - M_fr - M_0) + sum over directions d of tcp_kd F_d
+ *   f_k   = sum over axes A of (n_kA (M_a - M_fr - M_0) + x_kA F_a) + sum over directions d of tcp_kd F_d
  *   n_a   = n_fr = sum over k of n_kA q_k'             rotor against stator [rad/s]
  *   x_a   = x_0 + sum over k of x_kA q_k               slide against rail, at the linear scale [m]
  *   tool.x_d = sum over k of tcp_kd q_k                tool against workpiece [m]
  *   tcp.x_d  = tool.x_d + x_0 of the axis named d      tool centre point [m]
  *
- *   M_a motor torque, M_fr friction torque, M_0 constant load [N.m]; F_d force on the tool [N]; omega_k = 2 pi
- * frequency; n_kA, x_kA, tcp_kd: mode shapes at the ports, columns of the mode table (modes.h)
+ *   M_a motor torque, M_fr friction torque, M_0 constant load [N.m]; F_a force on the slide, F_d on the tool [N];
+ * omega_k = 2 pi frequency; n_kA, x_kA, tcp_kd: mode shapes at the ports, columns of the mode table (modes.h)
  *
  * With poses (poses.h) these are the modes of the cell that the axes stand in. At the end of a step that takes an axis
  * out of its cell, q and v are carried over into the next one, x_a unchanged; what is reported then belongs to the new
@@ -49,12 +49,14 @@ static double plant_start_position(Unit *unit, const Plant *plant, size_t direct
 /* Inputs at the ports, u, and their change du over a step of h. */
 static void plant_gather(Unit *unit, double h, double *u, double *du) {
     const Scalars *v = unit_scalars(unit);
-    const size_t axes = unit_axes(unit);
+    const size_t axes = unit_axes(unit), slides = axes + TOOL_DIRECTIONS;
     for (size_t i = 0; i < axes; i++) {
         const AxisBlock *axis = unit_axis(unit, i);
         const unsigned row = (unsigned)(SCALAR_ROWS + i * AXIS_ROWS);
         u[i] = axis->M_a - axis->M_fr - axis->M_0;
         du[i] = h * (unit_slope(unit, row + AXIS_VR_M_a) - unit_slope(unit, row + AXIS_VR_M_fr));
+        u[slides + i] = axis->F_a;
+        du[slides + i] = h * unit_slope(unit, row + AXIS_VR_F_a);
     }
     u[axes] = v->tool_F_X;
     u[axes + 1] = v->tool_F_Y;
@@ -66,12 +68,12 @@ static void plant_gather(Unit *unit, double h, double *u, double *du) {
 
 /* Speeds at the axes' rotors and displacements at their scales, y[ports]; false where one is no finite number. */
 static bool plant_measure(const Plant *plant, const Modal *modal, const double *q, const double *v, double *y) {
-    const size_t inputs = plant_inputs(plant);
+    const size_t slides = plant_slides(plant);
     double probe = 0;
     for (size_t i = 0; i < plant->axes; i++) {
         y[i] = modal_sum(modal, i, v);
-        y[inputs + i] = modal_sum(modal, inputs + i, q);
-        probe += number_probe(y[i]) + number_probe(y[inputs + i]);
+        y[slides + i] = modal_sum(modal, slides + i, q);
+        probe += number_probe(y[i]) + number_probe(y[slides + i]);
     }
     return !isnan(probe);
 }
@@ -79,7 +81,7 @@ static bool plant_measure(const Plant *plant, const Modal *modal, const double *
 /* Displacements at the tool, the rest of y[ports]; likewise. */
 static bool plant_measure_tool(const Plant *plant, const Modal *modal, const double *q, double *y) {
     double probe = 0;
-    for (size_t port = plant->axes; port < plant_inputs(plant); port++) {
+    for (size_t port = plant->axes; port < plant_slides(plant); port++) {
         y[port] = modal_sum(modal, port, q);
         probe += number_probe(y[port]);
     }
@@ -87,7 +89,7 @@ static bool plant_measure_tool(const Plant *plant, const Modal *modal, const dou
 }
 
 static void plant_show(Unit *unit, const Plant *plant, const double *y) {
-    const double *x = y + plant_inputs(plant);
+    const double *x = y + plant_slides(plant);
     for (size_t i = 0; i < plant->axes; i++) {
         AxisBlock *axis = unit_axis(unit, i);
         axis->n_a = y[i];
@@ -116,13 +118,13 @@ static void plant_positions(Unit *unit, const Plant *plant, const double *displa
 
 static void plant_start(Unit *unit) {
     Plant *plant = unit_derived(unit);
-    double *u = plant_state(unit), *q = u + plant_inputs(plant), *v = q + plant->size;
+    double *u = plant_state(unit), *q = u + plant_ports(plant), *v = q + plant->size;
     StateHead *head = plant_head(unit);
     Scalars *shown = unit_scalars(unit);
     plant_gather(unit, 0, u, plant->du);
     plant_measure(plant, &plant->modal[0], q, v, plant->y); /* at rest, whatever the cell */
     plant_measure_tool(plant, &plant->modal[0], q, plant->y);
-    plant_positions(unit, plant, plant->y + plant_inputs(plant), plant->x);
+    plant_positions(unit, plant, plant->y + plant_slides(plant), plant->x);
     head->table_hash = plant->table_hash;
     head->cell = plant->cells > 1 ? cells_find(&plant->poses, plant->x) : 0;
     plant_show(unit, plant, plant->y);
@@ -147,12 +149,12 @@ static int plant_count(int before, size_t more) {
 
 /* Into the cell that the positions at the end of the step lie in, with the end's q and v and what is measured there. */
 static bool plant_follow(Unit *unit, Plant *plant, double *q, double *v) {
-    const size_t inputs = plant_inputs(plant), ports = plant_ports(plant);
+    const size_t slides = plant_slides(plant), ports = plant_ports(plant);
     Scalars *shown = unit_scalars(unit);
     if (!plant_measure_tool(plant, &plant->modal[plant_head(unit)->cell], q, plant->y)) {
         return false; /* measured ahead, for the jump */
     }
-    plant_positions(unit, plant, plant->y + inputs, plant->x);
+    plant_positions(unit, plant, plant->y + slides, plant->x);
     const Passage passage =
         cells_follow(&plant->poses, plant->modal, (size_t)plant_head(unit)->cell, plant->x, q, v, plant->carried);
     if (passage.crossings == 0) {
@@ -169,9 +171,9 @@ static bool plant_follow(Unit *unit, Plant *plant, double *q, double *v) {
     shown->pose_E_kin_lost += passage.kinetic_lost;
     shown->pose_E_el_lost += passage.elastic_lost;
     shown->pose_held = fmax(shown->pose_held, passage.held);
-    shown->pose_jump_x_a = plant_jump(plant, inputs, ports, shown->pose_jump_x_a);
+    shown->pose_jump_x_a = plant_jump(plant, slides, ports, shown->pose_jump_x_a);
     shown->pose_jump_n_a = plant_jump(plant, 0, plant->axes, shown->pose_jump_n_a);
-    shown->pose_jump_tool = plant_jump(plant, plant->axes, inputs, shown->pose_jump_tool);
+    shown->pose_jump_tool = plant_jump(plant, plant->axes, slides, shown->pose_jump_tool);
     return true;
 }
 
@@ -179,18 +181,18 @@ static bool plant_step(Unit *unit, double t, double h) {
     (void)t; /* the structure does not change with time */
     Plant *plant = unit_derived(unit);
     Modal *modal = &plant->modal[plant_head(unit)->cell];
-    const size_t inputs = plant_inputs(plant), size = plant->size;
-    double *state = plant_state(unit), *end = plant->end, *q_end = end + inputs, *v_end = q_end + size;
+    const size_t ports = plant_ports(plant), size = plant->size;
+    double *state = plant_state(unit), *end = plant->end, *q_end = end + ports, *v_end = q_end + size;
     plant_gather(unit, h, plant->u, plant->du);
-    size_t active = plant->axes; /* mostly, no force is on the tool: nothing to add then */
-    for (size_t i = 0; i < inputs; i++) {
+    size_t active = plant->axes; /* mostly, no force is on tool and slides: nothing to add then */
+    for (size_t i = 0; i < ports; i++) {
         end[i] = plant->u[i] + plant->du[i];
         if (i >= active && (plant->u[i] < 0 || plant->u[i] > 0 || plant->du[i] < 0 || plant->du[i] > 0)) {
-            active = inputs;
+            active = i + 1;
         }
     }
     modal_prepare(modal, h);
-    modal_advance(modal, active, plant->u, plant->du, state + inputs, state + inputs + size, q_end, v_end);
+    modal_advance(modal, active, plant->u, plant->du, state + ports, state + ports + size, q_end, v_end);
     if (!plant_measure(plant, modal, q_end, v_end, plant->y) ||
         (plant->cells > 1 && !plant_follow(unit, plant, q_end, v_end))) {
         return unit_fail(unit, "an output would be no finite number at the end of the step");
@@ -209,7 +211,7 @@ static bool plant_step(Unit *unit, double t, double h) {
 static void plant_show_late(Unit *unit) {
     const Plant *plant = unit_derived(unit);
     const Modal *modal = &plant->modal[plant_head(unit)->cell];
-    plant_measure_tool(plant, modal, plant_state(unit) + plant_inputs(plant), plant->y);
+    plant_measure_tool(plant, modal, plant_state(unit) + plant_ports(plant), plant->y);
     plant_show_tool(unit, plant, plant->y);
 }
 
@@ -218,8 +220,8 @@ static void plant_show_late(Unit *unit) {
 static double plant_output_derivative(Unit *unit, unsigned vr) {
     const Plant *plant = unit_derived(unit);
     const Modal *modal = &plant->modal[plant_head(unit)->cell];
-    const size_t inputs = plant_inputs(plant);
-    const double *u = plant_state(unit), *q = u + inputs, *v = q + plant->size;
+    const size_t ports = plant_ports(plant);
+    const double *u = plant_state(unit), *q = u + ports, *v = q + plant->size;
     switch (vr) {
     case VR_tool_x_X:
     case VR_tcp_x_X:
@@ -240,9 +242,9 @@ static double plant_output_derivative(Unit *unit, unsigned vr) {
     switch ((vr - SCALAR_ROWS) % AXIS_ROWS) {
     case AXIS_VR_n_a:
     case AXIS_VR_n_fr:
-        return modal_acceleration(modal, axis, inputs, u, q, v);
+        return modal_acceleration(modal, axis, ports, u, q, v);
     case AXIS_VR_x_a:
-        return modal_sum(modal, inputs + axis, v);
+        return modal_sum(modal, plant_slides(plant) + axis, v);
     default:
         return 0;
     }

@@ -19,7 +19,8 @@
 
 #define NO_AXIS ((size_t)-1)
 
-/* Derived data. Ports of the modal systems: the axes' n, the tool's directions (inputs up to here), the axes' x. */
+/* Derived data. Ports of the modal systems: the axes' n, the tool's directions, the axes' x. A torque or force acts at
+ * each. */
 typedef struct Plant {
     size_t axes;
     const char **axis_names;           /* [axes] */
@@ -38,29 +39,30 @@ typedef struct Plant {
     Modal *modal;            /* [cells] */
     double *systems;         /* their memory */
     double *memory;          /* of what follows: scratch of a step */
-    double *u, *du;          /* [inputs] */
+    double *u, *du;          /* [ports] */
     double *end;             /* [state's doubles] a step's result, until it is known to be sound */
     double *y, *y_before;    /* [ports] */
     double *x;               /* [axes] positions */
     double *carried;         /* [cells_scratch()] */
 } Plant;
 
-/* State block: this head, then inputs at the end of the last step [inputs], q [size], v [size]. */
+/* State block: this head, then inputs at the end of the last step [ports], q [size], v [size]. */
 typedef struct StateHead {
     uint64_t table_hash; /* mode table that the state belongs to */
     uint64_t cell;       /* whose modes q and v belong to */
 } StateHead;
 
-static inline size_t plant_inputs(const Plant *plant) {
+/* The first of the ports at the slides. */
+static inline size_t plant_slides(const Plant *plant) {
     return plant->axes + TOOL_DIRECTIONS;
 }
 
 static inline size_t plant_ports(const Plant *plant) {
-    return plant->axes + TOOL_DIRECTIONS + plant->axes;
+    return plant_slides(plant) + plant->axes;
 }
 
 static inline size_t plant_state_doubles(const Plant *plant) {
-    return plant_inputs(plant) + 2 * plant->size;
+    return plant_ports(plant) + 2 * plant->size;
 }
 
 /* --- load.c: the archive */

@@ -86,7 +86,9 @@ def test_a_constant_is_exactly_itself() -> None:
 # --- closed forms on a rigid axis
 
 
-@pytest.mark.parametrize(("kind", "factor"), [("motor, axis: X", -I_P), ("tool, direction: X", 1.0)])
+@pytest.mark.parametrize(
+    ("kind", "factor"), [("motor, axis: X", -I_P), ("slide, axis: X", 1.0), ("tool, direction: X", 1.0)]
+)
 def test_a_free_axis_moves_as_newton_says(kind: str, factor: float, file: Path, fmus: Path) -> None:
     """F(t) = 100 N sin^2 over 0.5 s, in 101 rows: the position is its double integral.
 
@@ -117,10 +119,11 @@ def test_a_free_axis_moves_as_newton_says(kind: str, factor: float, file: Path, 
     assert work.peak == pytest.approx(100 * factor, rel=1e-3)
 
 
-def test_torque_and_force_of_the_same_size_hold_each_other(file: Path, fmus: Path) -> None:
-    """Sign, unit and place of the kinds at once: F on the tool pushes, F I_P at the motor counts against it."""
+@pytest.mark.parametrize("force", ["slide, axis: X", "tool, direction: X"])
+def test_torque_and_force_of_the_same_size_hold_each_other(force: str, file: Path, fmus: Path) -> None:
+    """Sign, unit and place of the kinds at once: F on slide or tool pushes, F I_P at the motor counts against it."""
     loads = (
-        "loads=[{kind: tool, direction: X, table: {time: [0 s, 0.3 s, 2 s], values: [0 N, 80 N, 10 N]}},"
+        f"loads=[{{kind: {force}, table: {{time: [0 s, 0.3 s, 2 s], values: [0 N, 80 N, 10 N]}}}},"
         f"{{kind: motor, axis: X, factor: {I_P!r}, "
         "table: {time: [0 s, 0.3 s, 2 s], values: [0 N.m, 80 N.m, 10 N.m]}}]"
     )
@@ -144,8 +147,35 @@ def test_at_rest_the_motor_carries_the_load(file: Path, fmus: Path) -> None:
     assert sag < -1e-6
 
 
+def test_a_slide_that_is_pushed_bends_the_drive_train(tmp_path: Path, fmus: Path) -> None:
+    """On a machine that gives way (synthetic). At rest the motor carries F I_P, wherever that acts, and the control has
+    brought the scale back. At first the force moves the slide itself, the torque only what the screw hands on."""
+    file = tmp_path / "s.yaml"
+    machine = SCENARIOS / "machines" / "one_axis"
+    file.write_text(f"name: s\nmachine: {machine}\nmotions: [{{kind: dwell, duration: 3 s}}]\n", encoding="utf-8")
+    lead = load_machine(machine).axes["X"].I_P
+    every = "recording.interval=125 us"
+    kinds = {"slide, axis: X": "400 N", "motor, axis: X": f"{-400 * lead!r} N.m"}
+    slide, motor = (
+        run(
+            file, fmus, every,
+            f"loads=[{{kind: {kind}, held: true, table: {{time: [0.1 s, 9 s], values: [{value}, {value}]}}}}]",
+        ).trace
+        for kind, value in kinds.items()
+    )  # fmt: skip
+    for trace in (slide, motor):
+        # What rings at 27 Hz and 2 % has decayed by exp(-0.02 * 170 * 2.9) = 5e-5.
+        assert trace["X.M_a"][-1] == pytest.approx(-400 * lead + trace["X.M_fr"][-1], abs=1e-3)
+        assert trace["X.x_a"][-1] == pytest.approx(trace["X.x_s"][-1], abs=1e-6)
+    first = round(0.1 / 125e-6) + 2  # two cycles after the step
+    moved = [trace["X.x_a"][first] - trace["X.x_a"][first - 2] for trace in (slide, motor)]
+    # Free masses and a spring: F t^2/(2 m) at the slide itself, F t^4/24 times k/(m m') through the spring.
+    assert moved[0] > 3 * abs(moved[1])
+    assert moved[0] > 0
+
+
 def test_the_energy_balance_closes(file: Path, fmus: Path) -> None:
-    """A move under both kinds of load, over whole stretches of the loop and one cycle more or less: what the motor
+    """A move under loads of every kind, over whole stretches of the loop and one cycle more or less: what the motor
     gives is what friction and loads take, and the kinetic energy. Work by the trapezoidal rule on 1 ms: 1e-3."""
     for cycles in (2 * REPORTED_EVERY - 1, 2 * REPORTED_EVERY, 2 * REPORTED_EVERY + 1):
         dwell = f"{(cycles - 2300) * 1e-3!r} s"
@@ -153,9 +183,10 @@ def test_the_energy_balance_closes(file: Path, fmus: Path) -> None:
             file, fmus,
             f"motions=[{{kind: dwell, duration: 1 s}}, {{kind: move, by: {{X: 100 mm}}, feed: 6 m/min}}, "
             f"{{kind: dwell, duration: {dwell}}}]",
-            "loads=[{kind: tool, direction: X, table: {time: [0.2 s, 1.2 s, 1.9 s], values: [0 N, -90 N, 20 N]}},"
+            "loads=[{kind: tool, direction: X, table: {time: [0.2 s, 1.2 s, 1.9 s], values: [0 N, -50 N, 20 N]}},"
             "{kind: motor, axis: X, held: true, "
-            "table: {time: [1.3 s, 1.31 s, 1.6 s, 3 s], values: [5e-2 N.m, 1e-2 N.m, -2e-2 N.m, 0 N.m]}}]",
+            "table: {time: [1.3 s, 1.31 s, 1.6 s, 3 s], values: [5e-2 N.m, 1e-2 N.m, -2e-2 N.m, 0 N.m]}},"
+            "{kind: slide, axis: X, table: {time: [0.2 s, 1.2 s, 1.9 s], values: [0 N, -40 N, 20 N]}}]",
             "machine.axes.X.constant_load=0 N.m",
         )  # fmt: skip
         trace, work = found.trace, found.loads
@@ -164,7 +195,7 @@ def test_the_energy_balance_closes(file: Path, fmus: Path) -> None:
         motor = float(np.sum(trace["X.M_a"][1:] * (n[1:] + n[:-1]) / 2) * 1e-3)
         kinetic = MASS * I_P**2 * (n[-1] ** 2 - n[0] ** 2) / 2
         loads = sum(each.net for each in work)
-        assert loads < -2
+        assert loads < -1
         assert found.coupling["X.friction_work"] > 1
         assert motor + loads == pytest.approx(found.coupling["X.friction_work"] + kinetic, rel=1e-3)
         # The same from what is recorded: each value acts over the cycle that follows.
@@ -172,6 +203,8 @@ def test_the_energy_balance_closes(file: Path, fmus: Path) -> None:
         assert work[1].net == pytest.approx(-recorded.sum(), rel=1e-12)
         forces = trace["tool.F_X"][:-1] * np.diff(trace["tool.x_X"])
         assert work[0].net == pytest.approx(forces.sum(), rel=1e-12)
+        slide = trace["X.F_a"][:-1] * np.diff(trace["X.x_a"])
+        assert work[2].net == pytest.approx(slide.sum(), rel=1e-12)
         assert (work[0].given, -work[0].taken) == pytest.approx((forces[forces > 0].sum(), forces[forces < 0].sum()))
 
 
@@ -237,6 +270,7 @@ motions: [{{kind: move, by: {{Z: 4 mm}}, feed: 5000 mm/min}}, {{kind: dwell, dur
 loads:
   - {{kind: motor, axis: Z, table: {{time: [0 s, 0.1 s, 0.4 s], values: [0 N.m, 3 N.m, -1 N.m]}}}}
   - {{kind: tool, direction: Z, held: true, table: {{time: [0.1 s, 0.2 s, 0.4 s], values: [-500 N, 300 N, 0 N]}}}}
+  - {{kind: slide, axis: Z, table: {{time: [0.05 s, 0.2 s, 0.3 s], values: [-50 N, 300 N, 20 N]}}}}
 coupling: {{scheme: {scheme}, substeps: 2}}
 """,
         encoding="utf-8",

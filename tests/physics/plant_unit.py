@@ -18,7 +18,9 @@ POSE = {"X": 0.8, "Y": 0.327, "Z": 0.1}
 SPEEDS = tuple(f"{axis}.n_a" for axis in AXES)
 POSITIONS = tuple(f"{axis}.x_a" for axis in AXES)
 TOOL = tuple(f"tool.x_{axis}" for axis in AXES)
-INPUTS = (*(f"{axis}.M_a" for axis in AXES), *(f"tool.F_{axis}" for axis in AXES))
+INPUTS = (
+    *(f"{axis}.M_a" for axis in AXES), *(f"tool.F_{axis}" for axis in AXES), *(f"{axis}.F_a" for axis in AXES)
+)  # fmt: skip
 OUTPUTS = (*SPEEDS, *POSITIONS, *TOOL)
 HEADER = [
     "mode",
@@ -64,5 +66,5 @@ def single_mode(path: Path, zeta: float) -> Path:
 
 def random_inputs(steps: int, seed: int) -> Floats:
     """Corner values of piecewise linear torques and forces, shape (steps + 1, INPUTS)."""
-    scale = np.array([20.0, 20.0, 20.0, 500.0, 500.0, 500.0])
+    scale = np.array([20.0] * 3 + [500.0] * 6)
     return scale * np.random.default_rng(seed).uniform(-1.0, 1.0, (steps + 1, len(INPUTS)))

@@ -40,25 +40,25 @@ class Reference:
     def _system(self, cell: int) -> tuple[Floats, Floats, Floats]:
         """K and, as columns and rows, the ports (inputs, outputs) where the mass matrix is 1."""
         if self.full:
-            ports = np.vstack([N, TCP])
+            ports = np.vstack([N, TCP, X])
             return (
                 np.linalg.solve(mass(), stiffness(self.grid.positions[cell])),
                 np.linalg.solve(mass(), ports.T),
                 ports,
             )
         modes = self.grid.cells[cell]
-        ports = np.vstack([N, TCP]) @ modes.phi
+        ports = np.vstack([N, TCP, X]) @ modes.phi
         return np.diag(modes.omega**2), ports.T, ports
 
     def _exponential(self, cell: int, h: float) -> Floats:
         k, b, _ = self._system(cell)
         size = len(k)
-        a = np.zeros((2 * size + 12, 2 * size + 12))
+        a = np.zeros((2 * size + 18, 2 * size + 18))
         a[:size, size : 2 * size] = np.eye(size)
         a[size : 2 * size, :size] = -k
         a[size : 2 * size, size : 2 * size] = -BETA * k
-        a[size : 2 * size, 2 * size : -6] = b
-        a[2 * size : -6, -6:] = np.eye(6)
+        a[size : 2 * size, 2 * size : -9] = b
+        a[2 * size : -9, -9:] = np.eye(9)
         return expm(a * h)
 
     def outputs(self) -> Floats:
@@ -75,7 +75,7 @@ class Reference:
         return float(self.v @ self.v) / 2, float(np.sum((omega * self.u) ** 2)) / 2
 
     def step(self, h: float, start: Floats, end: Floats) -> Floats:
-        """From inputs `start` to `end` (6,): torques, forces. Returns the outputs."""
+        """From inputs `start` to `end` (9,): torques, forces on tool and slides. Returns the outputs."""
         state = np.concatenate([self.u, self.v, start, (end - start) / h])
         state = self._matrix(self.cell, h) @ state
         size = len(self.u)

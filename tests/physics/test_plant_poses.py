@@ -52,8 +52,9 @@ def there_and_back(steps: int, distances: Mapping[str, float], seed: int) -> Flo
     """Corner values of inputs (steps + 1, INPUTS) that drive axes by distances [m] and back, about; with noise."""
     times = np.arange(steps + 1) / steps
     signs = np.where((times < 0.25) | (times >= 0.75), 1.0, -1.0)
-    noise = np.random.default_rng(seed).uniform(-1.0, 1.0, (steps + 1, len(INPUTS)))
-    values = noise * [0.5, 0.5, 0.5, 200.0, 200.0, 200.0]
+    random = np.random.default_rng(seed)
+    noise = np.hstack([random.uniform(-1.0, 1.0, (steps + 1, count)) for count in (6, 3)])
+    values = noise * ([0.5] * 3 + [200.0] * 6)
     for axis, distance in distances.items():
         rotor = ROTOR[AXES.index(axis)]
         acceleration = distance / (steps * H / 4) ** 2
@@ -139,7 +140,7 @@ def test_many_cells_in_one_step(assemble: Assemble) -> None:
         before = np.zeros(len(INPUTS))
         for k in range(40):
             h = float(random.choice([1e-3, 5e-3, 1.25e-2]))
-            after = np.array([60.0 if k < 20 else -60.0, *random.uniform(-1, 1, 2), *random.uniform(-100, 100, 3)])
+            after = np.array([60.0 if k < 20 else -60.0, *random.uniform(-1, 1, 2), *random.uniform(-100, 100, 6)])
             passed = reference.crossings
             expected = reference.step(h, before, after)
             unit.step(h, dict(zip(INPUTS, before, strict=True)), dict(zip(INPUTS, (after - before) / h, strict=True)))

@@ -99,7 +99,9 @@ def test_motions(refused: Refused, motion: str, message: str) -> None:
     [
         ("motor, axis: Q, file: s.yaml, column: F", ".axis: the machine has no axis 'Q'; it has X, Y, Z"),
         ("tool, direction: x, file: s.yaml, column: F", ".direction: 'x' is not allowed here; did you mean 'X'?"),
-        ("spindle, file: s.yaml", ": unknown kind 'spindle'; allowed: motor, tool"),
+        ("spindle, file: s.yaml", ": unknown kind 'spindle'; allowed: motor, slide, tool"),
+        ("slide, axis: X, table: {time: [0 s, 1 s], values: [0 N.m, 1 N]}",
+         ".table.values.0: '0 N.m' is a torque; a force is expected, for example 100 N"),
         ("tool, direction: X, file: none.csv, column: F", ".file: no such file: "),
         ("tool, direction: X", ": a load is in a 'file' with its 'column', or in a 'table' of 'time'"),
         ("tool, direction: X, file: s.yaml, column: F, table: {time: [0 s, 1 s], values: [0 N, 1 N]}",

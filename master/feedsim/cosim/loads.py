@@ -21,7 +21,7 @@ from feedsim.errors import InputError
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program
 from feedsim.scenario import Machine, Scenario
-from feedsim.scenario.loads import LoadCourse, MotorLoad, ToolLoad
+from feedsim.scenario.loads import LoadCourse, MotorLoad, SlideLoad, ToolLoad
 from feedsim.trace import read_signals
 
 
@@ -201,6 +201,8 @@ class Loads:
         """What its way is found from: the speed of a rotor, else a position."""
         if isinstance(load, MotorLoad):
             return np.asarray(self._measured[rows, 2 * self._axes[load.axis] + 1])
+        if isinstance(load, SlideLoad):
+            return np.asarray(self._measured[rows, 2 * self._axes[load.axis]])
         assert isinstance(load, ToolLoad)
         return np.asarray(self._tool.reals[rows, self._tool.real_names.index(f"tool.x_{load.direction}")])
 

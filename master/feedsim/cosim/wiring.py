@@ -68,6 +68,7 @@ def figure_2(
             Variable(control, "n_add"): Variable(ZERO, "n_add"),
             Variable(control, "M_add"): Variable(ZERO, "M_add"),
             Variable(PLANT, f"{axis}.M_a"): Variable(control, "M_a"),
+            Variable(PLANT, f"{axis}.F_a"): Variable(ZERO, "F_a"),
         }
         if with_friction:
             drives[Variable(PLANT, f"{axis}.M_fr")] = Variable(contact, "M_fr")

@@ -127,6 +127,28 @@ class MotorLoad(LoadCourse):
         return self.axis
 
 
+class SlideLoad(LoadCourse):
+    """A force on the slide of an axis where its scale is, positive in the axis's direction, its reaction on the rail."""
+
+    UNIT = "N"
+
+    kind: Literal["slide"] = "slide"
+    axis: AxisName
+    table: ForceTable | None = Field(default=None, description="The load over time, in place of a file")
+
+    @property
+    def input(self) -> str:
+        return f"{self.axis}.F_a"
+
+    @property
+    def words(self) -> str:
+        return f"on the slide of {self.axis}"
+
+    @property
+    def axis_name(self) -> str:
+        return self.axis
+
+
 class ToolLoad(LoadCourse):
     """A force on the tool in a direction of the machine's frame, with its reaction on the workpiece."""
 
@@ -149,4 +171,4 @@ class ToolLoad(LoadCourse):
         return self.direction
 
 
-Load = Annotated[MotorLoad | ToolLoad, Field(discriminator="kind")]
+Load = Annotated[MotorLoad | SlideLoad | ToolLoad, Field(discriminator="kind")]

@@ -196,7 +196,7 @@ def _logging_faults(scenario: Scenario) -> Iterator[tuple[Place, str]]:
 def _load_faults(scenario: Scenario) -> Iterator[tuple[Place, str]]:
     """Place and message of what does not fit the axes and the motions."""
     for i, load in enumerate(scenario.loads):
-        if load.kind == "motor" and load.axis not in scenario.machine.axes:
+        if load.kind != "tool" and load.axis not in scenario.machine.axes:
             yield ("loads", i, "axis"), no_axis(load.axis, scenario.machine.axes)
         if load.motion is not None and (message := _motion_fault(scenario, load.motion)):
             yield ("loads", i, "motion"), message

@@ -141,13 +141,16 @@ def rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def closed_loop(measured: Measured, parameters: Parameters, fmus: Path, folder: Path) -> tuple[float, float]:
+def closed_loop(
+    measured: Measured, parameters: Parameters, fmus: Path, folder: Path, push: Floats | None = None
+) -> tuple[float, float]:
     """RMS errors of position [m] and force [N] of the three units on the record's reference, but for its SETTLING.
 
     The run begins at rest, a run-in ahead of the record, and its origin is its own: the position counts from the
-    reference. A torque shown at t_k+1 is the one that was held since t_k.
+    reference. A torque shown at t_k+1 is the one that was held since t_k. push: force on the carriage [N] at the
+    record's instants.
     """
-    following, force = _follow(measured, parameters, fmus, folder)
+    following, force = follow(measured, parameters, fmus, folder, push)
     settled = measured.time >= SETTLING
     return (
         rms((following - (measured.position - measured.reference))[settled]),
@@ -155,12 +158,17 @@ def closed_loop(measured: Measured, parameters: Parameters, fmus: Path, folder: 
     )
 
 
-def _follow(measured: Measured, parameters: Parameters, fmus: Path, folder: Path) -> tuple[Floats, Floats]:
+def follow(
+    measured: Measured, parameters: Parameters, fmus: Path, folder: Path, push: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Position less reference [m] and force [N], each (N,), of the three units at the record's instants."""
     setpoints = folder / "setpoints.csv"
-    rows = [f"{t!r},{x!r}" for t, x in zip(measured.time.tolist(), measured.reference.tolist(), strict=True)]
-    setpoints.write_text("\n".join(["time [s],X.x_s [m]", *rows, ""]), encoding="utf-8")
+    columns = (measured.time, measured.reference, np.zeros(len(measured)) if push is None else push)
+    rows = [",".join(map(repr, row)) for row in zip(*(column.tolist() for column in columns), strict=True)]
+    setpoints.write_text("\n".join(["time [s],X.x_s [m],F [N]", *rows, ""]), encoding="utf-8")
     changes = [f"motions.1.file={setpoints}", RECORDED, *parameters.changes(folder)]
+    if push is not None:
+        changes.append(f"loads=[{{kind: slide, axis: X, file: {setpoints}, column: F, motion: 1}}]")
     found = run(load(SCENARIO, changes), fmus=fmus)
     at = _begin(found.program) + measured.every * np.arange(len(measured))
     trace = found.trace

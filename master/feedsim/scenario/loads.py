@@ -128,7 +128,7 @@ class MotorLoad(LoadCourse):
 
 
 class SlideLoad(LoadCourse):
-    """A force on the slide of an axis where its scale is, positive in the axis's direction, its reaction on the rail."""
+    """A force on the slide of an axis where its scale is, positive in its direction, with its reaction on the rail."""
 
     UNIT = "N"
 

@@ -93,7 +93,8 @@ def stationary(found: dict[str, Estimate]) -> Stationary:
     names = tuple(name for name in STATIONARY if own[name].status == "estimated")
     between = correlation(names, 3)
     return Stationary(
-        tuple(plateaus), own, between, between.matrix, speeds, curve(speeds), 0.004 * (1 + 0.3 * np.cos(speeds)),
+        tuple(plateaus), own, between, between.matrix, 0 * between.matrix, speeds, curve(speeds),
+        0.004 * (1 + 0.3 * np.cos(speeds)),
         (float(speeds[0]), float(speeds[-1])), 0.003, 0.004,
     )  # fmt: skip
 

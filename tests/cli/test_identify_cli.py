@@ -24,7 +24,7 @@ from feedsim.identify.friction_file import Line, friction_text
 from feedsim.identify.read import distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate, Plateau
-from feedsim.identify.stages import ORDER, merged_correlation, transitions
+from feedsim.identify.stages import ORDER, begins, merged_correlation, transitions
 from feedsim.identify.torque import RecordTorque
 from feedsim.scenario import load_machine
 from feedsim.scenario.load import read_friction
@@ -389,6 +389,21 @@ def test_records_with_sines_come_first() -> None:
     back = Record("back", time, np.zeros(2000), speed=np.cos(np.pi * time / 4))
     ahead = Record("ahead", time, np.zeros(2000), speed=1 + 0.1 * np.sin(time))
     assert [record.name for record in transitions((ahead, back))] == ["back"]
+
+
+def test_files_count_one_after_the_other_and_pieces_by_their_time() -> None:
+    def record(first: float, last: float) -> Record:
+        time = np.linspace(first, last, 101)
+        return Record("x", time, np.zeros(101), speed=np.ones(101))
+
+    assert begins([record(0.0, 10.0)]) == [0.0]
+    # The second begins 5 s after the first; the third is another file.
+    assert begins([record(2.0, 10.0), record(15.0, 20.0), record(0.0, 4.0), record(0.0, 1.0)]) == [
+        0.0,
+        13.0,
+        18.0,
+        22.0,
+    ]
 
 
 def test_correlation_of_both_stages() -> None:

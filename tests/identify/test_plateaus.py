@@ -36,6 +36,12 @@ def test_undisturbed_plateaus_are_found_with_their_torque(record: Record, angle:
     np.testing.assert_allclose([p.torque for p in found], [stationary(TRUE, p.speed) for p in found], rtol=1e-4)
 
 
+def test_a_plateau_knows_its_time_within_the_record(record: Record) -> None:
+    later = Record("one", record.time + 1000.0, record.torque, record.angle, record.speed)
+    found = plateaus(later, J)
+    assert [p.elapsed for p in found] == pytest.approx([(p.begin + p.end) / 2 - 1000.0 for p in found])
+
+
 def test_coarse_steps_are_told_in_the_standard_deviation(record: Record) -> None:
     found = plateaus(only(record, angle=True, steps=(1e-6, 2e-3)), J)
     assert len(found) == 24

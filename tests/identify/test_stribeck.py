@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.identify import stribeck
+from feedsim.identify import drift, stribeck
 from feedsim.identify.parameters import curve, torque
-from feedsim.identify.result import Plateau, Stationary
+from feedsim.identify.result import NORMAL_95, Plateau, Stationary
 from identify_records import I_P, SPEEDS, TRUE, stationary
 
 
@@ -239,3 +239,86 @@ def test_friction_that_drifts_between_repeated_speeds_is_told(warm: float, noise
     for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2"):
         each = told.estimates[name]
         assert abs(each.value - TRUE[name]) < (4 if warm == 0 else 2.5) * each.sigma, name
+
+
+FIRST_AND_LAST = "drive the fastest speed first and last"
+
+
+def warming(speeds: Sequence[float], course: Callable[[float], float], noise: float, seed: int) -> list[Plateau]:
+    """Strokes one after the other, ten seconds each; course: relative change of viscous friction by age, 0 to 1."""
+    found: list[Plateau] = []
+    last = 2 * len(speeds) - 1
+    for k, speed in enumerate(speeds):
+        for side, ahead in ((1.0, 0), (-1.0, 1)):
+            p = {**TRUE, "sigma_2": TRUE["sigma_2"] * (1 + course((2 * k + ahead) / last))}
+            stroke = made([speed], p, noise=noise, seed=100 * seed + 2 * k + ahead, sides=(side,))
+            found += [replace(each, elapsed=5.0 * (2 * k + ahead)) for each in stroke]
+    return found
+
+
+@pytest.mark.parametrize("course", ["soon", "evenly", "suddenly"])
+@pytest.mark.parametrize("share", [-0.05, -0.3])
+def test_warming_that_no_speed_shows_is_in_the_intervals(share: float, course: str) -> None:
+    """sigma_2 is that of the begin, when the axis is cold."""
+    courses: dict[str, Callable[[float], float]] = {
+        "soon": lambda age: share * (1 - np.exp(-5 * age)) / (1 - np.exp(-5)),
+        "evenly": lambda age: share * age,
+        "suddenly": lambda age: share * (age > 0.6),
+    }
+    found = stribeck.stationary(warming(SPEEDS, courses[course], 1e-5, 1))
+    for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2", "asymmetry", "M_0"):
+        each = found.estimates[name]
+        # A change at once of 30 % is 2.1 standard deviations of what is expected of one.
+        assert abs(each.value - TRUE[name]) < 2.5 * each.sigma, name
+    assert said(found, FIRST_AND_LAST)
+    assert found.estimates["sigma_2"].sigma > 0.15 * TRUE["sigma_2"]
+
+
+def random_course(seed: int) -> Callable[[float], float]:
+    """A course as warming is expected to take."""
+    random = np.random.default_rng([7, seed])
+    once, even = random.standard_normal(2)
+    ages = np.linspace(0.0, 1.0, 1001)
+    walk = np.concatenate([[0.0], np.cumsum(random.standard_normal(1000)) / np.sqrt(1000)])
+    return lambda age: drift.WARMS / np.sqrt(3) * (once * (age > 0) + even * age + float(np.interp(age, ages, walk)))
+
+
+@pytest.mark.parametrize("order", ["slow to fast", "fastest first and last"])
+def test_intervals_are_the_scatter_by_warming(order: str) -> None:
+    speeds = [*SPEEDS] if order == "slow to fast" else [SPEEDS[-1], *SPEEDS]
+    names = ("F_C", "F_log", "sigma_2")
+    scores = []
+    for seed in range(24):
+        found = stribeck.stationary(warming(speeds, random_course(seed), 1e-4, seed))
+        scores.append([(found.estimates[name].value - TRUE[name]) / found.estimates[name].sigma for name in names])
+    within = np.mean(np.abs(scores) < NORMAL_95, axis=0)
+    # 95 % of 24: 13 % are three standard deviations of that share.
+    assert np.all(within > 0.82), within
+    # An interval that is too wide would hold it all. Where a drift shows, it may be Coulomb friction's.
+    size = np.sqrt(np.mean(np.square(scores), axis=0))
+    assert np.all(size[1:] > 0.3), size
+
+
+def test_a_fast_speed_that_comes_back_narrows_the_interval() -> None:
+    def still(age: float) -> float:
+        return 0.0
+
+    once = stribeck.stationary(warming(SPEEDS, still, 1e-4, 0)).estimates["sigma_2"].sigma
+    found = stribeck.stationary(warming([SPEEDS[-1], *SPEEDS], still, 1e-4, 0))
+    assert found.estimates["sigma_2"].sigma < once / 8
+    assert not said(found, FIRST_AND_LAST)
+    slow = stribeck.stationary(warming([SPEEDS[0], *SPEEDS], still, 1e-4, 0))
+    assert slow.estimates["sigma_2"].sigma > once / 1.2  # a slow one shows no viscous friction
+    assert said(slow, FIRST_AND_LAST)
+
+
+def test_the_part_by_warming_is_told_apart() -> None:
+    """What stage 2 weighs by is the covariance of plateaus all driven at once."""
+    plateaus = warming(SPEEDS, lambda age: 0.0, 1e-3, 0)
+    found = stribeck.stationary(plateaus)
+    at_once = stribeck.stationary([replace(each, elapsed=0.0) for each in plateaus])
+    np.testing.assert_array_equal(at_once.drift, 0.0)
+    # Values are the same to the solver's tolerance.
+    np.testing.assert_allclose(found.covariance - found.drift, at_once.covariance, rtol=1e-6, atol=1e-12)
+    scale = np.sqrt(np.diag(found.covariance))
+    assert np.min(np.linalg.eigvalsh(found.drift / np.outer(scale, scale))) > -1e-9

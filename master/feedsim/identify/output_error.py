@@ -30,14 +30,7 @@ from feedsim.identify.motion import noise_of
 from feedsim.identify.parameters import FIXED, KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
-from feedsim.identify.search import (
-    Search,
-    Solution,
-    grid,
-    joined,
-    sliding,
-    spread,
-)
+from feedsim.identify.search import FOLLOWED, Search, Solution, grid, joined, sliding, spread, with_excess
 from feedsim.identify.torque import RecordTorque, deflection, models
 from feedsim.identify.uncertainty import FLOOR, Uncertainty, limits, uncertainty
 
@@ -46,8 +39,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, float], None]
 
-STARTS = 3  # of the grid's best that are followed
-FIRST, FINAL = 1e-3, 1e-9  # tolerances of cost and step: to compare starts, and for the result
+FINAL = 1e-9  # tolerance of cost and step for the result
 WORTH = 12.0  # least fall of the sum of squares (of unit variance) per parameter more: significant beyond 99.9 %
 # In the order in which they are tried where no stage 1 tells them: what friction is first, refinements last. Asymmetry
 # comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
@@ -73,6 +65,7 @@ LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant
 class _Known:
     """What is known before the fit: start values, which parameters the prior tells, which are held or given.
 
+    drift: the part of stage 1's covariance that the prior has not; None: no stage 1.
     open: names that are held though the records do not rule out other values -> the variance that the rest (inner
         names) has about its values then, from the fit with them free.
     """
@@ -81,6 +74,7 @@ class _Known:
     prior: Prior
     told: tuple[str, ...]
     held: dict[str, tuple[Status, str]]
+    drift: Prior | None = None
     open: dict[tuple[str, ...], dict[str, float]] = field(default_factory=dict)
 
     def leave_open(self, names: Collection[str], free: Solution, held: Solution) -> None:
@@ -134,12 +128,9 @@ def dynamic(
     search = Search(fine, known.prior, weights)
     states = np.zeros((len(fine), 2))
     coarse = models(records, law, coarse=True, without=without)
-    starts = [start for start in grid(coarse, known.values, base, STARTS + 1) if "W" not in base or start["W"] > 0]
+    starts = [start for start in grid(coarse, known.values, base) if "W" not in base or start["W"] > 0]
     tell("first fits", 0.2)
-    found = min(
-        (search.solve(start, states, base, tolerance=FIRST, limit=12) for start in starts[:STARTS]),
-        key=lambda one: one.fit.cost,
-    )
+    found = search.best(starts, states, base)
     search = Search(fine, known.prior, _weights(fine, found, weights))
     held = dict(known.held)
     found, base = _told(search, found, base, known, held)
@@ -151,11 +142,11 @@ def dynamic(
     tell("final fit", 0.9)
     found = search.solve(found.values, found.states, base, tolerance=FINAL, limit=40)
     found, base = _told(search, found, base, known, held)
-    honest = uncertainty(search, found, known.open.values())
+    honest = uncertainty(search, found, known.open.values(), known.drift)
     # The delay first: without it damping is told that both together leave open.
     while (judged := no_delay(fine, honest.solution, base) or verdict(honest.solution, base, known.told)) is not None:
         found, base = _without(search, found, base, judged, known, held)
-        honest = uncertainty(search, found, known.open.values())
+        honest = uncertainty(search, found, known.open.values(), known.drift)
     if prior is None and has_sines(fine):
         held |= _left_with(known, base)
     result = _result(fine, search, honest, base, held, I_P, prior)
@@ -176,6 +167,7 @@ def _known(
         name: ("held", "usual value, records of friction hardly tell it") for name in USUAL if name not in free
     }
     priors: list[Prior] = []
+    drift: Prior | None = None
     unknown = {"J", "sigma_2", "F_C", "M_0"}
     if prior is not None:
         values |= {name: estimate.value for name, estimate in prior.estimates.items() if name in KINDS}
@@ -190,7 +182,10 @@ def _known(
         places = [prior.correlation.names.index(name) for name in names]
         if names:
             at = np.array([values[name] for name in names])
-            priors.append(Prior(names, at, np.asarray(prior.covariance[np.ix_(places, places)])))
+            # Drift would leave the sines to bend what plateaus tell: it is in the intervals, not in the weights.
+            weighed, drifts = prior.covariance - prior.drift, prior.drift
+            priors.append(Prior(names, at, np.asarray(weighed[np.ix_(places, places)])))
+            drift = with_excess(Prior(names, np.zeros(len(names)), np.asarray(drifts[np.ix_(places, places)])))
     if J is not None:
         values["J"] = J.value
         unknown.discard("J")
@@ -219,7 +214,7 @@ def _known(
             held["v_log"] = "held", "a third of the typical speed, so that the logarithm bends where the axis moves"
     values.setdefault("sigma_0", 0.0)
     told = tuple(name for one in priors for name in one.names)
-    return _Known(values, joined(priors), told, held)
+    return _Known(values, joined(priors), told, held, drift)
 
 
 def _both_directions(fine: Sequence[RecordTorque]) -> bool:
@@ -318,11 +313,8 @@ def _refined(
         values["F_log"] = 0.05 * values["F_C"]
     starts = [values]
     if {"W", "gamma"} <= set(added):
-        starts = [start for start in grid(coarse, values, ["W", "gamma", "sigma_0"], STARTS) if start["W"] > 0][:2]
-    tried = min(
-        (search.solve(start, found.states, [*base, *added], tolerance=FIRST, limit=12) for start in starts),
-        key=lambda one: one.fit.cost,
-    )
+        starts = [start for start in grid(coarse, values, ["W", "gamma", "sigma_0"])[:FOLLOWED] if start["W"] > 0][:2]
+    tried = search.best(starts, found.states, [*base, *added])
     # Weighted by what the richer model leaves: what it explains must not pass for noise that hides it.
     search = Search(search.models, known.prior, _weights(search.models, tried, search.weights))
     tried = search.solve(tried.values, tried.states, [*base, *added], tolerance=1e-6, limit=30)

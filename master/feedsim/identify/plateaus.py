@@ -219,6 +219,7 @@ def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float, s
         # A drift that is left is as good as a rectangular distribution of so much width.
         hypot(sigma, drift / np.sqrt(12)),
         end - start,
+        float((record.time[start] + record.time[end - 1]) / 2 - record.time[0]),
     )
 
 

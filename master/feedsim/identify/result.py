@@ -58,6 +58,7 @@ class Plateau:
         torque: mean motor torque less inertia and known load [N.m], signed.
         sigma: standard deviation of that mean [N.m], from the scatter within the plateau (its correlation included).
         rows: number of samples.
+        elapsed: from the begin of all records, one after the other, to the middle of the stretch [s].
     """
 
     record: str
@@ -67,6 +68,7 @@ class Plateau:
     torque: float
     sigma: float
     rows: int
+    elapsed: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,8 @@ class Stationary:
 
     Attributes:
         estimates: F_C, F_S, v_s, beta, F_log, v_log, sigma_2, asymmetry, M_0.
-        covariance: of the estimated ones, in the order of correlation.names.
+        covariance: of the estimated ones, in the order of correlation.names. drift: the part of it by viscous friction
+            that may warm while the plateaus are driven, as far as they do not show it.
         speeds (K,), torque (K,), sigma (K,): the curve |M_fr| over |n| without asymmetry, and its standard deviation.
         range: lowest and highest speed of the plateaus [rad/s].
         rms: residual of the plateaus [N.m].
@@ -86,6 +89,7 @@ class Stationary:
     estimates: Mapping[str, Estimate]
     correlation: Correlation
     covariance: Array
+    drift: Array
     speeds: Array
     torque: Array
     sigma: Array

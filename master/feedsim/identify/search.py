@@ -14,6 +14,9 @@ from feedsim.identify.record import Array
 from feedsim.identify.torque import START_PRIOR, STARTS, RecordTorque
 
 REACH = {"z": 1.0, "c": 0.5}
+FIRST = 1e-3  # tolerance of cost and step to compare starts
+FOLLOWED = 3  # of the starts; as many again where none of them explains the torque
+EXPLAINED = 2.0  # mean square of the residuals over the weights up to which they are noise: wrong valleys leave 5 to 50
 
 
 def with_excess(prior: Prior) -> Prior:
@@ -78,6 +81,17 @@ class Search:
     def cost(self, solution: Solution) -> float:
         """Sum of squares of the residuals at a solution, without the prior's."""
         return float(sum(np.sum(part**2) for part in self.residuals(solution.values, solution.states)))
+
+    def best(self, starts: Sequence[Mapping[str, float]], states: Array, free: Sequence[str]) -> Solution:
+        """Where the best of the starts arrives, the likeliest of which come first."""
+        found: list[Solution] = []
+        for first in range(0, min(len(starts), 2 * FOLLOWED), FOLLOWED):
+            followed = starts[first : first + FOLLOWED]
+            found += [self.solve(start, states, free, tolerance=FIRST, limit=12) for start in followed]
+            best = min(found, key=lambda one: one.fit.cost)
+            if 2 * best.fit.cost <= EXPLAINED * len(best.fit.residuals):
+                break
+        return best
 
     def solve(
         self, values: Mapping[str, float], states: Array, free: Sequence[str], *, tolerance: float, limit: int
@@ -205,10 +219,8 @@ def stiffnesses(models: Sequence[RecordTorque], values: Mapping[str, float]) -> 
     return np.geomspace(least, most, count)
 
 
-def grid(
-    models: Sequence[RecordTorque], values: Mapping[str, float], free: Collection[str], count: int
-) -> list[dict[str, float]]:
-    """The `count` best sets of sigma_0, sigma_1, W, gamma of a grid, each of another W and gamma; the best one first.
+def grid(models: Sequence[RecordTorque], values: Mapping[str, float], free: Collection[str]) -> list[dict[str, float]]:
+    """The best sets of sigma_0, sigma_1, W, gamma of a grid, each of another W and gamma; the best one first.
 
     The law is linear in sigma_1: its best value comes with every point of the grid. Parameters that are not free keep
     their values.
@@ -229,7 +241,7 @@ def grid(
         assert best is not None
         found.append(best)
     found.sort(key=lambda pair: pair[0])
-    return [trial for _, trial in found[:count]]
+    return [trial for _, trial in found]
 
 
 def _damped(models: Sequence[RecordTorque], trial: dict[str, float], free: bool) -> float:

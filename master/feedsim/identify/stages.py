@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import pairwise
 from math import nan
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -23,7 +24,7 @@ from feedsim.identify.parameters import CONSTANT_SPEED, FIXED, FRICTION, NO_EFFE
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Correlation, Dynamic, Estimate, Identification, Plateau, Stationary
-from feedsim.identify.stribeck import repeats, stationary
+from feedsim.identify.stribeck import stationary
 from feedsim.identify.stribeck_identifiability import FEW_SPEEDS, Points
 from feedsim.identify.structure_torque import with_structure
 
@@ -163,9 +164,9 @@ class _Run:
 
     def _plateaus(self, J: float) -> tuple[Plateau, ...]:
         found: list[Plateau] = []
-        for k, record in enumerate(self.records):
+        for k, (record, begun) in enumerate(zip(self.records, begins(self.records), strict=True)):
             self.progress("plateaus", k, len(self.records))
-            found += plateaus(record, J)
+            found += [replace(each, elapsed=begun + each.elapsed) for each in plateaus(record, J)]
         self.progress("plateaus", len(self.records), len(self.records))
         return tuple(found)
 
@@ -182,11 +183,6 @@ class _Run:
             return None
         self.progress("stage 1: Stribeck curve", 0, 1)
         hold, free = self._held(CONSTANT_SPEED)
-        if not repeats(found):
-            self.advice.append(
-                "no speed comes back later in the records, so that friction that drifts with temperature is not told: "
-                "repeat one of the fastest strokes at the end, or warm the axis up first"
-            )
         try:
             return stationary(found, hold=hold, free=free, seed=self.options.seed, I_P=self.options.I_P)
         except InputError as error:
@@ -330,6 +326,15 @@ class _Run:
         begin = perf_counter()
         yield
         self.seconds[step] = perf_counter() - begin
+
+
+def begins(records: Sequence[Record]) -> list[float]:
+    """When each record began [s], one after the other: pieces of a trace as its time says, files without a gap."""
+    found = [0.0]
+    for before, after in pairwise(records):
+        gap = float(after.time[0] - before.time[-1])
+        found.append(found[-1] + float(before.time[-1] - before.time[0]) + max(gap, 0.0))
+    return found
 
 
 def transitions(records: Sequence[Record]) -> tuple[Record, ...]:

@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from math import nan
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.stats import chi2, f
 
 from feedsim.errors import InputError
+from feedsim.identify import drift
 from feedsim.identify import stribeck_identifiability as identifiability
 from feedsim.identify.fit import Fit, Parameter, correlation, fit, inverse
 from feedsim.identify.parameters import (
@@ -29,16 +31,14 @@ from feedsim.identify.parameters import (
     torque,
 )
 from feedsim.identify.record import Array
-from feedsim.identify.result import NORMAL_95, Correlation, Plateau, Stationary, Status
-from feedsim.identify.stribeck_identifiability import SAME_SPEED, Points
+from feedsim.identify.result import Correlation, Plateau, Stationary, Status
+from feedsim.identify.stribeck_identifiability import Points
 
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6
 DOUBTFUL = 0.95  # probability of a smaller chi^2 from which on plateaus count as scattering more than their noise
 CLEAR = 0.99  # the same, of the drop that a Stribeck effect, or a shape that is else held, must bring
 HALF = 0.5  # of the sum of squares: what lies below is worth to free a parameter that is held by default
-SAME = 0.02  # relative difference up to which a speed counts as repeated
-CERTAIN, LEAST_DRIFT = 4.0, 2e-3  # standard deviations, and share of the friction, that a drift must have
 SHAPED: Mapping[str, str] = {"beta": "v_s", "v_log": "F_log"}  # held by default -> without which it has no effect
 
 # The fit moves F_C and F_S - F_C >= 0 in place of F_S.
@@ -173,16 +173,29 @@ class _Problem:
 
         return fit(residuals, [self.parameter(name, begin[name]) for name in left], starts=starts, seed=self.seed)
 
-    def marginal(self, found: Fit, reasons: Mapping[str, str], extra: float) -> Array:
-        """Covariance of what was found. What is held because the plateaus do not tell it is not known: it adds what the
-        rest would move by if it had another usual value, as far as the plateaus allow that one, and what it moves by if
-        it has the value that suits them best."""
+    def marginal(
+        self, found: Fit, reasons: Mapping[str, str], extra: float, warms: float = drift.WARMS
+    ) -> tuple[Array, Array]:
+        """Covariance (P, P) of what was found, and its part by warming, in which viscous friction changes by `warms`.
+
+        What is held because the plateaus do not tell it is not known: it adds what the rest would move by if it had
+        another usual value, as far as the plateaus allow that one, and what it moves by if it has the value that suits
+        them best. So does the course of viscous friction over time.
+        """
+        without, moved = self._hidden(found, reasons, extra, 0.0)
+        within, warmed = self._hidden(found, reasons, extra, warms)
+        known = np.isfinite(within) & np.isfinite(without)
+        part = np.where(known, within - np.where(known, without, 0.0), 0.0) + np.outer(warmed - moved, warmed - moved)
+        # With nothing hidden what was found is the best there is, at a bound too.
+        best = not any(name in HIDDEN for name in reasons)
+        return without + (0.0 if best else np.outer(moved, moved)) + part, part
+
+    def _hidden(self, found: Fit, reasons: Mapping[str, str], extra: float, warms: float) -> tuple[Array, Array]:
+        """Covariance with what is hidden as nuisances, and how far what was found is from the best with them."""
         points, values = self.points, self.inner(found.mapping(), reasons)
         if "v_s" in reasons:
             values["v_s"] = float(points.speeds[0]) / UNSEEN
         names = [name for name in reasons if name in HIDDEN]
-        if not names:
-            return found.covariance
         weight = 1.0 / np.hypot(points.sigma, extra * np.abs(points.torque))
         columns = [found.jacobian]
         for name in names:
@@ -193,12 +206,15 @@ class _Problem:
         count = len(found.names)
         # In units of what may be: a row of unit variance for each that is hidden.
         usual = np.eye(len(names), count + len(names), count)
-        whole = np.vstack([np.hstack(columns), usual])
+        lost = warms * values["sigma_2"] * points.speed * weight
+        noise = np.eye(len(lost)) + drift.warming(points.age) * np.outer(lost, lost)
+        root = np.linalg.cholesky(noise)
+        whole = np.vstack([solve_triangular(root, np.hstack(columns), lower=True), usual])
+        away = np.concatenate([solve_triangular(root, found.residuals, lower=True), np.zeros(len(names))])
         scale = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
         covariance, _ = inverse(whole / scale)
         covariance = covariance / np.outer(scale, scale)
-        moved = covariance @ whole.T @ np.concatenate([found.residuals, np.zeros(len(names))])
-        return np.asarray((covariance + np.outer(moved, moved))[:count, :count])
+        return covariance[:count, :count], np.asarray((covariance @ whole.T @ away)[:count])
 
     def parameter(self, name: str, start: float) -> Parameter:
         """Bounds and the range of further starts, from what the plateaus span."""
@@ -281,9 +297,9 @@ def _conclude(
     values = problem.inner(found.mapping(), reasons)
     names = tuple(map(outer, found.names))
     turn = inner_to_outer(found.names, names)
-    covariance = turn @ problem.marginal(found, reasons, extra) @ turn.T
-    drift, drifts = _drift(plateaus, values, names)
-    covariance = covariance + np.diag(drift)
+    whole, warmed = problem.marginal(found, reasons, extra)
+    drifted, drifts = drift.repeated(plateaus, values, names)
+    covariance, warmed = turn @ whole @ turn.T + np.diag(drifted), turn @ warmed @ turn.T
     matrix = correlation(covariance)
     sigma = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
     told = {outer(name): reason for name, reason in reasons.items()}
@@ -292,9 +308,12 @@ def _conclude(
         status: Status = "estimated" if name in names else "undetermined" if name in told else "held"
         reason = told.get(name, "" if status == "estimated" else "held at a given or usual value")
         estimates[name] = estimate(name, values[name], float(sigma.get(name, nan)), status, reason)
-    said = identifiability.warnings(points, found, matrix, names, I_P)
+    said = identifiability.warnings(points, found, correlation(covariance - warmed), names, I_P)
     said += [f"{name} is not estimated but held at {values[name]:.4g}: {reason}" for name, reason in told.items()]
     said += drifts
+    if "sigma_2" in sigma:
+        at = names.index("sigma_2")
+        said += drift.hides(sigma["sigma_2"], float(np.sqrt(max(warmed[at, at], 0.0))), values["sigma_2"])
     if extra > 0:
         said.append(
             f"plateaus scatter about the curve by {100 * extra:.2g} % of their torque beyond their own noise (friction "
@@ -308,6 +327,7 @@ def _conclude(
         estimates,
         Correlation(names, matrix),
         covariance,
+        warmed,
         speeds,
         curve(values, speeds),
         _band(problem, found, reasons, speeds),
@@ -316,46 +336,6 @@ def _conclude(
         float(np.max(np.abs(away) / curve(values, points.speed))),
         tuple(said),
     )
-
-
-def repeats(plateaus: Sequence[Plateau]) -> list[tuple[int, int]]:
-    """The first and the last plateau of each direction and speed that came back after another speed."""
-    found = []
-    for k, first in enumerate(plateaus):
-        like = [m for m, other in enumerate(plateaus) if abs(other.speed - first.speed) <= SAME * abs(first.speed)]
-        between = (abs(abs(other.speed) - abs(first.speed)) for other in plateaus[k : like[-1]])
-        if like[0] == k and any(away > SAME_SPEED * abs(first.speed) for away in between):
-            found.append((k, like[-1]))
-    return found
-
-
-def _drift(
-    plateaus: Sequence[Plateau], values: Mapping[str, float], names: Sequence[str]
-) -> tuple[Array, tuple[str, ...]]:
-    """(P,) variance of `names` by friction that was another when a speed came back, and a sentence about it."""
-    variance, worst = np.zeros(len(names)), 0.0
-    said: tuple[str, ...] = ()
-    for k, m in repeats(plateaus):
-        first, last = plateaus[k], plateaus[m]
-        n = np.array([first.speed, last.speed])
-        before, after = np.array([first.torque, last.torque]) - torque(values, n)
-        change, friction, size = float(after - before), float(curve(values, n[:1])[0]), abs(first.speed)
-        if abs(change) < max(CERTAIN * float(np.hypot(first.sigma, last.sigma)), LEAST_DRIFT * friction):
-            continue
-        # What each would have to change by to make the difference alone, from the first plateau to the last one of all.
-        reach = {"sigma_2": size, "F_log": float(np.log1p(size / values["v_log"])), "F_C": 1.0, "F_S": 1.0}
-        whole = change * (len(plateaus) - 1) / (m - k)
-        moved = np.array([whole / reach[name] if name in reach else 0.0 for name in names])
-        variance = np.maximum(variance, (moved / NORMAL_95) ** 2)
-        if abs(change) / friction > worst:
-            worst = abs(change) / friction
-            way = "fell" if change * first.speed < 0 else "rose"
-            said = (
-                f"friction at {size:.3g} rad/s {way} by {100 * worst:.2g} % between {first.begin:.4g} s "
-                f"({first.record}) and {last.begin:.4g} s ({last.record}): it drifts, as with temperature; the "
-                "parameters are a mean, and their intervals hold the drift; warm the axis up and record again",
-            )
-    return variance, said
 
 
 def _band(problem: _Problem, found: Fit, reasons: Mapping[str, str], speeds: Array) -> Array:

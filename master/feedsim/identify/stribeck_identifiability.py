@@ -23,11 +23,13 @@ VARIED = 0.05  # range of the level over its mean that tells an asymmetry from a
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Plateaus as arrays (K,): speed [rad/s], torque [N.m], sigma [N.m]; and their distinct speeds (S,) [rad/s]."""
+    """Plateaus as arrays (K,): speed [rad/s], torque [N.m], sigma [N.m], age [1] from the first one at 0 to the last
+    one at 1; and their distinct speeds (S,) [rad/s]."""
 
     speed: Array
     torque: Array
     sigma: Array
+    age: Array
     speeds: Array
 
     @classmethod
@@ -39,7 +41,9 @@ class Points:
         ordered = np.sort(np.abs(speed))
         starts = np.concatenate([[True], np.diff(ordered) > SAME_SPEED * ordered[1:]])
         groups = np.cumsum(starts) - 1
-        return cls(speed, torque, sigma, np.bincount(groups, weights=ordered) / np.bincount(groups))
+        elapsed = np.array([plateau.elapsed for plateau in plateaus])
+        age = (elapsed - np.min(elapsed)) / (float(np.ptp(elapsed)) or 1.0)
+        return cls(speed, torque, sigma, age, np.bincount(groups, weights=ordered) / np.bincount(groups))
 
     @property
     def both(self) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from feedsim.identify.fit import Fit
+from feedsim.identify.fit import Fit, Prior
 from feedsim.identify.parameters import PRE_SLIDING, inner
 from feedsim.identify.record import Array
 from feedsim.identify.search import Search, Solution
@@ -17,7 +17,10 @@ from feedsim.identify.torque import RecordTorque
 # samples, modes of the structure). Without it the quietest move of a record without noise would count for all.
 FLOOR = 1e-3
 DRAWS = 8  # their mean square is known to within a half, their root to a quarter: an order of magnitude is wanted
-BY_CHANCE = 6.63  # variances that one stretch pulls by chance, 99 % (chi^2): a few stretches that agree tell no more
+BY_CHANCE = 3.84  # variances that one stretch pulls by chance, 95 % (chi^2): a few stretches that agree tell no more
+# Of a row's interval: to better than that no cubic between rows tells when something happened. A delay that is too
+# short by it passes for damping, sigma_0 times as large.
+APART = 0.01
 SMOOTHER = 1.5  # times lower a cut-off: what it takes off more is about what the first one did
 AT_ODDS = 3.0  # times the deviation by noise that stretches which contradict each other make of it: worth a warning
 WORTH_A_WORD, LEAST_DELAY = 0.01, 2e-5  # of the value, and [s]: deviations that are worth it
@@ -38,28 +41,49 @@ class Uncertainty:
     at_odds: Mapping[str, float]
 
 
-def uncertainty(search: Search, found: Solution, left_open: Collection[Mapping[str, float]]) -> Uncertainty:
-    """Stretches that contradict each other or stage 1; errors of the recorded motion; and what the rest would be with a
-    parameter free that the records leave open, which is held here.
+def uncertainty(
+    search: Search, found: Solution, left_open: Collection[Mapping[str, float]], drift: Prior | None = None
+) -> Uncertainty:
+    """Stretches that contradict each other or stage 1; errors of the recorded motion; what may have drifted in stage 1;
+    what the rest would be with a parameter free that the records leave open, which is held here; and what rows tell at
+    best.
 
-    left_open: per such parameter, inner name -> variance with it free.
+    left_open: per such parameter, inner name -> variance with it free. drift: the part of stage 1's covariance that is
+    not in the search's prior.
     """
     fit = found.fit
     factor = disagreement(search.models, fit)
     motion = motion_covariance(search.models, fit, found.values, found.states, search.weights)
     covariance = np.where(np.isfinite(fit.covariance), fit.covariance * np.outer(factor, factor), fit.covariance)
-    covariance = covariance + motion
-    if "J" in fit.names:
-        covariance[fit.names.index("J"), fit.names.index("J")] += (FLOOR * found.values["J"]) ** 2
+    covariance = covariance + motion + drift_covariance(search.prior, fit, drift)
     variance = np.diag(covariance)
-    most = [
-        max(float(v), *(each.get(n, 0.0) for each in left_open), 0.0) for n, v in zip(fit.names, variance, strict=True)
-    ]
+    wanted = (*left_open, _least(search.models, found.values))
+    most = [max(float(v), *(each.get(n, 0.0) for each in wanted)) for n, v in zip(fit.names, variance, strict=True)]
     usable = np.isfinite(variance) & (variance > 0)
     wider = np.sqrt(np.where(usable, most, 1.0) / np.where(usable, variance, 1.0))
     covariance = np.where(np.isfinite(covariance), covariance * np.outer(wider, wider), covariance)
     by_name = [dict(zip(fit.names, map(float, each), strict=True)) for each in (np.sqrt(np.diag(motion)), factor)]
     return Uncertainty(replace(found, fit=replace(fit, covariance=covariance)), fit.sigma, *by_name)
+
+
+def _least(models: Sequence[RecordTorque], values: Mapping[str, float]) -> dict[str, float]:
+    """Variances that no records tell a parameter better than, by inner name."""
+    apart = APART * max(model.record.interval for model in models)
+    least = {"delay": apart, "sigma_1": apart * values["sigma_0"], "J": FLOOR * values["J"]}
+    return {name: sigma**2 for name, sigma in least.items()}
+
+
+def drift_covariance(prior: Prior, fit: Fit, drift: Prior | None) -> Array:
+    """(P, P) covariance of the fit's parameters by what stage 1 may be off by, besides the prior that the fit had: as
+    far as the fit followed that prior."""
+    own = prior.restricted(fit.names)
+    names = () if drift is None else drift.restricted(own.names).names
+    if drift is None or not names:
+        return np.zeros_like(fit.covariance)
+    moved = np.where(np.isfinite(fit.covariance), fit.covariance, 0.0)[:, [fit.names.index(n) for n in own.names]]
+    rows = own.rows()
+    follows = (moved @ rows.T @ rows)[:, [own.names.index(name) for name in names]]
+    return np.asarray(follows @ drift.restricted(own.names).covariance @ follows.T, dtype=np.float64)
 
 
 def _matters(honest: Uncertainty, name: str) -> bool:

@@ -159,12 +159,23 @@ def test_a_delay_without_noise(runs: dict[str, dict[str, cosim.Run]], law: Frict
     assert abs(errors(result)["sigma_1"]) < 5e-3
 
 
+def without_drift(result: Identification, name: str) -> float:
+    """Standard deviation less what may have warmed: the machine does not, and stage 2 hardly tells the curve anew."""
+    first = result.stationary
+    assert first is not None
+    variance = result.estimates[name].sigma ** 2
+    if name in first.correlation.names:
+        at = first.correlation.names.index(name)
+        variance -= float(first.drift[at, at])
+    return float(np.sqrt(variance))
+
+
 def test_intervals_hold_what_they_promise(noisy: list[Identification]) -> None:
     """Scatter over the standard deviation that is said; 1.3 and 0.5: of 20 seeds the scatter itself is known to 16 %,
     and stage 1 says somewhat more than its scatter."""
     for name in GOALS:
         seen = np.std([result.estimates[name].value for result in noisy], ddof=1)
-        said = np.mean([result.estimates[name].sigma for result in noisy])
+        said = np.mean([without_drift(result, name) for result in noisy])
         assert 0.5 < seen / said < 1.3, name
 
 

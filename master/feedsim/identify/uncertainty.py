@@ -56,6 +56,8 @@ def uncertainty(
     motion = motion_covariance(search.models, fit, found.values, found.states, search.weights)
     covariance = np.where(np.isfinite(fit.covariance), fit.covariance * np.outer(factor, factor), fit.covariance)
     covariance = covariance + motion + drift_covariance(search.prior, fit, drift)
+    if "J" in fit.names:
+        covariance[fit.names.index("J"), fit.names.index("J")] += (FLOOR * found.values["J"]) ** 2
     variance = np.diag(covariance)
     wanted = (*left_open, _least(search.models, found.values))
     most = [max(float(v), *(each.get(n, 0.0) for each in wanted)) for n, v in zip(fit.names, variance, strict=True)]
@@ -69,7 +71,7 @@ def uncertainty(
 def _least(models: Sequence[RecordTorque], values: Mapping[str, float]) -> dict[str, float]:
     """Variances that no records tell a parameter better than, by inner name."""
     apart = APART * max(model.record.interval for model in models)
-    least = {"delay": apart, "sigma_1": apart * values["sigma_0"], "J": FLOOR * values["J"]}
+    least = {"delay": apart, "sigma_1": apart * values["sigma_0"]}
     return {name: sigma**2 for name, sigma in least.items()}
 
 

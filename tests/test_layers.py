@@ -14,6 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "master" / "feedsim"
 ORDER = [
     "__main__",
     "cli",
+    "front",
     "report",
     "sweep",
     "identify",
@@ -34,8 +35,10 @@ ORDER = [
     "units",
     "findings",
     "owned",
+    "extras",
     "errors",
     "installation",
+    "called",
 ]
 SOLE_USERS = {
     "fmpy": {"cosim/archive.py", "cosim/unit.py"},
@@ -45,6 +48,7 @@ SOLE_USERS = {
     "ruckig": {"motions"},
     "jinja2": {"report/page.py"},
     "tqdm": {"cli"},
+    "pandas": {"front", "trace/trace.py", "sweep/table.py"},
     "pyuff": {"trace/uff.py"},
     "distributed": {"sweep"},
     "dask": {"sweep"},

@@ -1,53 +1,71 @@
-"""Simulation of machine-tool feed drives with non-linear friction: the master of three FMI 2.0 co-simulation units.
+"""Simulation of machine-tool feed drives with non-linear friction: the master of FMI 2.0 co-simulation units.
 
->>> from feedsim import load_scenario, run                                   # doctest: +SKIP
->>> result = run(load_scenario("scenarios/z_positioning.yaml"))             # doctest: +SKIP
->>> result.trace["Z.x_a"].max()                                             # doctest: +SKIP
+>>> import feedsim as fs
+>>> result = fs.run("xz_circle.yaml", set={"machine.axes.Z.drive.K_v": "5 (m/min)/mm"})
+>>> result.figures["XZ.G"].unit
+'um'
+>>> picture = result.plot()
+>>> picture.save("circle.png").name
+'circle.png'
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from feedsim.analysis import evaluate  # type: ignore[no-redef]
-    from feedsim.cosim import Run, run  # type: ignore[no-redef]
+    from typing import Any
+
+    from feedsim.analysis.evaluate import evaluate
+    from feedsim.analysis.figures import Figure
+    from feedsim.cosim import Run
     from feedsim.errors import FeedsimError, InputError, OutputError, SimulationError
-    from feedsim.scenario import load as load_scenario  # type: ignore[no-redef]
+    from feedsim.examples import copy as example
+    from feedsim.front import Result, compare, frf, identify, load, run, sweep
+    from feedsim.scenario import Machine, Scenario, load_machine
+    from feedsim.scenario.load import load as load_scenario
     from feedsim.trace import Trace
     from feedsim.trace import read_csv as read_trace
 
-__all__ = [
-    "FeedsimError",
-    "InputError",
-    "OutputError",
-    "Run",
-    "SimulationError",
-    "Trace",
-    "evaluate",
-    "load_scenario",
-    "read_trace",
-    "run",
-]
-
 # Loaded on first use: `feedsim --help` should not wait for numpy and fmpy.
 _HOMES = {
-    "FeedsimError": ("errors", "FeedsimError"),
-    "InputError": ("errors", "InputError"),
-    "OutputError": ("errors", "OutputError"),
-    "SimulationError": ("errors", "SimulationError"),
-    "Run": ("cosim", "Run"),
-    "Trace": ("trace", "Trace"),
-    "evaluate": ("analysis", "evaluate"),
-    "load_scenario": ("scenario", "load"),
-    "read_trace": ("trace", "read_csv"),
-    "run": ("cosim", "run"),
+    "FeedsimError": "errors",
+    "Figure": "analysis",
+    "InputError": "errors",
+    "Machine": "scenario",
+    "OutputError": "errors",
+    "Result": "front",
+    "Run": "cosim",
+    "Scenario": "scenario",
+    "SimulationError": "errors",
+    "Trace": "trace",
+    "compare": "front",
+    "evaluate": "analysis",
+    "example": "examples:copy",
+    "frf": "front",
+    "identify": "front",
+    "load": "front",
+    "load_machine": "scenario",
+    "load_scenario": "scenario:load",
+    "read_trace": "trace:read_csv",
+    "run": "front",
+    "sweep": "front",
 }
+
+__all__ = [
+    "FeedsimError", "Figure", "InputError", "Machine", "OutputError", "Result", "Run", "Scenario", "SimulationError",
+    "Trace", "compare", "evaluate", "example", "frf", "identify", "load", "load_machine", "load_scenario",
+    "read_trace", "run", "sweep",
+]  # fmt: skip
 
 
 def __getattr__(public: str) -> Any:
     if public not in _HOMES:
         raise AttributeError(f"module 'feedsim' has no attribute '{public}'")
-    room, attribute = _HOMES[public]
-    return getattr(import_module(f"feedsim.{room}"), attribute)
+    room, _, name = _HOMES[public].partition(":")
+    return getattr(_import_module(f"feedsim.{room}"), name or public)
+
+
+def __dir__() -> list[str]:
+    return [*__all__]

@@ -60,16 +60,22 @@ def examples() -> list[Example]:
     return found
 
 
-def copy(names: Iterable[str], folder: str | Path = ".") -> list[Path]:
+def copy(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
     """Copy examples into a folder, with all files that they name, in the same layout; returns the files written.
 
     A file that is there with the same content stays; a scenario and the machine of the same name come both.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     len(copy("xz_circle", folder))
+    4
 
     Raises:
         InputError: there is no such example.
         OutputError: a file is there with another content, or cannot be written. Nothing is written then.
     """
     root, folder = shipped("scenarios"), Path(folder)
+    names = [names] if isinstance(names, str) else names
     contents = {folder / file.relative_to(root): file.read_bytes() for file in _needed(_asked(names), root)}
     if changed := [path for path in contents if _exists(path) and not _holds(path, contents[path])]:
         raise OutputError(

@@ -4,6 +4,7 @@ May use files (tolerances) and trace.
 Start with compare.py; tube.py is the method.
 """
 
+from feedsim.called import called
 from feedsim.compare.between import bounds_of, thinned
 from feedsim.compare.compare import compare
 from feedsim.compare.files import compare_files, compare_series, pairs_of, tolerances_of, unusable
@@ -18,3 +19,5 @@ __all__ = [
     "Variable", "along", "bounds", "bounds_of", "compare", "compare_files", "compare_series", "estimated_shift",
     "pairs_of", "percent", "seconds", "thinned", "tolerances_of", "unusable",
 ]  # fmt: skip
+
+called(__name__)

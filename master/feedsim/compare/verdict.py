@@ -121,7 +121,7 @@ class Coverage:
         return ", ".join(parts)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """A result against a reference.
 
@@ -146,6 +146,9 @@ class Comparison:
     shift: float = 0.0
     unused: tuple[str, ...] = ()
     coverage: Coverage | None = None
+
+    def __repr__(self) -> str:
+        return f"Comparison: {self.line}"
 
     @property
     def same(self) -> bool:

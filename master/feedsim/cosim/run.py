@@ -26,7 +26,7 @@ from feedsim.structure import checked_modes
 from feedsim.trace import Trace
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """What a run leaves behind.
 
@@ -60,6 +60,9 @@ class Run:
     fine: Trace | None = None
     log: Trace | None = None
     native: bool = False
+
+    def __repr__(self) -> str:
+        return f"Run of {self.scenario.name!r}: {self.program.duration:.4g} s, {len(self.trace)} rows"
 
 
 def run(

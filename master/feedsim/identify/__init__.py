@@ -4,6 +4,7 @@ May use analysis, structure, scenario and trace, and the friction law of cosim.
 Start with stages.py: records -> motion -> stage 1 (stribeck.py) -> stage 2 (output_error.py) -> result.py.
 """
 
+from feedsim.called import called
 from feedsim.identify.friction_file import Identified
 from feedsim.identify.options import STAGES, Asked, Options
 from feedsim.identify.read import Provenance, Recorded, named_apart, read_records, read_traces
@@ -15,3 +16,5 @@ __all__ = [
     "STAGES", "Asked", "Estimate", "Identification", "Identified", "Options", "Progress", "Provenance", "Record",
     "Recorded", "identify", "named_apart", "read_records", "read_traces",
 ]  # fmt: skip
+
+called(__name__)

@@ -193,7 +193,7 @@ class Balance:
     applies: bool = True
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Identification:
     """All of it, for one axis.
 
@@ -221,3 +221,12 @@ class Identification:
     rigid: Mapping[str, Estimate] = field(default_factory=dict)
     balance: Balance | None = None
     prior: bool = True
+
+    def __repr__(self) -> str:
+        found = [
+            f"{name} {each.value:.4g} {each.unit}".strip()
+            for name, each in self.estimates.items()
+            if each.status == "estimated"
+        ]
+        told = f"; {len(self.warnings)} warnings" if self.warnings else ""
+        return f"Identification of {self.axis}: {', '.join(found) or 'nothing estimated'}{told}"

@@ -16,11 +16,14 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 from numpy.typing import NDArray
+
+from feedsim.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -59,7 +62,7 @@ MOST_POINTS = 6000
 _REMARK: ContextVar[str] = ContextVar("remark", default="")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Picture:
     """A finished figure: file stem, caption (plain text), PNG bytes, SVG text with ids prefixed by the stem."""
 
@@ -73,6 +76,24 @@ class Picture:
     def is_light(self) -> bool:
         """Whether a page holds the SVG; one above LARGEST_SVG it holds as PNG."""
         return len(self.svg.encode()) <= LARGEST_SVG
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as .png or .svg, which the name tells; returns the path. Raises InputError, OutputError."""
+        path = Path(path)
+        kinds = {".png": self.png, ".svg": self.svg.encode()}
+        if path.suffix.lower() not in kinds:
+            raise InputError(f"{path}: a picture is saved as {' or '.join(kinds)}")
+        try:
+            path.write_bytes(kinds[path.suffix.lower()])
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror}") from None
+        return path
+
+    def __repr__(self) -> str:
+        return f"Picture {self.stem!r}: {self.title}"
+
+    def _repr_png_(self) -> bytes:
+        return self.png
 
 
 @contextmanager

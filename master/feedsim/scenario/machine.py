@@ -308,6 +308,11 @@ class PathLimits(Model):
 class Machine(Model):
     """A machine: structure data, pose, cycles, path limits and axes."""
 
+    def __repr__(self) -> str:
+        return f"Machine {self.name!r}: axes {', '.join(self.axes)}"
+
+    __str__ = __repr__
+
     IN_FOLDER: ClassVar[str] = "machine.yaml"
 
     name: StrictStr = Field(description="Name in reports")

@@ -83,6 +83,11 @@ Evaluation = Annotated[Positioning | CircleTest, Field(discriminator="kind")]
 class Scenario(Model):
     """Everything that a run needs, checked."""
 
+    def __repr__(self) -> str:
+        return f"Scenario {self.name!r} on {self.machine.name}: {len(self.motions)} motions"
+
+    __str__ = __repr__
+
     name: StrictStr = Field(description="Name in reports")
     note: StrictStr = Field(default="", description="Remark")
     machine: Machine = Field(description="Folder with a machine.yaml, a machine file, or the machine itself")

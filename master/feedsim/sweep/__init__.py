@@ -4,7 +4,10 @@ May use analysis and all below it; Dask and pyarrow are its own.
 Start with study.py, which makes the runs of a study.
 """
 
+from feedsim.called import called
 from feedsim.sweep.design import Design, Matrices, Outcome, Task, design
 from feedsim.sweep.table import Table, read_table, write_table
 
 __all__ = ["Design", "Matrices", "Outcome", "Table", "Task", "design", "read_table", "write_table"]
+
+called(__name__)

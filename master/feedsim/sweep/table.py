@@ -12,17 +12,21 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import InputError, OutputError
+from feedsim.extras import need
 from feedsim.fields import did_you_mean
 from feedsim.scenario.study import Parameter
 from feedsim.sweep.design import Design, Outcome
 from feedsim.trace import matches
 from feedsim.trace.files import written_whole
+
+if TYPE_CHECKING:
+    import pandas
 
 OK, FAILED = "ok", "failed"
 FIRST, LAST = ("run",), ("status", "message", "warnings", "seconds")
@@ -33,7 +37,7 @@ _KEY = b"feedsim"  # of the metadata
 _HEADER = re.compile(r"(.*?)(?: \[([^\[\]]*)\])?")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Table:
     """The runs that are done, in their order.
 
@@ -68,6 +72,19 @@ class Table:
         """Head of a column: "XZ.G [m]"."""
         unit = self.unit(name)
         return f"{name} [{unit}]" if unit else name
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A DataFrame with a row per run; units in ``.attrs["units"]``. Raises InputError where pandas is missing."""
+        table = need("pandas", "a DataFrame").DataFrame(dict(self.columns))
+        table.attrs["units"] = dict(self.units)
+        return table
+
+    def __repr__(self) -> str:
+        failed = len(self) - int(self.ok.sum())
+        return (
+            f"Table: {len(self)} of {self.runs} runs{f', {failed} failed' * bool(failed)}; "
+            f"parameters {', '.join(self.parameters)}; {len(self.figures)} figures"
+        )
 
     @property
     def ok(self) -> NDArray[np.bool_]:

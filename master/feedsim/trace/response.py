@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -19,7 +20,7 @@ Complexes = NDArray[np.complex128]
 ROUNDING = 1e-9  # of a frequency: quotients of times carry it
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FrequencyResponse(Columns[Complexes]):
     """Functions over a common frequency axis.
 
@@ -42,6 +43,10 @@ class FrequencyResponse(Columns[Complexes]):
     units: Mapping[str, str] = field(default_factory=dict)
     coherence: Mapping[str, Array] = field(default_factory=dict)
     kind = "frequency response"
+
+    def __repr__(self) -> str:
+        band = f"{self.frequency[0]:.4g} to {self.frequency[-1]:.4g} Hz" if len(self.frequency) else "no frequencies"
+        return f"FrequencyResponse: {band}; {textwrap.shorten(', '.join(self), 80)}"
 
     def __post_init__(self) -> None:
         frequency = _frozen(self.frequency, np.float64, "frequency", None)

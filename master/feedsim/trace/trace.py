@@ -1,17 +1,22 @@
 """A trace: time series with names and units over one time axis."""
 
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from types import MappingProxyType
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedsim.errors import InputError
+from feedsim.extras import need
 from feedsim.trace.table import STRETCH, release, stretches, unchangeable
+
+if TYPE_CHECKING:
+    import pandas
 
 Array = NDArray[np.float64]
 Values = TypeVar("Values", bound=NDArray[Any])
@@ -73,7 +78,7 @@ class TimeColumns(Columns[Array]):
         return int(self.time.size)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trace(TimeColumns):
     """Columns of numbers over a common time.
 
@@ -116,6 +121,17 @@ class Trace(TimeColumns):
         """
         kept = matching(self.columns, patterns)
         return Trace(self.time, {name: self.columns[name] for name in kept}, {name: self.units[name] for name in kept})
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A DataFrame over time [s]; units in ``.attrs["units"]``. Raises InputError where pandas is not installed."""
+        frames = need("pandas", "a DataFrame")
+        table = frames.DataFrame(dict(self.columns), index=frames.Index(self.time, name="time [s]"))
+        table.attrs["units"] = dict(self.units)
+        return table
+
+    def __repr__(self) -> str:
+        span = f", {self.time[0]:.6g} to {self.time[-1]:.6g} s" if len(self) else ""
+        return f"Trace: {len(self)} rows{span}; {len(self.names)} columns: {textwrap.shorten(', '.join(self), 60)}"
 
 
 def matches(name: str, pattern: str) -> bool:

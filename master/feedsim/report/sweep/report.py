@@ -21,8 +21,9 @@ from feedsim.sweep.sensitivity import Indices, Trends
 from feedsim.sweep.table import RECORD
 
 if TYPE_CHECKING:
-    from feedsim import sweep
     from feedsim.scenario.study import Study
+    from feedsim.sweep.design import Design
+    from feedsim.sweep.table import Table as Runs
 
 REMARK_WIDTH, REMARK_LINES = 95, 2  # fits the narrowest figure
 METHODS = {
@@ -67,7 +68,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (REPORT, SUMMARY), inputs)
 
 
-def write(table: sweep.Table, study: Study, design: sweep.Design, directory: Path | str) -> tuple[Path, ...]:
+def write(table: Runs, study: Study, design: Design, directory: Path | str) -> tuple[Path, ...]:
     """Write report.html, summary.json and figures/*.png beside the table; returns their paths.
 
     The table may be that of an unfinished study. The table's own files are left as they are. Raises OutputError.

@@ -1,0 +1,33 @@
+"""Rooms that share their name with what a person calls: ``feedsim.compare(...)`` beside ``feedsim.compare.Options``.
+
+Once such a room is loaded, Python binds its name in the package, and what the front door has under that name cannot be
+reached any more; so the room itself is called, and passes the call on. May use: nothing. Start reading at called().
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+
+class _CalledRoom(ModuleType):
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        return self._call(*given, **named)
+
+    @property
+    def _call(self) -> Callable[..., Any]:
+        found: Callable[..., Any] = getattr(import_module("feedsim.front"), self.__name__.rpartition(".")[2])
+        return found
+
+    @property
+    def __signature__(self) -> inspect.Signature:
+        return inspect.signature(self._call)
+
+
+def called(room: str) -> None:
+    """Have the room of that module name stand for the front door's function of the same name."""
+    sys.modules[room].__class__ = _CalledRoom

@@ -1,0 +1,195 @@
+"""`import feedsim`: what a person types, what is shown, what completion offers; the examples of the docstrings."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import os
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import feedsim as fs
+from feedsim import cosim, extras
+from feedsim.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[2]
+DWELL = {"motions": [{"kind": "dwell", "duration": "20 ms"}], "evaluate": []}
+LOGGED = {
+    "motions.1.speeds.count": 4,
+    "motions.1.duration": "1 s",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a user has who has copied the examples and logged an axis."""
+    folder = tmp_path_factory.mktemp("user")
+    fs.example(["xz_circle", "z_positioning", "z_stop", "identify_z_constant"], folder)
+    logged = fs.run(folder / "identify_z_constant.yaml", set=LOGGED)
+    logged.save(folder / "logged")
+    (folder / "logged" / "log.csv").rename(folder / "log.csv")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def circle(folder: Path) -> fs.Result:
+    return fs.run(folder / "xz_circle.yaml")
+
+
+@pytest.mark.parametrize(
+    "module", ["feedsim", "feedsim.front.calls", "feedsim.front.result", "feedsim.examples", "feedsim.extras"]
+)
+def test_examples_of_docstrings(module: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    found = doctest.testmod(import_module(module))
+    assert found.attempted
+    assert not found.failed
+
+
+def test_every_public_function_has_an_example() -> None:
+    for name in ("run", "load", "compare", "identify", "sweep", "frf"):
+        described = inspect.getdoc(getattr(import_module("feedsim.front"), name)) or ""
+        assert ">>> " in described, name
+
+
+def test_the_front_door_offers_public_names_and_has_them_all() -> None:
+    names = dir(fs)
+    assert not [name for name in names if name.startswith("_")]
+    assert {"load", "run", "identify", "compare", "sweep", "frf", "example"} <= set(names) == set(fs.__all__)
+    assert all(getattr(fs, name) is not None for name in names)
+    with pytest.raises(AttributeError, match="no attribute 'plot_all'"):
+        fs.plot_all  # noqa: B018
+
+
+@pytest.mark.parametrize("room", ["compare", "identify", "sweep"])
+def test_rooms_that_are_called_are_rooms_as_well(room: str) -> None:
+    """In a process of its own: whichever is first, the import or the call."""
+    code = (
+        f"import feedsim as fs, inspect; import feedsim.{room}; from feedsim.front import {room} as meant\n"
+        f"assert inspect.ismodule(fs.{room}) and fs.{room}.__all__\n"
+        f"assert inspect.signature(fs.{room}) == inspect.signature(meant)\n"
+        f"try: fs.{room}()\nexcept TypeError as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert f"{room}() missing" in done.stdout
+
+
+def test_a_file_and_what_was_loaded_give_the_same(folder: Path) -> None:
+    file = folder / "z_positioning.yaml"
+    by_file = fs.run(file, set=DWELL)
+    loaded = fs.run(fs.load(file, DWELL))
+    assert by_file["Z.x_a"].tobytes() == loaded["Z.x_a"].tobytes()
+    with pytest.raises(InputError, match="set: changes are for a file"):
+        fs.run(fs.load(file), set=DWELL)
+
+
+def test_set_means_what_it_means_on_the_command_line(folder: Path) -> None:
+    changes = {"machine.axes.Z.drive.K_v": "5 (m/min)/mm", "coupling.substeps": 2, "evaluate": []}
+    texts = ["machine.axes.Z.drive.K_v=5 (m/min)/mm", "coupling.substeps=2", "evaluate=[]"]
+    file = folder / "z_positioning.yaml"
+    assert fs.load(file, changes) == fs.load(file, texts)
+    assert fs.load(file, changes) != fs.load(file)
+
+
+def test_an_ssp_file_runs(folder: Path) -> None:
+    from feedsim import ssp
+
+    scenario = fs.load(folder / "z_positioning.yaml", DWELL)
+    ssp.export(scenario, folder / "dwell.ssp")
+    result = fs.run(folder / "dwell.ssp")
+    assert np.abs(result["Z.x_a"] - fs.run(scenario)["Z.x_a"]).max() < 1e-9
+
+
+def test_representations_are_short(circle: fs.Result, folder: Path) -> None:
+    response = fs.frf(folder / "machines" / "test_centre", ["Z"], tool=False)
+    shown = [circle, circle.trace, circle.scenario, circle.scenario.machine, circle.plot(), response]
+    shown += [cosim.run(fs.load(folder / "z_positioning.yaml", DWELL)), fs.compare(circle, circle)]
+    for each in shown:
+        text = repr(each)
+        assert "\n" not in text
+        assert 10 < len(text) < 300, text
+        assert len(str(each)) < 300
+    assert "XZ.G 8.19" in repr(circle)
+
+
+def test_a_notebook_shows_figures_a_picture_and_that_it_is_synthetic(circle: fs.Result) -> None:
+    page = circle._repr_html_()
+    assert "XZ.G" in page
+    assert "data:image/png;base64," in page
+    assert "Synthetic machine" in page
+    assert len(page) < 1_000_000
+
+
+def test_pictures(circle: fs.Result, tmp_path: Path) -> None:
+    assert circle.plot().stem.startswith("contour")
+    assert circle.plot().save(tmp_path / "circle.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in circle.plot().save(tmp_path / "circle.svg").read_text(encoding="utf-8")
+    two = circle.plot("Z.x_a", "X.M_*")
+    assert two.caption.startswith("Z.x_a, X.M_") or "Z.x_a" in two.caption
+    with pytest.raises(InputError, match=r"circle\.bmp: a picture is saved as \.png or \.svg"):
+        circle.plot().save(tmp_path / "circle.bmp")
+    with pytest.raises(InputError, match="no column"):
+        circle.plot("Z.unknown")
+
+
+def test_saved_is_what_the_command_leaves(circle: fs.Result, folder: Path, tmp_path: Path) -> None:
+    names = {path.name for path in circle.save(tmp_path / "saved")}
+    assert {"result.csv", "summary.json", "report.html"} <= names
+    command = [sys.executable, "-m", "feedsim", "run", "xz_circle.yaml", "--out", str(tmp_path / "command")]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    for name in ("result.csv",):
+        assert (tmp_path / "saved" / name).read_bytes() == (tmp_path / "command" / name).read_bytes()
+
+
+class FakePandas:
+    """As much of pandas as the call takes: what it is given is kept."""
+
+    class Index:
+        def __init__(self, values: Any, name: str) -> None:
+            self.values, self.name = values, name
+
+    class DataFrame:
+        def __init__(self, columns: Any, index: Any = None) -> None:
+            self.columns, self.index, self.attrs = columns, index, {}
+
+
+def test_pandas_is_asked_for_only_where_it_is_used(circle: fs.Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)  # type: ignore[arg-type]
+    with pytest.raises(extras.MissingPackage, match=r"a DataFrame needs the package pandas, .*: pip install pandas"):
+        circle.to_pandas()
+    monkeypatch.setitem(sys.modules, "pandas", FakePandas)  # type: ignore[arg-type]
+    frame: Any = circle.to_pandas()
+    assert frame.index.name == "time [s]"
+    assert frame.columns["Z.x_a"] is circle["Z.x_a"]
+    assert frame.attrs["units"]["Z.x_a"] == "m"
+
+
+def test_with_pandas_itself(circle: fs.Result) -> None:
+    pytest.importorskip("pandas")
+    frame = circle.to_pandas()
+    assert np.array_equal(frame["Z.x_a"].to_numpy(), circle["Z.x_a"])
+    assert np.array_equal(frame.index.to_numpy(), circle.trace.time)
+
+
+def test_user_code_is_typed(tmp_path: Path) -> None:
+    code = tmp_path / "use.py"
+    code.write_text(
+        "import feedsim as fs\n"
+        'result = fs.run("xz_circle.yaml", set={"motions.0.radius": "20 mm"})\n'
+        "reveal_type(result)\nreveal_type(fs.compare(result, result).same)\nreveal_type(fs.load('a.yaml'))\n"
+        "fs.run(3)\n"
+    )
+    environment = os.environ | {"MYPYPATH": f"{ROOT / 'master'}{os.pathsep}{ROOT / 'src' / 'packager'}"}
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(ROOT / "pyproject.toml"), str(code)]
+    said = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False).stdout
+    revealed = [line.partition('"')[2].rstrip('"') for line in said.splitlines() if "Revealed type" in line]
+    assert revealed == ["feedsim.front.result.Result", "bool", "feedsim.scenario.model.Scenario"] or [
+        each.removeprefix("builtins.") for each in revealed
+    ] == ["feedsim.front.result.Result", "bool", "feedsim.scenario.model.Scenario"], said
+    assert 'has incompatible type "int"' in said

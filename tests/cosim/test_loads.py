@@ -59,7 +59,8 @@ def test_means_are_those_of_the_course(held: bool) -> None:
     """Against adaptive quadrature of the course itself, which is 0 outside of its rows: 1e-9, its own tolerance."""
     draw = np.random.default_rng(5)
     time, values = np.cumsum(draw.uniform(0.01, 0.5, 30)), draw.normal(size=30)
-    load = ToolLoad(direction="X", table=ForceTable(time=tuple(time.tolist()), values=tuple(values.tolist())))
+    table = ForceTable(time=tuple(time.tolist()), values=tuple(values.tolist()))
+    load = ToolLoad(direction="X", held=held, table=table)
     edges = np.linspace(-0.2, time[-1] + 0.3, 60)
 
     def course(t: float) -> float:
@@ -69,7 +70,7 @@ def test_means_are_those_of_the_course(held: bool) -> None:
         share = 0.0 if held else (t - time[row]) / (time[row + 1] - time[row])
         return float((1 - share) * values[row] + share * values[row + 1])
 
-    found = Acting("loads.0", load, time, values, held).means(edges)
+    found = Acting("loads.0", load, time, values).means(edges)
     for i, mean in enumerate(found):
         a, b = edges[i], edges[i + 1]
         kinks = [t for t in time if a < t < b]
@@ -79,7 +80,7 @@ def test_means_are_those_of_the_course(held: bool) -> None:
 
 def test_a_constant_is_exactly_itself() -> None:
     load = ToolLoad(direction="X", table=ForceTable(time=(0.0, 9.0), values=(0.1, 0.1)))
-    acting = Acting("loads.0", load, np.array([0.0, 9.0]), np.array([0.1, 0.1]), held=False)
+    acting = Acting("loads.0", load, np.array([0.0, 9.0]), np.array([0.1, 0.1]))
     assert set(acting.means(np.arange(5000) * 125e-6).tolist()) == {0.1}
 
 
@@ -316,6 +317,51 @@ def test_a_load_that_drives_is_told_by_its_work(file: Path, fmus: Path) -> None:
     assert wrong.endswith("its sign is wrong, and factor: -1 turns it")
 
 
+@pytest.fixture
+def recorded(file: Path, fmus: Path) -> Path:
+    """A record of the axis under a force of 60 N that resists its motion: force, setpoint, motor torque."""
+    motions = "motions=[{kind: dwell, duration: 1 s}, {kind: move, by: {X: 100 mm}, feed: 6 m/min}]"
+    table = "table: {time: [1.2 s, 1.4 s, 1.9 s, 2.1 s], values: [0 N, -60 N, -60 N, 0 N]}"
+    found = run(file, fmus, motions, f"loads=[{{kind: slide, axis: X, {table}}}]").trace
+    columns = (found.time, found["X.x_s"], found["X.F_a"], found["X.M_a"])
+    rows = [",".join(map(repr, row)) for row in zip(*(column.tolist() for column in columns), strict=True)]
+    path = file.parent / "record.csv"
+    path.write_text("\n".join(["time [s],x [m],F [N],M [N.m]", *rows, ""]), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit", "factor", "fits"),
+    [
+        ("slide", "N", 1.0, None),
+        ("slide", "N", 1.3, None),  # friction may be that wrong
+        ("slide", "N", -1.0, 1.0),
+        ("slide", "kN", 1e-3, None),
+        ("slide", "N", 0.2, 1.0),
+        ("slide", "N", -0.2, 1.0),
+        ("motor", "N.m", -I_P, None),
+        ("motor", "N.m", I_P, -I_P),
+    ],
+)
+def test_the_recorded_motor_torque_tells_a_wrong_sign_and_size(
+    kind: str, unit: str, factor: float, fits: float | None, recorded: Path, file: Path, fmus: Path
+) -> None:
+    """By the work while the load acts. The factor that fits is told, to 3 %: under another load the P control lets the
+    axis move a little otherwise."""
+    recorded.write_text(recorded.read_text(encoding="utf-8").replace("F [N]", f"F [{unit}]"), encoding="utf-8")
+    found = run(
+        file, fmus, f"motions=[{{kind: setpoints, file: {recorded}, columns: {{X: x}}}}]",
+        f"loads=[{{kind: {kind}, axis: X, file: {recorded}, column: F, motor_torque: M, factor: {factor!r}}}]",
+    )  # fmt: skip
+    told = [each for each in found.warnings if "J in the record" in each]
+    if fits is None:
+        assert told == []
+        return
+    (text,) = told
+    assert ("its sign is wrong" in text) == (fits * factor < 0)
+    assert float(text.rpartition("factor: ")[2]) == pytest.approx(fits, rel=0.03)
+
+
 def test_a_load_at_the_start_lets_the_axis_sag(tmp_path: Path, fmus: Path) -> None:
     file = tmp_path / "s.yaml"
     file.write_text(
@@ -341,6 +387,8 @@ def test_a_load_at_the_start_lets_the_axis_sag(tmp_path: Path, fmus: Path) -> No
         ("kind: motor, axis: X", "time [s],G\n0,1\n1,1\n", "no column 'F'"),
         ("kind: motor, axis: X", "time [s],F [N.m]\n0,1\n1,\n", "F.csv:3"),
         ("kind: motor, axis: X", "time [s],F [N.m]\n0,1\n", "F.csv: 1 row; at least 2 are needed"),
+        ("kind: motor, axis: X, motor_torque: M", "time [s],F [N.m],M [A]\n0,1,1\n1,1,1\n",
+         "F.csv:1: column 'M': unit 'A' is that of a current; one of a torque is expected"),
         ("kind: tool, direction: X", "time [s],F [N]\n50,1\n60,1\n",
          "the load acts from 50 to 60 s of the run, which lasts from 0 to 1 s: it never acts"),
     ],

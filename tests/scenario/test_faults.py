@@ -116,6 +116,8 @@ def test_motions(refused: Refused, motion: str, message: str) -> None:
          ".table.values.0: '0 N.m' is a torque; a force is expected, for example 100 N"),
         ("motor, axis: X, table: {time: [0 s, 1 s], values: [0 N.m, 1]}",
          ".table.values.1: 1 has no unit; a torque is expected, for example 2 N.m"),
+        ("motor, axis: X, motor_torque: M, table: {time: [0 s, 1 s], values: [0 N.m, 1 N.m]}",
+         ": 'motor_torque' is a column of the file with the load; a table has none"),
         ("motor, axis: X, file: s.yaml, column: F, factor: 0", ".factor: 0 leaves nothing of the load"),
         ("motor, axis: X, file: s.yaml, column: {column: F, unit: furlong}", ".column.unit: unknown unit 'furlong'"),
         ("motor, axis: X, file: s.yaml, column: F, motion: 1",

@@ -116,10 +116,10 @@ def run(
             recordings.append(at_full_rate)
         drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
         # What is recorded of a cycle is the load that acts in it.
-        before = [*drives.operations, *loading.operations]
+        before = [*drives.operations, *loading.before]
         before += (operation for each in recordings for operation in each.operations)
         before += feeders(system, torque_feedforward or {}, total + 1)
-        loop = Loop(cycle, before, (), library, (drives, loading, *recordings))
+        loop = Loop(cycle, before, loading.after, library, (drives, loading, *recordings))
         system.initialise(program, stop=total * cycles.T_c)
         begun = time.perf_counter()
         try:
@@ -130,7 +130,7 @@ def run(
         for each in recordings:
             each.record(total)
             each.collect(total + 1)
-        loading.finish(total)
+        loading.count(total)
         wall_time = time.perf_counter() - begun - recording.sinking
         loops = judge(scenario.machine, modes)
         pose = pose_use(scenario.machine, program, system)

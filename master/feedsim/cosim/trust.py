@@ -35,6 +35,9 @@ FELT = 1e-2
 # A load that drives: the share of its work that it does on the machine and not the machine on it, net, and the least
 # share of the friction work that makes it matter.
 DRIVING, MATTERS = 0.5, 0.05
+# A load that the recorded motor torque contradicts: the least change of its factor, and the least share of the motor's
+# work by which run and record differ while it acts.
+AMISS, APART = 0.5, 0.1
 
 
 def energies(system: System, cycle: Cycle) -> dict[str, float]:
@@ -59,7 +62,8 @@ def found(
 ) -> tuple[str, ...]:
     """What the run itself tells a user to doubt, a sentence each."""
     lost = _energy(scenario, cycle.system, cycle, loops)
-    return (*lost, *_limits(recording), *_driving_loads(scenario, cycle, loads))
+    told = (*_driving_loads(scenario, cycle, loads), *_contradicted_loads(scenario, loads))
+    return (*lost, *_limits(recording), *told)
 
 
 def _control(machine: Machine, program: Program, loops: Sequence[Loop]) -> list[str]:
@@ -208,6 +212,27 @@ def _driving_loads(scenario: Scenario, cycle: Cycle, loads: Sequence[Work]) -> l
         for work in loads
         if work.net > DRIVING * (work.given + work.taken) and work.net > MATTERS * friction
     ]
+
+
+def _contradicted_loads(scenario: Scenario, loads: Sequence[Work]) -> list[str]:
+    """By the energy: loads with which the motor of the run does other work than that of the record."""
+    told = []
+    for work in loads:
+        drives = work.drives
+        if drives is None or (factor := drives.factor) is None or abs(factor - 1) < AMISS:
+            continue
+        if abs(drives.run - drives.record) < APART * drives.turned:
+            continue
+        load = scenario.loads[work.load]
+        column = load.motor_torque.column if load.motor_torque is not None else ""
+        wrong = "its sign is wrong" if factor < 0 else "its size is wrong: unit, kind or factor"
+        told.append(
+            f"{scenario.at('loads', work.load)}: while the load {work.words} acts, the motor of {load.axis_name} does "
+            f"{drives.run:.3g} J of work in the run and {drives.record:.3g} J in the record (column "
+            f"{column!r}); the load does {drives.load:.3g} J on the machine. If the recorded torque's own sign is "
+            f"right, {wrong}; both agree with factor: {factor * load.factor:.3g}"
+        )
+    return told
 
 
 def _energy(scenario: Scenario, system: System, cycle: Cycle, loops: Sequence[Loop]) -> list[str]:

@@ -60,6 +60,11 @@ class LoadCourse(Model):
     file: File | None = Field(default=None, description="CSV file with the load over time, relative to this file")
     column: Column | None = Field(default=None, description="Column of the load in the file")
     time: Column = Field(default=Column(column="time"), description="Column of the time in the file")
+    motor_torque: Column | None = Field(
+        default=None,
+        description="Column of the motor torque that was recorded with it: the drive's work in the run is held against "
+        "that, and tells a load of wrong sign or size",
+    )
     table: Table | None = None
     held: StrictBool = Field(
         default=False, description="Each value holds until the next instant; false: linear in between"
@@ -87,6 +92,8 @@ class LoadCourse(Model):
             raise fault(f"a load is in a 'file' with its 'column', or in a 'table' of 'time' and 'values'; {found}")
         if (self.file is None) != (self.column is None):
             raise fault("a 'file' needs the 'column' of the load, and only a file has one")
+        if self.motor_torque is not None and self.file is None:
+            raise fault("'motor_torque' is a column of the file with the load; a table has none")
         return self
 
     @property

@@ -203,6 +203,8 @@ def _load_faults(scenario: Scenario) -> Iterator[tuple[Place, str]]:
     for i, load in enumerate(scenario.loads):
         if load.kind != "tool" and load.axis not in scenario.machine.axes:
             yield ("loads", i, "axis"), no_axis(load.axis, scenario.machine.axes)
+        if load.motor_torque is not None and load.axis_name not in scenario.machine.axes:
+            yield ("loads", i, "motor_torque"), no_axis(load.axis_name, scenario.machine.axes)
         if load.motion is not None and (message := _motion_fault(scenario, load.motion)):
             yield ("loads", i, "motion"), message
 

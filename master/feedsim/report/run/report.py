@@ -274,6 +274,12 @@ def summary(
                 "largest": quantity(work.peak, work.unit),
                 "work_on_machine": quantity(work.given, "J"),
                 "work_taken": quantity(work.taken, "J"),
+                "motor_while_it_acts": None
+                if work.drives is None
+                else {
+                    "work_in_run": quantity(work.drives.run, "J"),
+                    "work_in_record": quantity(work.drives.record, "J"),
+                },
             }
             for work in run.loads
         ],

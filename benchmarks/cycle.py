@@ -59,7 +59,7 @@ def unit_cost(program: Path, name: str) -> tuple[float, float]:
 def main(given: Sequence[str] | None = None) -> int:
     bench = arguments("cycle", __doc__, given, rounds=ROUNDS, only=(*CASES, *LOOPS))
     program = build(ROOT / "build" / "bench")
-    circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml")
+    circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml", ["motions.0.direction=counterclockwise"])
     planned = nc.plan(circle)
     simulated = float(planned.time[-1])
     cycles = simulated / circle.machine.cycles.T_c

@@ -86,7 +86,7 @@ def floor(library: ctypes.CDLL, circle: scenario.Scenario, program: nc.Program) 
 def main(given: Sequence[str] | None = None) -> int:
     bench = arguments("floor", __doc__, given, rounds=ROUNDS, only=("native loop", "Python loop"))
     library = build(ROOT / "build" / "bench" / "floor")
-    circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml")
+    circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml", ["motions.0.direction=counterclockwise"])
     program = nc.plan(circle)
     simulated = float(program.time[-1])
     cycles = simulated / circle.machine.cycles.T_c

@@ -25,6 +25,7 @@ from peers_contestants import AXES, STEP, Outcome
 from feedsim import nc, scenario, ssp
 
 CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
+ONE_WAY = "motions.0.direction=counterclockwise"  # which the reference is of
 REFERENCE = ROOT / "tests" / "reference" / "system" / "xz_circle_ref.csv"
 ROUNDS = 5
 TIMEOUT = 300.0  # s, a process; the slowest takes 12 s on an idle machine
@@ -247,7 +248,7 @@ def _options(parser: argparse.ArgumentParser) -> None:
 def main(given: Sequence[str] | None = None) -> int:
     options = arguments("peers", __doc__, given, rounds=ROUNDS, only=[entry.key for entry in ENTRIES], more=_options)
     overrides = options.given.overrides
-    loaded = scenario.load(CIRCLE, overrides)
+    loaded = scenario.load(CIRCLE, [ONE_WAY, *overrides])
     cycles = round(float(nc.plan(loaded).time[-1]) / STEP)
     wanted = [entry for entry in ENTRIES if entry.key in (*options.only, NATIVE, "native-parallel")]
     if overrides:  # the reference is of the circle as it is
@@ -255,7 +256,7 @@ def main(given: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory(prefix="feedsim-bench-") as name:
         file = Path(name) / "circle.ssp"
         ssp.export(loaded, file)
-        bench = Bench(file, tuple(overrides), cycles, Path(name))
+        bench = Bench(file, (ONE_WAY, *overrides), cycles, Path(name))
         differs = check(bench, wanted, {} if overrides else {"reference": _pinned()})
         running = [entry for entry in wanted if entry.key not in bench.left_out]
         contestants = [

@@ -50,7 +50,7 @@ class Case:
             yield Task(run, (Change("machine.axes.Z.friction.F_C", torque, torque),))
 
 
-CIRCLE = Case("circle", "xz_circle.yaml", (), 40)
+CIRCLE = Case("circle", "xz_circle.yaml", ("motions.0.direction=counterclockwise",), 40)
 SHORT = Case("short move", "z_positioning.yaml", ("motions.0.by.Z=1 mm", "motions.1.duration=0.05 s"), 400)
 CASES = {"circle": CIRCLE, "short": SHORT}
 MEMORY = "memory"

@@ -63,7 +63,7 @@ def test_shares_add_up_to_the_deviation() -> None:
 def test_one_direction_tells_squareness_and_servo_mismatch_as_one() -> None:
     rng = np.random.default_rng(1)
     for causes, words in (
-        (Causes(delay=(1e-3, 0.0)), "X answers 1 ms later than Z"),
+        (Causes(delay=(1e-3, 0.0)), "X answers 1.00 ms later than Z"),
         (Causes(squareness=500e-6), "(500 um/m)"),
     ):
         found = diagnose(BALLBAR, [driven(BALLBAR, causes, 1, rng, SAMPLES)])
@@ -75,7 +75,7 @@ def test_one_direction_tells_squareness_and_servo_mismatch_as_one() -> None:
             found["servo"]
     back = diagnose(BALLBAR, [driven(BALLBAR, Causes(delay=(1e-3, 0.0)), -1, rng, SAMPLES)])
     assert back["squareness_or_servo"].value == pytest.approx(-25e-6, rel=1e-3)
-    assert "X answers 1 ms later than Z" in sentence(back, back["squareness_or_servo"])
+    assert "X answers 1.00 ms later than Z" in sentence(back, back["squareness_or_servo"])
 
 
 def test_a_peak_has_its_height_width_and_decay() -> None:

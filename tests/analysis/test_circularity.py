@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from feedsim.analysis import CircleTask, Figure, Turn, circularity, contour, tasks
+from feedsim.analysis.circle_figures import bidirectional
 from feedsim.errors import InputError
 from feedsim.motions import Circle, Dwell, Move
 from feedsim.nc import plan
@@ -129,6 +130,28 @@ def test_radius_change_is_the_mean_and_no_circularity() -> None:
     assert found["mean"] == pytest.approx(-1.5, abs=1e-7)
     assert found["median"] == pytest.approx(-1.5, abs=1e-7)
     assert found["G"] == pytest.approx(0, abs=1e-7)
+
+
+def test_both_directions_together() -> None:
+    """Counterclockwise 3 um too large and 2 um high; clockwise 1 um too small. Both 5 um off in X, as one set-up is."""
+    t = instants()
+    there, back = circle(np.full(len(t), 3e-6), OMEGA * t, t), circle(np.full(len(t), -1e-6), -OMEGA * t, t)
+    bulge = circle(3e-6 + bump(OMEGA * t, 0.5, 2e-6), OMEGA * t, t)
+    for first, hysteresis, deviation in ((there, 4.0, 4.0), (bulge, 6.0, 6.0)):
+        time = np.concatenate([t, t[-1] + 1 + t])
+        columns = {
+            name: np.concatenate([first[name], back[name]]) + 5e-6 * (name[0] == "X") for name in ("X.x_a", "Z.x_a")
+        }
+        later = t[-1] + 1
+        found = values(
+            bidirectional(
+                Trace(time, columns), turn(1), Turn(("X", "Z"), CENTRE, RADIUS, -1, later + LAP, later + 2 * LAP)
+            )
+        )
+        # the bump of 2 um over 12 deg moves the fitted centre by up to 2 um / 60
+        assert found["H"] == pytest.approx(hysteresis, abs=0.04)
+        assert found["G_b"] == pytest.approx(deviation, abs=0.04)
+        assert found["D"] == pytest.approx(1.0, abs=0.04)
 
 
 def test_only_the_turn_counts() -> None:

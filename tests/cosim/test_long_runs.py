@@ -16,8 +16,8 @@ from feedsim.cosim import loop, recording
 from feedsim.cosim.unit import Log
 from feedsim.errors import InputError, OutputError, SimulationError
 from feedsim.motions import circular
+from feedsim.motions.points import Held, Joined
 from feedsim.nc import program, spline
-from feedsim.nc.spline import Held, Joined
 from feedsim.report import run as report
 from feedsim.trace import Table, Trace, least_and_largest, read_csv, release, stretches, table, write_csv
 

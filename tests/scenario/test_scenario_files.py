@@ -88,7 +88,7 @@ def test_shipped_scenarios() -> None:
     assert positioning.file == SCENARIOS / "z_positioning.yaml"
 
     circle = load(SCENARIOS / "xz_circle.yaml")
-    assert circle.motions[0] == Circle(plane=("X", "Z"), radius=0.015, feed=0.05, direction="counterclockwise", turns=3)
+    assert circle.motions[0] == Circle(plane=("X", "Z"), radius=0.015, feed=0.05, direction="both", turns=3)
     assert circle.evaluate == (CircleTest(turn=2),)
 
     measured = load(SCENARIOS / "z_measured.yaml").motions[0]

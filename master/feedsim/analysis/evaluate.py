@@ -201,10 +201,13 @@ def _turn(item: CircleTest, scenario: Scenario, program: Program) -> CircleTask:
     turns = len(circle.turns)
     if (item.turn or 0) > turns:
         raise InputError(f"circularity: turn {item.turn} of a circle of {turns} turn{'s'[: turns != 1]}")
-    begin, end = _even_turn(circle, item.turn, program)
-    turn = Turn(circle.axes, circle.centre, circle.radius, circle.sense, begin, end)
+    turn, *back = (
+        Turn(each.axes, each.centre, each.radius, each.sense, *_even_turn(each, item.turn, program))
+        for each in (circle, circle.back)
+        if each is not None
+    )
     pitch = {axis: 2 * math.pi * scenario.machine.axes[axis].I_P for axis in circle.axes}
-    return CircleTask(axis_letters(circle.axes), turn, pitch=pitch)
+    return CircleTask(axis_letters(circle.axes), turn, back[0] if back else None, pitch)
 
 
 def _even_turn(circle: Circular, number: int | None, program: Program) -> tuple[float, float]:

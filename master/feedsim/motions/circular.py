@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from math import pi
 from typing import Annotated, ClassVar, Literal, Self
@@ -14,8 +14,9 @@ from pydantic import Field, StrictInt, field_validator, model_validator
 
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, Quantity, fault
-from feedsim.motions.kind import Array, Geometry, Peaks
+from feedsim.motions.kind import Array, Course, Geometry, Peaks, Start, whole_cycles
 from feedsim.motions.path import Path, PathMotion, Position, steady
+from feedsim.motions.points import Held, Joined
 from feedsim.motions.profile import Profile
 
 Direction = Literal["counterclockwise", "clockwise"]
@@ -26,15 +27,14 @@ END_POINT_TOLERANCE = 1e-6
 POINTS_PER_PHASE = 33
 # Instants that are looked at together: a long circle has millions.
 INSTANTS = 1 << 15
+# Rest [s] between a circle and the same one in the other direction: what the stop leaves dies away in it.
+BETWEEN = 0.3
 
 
 class PlaneMotion(PathMotion):
     """A motion in the plane of two axes. Counterclockwise turns from the first axis towards the second."""
 
     plane: tuple[AxisName, AxisName] = Field(description="First and second axis of the plane, for example [X, Z]")
-    direction: Direction = Field(
-        default="counterclockwise", description="Counterclockwise turns the first axis towards the second"
-    )
 
     @field_validator("plane")
     @classmethod
@@ -47,21 +47,19 @@ class PlaneMotion(PathMotion):
     def axes(self) -> tuple[str, ...]:
         return self.plane
 
-    @property
-    def sense(self) -> int:
-        """+1 counterclockwise, -1 clockwise."""
-        return 1 if self.direction == "counterclockwise" else -1
 
-    @property
-    def in_plane(self) -> str:
-        """Plane and direction as reports tell them."""
-        return f"in {self.plane[0]}-{self.plane[1]}, {self.direction}"
+def _sense(direction: Direction) -> int:
+    """+1 counterclockwise, -1 clockwise."""
+    return 1 if direction == "counterclockwise" else -1
 
 
 class Arc(PlaneMotion):
     """A circular arc from where the axes are, about a centre, to an end point or through an angle."""
 
     kind: Literal["arc"] = "arc"
+    direction: Direction = Field(
+        default="counterclockwise", description="Counterclockwise turns the first axis towards the second"
+    )
     centre: dict[AxisName, Position] = Field(default={}, description="Centre, as positions of both axes of the plane")
     centre_by: dict[AxisName, Position] = Field(default={}, description="Centre, relative to the start of the arc")
     to: dict[AxisName, Position] = Field(default={}, description="End point, as positions of both axes of the plane")
@@ -92,7 +90,7 @@ class Arc(PlaneMotion):
 
     @property
     def description(self) -> str:
-        return f"arc {self.in_plane}, {self.at_feed}"
+        return f"arc in {self.plane[0]}-{self.plane[1]}, {self.direction}, {self.at_feed}"
 
     def path(self, position: Mapping[str, float]) -> CircularPath:
         """Path of the arc. An end point equal to the start means a full turn.
@@ -100,6 +98,7 @@ class Arc(PlaneMotion):
         Raises InputError: centre on the start, or end point off the circle about the centre through the start.
         """
         first, second = self.plane
+        sense = _sense(self.direction)
         offset = self.centre_by or {axis: self.centre[axis] - position[axis] for axis in self.plane}
         centre = (position[first] + offset[first], position[second] + offset[second])
         radius = math.hypot(offset[first], offset[second])
@@ -110,7 +109,7 @@ class Arc(PlaneMotion):
             )
         start_angle = math.atan2(-offset[second], -offset[first])
         if self.angle is not None:
-            return CircularPath(self.plane, centre, radius, start_angle, self.angle, self.sense)
+            return CircularPath(self.plane, centre, radius, start_angle, self.angle, sense)
         end = self.to or {axis: position[axis] + self.by[axis] for axis in self.plane}
         u, w = end[first] - centre[0], end[second] - centre[1]
         if abs(math.hypot(u, w) - radius) > END_POINT_TOLERANCE:
@@ -119,11 +118,11 @@ class Arc(PlaneMotion):
                 f"its start {radius * 1e3:.7g} mm; "
                 f"allowed difference: {END_POINT_TOLERANCE * 1e6:g} um"
             )
-        sweep = (self.sense * (math.atan2(w, u) - start_angle)) % (2 * math.pi)
+        sweep = (sense * (math.atan2(w, u) - start_angle)) % (2 * math.pi)
         # Where the end is the start to within the tolerance, a full turn is meant, not none.
         if min(sweep, 2 * math.pi - sweep) * radius <= END_POINT_TOLERANCE:
             sweep = 2 * math.pi
-        return CircularPath(self.plane, centre, radius, start_angle, sweep, self.sense)
+        return CircularPath(self.plane, centre, radius, start_angle, sweep, sense)
 
 
 class Circle(PlaneMotion):
@@ -131,6 +130,10 @@ class Circle(PlaneMotion):
 
     returns: ClassVar[bool] = True
     kind: Literal["circle"] = "circle"
+    direction: Direction | Literal["both"] = Field(
+        default="counterclockwise",
+        description="Counterclockwise turns the first axis towards the second; both: so first, then clockwise",
+    )
     radius: Annotated[float, Quantity("m", above=0, example="15 mm")] = Field(description="Radius")
     turns: Annotated[StrictInt, Field(ge=1, le=100_000)] = Field(default=1, description="Number of full turns")
     start_angle: Annotated[float, Quantity("rad", minimum=-2 * pi, maximum=2 * pi, example="0 deg")] = Field(
@@ -140,7 +143,10 @@ class Circle(PlaneMotion):
     @property
     def description(self) -> str:
         turns = f"{self.turns} turn{'s'[: self.turns != 1]}"
-        return f"circle {self.in_plane}, R {self.radius * 1e3:.6g} mm, {turns}, {self.at_feed}"
+        way = "counterclockwise, then clockwise" if self.direction == "both" else self.direction
+        each = " each" if self.direction == "both" else ""
+        plane = f"{self.plane[0]}-{self.plane[1]}"
+        return f"circle in {plane}, {way}, R {self.radius * 1e3:.6g} mm, {turns}{each}, {self.at_feed}"
 
     def path(self, position: Mapping[str, float]) -> CircularPath:
         """Path of the circle; its start lies at its start angle."""
@@ -149,10 +155,36 @@ class Circle(PlaneMotion):
             position[first] - self.radius * math.cos(self.start_angle),
             position[second] - self.radius * math.sin(self.start_angle),
         )
-        return CircularPath(self.plane, centre, self.radius, self.start_angle, 2 * math.pi * self.turns, self.sense)
+        sense = 1 if self.direction == "both" else _sense(self.direction)
+        return CircularPath(self.plane, centre, self.radius, self.start_angle, 2 * math.pi * self.turns, sense)
 
     def target(self, path: Path) -> dict[str, float]:
         return {}
+
+    def plan(self, start: Start) -> Course:
+        there = super().plan(start)
+        if self.direction != "both":
+            return there
+        pause = whole_cycles(BETWEEN, start.T_ipo)
+        begin = there.cycles + pause
+        clockwise = self.model_copy(update={"direction": "clockwise"})
+        again = clockwise.plan(
+            replace(start, time=start.time + begin * start.T_ipo, most=max(start.most - begin, 0))
+        )  # fmt: skip
+        geometry = there.geometry
+        assert isinstance(geometry, Circular)
+        assert isinstance(again.geometry, Circular)
+        return replace(
+            there,
+            duration=begin * start.T_ipo + again.duration,
+            cycles=begin + again.cycles,
+            points={
+                axis: Joined([points, Held(start.position[axis], pause), again.points[axis]])
+                for axis, points in there.points.items()
+            },
+            peaks={axis: there.peaks[axis].with_(again.peaks[axis]) for axis in again.peaks},
+            geometry=replace(geometry, back=again.geometry),
+        )
 
 
 @dataclass(frozen=True)
@@ -201,11 +233,7 @@ class CircularPath:
         found = dict.fromkeys(self.axes, Peaks(math.inf, -math.inf, 0.0, 0.0))
         for t in chain([special], stretches):
             for axis, now in self._peaks_at(profile, t).items():
-                most = found[axis]
-                found[axis] = Peaks(
-                    min(most.low, now.low), max(most.high, now.high),
-                    max(most.speed, now.speed), max(most.acceleration, now.acceleration),
-                )  # fmt: skip
+                found[axis] = found[axis].with_(now)
         return found
 
     def _peaks_at(self, profile: Profile, t: Array) -> dict[str, Peaks]:
@@ -270,8 +298,11 @@ class Circular(Geometry):
     """Begin and end of the constant-speed phase [s], program time; None where there is none."""
     turn_time: float | None
     """Duration of a full turn at the highest speed of the path [s]; None where the path is known by its setpoints."""
+    back: Circular | None = None
+    """The same circle in the other sense, driven behind this one; None where there is none."""
 
     @property
     def text(self) -> str:
         turns = f" ({len(self.turns)} full turn{'s'[: len(self.turns) != 1]})" if self.turns else ""
-        return f"R {self.radius * 1e3:.6g} mm, {math.degrees(self.sweep):.6g}°{turns}"
+        both = ", and back" if self.back is not None else ""
+        return f"R {self.radius * 1e3:.6g} mm, {math.degrees(self.sweep):.6g}°{turns}{both}"

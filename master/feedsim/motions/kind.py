@@ -107,6 +107,13 @@ class Peaks:
     speed: float
     acceleration: float
 
+    def with_(self, other: Peaks) -> Peaks:
+        """Peaks of two stretches together."""
+        return Peaks(
+            min(self.low, other.low), max(self.high, other.high),
+            max(self.speed, other.speed), max(self.acceleration, other.acceleration),
+        )  # fmt: skip
+
 
 class Geometry(ABC):
     """What figures and reports know of the way of a motion."""

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.motions import Motion
 from feedsim.motions.kind import Array, Course, Peaks, Points, Start
+from feedsim.motions.points import Held, Joined
 from feedsim.nc.segment import Program, Segment
-from feedsim.nc.spline import BLOCK, Held, Joined, LongSpline
+from feedsim.nc.spline import BLOCK, LongSpline
 from feedsim.scenario import Axis, Machine, Scenario
 from feedsim.trace import Table
 

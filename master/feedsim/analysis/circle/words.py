@@ -134,6 +134,5 @@ def _um(value: float) -> str:
 
 def _digits(value: float) -> str:
     """Three digits that matter, and none after the third place behind the point."""
-    if abs(value) >= 100:
-        return f"{value:.0f}"
-    return f"{round(value, 3):.3g}"
+    places = max(0, 2 - math.floor(math.log10(abs(value)))) if abs(value) >= 1e-3 else 3
+    return f"{value:.{min(places, 3)}f}"

@@ -1,0 +1,93 @@
+"""Causes of circles that are not round, put into the simulated machine and found in its circles again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from feedsim import analysis, cosim, scenario
+from feedsim.analysis import Diagnosis, Figure
+
+CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
+SPEED = 0.05  # m/s
+NO_FEEDFORWARD = ("machine.axes.X.drive.k_ffw=0", "machine.axes.Z.drive.k_ffw=0")
+
+Driven = Callable[..., tuple[Mapping[str, Figure], Diagnosis]]
+
+
+def gains(x: float, z: float) -> tuple[str, ...]:
+    """K_v of X and Z in (m/min)/mm, without speed feedforward."""
+    return (
+        *NO_FEEDFORWARD,
+        f"machine.axes.X.drive.K_v={x:g} (m/min)/mm",
+        f"machine.axes.Z.drive.K_v={z:g} (m/min)/mm",
+    )
+
+
+@pytest.fixture(scope="module")
+def driven(fmus: Path) -> Driven:
+    @cache
+    def run(*overrides: str) -> tuple[Mapping[str, Figure], Diagnosis]:
+        result = cosim.run(scenario.load(CIRCLE, list(overrides)), fmus=fmus)
+        return analysis.evaluate(result), analysis.diagnoses(result)["XZ"]
+
+    return run
+
+
+def test_unlike_gains_are_a_servo_mismatch(driven: Driven) -> None:
+    """Without feedforward an axis is 1/K_v late, whatever its inner loops: 15 ms at 4 (m/min)/mm, 12 ms at 5."""
+    figures, found = driven(*gains(4, 5))
+    late = 60e-3 / 4 - 60e-3 / 5
+    assert figures["XZ.servo_mismatch"].value == pytest.approx(late * 1e3, rel=0.01)
+    assert found["servo"].size / 2 == pytest.approx(SPEED * late / 2, rel=0.01)
+    assert found["servo"].share > 0.99
+    assert figures["XZ.squareness"].value == pytest.approx(0, abs=1)
+    assert "X answers 3.00 ms later than Z: K_v" in analysis.answer(found)
+
+
+def test_peaks_of_unlike_gains_are_those_of_like_ones(driven: Driven) -> None:
+    """On an ellipse of 75 um: each axis' peak as in a machine of which both axes have its gain."""
+    unlike = driven(*gains(4, 5))[0]
+    for axis, gain in (("X", 4), ("Z", 5)):
+        like = driven(*gains(gain, gain))[0]
+        assert unlike[f"XZ.peak_{axis}"].value == pytest.approx(like[f"XZ.peak_{axis}"].value, abs=0.3)
+        assert unlike[f"XZ.glitch_{axis}"].value > 60  # what the old definition makes of it
+
+
+def test_glitches_that_are_none_are_told(driven: Driven) -> None:
+    for overrides, axes in ((gains(4, 5), ["X", "Z"]), ((), [])):
+        figures, found = driven(*overrides)
+        told = analysis.doubts(figures, {"XZ": found})
+        assert [text.split("glitch_")[1][0] for text in told] == axes
+
+
+def test_one_direction_does_not_name_which(driven: Driven) -> None:
+    figures, found = driven(*gains(4, 5), "motions.0.direction=counterclockwise")
+    assert figures["XZ.squareness_or_servo"].value == pytest.approx(75, rel=0.01)
+    assert not {"XZ.servo_mismatch", "XZ.squareness"} & set(figures)
+    assert "one direction cannot tell" in analysis.answer(found)
+
+
+def test_the_first_direction_is_the_circle_of_one_direction(driven: Driven) -> None:
+    """Bit for bit: what follows does not reach back."""
+    both, one = driven()[0], driven("motions.0.direction=counterclockwise")[0]
+    names = [name for name in one if name in both and name.split(".")[1] in ("G", "F_max", "glitch_X+", "tool", "mean")]
+    assert len(names) > 10
+    assert {name: both[name].value for name in names} == {name: one[name].value for name in names}
+
+
+def test_second_direction_is_that_circle_alone(driven: Driven) -> None:
+    """Friction has other rests behind it at its start; a turn later nothing of that is left."""
+    both, alone = driven()[0], driven("motions.0.direction=clockwise")[0]
+    for name in ("G", "F_max", "mean", "glitch_X", "glitch_Z"):
+        assert both[f"XZ.clockwise.{name}"].value == pytest.approx(alone[f"XZ.{name}"].value, abs=0.01)
+
+
+def test_hysteresis_of_a_servo_mismatch_is_twice_its_ellipse(driven: Driven) -> None:
+    """Two ellipses along +45 and -45 deg: H is 2 * 75 um, at 45 deg; G(b) too."""
+    figures, _ = driven(*gains(4, 5))
+    assert figures["XZ.H"].value == pytest.approx(150, rel=0.01)
+    assert figures["XZ.G_b"].value == pytest.approx(150, rel=0.01)

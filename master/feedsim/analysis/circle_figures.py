@@ -93,17 +93,16 @@ def misleading(diagnosis: Diagnosis, glitches: Mapping[str, Figure]) -> list[str
 def bidirectional(trace: Trace, turn: Turn, back: Turn) -> dict[str, Figure]:
     """ISO 230-4's figures of two turns in opposite senses, about the centre of the circle fitted to both."""
     measured = [contour(trace, each) for each in (turn, back)]
-    centre = fitted_centre(
-        np.concatenate([m.angle for m in measured]), np.concatenate([m.deviation for m in measured]), turn.radius
-    )
-    around = []
-    for m in measured:
-        x = (turn.radius + m.deviation) * np.cos(m.angle) - centre[0]
-        y = (turn.radius + m.deviation) * np.sin(m.angle) - centre[1]
-        around.append((np.arctan2(y, x), np.hypot(x, y) - turn.radius))
+    return both_directions([(m.angle, m.deviation) for m in measured], turn.radius, turn.axes)
+
+
+def both_directions(turns: Sequence[tuple[Array, Array]], radius: float, axes: tuple[str, str]) -> dict[str, Figure]:
+    """The same of two turns by their angles [rad] and deviations of the radius [m]."""
+    centre = fitted_centre(np.concatenate([a for a, _ in turns]), np.concatenate([e for _, e in turns]), radius)
+    around = [about(angle, deviation, radius, centre) for angle, deviation in turns]
     even: Array = np.arange(ANGLES, dtype=np.float64) * (2 * math.pi / ANGLES) - math.pi
     there, again = (_at(even, angle, deviation) for angle, deviation in around)
-    letters = axis_letters(turn.axes)
+    letters = axis_letters(axes)
     both = np.concatenate([deviation for _, deviation in around])
 
     def um(value: float, meaning: str) -> Figure:
@@ -122,6 +121,12 @@ def bidirectional(trace: Trace, turn: Turn, back: Turn) -> dict[str, Figure]:
             f"ISO 230-4 circular hysteresis H_{letters}: largest distance of the two turns at an angle",
         ),
     }
+
+
+def about(angle: Array, deviation: Array, radius: float, centre: Array) -> tuple[Array, Array]:
+    """Angle [rad] and deviation of the radius [m] about another centre (2,) [m]."""
+    x, y = (radius + deviation) * np.cos(angle) - centre[0], (radius + deviation) * np.sin(angle) - centre[1]
+    return np.arctan2(y, x), np.hypot(x, y) - radius
 
 
 def _at(wanted: Array, angle: Array, deviation: Array) -> Array:

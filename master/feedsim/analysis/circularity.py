@@ -199,7 +199,7 @@ def recorded_circle(
     rounding = 1e-6 * (program.time[1] - program.time[0])
     rows = (program.time >= recording.begin - rounding) & (program.time <= recording.end + rounding)
     time, x, y = (program.time[rows], *(program.x_s[axis][rows] for axis in plane))
-    c, r = _fit(x, y)
+    c, r = fitted_circle(x, y)
     if centre is not None:
         c = (centre[plane[0]], centre[plane[1]])
         r = float(np.hypot(x - c[0], y - c[1]).mean())
@@ -244,7 +244,7 @@ def speed_change(program: Program, circle: Circular, begin: float, end: float) -
     return float(np.abs(parts / parts.mean() - 1).max())
 
 
-def _fit(x: Array, y: Array) -> tuple[tuple[float, float], float]:
+def fitted_circle(x: Array, y: Array) -> tuple[tuple[float, float], float]:
     """Centre and radius [m] of the circle with the least sum of squared distances: algebraic fit, then Gauss-Newton."""
     origin = (float(x.mean()), float(y.mean()))
     u, w = x - origin[0], y - origin[1]

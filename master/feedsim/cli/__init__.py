@@ -19,7 +19,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from feedsim.cli import compare, compensate, example, files, frf, identify, machine, run, sweep
+from feedsim.cli import circle, compare, compensate, example, files, frf, identify, machine, run, sweep
 from feedsim.cli.terminal import prepare_streams
 from feedsim.owned import remove_orphans
 
@@ -39,6 +39,7 @@ examples:
   feedsim frf scenarios/machines/test_centre --axes X,Z
   feedsim identify results/identify_z_constant/log.csv --axis Z --machine scenarios/machines/test_centre
   feedsim compensate scenarios/xz_circle.yaml
+  feedsim circle ballbar.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
   feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
   feedsim run xz_circle.ssp
   feedsim sweep scenarios/studies/friction_wear.yaml
@@ -47,8 +48,8 @@ examples:
 
 
 COMMANDS = (
-    example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, compensate.COMMAND, run.SSP,
-    sweep.COMMAND, compare.COMMAND, files.SCHEMA, files.CONVERT,
+    example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, compensate.COMMAND,
+    circle.COMMAND, run.SSP, sweep.COMMAND, compare.COMMAND, files.SCHEMA, files.CONVERT,
 )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """Why a circle is not round: the radial deviation of one direction or of both taken apart into causes.
 
-May use analysis.figures. Knows nothing of scenarios: simulated circles and recorded ones are the same to it.
+May use analysis.figures, analysis.circularity, trace and units. Simulated circles and recorded ones are the same to it.
 Start with model.py, the terms and their fit; diagnosis.py says what share of G each of them has.
 """
 

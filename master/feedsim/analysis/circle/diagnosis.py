@@ -16,7 +16,8 @@ from feedsim.analysis.figures import Array
 # A peak is seen where its mean over this angle [deg] exceeds this multiple of what noise makes of such means and of the
 # fitted rest below them.
 SEEN, OVER = 5.0, 1.0
-# Noise may change a height by this share: over so many samples it is averaged, and no more.
+# Noise may change a height by this share: over so many samples it is averaged, and no more; nor over more than a
+# quarter of the peak's width, which would take from its height.
 BLUR = 0.015
 FLOOR = 1e-9  # a deviation of less [m] is not worth a word
 # Lines of the spectrum that belong to one vibration, and how far their mean stands out of what is around them.
@@ -91,6 +92,7 @@ class Diagnosis:
         vibration: the strongest; None where none stands out.
         form: order -> amplitude of it in what remains [m].
         noise: standard deviation of what remains outside the windows behind the reversals [m].
+        centre: fitted, from the programmed one [m].
         left_out: axes for whose pitch the circle is too small.
         rest: of every turn, what the model says without peaks: angle (N,) [rad], deviation (N,) [m].
     """
@@ -104,6 +106,7 @@ class Diagnosis:
     form: dict[int, float]
     noise: float
     left_out: tuple[str, ...]
+    centre: tuple[float, float]
     rest: tuple[tuple[Array, Array], ...]
 
     def __getitem__(self, key: str) -> Term:
@@ -157,6 +160,7 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         form=_form(found),
         noise=found.noise,
         left_out=found.left_out,
+        centre=(found["offset_0"], found["offset_1"]),
         rest=tuple(
             (path.angle, path.deviation - residual) for path, residual in zip(paths, found.residual, strict=True)
         ),
@@ -235,7 +239,13 @@ def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak
         if most < level:
             peaks.append(Peak(name, axis, sense, 0.0, level, at_crossing, math.nan, math.nan))
             continue
-        enough = min(wide, max(1, math.ceil((found.noise / (BLUR * most)) ** 2)))
+        top = int(np.abs(smooth).argmax())
+        broad = np.flatnonzero(np.abs(smooth[top:]) < most / 2)  # half of it, in samples
+        enough = min(
+            wide,
+            max(1, math.ceil((found.noise / (BLUR * most)) ** 2)),
+            max(1, int(broad[0]) // 2 if len(broad) else wide),
+        )
         curve = _averaged(off, enough)
         at = int(np.abs(curve).argmax())
         height = float(curve[at])

@@ -34,7 +34,9 @@ def worth_telling(diagnosis: Diagnosis) -> list[Term]:
     """Causes that somebody can act on, the largest first."""
     able = [term for term in diagnosis.terms if term.told and term.key not in ("rest", "radius")]
     found = [term for term in able if term.share >= WORTH and term.size >= WORTH * diagnosis.G]
-    besides = [term for term in able if term not in found and term.size >= BESIDES * diagnosis.G]
+    besides = [
+        term for term in able if term not in found and term.key != "offset" and term.size >= BESIDES * diagnosis.G
+    ]
     return [*sorted(found, key=lambda term: -term.share), *sorted(besides, key=lambda term: -term.size)]
 
 
@@ -134,5 +136,5 @@ def _um(value: float) -> str:
 
 def _digits(value: float) -> str:
     """Three digits that matter, and none after the third place behind the point."""
-    places = max(0, 2 - math.floor(math.log10(abs(value)))) if abs(value) >= 1e-3 else 3
-    return f"{value:.{min(places, 3)}f}"
+    exponent = int(f"{value:.2e}".partition("e")[2])
+    return f"{value:.{min(max(0, 2 - exponent), 3)}f}"

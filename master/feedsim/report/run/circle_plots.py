@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -22,6 +22,24 @@ RING = 10.0  # um; kept as long as the contour error is neither much smaller nor
 NOMINAL = 1.0  # radius of the nominal circle in the drawing
 TOOL: dict[str, Any] = {"color": style.ORANGE, "linestyle": (0, (5, 1.5))}
 RING_GAPS = {1: 0.36, 2: 0.24}  # rings to either side -> their distance in the drawing
+
+
+class Curve(Protocol):
+    """A turn to draw: angle (N,) [rad] and deviation of the radius (N,) [m]."""
+
+    @property
+    def angle(self) -> Array: ...
+    @property
+    def deviation(self) -> Array: ...
+
+
+class OnCircle(Protocol):
+    """The circle to draw it on: axes of the plane, radius [m]."""
+
+    @property
+    def axes(self) -> tuple[str, str]: ...
+    @property
+    def radius(self) -> float: ...
 
 
 def contour_picture(trace: Trace, turn: Turn, figures: Figures, stem: str) -> Picture:
@@ -85,7 +103,7 @@ def ring_step(largest: float) -> float:
     return next(step for step in (decade, 2 * decade, 5 * decade, 10 * decade) if max(largest, 0.1) <= 1.5 * step)
 
 
-def polar_ground(axes: Axes, turn: Turn, ring: float, rings: int) -> None:
+def polar_ground(axes: Axes, turn: OnCircle, ring: float, rings: int) -> None:
     """Rings every ``ring`` [um], ``rings`` to either side of the programmed circle, and the directions of the plane."""
     gap = RING_GAPS[rings]
     axes.set_aspect("equal", anchor="N")
@@ -105,7 +123,7 @@ def polar_ground(axes: Axes, turn: Turn, ring: float, rings: int) -> None:
     heading(axes, f"Contour error, {first}-{second}, R {turn.radius * 1e3:g} mm")
 
 
-def polar_curve(axes: Axes, measured: Contour, ring: float, rings: int, **look: Any) -> None:
+def polar_curve(axes: Axes, measured: Curve, ring: float, rings: int, **look: Any) -> None:
     """The contour over such a ground, closed where the turn is."""
     gap = RING_GAPS[rings]
     r = NOMINAL + measured.deviation * 1e6 * gap / ring
@@ -115,14 +133,14 @@ def polar_curve(axes: Axes, measured: Contour, ring: float, rings: int, **look: 
     axes.plot(r[closed] * np.cos(measured.angle[closed]), r[closed] * np.sin(measured.angle[closed]), **look)
 
 
-def unrolled_curve(axes: Axes, measured: Contour, **look: Any) -> None:
+def unrolled_curve(axes: Axes, measured: Curve, **look: Any) -> None:
     """The contour over the angle."""
     angle = np.rad2deg(measured.angle % (2 * math.pi))
     order = np.argsort(angle)
     axes.plot(*thinned(angle[order], measured.deviation[order] * 1e6), **look)
 
 
-def unrolled_ground(axes: Axes, turn: Turn) -> None:
+def unrolled_ground(axes: Axes, turn: OnCircle) -> None:
     """What such axes need; call when the curves are there."""
     axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
     heading(axes, "Over the angle")

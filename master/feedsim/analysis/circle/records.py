@@ -1,0 +1,257 @@
+"""Circles that were recorded: turns found in files of linear scales, of a ballbar, or of a control's log.
+
+A file has either positions of two axes, or angle and radius (or its deviation). Full turns are found in it by the angle
+itself: where it turns round, a new direction begins; of each stretch the middle turn is taken, so that run-in and
+run-out stay outside.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from feedsim import units
+from feedsim.analysis.circle.model import CircleUnderTest, TurnedPath
+from feedsim.analysis.circularity import EVEN, PARTS, fitted_circle
+from feedsim.analysis.figures import Array
+from feedsim.errors import InputError
+from feedsim.trace import Recording, read_recording
+
+ANGLES = ("angle", "phi", "theta", "winkel", "angular position")
+DEVIATIONS = ("deviation", "radial deviation", "radius deviation", "error", "e", "dr", "delta r", "abweichung")
+RADII = ("radius", "r", "length", "ballbar length", "radius length")
+TIMES = ("time", "t", "zeit")
+# The angle has turned round where it goes back by this [rad]: less is noise at rest.
+TURNED_ROUND = math.radians(10)
+# A full turn may lack this share of it; files often end one sample ahead of the full turn.
+CLOSED = 0.01
+# A turn needs so many samples for its parts to be told apart.
+LEAST = 180
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedTurn:
+    """A turn of a file: what it is called, the path, and how long it took [s], None where the file has no time."""
+
+    name: str
+    path: TurnedPath
+    duration: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedCircle:
+    """Turns of one circle. centred: its centre was not known and is fitted. notes: how the files were read."""
+
+    circle: CircleUnderTest
+    turns: tuple[RecordedTurn, ...]
+    centred: bool
+    notes: tuple[str, ...]
+
+
+def read_circle(
+    files: Sequence[Path],
+    axes: tuple[str, str],
+    *,
+    radius: float | None = None,
+    feed: float | None = None,
+    centre: tuple[float, float] | None = None,
+    pitch: dict[str, float] | None = None,
+) -> RecordedCircle:
+    """Turns of one circle in one file or several.
+
+    axes: first and second of its plane. radius [m], feed [m/s], centre [m]: as programmed; where they are not given
+    they are those of the files. Raises InputError: what a file lacks, and what it has.
+    """
+    notes: list[str] = []
+    turns: list[RecordedTurn] = []
+    radii: list[float] = []
+    for file in files:
+        recording = read_recording(file)
+        polar = _polar(recording, axes)
+        if polar is None:
+            x, y = _positions(recording, axes)
+            found, mean = _of_positions(recording, x, y, centre, radius)
+        else:
+            found, mean = _of_angles(recording, *polar, radius)
+        notes += [f"{file}: {each}" for each in recording.notes]
+        notes.append(f"{file}: {', '.join(turn.name for turn in found)}")
+        turns += found
+        radii.append(mean)
+    nominal = radius if radius is not None else radii[0]
+    speed = feed if feed is not None else _speed(turns, nominal, files)
+    if radius is None:
+        notes.append(f"the programmed radius is taken to be {nominal * 1e3:.6g} mm, that of the recorded turns")
+    circle = CircleUnderTest(axes, nominal, speed, pitch or {})
+    return RecordedCircle(circle, tuple(turns), centre is None, tuple(notes))
+
+
+def _speed(turns: Sequence[RecordedTurn], radius: float, files: Sequence[Path]) -> float:
+    known = [turn.duration for turn in turns if turn.duration is not None]
+    if not known:
+        raise InputError(
+            f"{files[0]}: has no column of time, and the feed is not known: give it, for example --feed '1000 mm/min'"
+        )
+    return 2 * math.pi * radius / float(np.mean(known))
+
+
+def _plain(name: str) -> str:
+    return " ".join(re.split(r"[\s_]+", name.strip().lower()))
+
+
+def _column(recording: Recording, names: Sequence[str], unit: str) -> str | None:
+    """The column that has one of these names and a unit of this kind; None where there is none."""
+    for name in recording.names:
+        if _plain(name) in names:
+            if not _is(recording, name, unit):
+                raise InputError(
+                    f"{recording.header}: column {name!r} is in {recording.units[name] or 'no unit'}; one such as "
+                    f"{name} [{unit}] is needed"
+                )
+            return name
+    return None
+
+
+def _is(recording: Recording, name: str, unit: str) -> bool:
+    try:
+        units.factor(recording.units[name] or "1", unit)
+    except InputError:
+        return False
+    return bool(recording.units[name])
+
+
+def _values(recording: Recording, name: str, unit: str) -> Array:
+    factor = float(units.factor(recording.units[name], unit))
+    return np.asarray(recording.read([name])[name], dtype=np.float64) * factor
+
+
+def _time(recording: Recording) -> Array | None:
+    name = _column(recording, TIMES, "s")
+    return None if name is None else _values(recording, name, "s")
+
+
+def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool] | None:
+    """Columns of angle and of deviation (or radius: True); None where the file has positions of both axes instead."""
+    if all(_position(recording, axis) for axis in axes):
+        return None
+    angle, deviation = _column(recording, ANGLES, "rad"), _column(recording, DEVIATIONS, "m")
+    length = _column(recording, RADII, "m")
+    if angle is not None and (deviation or length) is not None:
+        return (angle, deviation, False) if deviation is not None else (angle, str(length), True)
+    has = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in recording.units.items())
+    raise InputError(
+        f"{recording.header}: holds {has}; needed are positions of both axes ({axes[0]} [mm], {axes[1]} [mm]; --axes "
+        "says which two), or angle [deg] with deviation [um] or radius [mm]"
+    )
+
+
+def _position(recording: Recording, axis: str) -> str | None:
+    names = (axis.lower(), f"{axis.lower()}.x a", f"{axis.lower()} position", f"position {axis.lower()}")
+    found = [name for name in recording.names if _plain(name) in names and _is(recording, name, "m")]
+    return found[0] if found else None
+
+
+def _positions(recording: Recording, axes: tuple[str, str]) -> tuple[Array, Array]:
+    x, y = (_values(recording, str(_position(recording, axis)), "m") for axis in axes)
+    return x, y
+
+
+def _of_positions(
+    recording: Recording, x: Array, y: Array, centre: tuple[float, float] | None, radius: float | None
+) -> tuple[list[RecordedTurn], float]:
+    about, mean = fitted_circle(x, y)
+    for _ in range(2):  # the first fit may hold a way to the circle; the second one holds full turns alone
+        u, w = x - about[0], y - about[1]
+        stretches = _turns(np.unwrap(np.arctan2(w, u)), str(recording.path))
+        rows = np.concatenate([np.arange(part.start, part.stop) for part, _ in stretches])
+        about, mean = fitted_circle(x[rows], y[rows])
+    if centre is not None:
+        about = centre
+    nominal = radius if radius is not None else mean
+    u, w = x - about[0], y - about[1]
+    angle, deviation = np.arctan2(w, u), np.hypot(u, w) - nominal
+    return _named(recording, angle, deviation, _time(recording)), mean
+
+
+def _of_angles(
+    recording: Recording, angle: str, column: str, is_radius: bool, radius: float | None
+) -> tuple[list[RecordedTurn], float]:
+    phi, length = _values(recording, angle, "rad"), _values(recording, column, "m")
+    if not is_radius and radius is None:
+        raise InputError(
+            f"{recording.header}: {column!r} is a deviation; give the radius, for example --radius '100 mm'"
+        )
+    mean = float(np.median(length)) if is_radius else float(radius or 0.0)
+    nominal = radius if radius is not None else mean
+    deviation = length - nominal if is_radius else length
+    if float(np.abs(deviation).max()) > 0.2 * nominal:
+        raise InputError(
+            f"{recording.header}: {column!r} leaves the radius of {nominal * 1e3:.6g} mm by up to "
+            f"{float(np.abs(deviation).max()) * 1e3:.4g} mm; allowed: 20 % of it"
+        )
+    return _named(recording, phi, deviation, _time(recording)), mean
+
+
+def _named(recording: Recording, angle: Array, deviation: Array, time: Array | None) -> list[RecordedTurn]:
+    found = []
+    for rows, sense in _turns(np.unwrap(angle), str(recording.path)):
+        path = TurnedPath((angle[rows] + math.pi) % (2 * math.pi) - math.pi, deviation[rows], sense)
+        duration = None
+        if time is not None:
+            turned = np.abs(np.unwrap(angle[rows]) - angle[rows][0])
+            passed = np.interp(np.linspace(0, turned[-1], PARTS + 1), turned, time[rows])
+            parts = np.diff(passed)
+            if (uneven := float(np.abs(parts / parts.mean() - 1).max())) > EVEN:
+                raise InputError(
+                    f"{recording.path}: a turn from {time[rows][0]:.6g} s on is not driven at constant speed: parts of "
+                    f"it take {100 * uneven:.2g} % more or less time than the mean; allowed: {100 * EVEN:g} %"
+                )
+            duration = float(time[rows][-1] - time[rows][0]) * 2 * math.pi / float(turned[-1])
+        way = "counterclockwise" if sense > 0 else "clockwise"
+        found.append(RecordedTurn(f"a turn {way}, {rows.stop - rows.start} samples", path, duration))
+    return found
+
+
+def _turns(angle: Array, where: str) -> list[tuple[slice, int]]:
+    """The middle full turn of every stretch in one direction, and its sense. angle: unwrapped (N,) [rad]."""
+    found = []
+    most = 0.0
+    for first, last in _stretches(angle):
+        covered = abs(float(angle[last - 1] - angle[first]))
+        most = max(most, covered)
+        turns = math.floor(covered / (2 * math.pi) + CLOSED)
+        if turns < 1:
+            continue
+        sense = 1 if angle[last - 1] > angle[first] else -1
+        turned = np.maximum.accumulate(sense * (angle[first:last] - angle[first]))
+        begin = max((covered - 2 * math.pi) / 2, 0.0)
+        rows = np.flatnonzero((turned >= begin) & (turned < begin + 2 * math.pi))
+        if len(rows) < LEAST:
+            raise InputError(f"{where}: a turn has {len(rows)} samples; {LEAST} or more are needed")
+        found.append((slice(first + int(rows[0]), first + int(rows[-1]) + 1), sense))
+    if not found:
+        raise InputError(
+            f"{where}: covers {math.degrees(most):.0f} deg in one direction; a full turn, 360 deg, is needed"
+        )
+    return found
+
+
+def _stretches(angle: Array) -> list[tuple[int, int]]:
+    """Rows between which the angle goes one way; going back by less than TURNED_ROUND does not count."""
+    cuts, extreme, way = [0], 0, 0
+    for i in range(1, len(angle)):
+        off = angle[i] - angle[extreme]
+        if way == 0:
+            if abs(off) > TURNED_ROUND:
+                way, extreme = (1 if off > 0 else -1), i
+        elif way * off > 0:
+            extreme = i
+        elif way * off < -TURNED_ROUND:
+            cuts.append(extreme + 1)
+            way, extreme = -way, i
+    ends = [*cuts[1:], len(angle)]
+    return [(first, last) for first, last in zip(cuts, ends, strict=True) if last - first > 1]

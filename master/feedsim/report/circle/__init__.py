@@ -1,0 +1,9 @@
+"""What a recorded circle leaves: summary.json, report.html and figures/*.png: why it is not round.
+
+May use the report's core, what the report of a run draws of circles, and the analyses.
+Start with report.py.
+"""
+
+from feedsim.report.circle.report import check_writable, lines, write
+
+__all__ = ["check_writable", "lines", "write"]

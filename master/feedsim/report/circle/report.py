@@ -1,0 +1,177 @@
+"""The report of recorded circles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feedsim.analysis import Diagnosis, Figure, answer
+from feedsim.analysis.circle import CircleUnderTest, TurnedPath
+from feedsim.analysis.circle.records import RecordedCircle
+from feedsim.analysis.circle_figures import about, both_directions, cause_figures
+from feedsim.analysis.circularity import axis_letters
+from feedsim.report import sections
+from feedsim.report.content import Bullets, Report, Section, Tile, tile_value
+from feedsim.report.formatting import typeset
+from feedsim.report.provenance import figures_part, hashed, inputs_part, quantity, software
+from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.run import circle_plots
+from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
+from feedsim.report.style import BLUE, MUTED, VERMILLION, Array, Picture, drawing, finish
+
+FORMAT = 1
+TILES = {"G": "circular deviation G", "G_b": "bidirectional deviation G(b)", "H": "circular hysteresis H"}
+
+
+@dataclass(frozen=True, eq=False)
+class _Centred:
+    """A turn about the centre that is fitted to all."""
+
+    angle: Array
+    deviation: Array
+    sense: int
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the report can be written to ``directory`` without one of ``inputs`` being lost."""
+    check_place(directory, (REPORT, SUMMARY), inputs)
+
+
+def write(
+    recorded: RecordedCircle, diagnosis: Diagnosis, files: Sequence[Path], directory: Path | str
+) -> tuple[Path, ...]:
+    """Write summary.json, report.html and figures; returns the paths. Raises OutputError."""
+    figures = figures_of(recorded, diagnosis)
+    report = report_of(recorded, diagnosis, figures, files)
+    return write_report(directory, report, partial(summary, recorded, diagnosis, figures, files), {})
+
+
+def lines(diagnosis: Diagnosis, recorded: RecordedCircle) -> list[str]:
+    """What the command says in the end."""
+    return [f"{axis_letters(diagnosis.circle.axes)}: {answer(diagnosis)}", *(f"  {note}" for note in recorded.notes)]
+
+
+def figures_of(recorded: RecordedCircle, diagnosis: Diagnosis) -> dict[str, Figure]:
+    """Figures of the circle, named as those of a run."""
+    circle = recorded.circle
+    prefix = axis_letters(circle.axes)
+    centre = "the fitted centre" if recorded.centred else "the programmed centre"
+    found = {"G": Figure(diagnosis.G * 1e6, "um", f"range of the radial deviation of all turns, about {centre}")}
+    for sense in (1, -1):
+        if sense not in diagnosis.senses:
+            return _prefixed(prefix, found | cause_figures(diagnosis))
+    one = next(turn.path for turn in recorded.turns if turn.path.sense > 0)
+    other = next(turn.path for turn in recorded.turns if turn.path.sense < 0)
+    curves = [(one.angle, one.deviation), (other.angle, other.deviation)]
+    return _prefixed(prefix, found | both_directions(curves, circle.radius, circle.axes) | cause_figures(diagnosis))
+
+
+def _prefixed(prefix: str, figures: Mapping[str, Figure]) -> dict[str, Figure]:
+    # Nobody knows here where a position was read: by scales, or at the tool.
+    return {
+        f"{prefix}.{name}": Figure(each.value, each.unit, each.meaning.removesuffix(", by the linear scales"))
+        for name, each in figures.items()
+    }
+
+
+def report_of(
+    recorded: RecordedCircle, diagnosis: Diagnosis, figures: Mapping[str, Figure], files: Sequence[Path]
+) -> Report:
+    """Content of the report."""
+    circle = recorded.circle
+    prefix = axis_letters(circle.axes)
+    tiles = [
+        Tile(tile_value(each), TILES[name.partition(".")[2]], typeset(each.meaning))
+        for name, each in figures.items()
+        if name.partition(".")[2] in TILES
+    ]
+    rows = [
+        ("Radius", f"{circle.radius * 1e3:.6g} mm"),
+        ("Path speed", f"{circle.speed * 6e4:.5g} mm/min"),
+        ("Centre", "fitted to the turns" if recorded.centred else "as given"),
+    ]
+    return Report(
+        f"Recorded circle {prefix}",
+        f"{', '.join(file.name for file in files)} · {len(recorded.turns)} turn(s)",
+        answer=[typeset(f"{prefix}: {answer(diagnosis)}")],
+        tiles=tiles,
+        main=[
+            picture(circle, recorded, diagnosis),
+            diagnosis_section(prefix, diagnosis),
+            sections.figures_section(figures),
+            Section("How the files were read", [Bullets(recorded.notes)]),
+        ],
+        provenance=sections.provenance_section(rows, hashed([("record", file) for file in files])),
+        footer=sections.figures_footer("Values in full precision: summary.json."),
+    )
+
+
+def picture(circle: CircleUnderTest, recorded: RecordedCircle, diagnosis: Diagnosis) -> Picture:
+    """All turns over each other, magnified, and what the model says of them."""
+    turns = _centred([turn.path for turn in recorded.turns], circle, diagnosis, recorded.centred)
+    largest = max(float(np.abs(turn.deviation).max()) for turn in turns) * 1e6
+    ring = circle_plots.ring_step(largest)
+    rings = 1 if largest < 1.1 * ring else 2
+    with drawing(10.0, 6.0) as figure:
+        polar, unrolled = figure.subplots(1, 2, width_ratios=[1.35, 1])
+        circle_plots.polar_ground(polar, circle, ring, rings)
+        seen: set[int] = set()
+        for turn in turns:
+            colour, words = (BLUE, "counterclockwise") if turn.sense > 0 else (VERMILLION, "clockwise")
+            look = {"color": colour, "linewidth": 1.3, "label": "" if turn.sense in seen else words}
+            seen.add(turn.sense)
+            circle_plots.polar_curve(polar, turn, ring, rings, **look)
+            circle_plots.unrolled_curve(unrolled, turn, **look)
+        fitted = [TurnedPath(a, e, s) for (a, e), s in zip(diagnosis.rest, diagnosis.senses, strict=True)]
+        for i, turn in enumerate(_centred(fitted, circle, diagnosis, recorded.centred)):
+            label = "" if i else "model without peaks"
+            circle_plots.unrolled_curve(unrolled, turn, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
+        circle_plots.unrolled_ground(unrolled, circle)
+        plane = f"{circle.axes[0]}-{circle.axes[1]}"
+        gap = circle_plots.RING_GAPS[rings]
+        caption = (
+            f"Radius {circle.radius * 1e3:.6g} mm. Radius deviation magnified "
+            f"{gap / ring * 1e6 / (circle_plots.NOMINAL / circle.radius):,.0f} times; rings at ±{ring:g} µm about the "
+            f"circle{', about its fitted centre' if recorded.centred else ''}. Dashed: the fitted model without peaks."
+        )
+        return finish(figure, f"circle-{plane}", f"Recorded circle in the plane {plane}", caption)
+
+
+def _centred(
+    paths: Sequence[TurnedPath], circle: CircleUnderTest, diagnosis: Diagnosis, centred: bool
+) -> list[_Centred]:
+    centre = np.array(diagnosis.centre if centred else (0.0, 0.0))
+    return [_Centred(*about(path.angle, path.deviation, circle.radius, centre), path.sense) for path in paths]
+
+
+def summary(
+    recorded: RecordedCircle,
+    diagnosis: Diagnosis,
+    figures: Mapping[str, Figure],
+    files: Sequence[Path],
+    names: Sequence[str],
+) -> dict[str, Any]:
+    """Content of summary.json."""
+    circle = recorded.circle
+    prefix = axis_letters(circle.axes)
+    return {
+        "format": FORMAT,
+        "answer": [f"{prefix}: {answer(diagnosis)}"],
+        "figures": figures_part(figures),
+        "diagnosis": {prefix: diagnosis_part(diagnosis)},
+        "circle": {
+            "axes": list(circle.axes),
+            "radius": quantity(circle.radius, "m"),
+            "speed": quantity(circle.speed, "m/s"),
+            "centre_fitted": recorded.centred,
+            "turns": [turn.name for turn in recorded.turns],
+        },
+        "inputs": inputs_part(hashed([("record", file) for file in files])),
+        "software": software(),
+        "files": list(names),
+    }

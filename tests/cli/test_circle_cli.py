@@ -1,0 +1,140 @@
+"""feedsim circle: files of scales and of ballbars as people's machines write them, made of known causes."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.drawn_circles import Causes, driven
+from feedsim import cli
+from feedsim.analysis.circle import CircleUnderTest
+
+CAUSES = Causes(
+    offset=(30e-6, -10e-6), delay=(0.0, 8e-4), squareness=40e-6, lost=(3e-6, 0.0), peak=(0.0, 5e-6), noise=0.2e-6
+)
+RADIUS, SPEED = 0.1, 0.05
+CIRCLE = CircleUnderTest(("X", "Y"), RADIUS, SPEED)
+SAMPLES = 3600
+
+
+def turns(samples: int = SAMPLES) -> list[tuple[np.ndarray, np.ndarray, int]]:
+    """Angle from 0 on in the sense of the motion [rad], and deviation [m], of both senses."""
+    rng = np.random.default_rng(7)
+    found = []
+    for sense in (1, -1):
+        path = driven(CIRCLE, CAUSES, sense, rng, samples)
+        found.append((np.unwrap(path.angle), path.deviation, sense))
+    return found
+
+
+def ballbar_in_one_file(folder: Path) -> list[str]:
+    """An instrument's export: lines ahead of the header, degrees and micrometres, semicolons and decimal commas; one
+    run after the other, each with 45 deg of run-in and run-out."""
+    lines = ["Instrument: ballbar;", "Operator: unknown;", "Angle [deg];Deviation [um]"]
+    for angle, deviation, sense in turns():
+        first, last = SAMPLES // 8, SAMPLES // 8
+        around = np.concatenate([angle[-first:] - sense * 2 * np.pi, angle, angle[:last] + sense * 2 * np.pi])
+        e = np.concatenate([deviation[-first:], deviation, deviation[:last]])
+        lines += [f"{np.degrees(a):.4f};{d * 1e6:.3f}".replace(".", ",") for a, d in zip(around, e, strict=True)]
+    (folder / "bar.csv").write_text("\n".join(lines) + "\n")
+    return [str(folder / "bar.csv"), "--radius", "100 mm", "--feed", "3000 mm/min"]
+
+
+def lengths_in_two_files(folder: Path) -> list[str]:
+    """Length of the bar in mm over time and angle in radians, a file for each direction, wrapped at 2 pi."""
+    files = []
+    for angle, deviation, sense in turns():
+        time = np.arange(SAMPLES) * (2 * np.pi * RADIUS / SPEED / SAMPLES)
+        file = folder / ("ccw.csv" if sense > 0 else "cw.csv")
+        table = np.column_stack([time, angle % (2 * np.pi), (RADIUS + deviation) * 1e3])
+        np.savetxt(file, table, "%.7f", ",", header="time [s],phi [rad],length [mm]", comments="")
+        files.append(str(file))
+    return [*files, "--radius", "100 mm"]
+
+
+def scales_over_time(folder: Path) -> list[str]:
+    """Linear scales in mm: at rest, a turn and a half one way, at rest, as much back; the centre is anywhere."""
+    step = 2 * np.pi * RADIUS / SPEED / SAMPLES
+    x, y = [], []
+    for angle, deviation, sense in turns():
+        half = SAMPLES // 2
+        around = np.concatenate([angle, angle[:half] + sense * 2 * np.pi])
+        e = np.concatenate([deviation, deviation[:half]])
+        around, e = (np.concatenate([np.full(500, each[0]), each, np.full(500, each[-1])]) for each in (around, e))
+        x.append(412.5 + (RADIUS + e) * 1e3 * np.cos(around))
+        y.append(-73.2 + (RADIUS + e) * 1e3 * np.sin(around))
+    table = np.column_stack([np.arange(2 * len(x[0])) * step * 1e3, np.concatenate(x), np.concatenate(y)])
+    np.savetxt(folder / "scales.csv", table, "%.6f", ",", header="t [ms],X.x_a [mm],Y.x_a [mm]", comments="")
+    return [str(folder / "scales.csv"), "--radius", "100 mm"]
+
+
+FORMATS = {each.__name__: each for each in (ballbar_in_one_file, lengths_in_two_files, scales_over_time)}
+
+
+def run(folder: Path, words: list[str]) -> tuple[int, dict[str, Any]]:
+    out = folder / "out"
+    code = cli.main(["circle", *words, "--out", str(out)])
+    return code, json.loads((out / "summary.json").read_text()) if (out / "summary.json").is_file() else {}
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_files_of_every_form_are_diagnosed_alike(form: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, summary = run(tmp_path, FORMATS[form](tmp_path))
+    assert code == 0
+    figures = {name: each["value"] for name, each in summary["figures"].items()}
+    # three times the half intervals of noise of 0.2 um: 0.13 um of amplitude is 5 us and 2.6 um/m
+    assert figures["XY.servo_mismatch"] == pytest.approx(-0.8, abs=0.01)
+    assert figures["XY.squareness"] == pytest.approx(40, abs=3)
+    assert figures["XY.lost_motion_X"] == pytest.approx(3, abs=0.3)
+    assert figures["XY.lost_motion_Y"] == pytest.approx(0, abs=0.3)
+    assert figures["XY.peak_X"] == 0
+    assert figures["XY.peak_Y"] == pytest.approx(5 * 0.72, abs=0.5)  # the highest of its rise and decay
+    assert figures["XY.H"] > 2 * 0.8e-3 * SPEED / 2 * 1e6 * 0.95
+    said = capsys.readouterr().out
+    assert re.search(r"Y answers (0\.79\d|0\.80\d) ms later than X: K_v", said.splitlines()[0])
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_one_direction_asks_for_the_other(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = lengths_in_two_files(tmp_path)
+    code, summary = run(tmp_path, [words[0], *words[2:]])
+    assert code == 0
+    assert "XY.squareness_or_servo" in summary["figures"]
+    assert "the other one will" in capsys.readouterr().out
+
+
+REFUSED = {
+    "a deviation without radius": (lambda words: [words[0], *words[3:]], "'Deviation' is a deviation; give the radius"),
+    "no feed and no time": (lambda words: words[:3], "has no column of time, and the feed is not known"),
+    "one axis": (lambda words: [*words, "--axes", "X"], "two different axes of the plane are needed"),
+    "another axis' pitch": (lambda words: [*words, "--pitch", "Z=10 mm"], "Z is no axis of the plane"),
+    "half a centre": (lambda words: [*words, "--centre", "X=1 mm"], "give it of X and Y"),
+    "a radius of nothing": (lambda words: [*words[:2], "0 mm"], "must be above 0"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_done_is_refused(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    changed, message = REFUSED[case]
+    code, _ = run(tmp_path, changed(ballbar_in_one_file(tmp_path)))
+    assert code == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out" / "report.html").exists()
+
+
+def test_a_file_of_something_else_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for text, message in (
+        ("time [s],force [N]\n0,1\n1,2\n", "needed are positions of both axes (X [mm], Y [mm]"),
+        ("angle [deg],deviation [N]\n0,1\n1,2\n", "column 'deviation' is in N; one such as deviation [m] is needed"),
+        ("angle [deg],radius [mm]\n" + "".join(f"{i},100\n" for i in range(300)), "covers 299 deg in one direction"),
+        ("angle [deg],radius [mm]\n" + "".join(f"{3 * i},100\n" for i in range(122)), "180 or more are needed"),
+    ):
+        (tmp_path / "other.csv").write_text(text)
+        code, _ = run(tmp_path, [str(tmp_path / "other.csv")])
+        assert code == 2
+        assert message in capsys.readouterr().err

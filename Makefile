@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all lint format reference check-reference bench worst-case pose-study identification-study identification-accuracy lock ansys clean
+.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all release lint format reference check-reference bench worst-case pose-study identification-study identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -121,6 +121,11 @@ $(BUILD)/fmus-all/plant.fmu: scenarios/machines/test_centre/modes.csv
 $(FMUS) $(ALL_FMUS): tests/reference/integrators.md
 $(foreach unit,$(UNITS),$(eval fmus/$(unit).fmu $(BUILD)/fmus-all/$(unit).fmu: \
     $(wildcard tests/reference/$(unit)/*.* tests/reference/$(unit)/held/*.*)))
+
+# Made anew they are the same, byte for byte.
+DIST := dist
+release: $(ALL_FMUS) $(VENV)/.run $(ZIG_HERE) ## wheels, source archive, archives in one file, bill of materials and sums, into dist/
+	PYTHONPATH=src/distribution $(PY) -m feedsim_distribution.release --archives $(BUILD)/fmus-all --out $(DIST)
 
 # --- run -----------------------------------------------------------------------------------------------------------
 
@@ -213,11 +218,11 @@ format: $(VENV)/.dev ## bring all sources into the one format
 	@$(VENV)/bin/clang-format -i $(C_FILES)
 
 lock: ## resolve the dependencies of pyproject.toml anew
-	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group build -o requirements.lock
-	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
+	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra all --group build -o requirements.lock
+	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra all --group dev -c requirements.lock -o requirements-dev.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --group zig -o requirements-zig.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group importers -c requirements-dev.lock -o requirements-importers.lock
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --no-deps pyproject.toml --extra ansys -c requirements.lock -o requirements-ansys.lock
 
 clean: ## remove what was built, keep the environment
-	rm -rf $(BUILD) $(FMUS) fmus/exchange.* $(VARIABLES) $(RESULTS)
+	rm -rf $(BUILD) $(FMUS) fmus/exchange.* $(VARIABLES) $(RESULTS) $(DIST)

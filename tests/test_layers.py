@@ -35,10 +35,10 @@ ORDER = [
     "units",
     "findings",
     "owned",
+    "called",
     "extras",
     "errors",
     "installation",
-    "called",
 ]
 SOLE_USERS = {
     "fmpy": {"cosim/archive.py", "cosim/unit.py"},

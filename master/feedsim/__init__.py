@@ -64,7 +64,12 @@ def __getattr__(public: str) -> Any:
     if public not in _HOMES:
         raise AttributeError(f"module 'feedsim' has no attribute '{public}'")
     room, _, name = _HOMES[public].partition(":")
-    return getattr(_import_module(f"feedsim.{room}"), name or public)
+    try:
+        return getattr(_import_module(f"feedsim.{room}"), name or public)
+    except ModuleNotFoundError as error:
+        from feedsim.extras import missing
+
+        raise missing(error, f"feedsim.{public}") or error from None
 
 
 def __dir__() -> list[str]:

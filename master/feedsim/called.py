@@ -1,7 +1,8 @@
 """Rooms that share their name with what a person calls: ``feedsim.compare(...)`` beside ``feedsim.compare.Options``.
 
 Once such a room is loaded, Python binds its name in the package, and what the front door has under that name cannot be
-reached any more; so the room itself is called, and passes the call on. May use: nothing. Start reading at called().
+reached any more; so the room itself is called, and passes the call on. May use: extras.
+Start reading at called().
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+from feedsim.extras import missing
+
 
 class _CalledRoom(ModuleType):
     def __call__(self, *given: Any, **named: Any) -> Any:
@@ -20,7 +23,10 @@ class _CalledRoom(ModuleType):
 
     @property
     def _call(self) -> Callable[..., Any]:
-        found: Callable[..., Any] = getattr(import_module("feedsim.front"), self.__name__.rpartition(".")[2])
+        try:
+            found: Callable[..., Any] = getattr(import_module("feedsim.front"), self.__name__.rpartition(".")[2])
+        except ModuleNotFoundError as error:
+            raise missing(error, self.__name__) or error from None
         return found
 
     @property

@@ -82,6 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     from feedsim.errors import FeedsimError
+    from feedsim.extras import missing
 
     # Where no home folder can be written to, matplotlib tells at length that its cache is a temporary one.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
@@ -93,6 +94,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except FeedsimError as error:
         print(f"feedsim: {error}", file=sys.stderr)
         return error.exit_code
+    except ModuleNotFoundError as error:
+        if (told := missing(error, f"feedsim {options.command}")) is None:
+            raise
+        print(f"feedsim: {told}", file=sys.stderr)
+        return told.exit_code
     except KeyboardInterrupt:
         print("feedsim: interrupted", file=sys.stderr)
         return 130

@@ -8,7 +8,6 @@ from math import floor, log10
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from feedsim.compare.options import Options, chosen, factor, listed, sources, with_units
 from feedsim.compare.tolerance import Tolerances
@@ -97,6 +96,8 @@ def estimated_shift(
     best = _best(misfit, tried)
     if best is None or best in (0, len(tried) - 1):
         raise InputError(f"the shift in time cannot be found within +-{most:.6g} s; allow a larger one")
+    from scipy.optimize import minimize_scalar  # a comparison without an estimate does without scipy
+
     refined = minimize_scalar(
         misfit.of, bounds=(tried[best - 1], tried[best + 1]), method="bounded", options={"xatol": 1e-6 * step}
     )

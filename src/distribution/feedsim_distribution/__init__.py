@@ -6,6 +6,8 @@
     shipped    what a wheel holds besides Python: archives, native cycle loop, scenarios
     wheel      -> the wheel
     sdist      -> the source archive
+    sbom       -> the bill of materials
+    release    -> all that is handed out of a version
 
 May use the packager. The same sources and the same compiler give the same bytes.
 """

@@ -46,16 +46,21 @@ def for_platform(name: str, compiler: Sequence[str], archives: Path | None = Non
     """
     if name not in (*TAGS, ANY):
         raise InputError(f"platform {name}: no wheel is made for it (known: {', '.join(TAGS)}, {ANY})")
-    held = _archives(compiler, targets.named("all")) if archives is None else _taken(archives)
+    held = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
     loop = {} if name == ANY else _loop(compiler, targets.ALL[name])
     return Shipped(held | loop | _plain(compiler), TAGS.get(name, ANY))
 
 
-def _taken(folder: Path) -> dict[str, bytes]:
+def taken(folder: Path) -> dict[str, bytes]:
+    """The four archives of a folder by their file names. Raises InputError where one is missing."""
     names = [f"{path.name.removesuffix('_fmu')}.fmu" for path in checkout.unit_folders()]
     if missing := [name for name in names if not (folder / name).is_file()]:
         raise InputError(f"{folder}: has no {', '.join(missing)}; make fmus-all builds them")
-    return {f"{PLACE}fmus/{name}": (folder / name).read_bytes() for name in names}
+    return {name: (folder / name).read_bytes() for name in names}
+
+
+def _placed(files: dict[str, bytes]) -> dict[str, bytes]:
+    return {f"{PLACE}fmus/{name}": content for name, content in files.items()}
 
 
 def _archives(compiler: Sequence[str], platforms: Sequence[targets.Target] | None) -> dict[str, bytes]:
@@ -64,13 +69,13 @@ def _archives(compiler: Sequence[str], platforms: Sequence[targets.Target] | Non
         for path in checkout.unit_folders():
             unit = build.load(path, compiler)
             build.build(unit, folder / f"{unit.table.unit}.fmu", compiler, targets=platforms)
-        return _taken(folder)
+        return _placed(taken(folder))
 
 
 def _loop(compiler: Sequence[str], target: targets.Target | None) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as scratch:
         library = exchange.build(Path(scratch), compiler, target)
-        return {f"{PLACE}fmus/{library.name}": library.read_bytes()}
+        return _placed({library.name: library.read_bytes()})
 
 
 def _plain(compiler: Sequence[str]) -> dict[str, bytes]:

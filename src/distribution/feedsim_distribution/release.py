@@ -1,0 +1,117 @@
+"""Everything that is handed out of a version: ``python -m feedsim_distribution.release`` (make release).
+
+Wheels for all platforms, the source archive, the archives for other simulators in one file, the section of the
+changelog, a bill of materials, and SHA-256 sums over all of them. The same sources give the same bytes.
+"""
+
+import argparse
+import hashlib
+import re
+import sys
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from feedsim_packager import archive
+from feedsim_packager.errors import InputError, PackagerError
+
+from . import sbom, sdist, shipped, wheel
+from .project import PROJECT, table
+
+SUMS = "SHA256SUMS"
+_ABOUT = """# The feed drive units of feedsim {version}
+
+FMI 2.0 co-simulation archives with binaries for Linux (x86-64, ARM 64 bit), Windows (x86-64) and macOS (Intel, Apple),
+and with their sources. Each one is whole by itself: `documentation/index.html` inside has equations, variables, timing.
+Their start values are those of a synthetic machine, which runs, but describes no machine you own.
+
+| file | what it is |
+|---|---|
+{files}
+| `references/UNIT` | inputs, parameters and results to check an import with, as the archives hold them |
+| `icons/UNIT.png` | the unit's picture |
+| `{sums}` | SHA-256 of every file here: `sha256sum --check {sums}` |
+
+An FMU is a program: to run it is to run its library with your rights. Licence: MIT (LICENSE).
+"""
+
+
+def write(folder: Path, archives: Path) -> list[Path]:
+    """Write all artefacts into `folder`; `archives`: folder with the archives for all platforms."""
+    folder.mkdir(parents=True, exist_ok=True)
+    version = str(table()["version"])
+    notes = _notes(version)
+    names = [wheel.write(folder, shipped.for_platform(platform, shipped.zig(), archives)) for platform in _platforms()]
+    names.append(sdist.write(folder))
+    made = {
+        f"feedsim-fmus-{version}.zip": _units(archives, version),
+        f"feedsim-{version}.cdx.json": sbom.describe(),
+        f"feedsim-{version}-changes.md": notes.encode(),
+    }
+    for name, content in made.items():
+        archive.write(folder / name, content)
+    files = sorted(folder / name for name in (*names, *made))
+    archive.write(folder / SUMS, _sums({path.name: path.read_bytes() for path in files}))
+    return [*files, folder / SUMS]
+
+
+def _platforms() -> tuple[str, ...]:
+    return (*shipped.TAGS, shipped.ANY)
+
+
+def _units(archives: Path, version: str) -> bytes:
+    """The archives, with what people want to see without opening one."""
+    held = shipped.taken(archives)
+    content: dict[str, bytes] = {"LICENSE": (PROJECT / "LICENSE").read_bytes()}
+    lines = []
+    for name, data in held.items():
+        content[name] = data
+        unit = name.removesuffix(".fmu")
+        described = (PROJECT / "src" / f"{unit}_fmu" / "README.md").read_text(encoding="utf-8").splitlines()[0]
+        lines.append(f"| `{name}` | {described.lstrip('# ')} |")
+        content |= dict(_looked_at(archives / name, unit))
+    content["README.md"] = _ABOUT.format(version=version, files="\n".join(lines), sums=SUMS).encode()
+    return archive.pack(content | {SUMS: _sums(content)})
+
+
+def _looked_at(path: Path, unit: str) -> Iterator[tuple[str, bytes]]:
+    with zipfile.ZipFile(path) as opened:
+        for name in opened.namelist():
+            if name == "model.png":
+                yield f"icons/{unit}.png", opened.read(name)
+            elif name.startswith("extra/") and not name.endswith("/"):
+                yield f"references/{unit}/{name.split('/', 2)[2]}", opened.read(name)
+
+
+def _sums(files: Mapping[str, bytes]) -> bytes:
+    return "".join(f"{hashlib.sha256(data).hexdigest()}  {name}\n" for name, data in sorted(files.items())).encode()
+
+
+def _notes(version: str) -> str:
+    """The changelog's section of a version, or, ahead of its release, what is unreleased."""
+    text = (PROJECT / "CHANGELOG.md").read_text(encoding="utf-8")
+    sections = {
+        head: body for head, body in re.findall(r"^## \[([^\]]+)\][^\n]*\n(.*?)(?=^## \[|\Z)", text, re.M | re.S)
+    }
+    body = sections.get(version) or sections.get("Unreleased")
+    if body is None:
+        raise InputError(f"CHANGELOG.md: has no section [{version}] and none [Unreleased]")
+    return f"# feedsim {version}\n\n{body.strip()}\n"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Write everything that is handed out of this version.")
+    parser.add_argument("--archives", type=Path, required=True, help="folder of the archives for all platforms")
+    parser.add_argument("--out", type=Path, required=True, help="folder to write into")
+    options = parser.parse_args()
+    try:
+        for path in write(options.out, options.archives):
+            print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
+    except PackagerError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

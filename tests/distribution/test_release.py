@@ -1,0 +1,105 @@
+"""What a release holds, and that it is the same when it is made again."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import re
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from feedsim_distribution import release, shipped
+from feedsim_distribution.project import table
+from feedsim_packager import toolchain
+from feedsim_packager.errors import InputError
+from feedsim_packager.targets import host_target
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = host_target().folder
+VERSION = str(table()["version"])
+
+
+@pytest.fixture(scope="module")
+def made(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """By this machine's compiler, and for this platform alone; zig makes those of the others."""
+    if HERE not in shipped.TAGS:
+        pytest.skip(f"no wheel is made for {HERE}")
+    folder = tmp_path_factory.mktemp("release")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(shipped, "zig", toolchain.find_compiler)
+        patch.setattr(shipped, "TAGS", {HERE: shipped.TAGS[HERE]})
+        for name in ("first", "second"):
+            release.write(folder / name, fmus)
+    return folder
+
+
+def sums_of(text: str) -> dict[str, str]:
+    return {line[66:]: line[:64] for line in text.splitlines()}
+
+
+def test_the_same_again(made: Path) -> None:
+    first = {path.name: path.read_bytes() for path in (made / "first").iterdir()}
+    assert first == {path.name: path.read_bytes() for path in (made / "second").iterdir()}
+    assert len(first) == 7
+
+
+def test_sums_are_of_every_file(made: Path) -> None:
+    folder = made / "first"
+    sums = sums_of((folder / "SHA256SUMS").read_text())
+    assert set(sums) == {path.name for path in folder.iterdir()} - {"SHA256SUMS"}
+    assert all(hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest for name, digest in sums.items())
+
+
+def test_units_come_with_references_icons_and_sums(made: Path, fmus: Path) -> None:
+    with zipfile.ZipFile(made / "first" / f"feedsim-fmus-{VERSION}.zip") as opened:
+        files = {name: opened.read(name) for name in opened.namelist()}
+    for unit in ("plant", "controller", "friction", "setpoint"):
+        assert files[f"{unit}.fmu"] == (fmus / f"{unit}.fmu").read_bytes()
+        assert files[f"icons/{unit}.png"].startswith(b"\x89PNG")
+        assert [name for name in files if name.startswith(f"references/{unit}/") and name.endswith(".csv")]
+        assert f"| `{unit}.fmu` |" in files["README.md"].decode()
+        with zipfile.ZipFile(io.BytesIO(files[f"{unit}.fmu"])) as archive:
+            assert "modelDescription.xml" in archive.namelist()
+    sums = sums_of(files["SHA256SUMS"].decode())
+    assert set(sums) == set(files) - {"SHA256SUMS"}
+    assert all(hashlib.sha256(files[name]).hexdigest() == digest for name, digest in sums.items())
+
+
+def test_a_wheel_for_every_platform_has_no_native_loop(made: Path) -> None:
+    (pure,) = (made / "first").glob("*-any.whl")
+    (own,) = set((made / "first").glob("*.whl")) - {pure}
+    names = {path: set(zipfile.ZipFile(path).namelist()) for path in (pure, own)}
+    (loop,) = (name for name in names[own] - names[pure] if "/shipped/" in name)
+    assert Path(loop).name.startswith("exchange.")
+    with zipfile.ZipFile(pure) as opened:
+        assert "Root-Is-Purelib: true" in opened.read(f"feedsim-{VERSION}.dist-info/WHEEL").decode()
+
+
+def test_bill_of_materials_has_what_is_locked(made: Path) -> None:
+    bill = json.loads((made / "first" / f"feedsim-{VERSION}.cdx.json").read_text())
+    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.5")
+    assert re.fullmatch(r"urn:uuid:[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", bill["serialNumber"])
+    lines = (ROOT / "requirements.lock").read_text().splitlines()
+    locked = {line.split("==")[0] for line in lines if "==" in line and not line.startswith((" ", "#"))}
+    held = {part["name"]: part for part in bill["components"]}
+    assert set(held) - {"FMI headers of the Modelica Association"} == locked
+    digests = [each["value"] for each in held["numpy"]["properties"]]
+    assert digests
+    assert all(f"--hash=sha256:{digest}" in "".join(lines) for digest in digests)
+
+
+def test_changes_are_those_of_the_changelog(made: Path) -> None:
+    notes = (made / "first" / f"feedsim-{VERSION}-changes.md").read_text()
+    assert notes.startswith(f"# feedsim {VERSION}\n\n### ")
+    assert "\n## [" not in notes
+
+
+def test_archives_that_are_missing_are_told(tmp_path: Path) -> None:
+    (tmp_path / "plant.fmu").write_bytes(b"")
+    with pytest.raises(InputError, match=r"has no controller\.fmu, friction\.fmu, setpoint\.fmu; make fmus-all"):
+        shipped.for_platform("any", ("cc",), tmp_path)
+    with pytest.raises(InputError, match="platform amiga: no wheel is made for it"):
+        shipped.for_platform("amiga", ("cc",), tmp_path)

@@ -36,8 +36,8 @@ FELT = 1e-2
 # share of the friction work that makes it matter.
 DRIVING, MATTERS = 0.5, 0.05
 # A load that the recorded motor torque contradicts: the least change of its factor, and the least share of the motor's
-# work by which run and record differ while it acts.
-AMISS, APART = 0.5, 0.1
+# work by which run and record differ while it acts. Below the last factor the record shows little of such a load.
+AMISS, APART, SHOWN = 0.5, 0.1, 0.3
 
 
 def energies(system: System, cycle: Cycle) -> dict[str, float]:
@@ -225,7 +225,10 @@ def _contradicted_loads(scenario: Scenario, loads: Sequence[Work]) -> list[str]:
             continue
         load = scenario.loads[work.load]
         column = load.motor_torque.column if load.motor_torque is not None else ""
-        wrong = "its sign is wrong" if factor < 0 else "its size is wrong: unit, kind or factor"
+        if abs(factor) < SHOWN:
+            wrong = "the record shows little or nothing of it: its size, kind or time is wrong"
+        else:
+            wrong = "its sign is wrong" if factor < 0 else "its size is wrong: unit, kind or factor"
         told.append(
             f"{scenario.at('loads', work.load)}: while the load {work.words} acts, the motor of {load.axis_name} does "
             f"{drives.run:.3g} J of work in the run and {drives.record:.3g} J in the record (column "

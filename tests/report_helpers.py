@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.cosim import PoseUse
+from feedsim.cosim.loads import Work
 from feedsim.motions import Circle, Dwell, Move
 from feedsim.nc import Program, plan
 from feedsim.scenario import CircleTest, Positioning, Scenario
@@ -32,6 +33,7 @@ class FakeRun:
     )
     pose: PoseUse | None = None
     warnings: tuple[str, ...] = ()
+    loads: tuple[Work, ...] = ()
     log: Trace | None = None
     native: bool = True
 

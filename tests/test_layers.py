@@ -17,6 +17,7 @@ ORDER = [
     "front",
     "report",
     "sweep",
+    "replay",
     "identify",
     "analysis",
     "compare",

@@ -19,7 +19,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from feedsim.cli import circle, compare, compensate, example, files, frf, identify, machine, run, sweep
+from feedsim.cli import circle, compare, compensate, example, files, frf, identify, machine, replay, run, sweep
 from feedsim.cli.terminal import prepare_streams
 from feedsim.owned import remove_orphans
 
@@ -38,6 +38,8 @@ examples:
   feedsim machine pack scenarios/machines/test_centre --out my_plant.fmu
   feedsim frf scenarios/machines/test_centre --axes X,Z
   feedsim identify results/identify_z_constant/log.csv --axis Z --machine scenarios/machines/test_centre
+  feedsim identify-drive capture.json --axes X,Y --out results/my_machine
+  feedsim replay capture.json --machine results/my_machine
   feedsim compensate scenarios/xz_circle.yaml
   feedsim circle ballbar.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
   feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
@@ -48,8 +50,9 @@ examples:
 
 
 COMMANDS = (
-    example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, compensate.COMMAND,
-    circle.COMMAND, run.SSP, sweep.COMMAND, compare.COMMAND, files.SCHEMA, files.CONVERT,
+    example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, replay.IDENTIFY_DRIVE,
+    replay.REPLAY, compensate.COMMAND, circle.COMMAND, run.SSP, sweep.COMMAND, compare.COMMAND, files.SCHEMA,
+    files.CONVERT,
 )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from feedsim.cosim.trust import PoseUse, pose_use
 from feedsim.errors import InputError
 from feedsim.linear.judgement import judge
 from feedsim.nc import Program, plan
-from feedsim.scenario import Logging, Scenario
+from feedsim.scenario import Coupling, Logging, Machine, Scenario
 from feedsim.structure import checked_modes
 from feedsim.trace import Trace
 
@@ -158,6 +158,41 @@ def run(
             else log(fine, scenario.logging, ideal_axes(scenario), scratch),
             native=library is not None,
         )
+
+
+def follow(
+    machine: Machine,
+    program: Program,
+    columns: Collection[str],
+    interval: float,
+    *,
+    coupling: Coupling | None = None,
+    fmus: Path | None = None,
+    native: bool | None = None,
+) -> Trace:
+    """The axes of a machine on setpoints from anywhere: its units, exchanged as :func:`run` does, and nothing judged.
+
+    Args:
+        columns: what is recorded, by name ("Z.x_a"). interval: of the rows [s], a whole multiple of the control cycle.
+
+    Raises:
+        InputError, SimulationError: as :func:`run`.
+    """
+    cycles, coupling = machine.cycles, coupling or Coupling()
+    ratio, every = round(cycles.T_pos / cycles.T_c), round(interval / cycles.T_c)
+    total = (len(program.time) - 1) * ratio
+    fmus = fmus or fmus_directory()
+    library = chosen(native, fmus, fmus_directory())
+    with System(machine, fmus) as system:
+        cycle = Cycle(system, SCHEMES[coupling.scheme], cycles.T_c, coupling.substeps)
+        recording = Recording(cycle, program, total, ratio, every, columns)
+        drives = Setpoints(system, program, ratio)
+        loop = Loop(cycle, [*drives.operations, *recording.operations], (), library, (drives, recording))
+        system.initialise(program, stop=total * cycles.T_c)
+        loop.run(total)
+        recording.record(total)
+        recording.collect(total + 1)
+        return recording.trace()
 
 
 def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> tuple[str, ...]:

@@ -43,6 +43,9 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
     "force": ("N",),
     "load": ("N.m", "N"),
     "setpoint": ("m", "rad"),
+    "deviation": ("m", "rad"),
+    "speed_setpoint": ("rad/s", "m/s"),
+    "feedforward": ("rad/s", "m/s"),
 }
 DRIVING = ("torque", "current", "force")
 
@@ -196,6 +199,11 @@ class Columns(Model):
         default=None, description="Known disturbance, force or torque, counted against the motor"
     )
     setpoint: MotionSignal | None = Field(default=None, description="Position setpoint")
+    deviation: MotionSignal | None = Field(
+        default=None, description="Following error as the control forms it: delayed position setpoint less position"
+    )
+    speed_setpoint: MotionSignal | None = Field(default=None, description="Speed setpoint of the position controller")
+    feedforward: MotionSignal | None = Field(default=None, description="Speed feedforward of the control")
     pitch: Annotated[float, Quantity("m", minimum=1e-8, example="20 mm")] | None = Field(
         default=None, description="Travel per motor turn"
     )

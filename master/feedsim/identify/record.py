@@ -18,7 +18,8 @@ from feedsim.errors import InputError
 Array = NDArray[np.float64]
 
 EVEN = 1e-3  # of the step: how far an instant may lie off the grid
-SIGNALS = ("torque", "angle", "speed", "load", "setpoint", "clipped")  # of a record, over its time
+# Of a record, over its time.
+SIGNALS = ("torque", "angle", "speed", "load", "setpoint", "deviation", "speed_setpoint", "feedforward", "clipped")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,9 @@ class Record:
         angle: (N,) motor angle [rad], or the scale's position over the lead I_P; None where there is only a speed.
         speed: (N,) motor speed [rad/s]; None where there is only a position.
         load: (N,) known torque against the motor torque [N.m], for example a measured disturbance; None: none.
-        setpoint: (N,) commanded angle [rad]; None where it was not recorded.
+        setpoint: (N,) commanded angle [rad]; None where it was not recorded, likewise those below.
+        deviation: (N,) following error as the control forms it, of the delayed setpoint [rad].
+        speed_setpoint, feedforward: (N,) speed that the position controller asks for, the feedforward in it [rad/s].
         columns: role -> name of the trace's column.
         clipped: (N,) bool, where the torque was cut off at a limit (clipping.py); None: nowhere.
 
@@ -46,6 +49,9 @@ class Record:
     speed: Array | None = None
     load: Array | None = None
     setpoint: Array | None = None
+    deviation: Array | None = None
+    speed_setpoint: Array | None = None
+    feedforward: Array | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
     clipped: NDArray[Any] | None = None
 

@@ -24,9 +24,13 @@ from feedsim.identify.signal_names import alias_of
 from feedsim.trace import Recording
 
 # feedsim's own signals of an axis -> role. The torque is taken before the current: it needs no torque constant.
-OWN = {"x_a": "position", "n_a": "speed", "M_a": "torque", "i_q": "current", "x_s": "setpoint"}
+OWN = {"x_a": "position", "n_a": "speed", "M_a": "torque", "i_q": "current", "x_s": "setpoint",
+       "x_e": "deviation", "n_s": "speed_setpoint", "n_ffw": "feedforward"}  # fmt: skip
+# What a control shows of its position loop: no identification of friction needs it.
+OF_CONTROL = ("deviation", "speed_setpoint", "feedforward")
 _OWN = re.compile(rf"([A-Za-z][A-Za-z0-9_]*)\.({'|'.join(OWN)})")
-_EXAMPLE = {"time": "ms", "position": "mm", "speed": "rpm", "torque": "N.m", "current": "A", "setpoint": "mm"}
+_EXAMPLE = {"time": "ms", "position": "mm", "speed": "rpm", "torque": "N.m", "current": "A", "setpoint": "mm",
+            "deviation": "mm", "speed_setpoint": "rpm", "feedforward": "rpm"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -150,7 +154,11 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...]) -> Chosen:
             sign: Literal[1, -1] = -1 if against else 1
             channels[role] = column(recording, role, MotionSignal(column=name, unit=unit, at=at, sign=sign))
         except InputError as error:
-            faults.append(f"{recording.header}: {error}; mapping: {_line(role, recording, name)}")
+            problem = f"{recording.header}: {error}; mapping: {_line(role, recording, name)}"
+            if role in OF_CONTROL:
+                notes.append(f"{problem}; it is not read")
+            else:
+                faults.append(problem)
     if faults:
         raise InputError.of(str(recording.path), faults)
     pitch = recording.axes[0].pitch if recording.axes else None

@@ -5,6 +5,7 @@ Start with trace.py (the Trace), then cells.py and csv.py (how a file becomes on
 response.py and response_files.py.
 """
 
+from feedsim.trace.capture import Mark
 from feedsim.trace.csv import read_csv, read_signals, write_csv
 from feedsim.trace.files import written_whole
 from feedsim.trace.recording import Recording, convert, read_recording
@@ -13,7 +14,7 @@ from feedsim.trace.table import Table, least_and_largest, release, stretches
 from feedsim.trace.trace import Array, Trace, matches, matching
 
 __all__ = [
-    "Array", "Recording", "Series", "Table", "Trace", "as_series", "convert", "least_and_largest", "matches",
-    "matching", "read_csv", "read_recording", "read_series", "read_signals", "release", "stretches", "write_csv",
-    "written_whole",
+    "Array", "Mark", "Recording", "Series", "Table", "Trace", "as_series", "convert", "least_and_largest",
+    "matches", "matching", "read_csv", "read_recording", "read_series", "read_signals", "release", "stretches",
+    "write_csv", "written_whole",
 ]  # fmt: skip

@@ -1,0 +1,248 @@
+"""The position loop of a control out of a record, by regression: what it delays, what it compares, what it asks for.
+
+A control forms its following error x_e and its speed setpoint n_s from samples of its own:
+
+    x_e[k] = sum_i a_i x_s[k - i] - x[k]                       sum of the a_i = 1: a dead time, with interpolation
+    n_s[k] = k_ffw n_ffw[k] + K_v (sum_i b_i x_s[k - i] - x[k]) + n_0
+
+Where a record holds both sides, the weights are least squares to the last digit of the record. The delay is what slow
+motions see, sum_i i a_i rows. Lags are taken as long as they earn their place: the smallest window of neighbouring
+samples that explains the record as well as the widest does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+
+from feedsim.errors import InputError
+from feedsim.identify.record import Array, Record
+from feedsim.identify.result import NORMAL_95
+
+LONGEST = 0.1  # [s]: no control delays its setpoint by more
+ROUNDING = 1e-13  # of the range of a signal: no residual is worth more
+WIDEST = 6  # samples that an interpolation runs over
+# Weights that are none take off chi^2 of 1 each from the residual: a window is narrowed as long as its residual grows
+# by no more than that, 95 %. Where what is left is a matter of digits (of the setpoint's way from row to row), it is no
+# noise, and may grow by a share.
+BY_CHANCE = 3.84
+DIGITS, GROWS = 1e-5, 0.05
+LEAST_TRAVEL = 1e-3  # rad: a motor that turns less does not tell a delay
+
+
+@dataclass(frozen=True, eq=False)
+class Taps:
+    """Weights of past samples.
+
+    Attributes:
+        first: age of the youngest one, in rows. weights: (W,), their sum is 1.
+        interval: of the rows [s]. sigma: standard deviation of the delay [s].
+        rms, largest: what is left [rad] of the following error, or [rad/s] of the speed setpoint.
+    """
+
+    first: int
+    weights: Array
+    interval: float
+    sigma: float
+    rms: float
+    largest: float
+
+    @property
+    def delay(self) -> float:
+        """As slow motions see it [s]."""
+        return float(self.weights @ (self.first + np.arange(len(self.weights)))) * self.interval
+
+    @property
+    def reach(self) -> int:
+        """Rows at the begin of a record that it has no past for."""
+        return self.first + len(self.weights) - 1
+
+    @property
+    def half_width(self) -> float:
+        """Of the 95 % interval of the delay [s]."""
+        return NORMAL_95 * self.sigma
+
+    def of(self, values: Array) -> Array:
+        """(N,) weighted past of values (N,); what lies ahead of them is as the first one."""
+        padded = np.concatenate([np.full(self.reach, values[0]), values])
+        ages = self.first + np.arange(len(self.weights))
+        rows = self.reach - ages[:, None] + np.arange(len(values))
+        return np.asarray(self.weights @ padded[rows], dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedSetpoint:
+    """How the speed setpoint comes about.
+
+    K_v: gain [1/s]. k_ffw: weight of the feedforward; 0 where the record has none. offset: n_0 [rad/s]. taps: of the
+    position setpoint. sigma: of K_v and k_ffw. rms, largest: what is left [rad/s].
+    """
+
+    K_v: float
+    k_ffw: float
+    offset: float
+    taps: Taps
+    sigma: tuple[float, float]
+    rms: float
+    largest: float
+
+    def of(self, setpoint: Array, angle: Array, feedforward: Array | None) -> Array:
+        """(N,) [rad/s] from the setpoint (N,) and the measured angle (N,) [rad], and the feedforward [rad/s]."""
+        forward = 0.0 if feedforward is None else self.k_ffw * feedforward
+        return np.asarray(forward + self.K_v * (self.taps.of(setpoint) - angle) + self.offset, dtype=np.float64)
+
+
+def setpoint_delay(records: Sequence[Record]) -> Taps:
+    """The delay of the position setpoint, from records of one axis with setpoint, angle and deviation.
+
+    Raises InputError: a signal is missing, or nothing moves.
+    """
+    moved = _usable(records, ("setpoint", "angle", "deviation"))
+    targets = [record.deviation + record.angle for record in moved]  # type: ignore[operator]
+    return _window(moved, targets, [[] for _ in moved])[0]
+
+
+def speed_setpoint(records: Sequence[Record]) -> SpeedSetpoint:
+    """K_v, k_ffw and the age of the setpoint, from records with setpoint, angle and speed setpoint.
+
+    Raises InputError: a signal is missing, or nothing moves.
+    """
+    moved = _usable(records, ("setpoint", "angle", "speed_setpoint"))
+    with_forward = all(record.feedforward is not None for record in moved)
+    targets = [np.asarray(record.speed_setpoint, dtype=np.float64) for record in moved]
+    # K_v x_s and K_v x are columns of their own, so that K_v is told by the measured position alone.
+    others = [
+        [-np.asarray(record.angle), np.ones(len(record)), *([np.asarray(record.feedforward)] if with_forward else [])]
+        for record in moved
+    ]
+    taps, further, covariance = _window(moved, targets, others, gain=0)
+    K_v, offset = float(further[0]), float(further[1])
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    count = len(further)
+    k_ffw = float(further[2]) if with_forward else 0.0
+    return SpeedSetpoint(
+        K_v, k_ffw, offset, taps,
+        (float(spread[-count]), float(spread[-1]) if with_forward else np.nan), taps.rms, taps.largest,
+    )  # fmt: skip
+
+
+def _usable(records: Sequence[Record], roles: Sequence[str]) -> list[Record]:
+    for record in records:
+        if missing := [role for role in roles if getattr(record, role) is None]:
+            raise InputError(f"{record.name}: no {' and no '.join(missing)}; the position loop needs it")
+    moved = [each for each in records if np.ptp(np.asarray(each.setpoint)) > LEAST_TRAVEL]
+    if not moved:
+        raise InputError(f"{records[0].name}: the setpoint does not move; the position loop cannot be told")
+    return moved
+
+
+def _window(
+    records: Sequence[Record], targets: Sequence[Array], others: Sequence[Sequence[Array]], gain: int | None = None
+) -> tuple[Taps, Array, Array]:
+    """The narrowest window of samples of the setpoint that explains the targets, and what goes with it.
+
+    others: further columns of each record. gain: which of them tells the sum of the weights (negative of the measured
+    angle's); None: it is 1.
+
+    Returns the taps, the coefficients of `others`, and the covariance of taps and others together.
+    """
+    longest = min(round(LONGEST / records[0].interval), min(len(record) for record in records) // 4)
+    best: tuple[float, int, int] | None = None
+    # Widest windows first: where one of them holds the whole interpolation, the residual falls to the rounding.
+    width = min(WIDEST, longest + 1)
+    for first in range(longest - width + 2):
+        rms = _solved(records, targets, others, first, width, longest, gain)[1]
+        if best is None or rms < best[0]:
+            best = rms, first, width
+    assert best is not None
+    floor, begin, _ = best
+    rows = sum(len(record) - longest for record in records)
+    steps = np.concatenate([np.diff(np.asarray(record.setpoint)) for record in records])
+    digits = DIGITS * _rms(steps) * (1.0 if gain is None else 1.0 / records[0].interval)
+    rounding = (ROUNDING * max(float(np.ptp(target)) for target in targets)) ** 2
+    chosen = begin, width
+    for narrow in range(1, width):
+        found = min(
+            (_solved(records, targets, others, first, narrow, longest, gain)[1], first)
+            for first in range(begin, begin + width - narrow + 1)
+        )
+        grown = log((found[0] ** 2 + rounding) / (floor**2 + rounding))
+        if grown <= max(BY_CHANCE * (width - narrow) / rows, 2 * GROWS if floor < digits else 0.0):
+            chosen = found[1], narrow
+            break
+    coefficients, rms, largest, covariance = _solved(records, targets, others, *chosen, longest, gain)
+    first, width = chosen
+    weights, further = coefficients[:width], coefficients[width:]
+    total = 1.0 if gain is None else float(further[gain])
+    ages = (first + np.arange(width)) * records[0].interval
+    lean = (ages - float(weights @ ages) / float(np.sum(weights))) / total
+    variance = float(lean @ covariance[:width, :width] @ lean)
+    taps = Taps(first, weights / np.sum(weights), records[0].interval, np.sqrt(max(variance, 0.0)), rms, largest)
+    return taps, further, covariance
+
+
+def _solved(
+    records: Sequence[Record],
+    targets: Sequence[Array],
+    others: Sequence[Sequence[Array]],
+    first: int,
+    width: int,
+    longest: int,
+    gain: int | None,
+) -> tuple[Array, float, float, Array]:
+    """Coefficients, residual (rms and largest) and covariance for one window. The first `longest` rows are the past."""
+    columns, right = [], []
+    for record, target, further in zip(records, targets, others, strict=True):
+        setpoint = np.asarray(record.setpoint)
+        rows = np.arange(longest, len(record))
+        origin = setpoint[rows]  # positions are far from 0, and weights differences: counted from where the axis is
+        lagged = [setpoint[rows - first - i] - origin for i in range(width)]
+        own = [column[rows] for column in further]
+        if gain is None:
+            right.append(target[rows] - origin)
+        else:
+            own[gain] = own[gain] + origin  # K_v (sum b x_s - x): with sum b = 1 the origin falls out
+            right.append(target[rows])
+        columns.append(np.column_stack([*lagged, *own]))
+    A, b = np.vstack(columns), np.concatenate(right)
+    # The last weight follows from the sum: with others it is K_v, without it is 1.
+    if gain is None:
+        base = A[:, width - 1]
+        reduced = A[:, : width - 1] - base[:, None]
+        x, cov = _least_squares(reduced, b - base)
+        weights = np.append(x, 1.0 - np.sum(x))
+        turn = np.vstack([np.eye(width - 1), -np.ones(width - 1)]) if width > 1 else np.zeros((1, 0))
+        residual = b - A @ weights
+        return weights, _rms(residual), float(np.max(np.abs(residual))), turn @ cov @ turn.T
+    at = width + gain
+    keep = [i for i in range(A.shape[1]) if i != width - 1]
+    reduced = A.copy()
+    reduced[:, :width] -= A[:, [width - 1]]
+    reduced[:, at] += A[:, width - 1]
+    x, cov = _least_squares(reduced[:, keep], b)
+    full = np.zeros((A.shape[1], len(keep)))
+    full[keep, range(len(keep))] = 1.0
+    full[width - 1, : width - 1] = -1.0
+    full[width - 1, keep.index(at)] = 1.0
+    solution = full @ x
+    residual = b - A @ solution
+    return solution, _rms(residual), float(np.max(np.abs(residual))), full @ cov @ full.T
+
+
+def _least_squares(A: Array, b: Array) -> tuple[Array, Array]:
+    """Solution and covariance, by the residual's variance."""
+    scale = np.linalg.norm(A, axis=0)
+    scale[scale == 0] = 1.0
+    U, s, Vt = np.linalg.svd(A / scale, full_matrices=False)
+    kept = s > 1e-12 * (s[0] if len(s) else 1.0)
+    inverse = np.where(kept, 1.0 / np.where(kept, s, 1.0), 0.0)
+    x = (Vt.T * inverse) @ (U.T @ b) / scale
+    variance = float(np.sum((b - A @ x) ** 2)) / max(len(b) - len(x), 1)
+    return x, variance * ((Vt.T * inverse**2) @ Vt) / np.outer(scale, scale)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

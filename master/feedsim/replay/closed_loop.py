@@ -1,0 +1,225 @@
+"""A record's setpoints through the simulated axes: the same motion asked for, by the units in closed loop.
+
+The run begins ahead of the record. An axis stands where the record begins, until friction has taken up the constant
+load and the speed controller carries the rest; where the record begins in motion, a run-in from rest leads to its
+speed. What is compared lies within a window of the record; the run covers the record from BEFORE ahead
+of it, so that the state of drive and friction there is what the motion before has made it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from feedsim.cosim import follow
+from feedsim.errors import InputError
+from feedsim.files.columns import Columns
+from feedsim.identify import Record, Recorded
+from feedsim.identify.read import read_records
+from feedsim.motions.profile import speed_change
+from feedsim.nc import Program
+from feedsim.scenario import Coupling, Machine
+from feedsim.trace.trace import Array
+
+Mask = NDArray[np.bool_]
+
+SETTLED = 0.6  # [s] at rest ahead of the record
+BEFORE = 2.0  # [s] of the record ahead of a window that are run, too
+BEHIND = 4  # position cycles that the program goes on behind the last row
+# The setpoint moves where its speed is more than a share of the top speed; the axis follows for a while behind.
+MOVES, FOLLOWS = 1e-4, 0.02  # share, [s]
+SIGNALS = ("x_a", "M_a", "n_s")
+
+
+@dataclass(frozen=True, eq=False)
+class AxisRecord:
+    """A stretch of one axis without gaps, at the slide.
+
+    Attributes:
+        axis: name in the machine. record: motor side. I_P: lead [m/rad].
+        rows: (N,) which rows count: within the window.
+    """
+
+    axis: str
+    record: Record
+    I_P: float
+    rows: Mask
+
+    @property
+    def setpoint(self) -> Array:
+        """(N,) [m]."""
+        assert self.record.setpoint is not None
+        return self.I_P * self.record.setpoint
+
+    @property
+    def position(self) -> Array:
+        """(N,) measured [m]."""
+        assert self.record.angle is not None
+        return self.I_P * self.record.angle
+
+    @property
+    def speed(self) -> Array:
+        """(N,) measured, by central differences [m/s]."""
+        return np.asarray(np.gradient(self.position, self.record.interval), dtype=np.float64)
+
+    @property
+    def moving(self) -> Mask:
+        """(N,) bool: rows within the window in which the axis moves."""
+        speed = np.abs(np.gradient(self.setpoint, self.record.interval))
+        asked = speed > MOVES * float(np.max(speed, initial=0.0))
+        behind = np.ones(round(FOLLOWS / self.record.interval) + 1)
+        return np.asarray(self.rows & (np.convolve(asked, behind)[: len(asked)] > 0.5))
+
+
+def read_axes(
+    path: Path, axes: Sequence[str], machine: Machine | None = None, mapping: Columns | None = None
+) -> dict[str, Recorded]:
+    """The record of each axis. InputError: as read_records; no position setpoint, or no position."""
+    found: dict[str, Recorded] = {}
+    for axis in axes:
+        read = read_records(path, mapping, axis, machine)
+        missing = [
+            name
+            for name, role in (("position setpoint", "setpoint"), ("position", "angle"))
+            if any(getattr(record, role) is None for record in read.records)
+        ]
+        if missing:
+            columns = ", ".join(f"{role} {name!r}" for role, name in read.provenance.columns.items())
+            raise InputError(
+                f"{path}, axis {axis}: no {' and no '.join(missing)} is read ({columns}); a replay needs both; name "
+                "them in a mapping file: setpoint: {column: ..., unit: mm}"
+            )
+        found[axis] = read
+    return found
+
+
+def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> AxisRecord:
+    """The stretch of an axis that holds the window, from BEFORE ahead of it on; without one the longest stretch.
+
+    Raises InputError: no stretch without a gap holds the window, or less than ten rows of it.
+    """
+    pitch = read.provenance.pitch
+    if pitch is None:
+        raise InputError(f"{read.provenance.file}, axis {axis}: its pitch is needed: pitch: 10 mm in a mapping file")
+    if window is None:
+        record = max(read.records, key=len)
+        begin, end = float(record.time[0]), float(record.time[-1])
+    else:
+        begin, end = window
+        slack = 0.5 * read.records[0].interval
+        holding = [
+            each for each in read.records if each.time[0] <= begin + slack and each.time[-1] >= end - slack
+        ]  # fmt: skip
+        if not holding:
+            stretches = ", ".join(f"{each.time[0]:.6g} to {each.time[-1]:.6g} s" for each in read.records)
+            raise InputError(
+                f"{read.provenance.file}: no stretch without a gap holds the window {begin:.6g} to {end:.6g} s; there "
+                f"is {stretches}"
+            )
+        record = holding[0]
+    first = int(np.searchsorted(record.time, begin - BEFORE))
+    last = int(np.searchsorted(record.time, end + 0.5 * record.interval))
+    record = record.between(first, last)
+    slack = 0.5 * record.interval
+    rows = np.asarray((record.time >= begin - slack) & (record.time <= end + slack))
+    if np.count_nonzero(rows) < 10:
+        raise InputError(f"{read.provenance.file}: {np.count_nonzero(rows)} rows in the window; at least 10 are needed")
+    return AxisRecord(axis, record, pitch / (2 * np.pi), rows)
+
+
+class Replay:
+    """Records of some axes of a machine, and what its units make of them; the other axes are held where they are.
+
+    Attributes:
+        records: axis -> its record; all over the same time.
+        lead: time that the run begins ahead of the first row [s].
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        records: Mapping[str, AxisRecord],
+        *,
+        coupling: Coupling | None = None,
+        fmus: Path | None = None,
+    ) -> None:
+        self.records, self._coupling, self._fmus = dict(records), coupling, fmus
+        one = next(iter(records.values())).record
+        self.time, self.interval = one.time, one.interval
+        T_c = machine.cycles.T_c
+        if abs(self.interval / T_c - round(self.interval / T_c)) > 1e-6 * self.interval / T_c:
+            raise InputError(
+                f"{one.name}: {1e3 * self.interval:.6g} ms between rows are no whole multiple of the control cycle of "
+                f"{machine.name}, {1e6 * T_c:.6g} us; set machine.cycles.control"
+            )
+        self.pose = dict(machine.pose)
+        self._into = {}
+        for axis, each in records.items():
+            speed = float(self._spline(each)(0.0, 1)) if each.moving[0] else 0.0
+            limits = machine.axes[axis].max_acceleration, machine.path.jerk
+            self._into[axis] = speed_change(speed, *limits)
+            self.pose[axis] = float(each.setpoint[0]) - self._into[axis].distance
+        run_in = max(change.duration for change in self._into.values())
+        self.lead = self.interval * np.ceil((SETTLED + run_in) / self.interval)
+        self._programs: dict[float, Program] = {}
+
+    @staticmethod
+    def _spline(each: AxisRecord) -> CubicSpline:
+        return CubicSpline(each.record.time - each.record.time[0], each.setpoint)
+
+    def program(self, machine: Machine) -> Program:
+        """The setpoints at the position cycle of a machine."""
+        T_pos = machine.cycles.T_pos
+        if T_pos not in self._programs:
+            self._programs[T_pos] = self._planned(machine, T_pos)
+        return self._programs[T_pos]
+
+    def _planned(self, machine: Machine, T_pos: float) -> Program:
+        length = float(self.time[-1] - self.time[0])
+        count = int(np.ceil((self.lead + length) / T_pos)) + BEHIND
+        time = T_pos * np.arange(count + 1, dtype=np.float64)
+        x_s = {axis: np.full(len(time), position) for axis, position in machine.pose.items()}
+        n_ffw = {axis: np.zeros(len(time)) for axis in machine.axes}
+        for axis, each in self.records.items():
+            spline, into = self._spline(each), self._into[axis]
+            own = time - self.lead
+            within = np.clip(own, 0.0, length)
+            x, v = spline(within), spline(within, 1)
+            ahead, behind = own < 0, own > length
+            covered, v[ahead] = into.at(own[ahead] + into.duration)
+            x[ahead] = covered - into.distance + float(each.setpoint[0])
+            # Nothing is compared behind the last row: the axis goes on as it was.
+            x[behind] += v[behind] * (own[behind] - length)
+            x_s[axis], n_ffw[axis] = x, v / machine.axes[axis].I_P
+        return Program(time, x_s, n_ffw)
+
+    def follow(
+        self, machine: Machine, signals: Sequence[str] = SIGNALS, per_row: int = 1
+    ) -> dict[str, dict[str, Array]]:
+        """Axis -> signal -> (N,) at the rows of the record, of the units with the parameters of `machine`.
+
+        per_row: samples from one row to the next; ((N - 1) per_row + 1,) then.
+
+        Raises SimulationError: a unit failed, as with a drive that is unstable.
+        """
+        machine = machine.model_copy(update={"pose": machine.pose | self.pose})
+        columns = [f"{axis}.{signal}" for axis in self.records for signal in signals]
+        trace = follow(
+            machine, self.program(machine), columns, self.interval / per_row, coupling=self._coupling, fmus=self._fmus
+        )
+        first = round(self.lead / self.interval) * per_row
+        rows = slice(first, first + (len(self.time) - 1) * per_row + 1)
+        return {
+            axis: {signal: np.array(trace[f"{axis}.{signal}"][rows]) for signal in signals} for axis in self.records
+        }
+
+
+def per_row_of(interval: float, machine: Machine) -> int:
+    """Samples of a simulation per row of a record that a delay between the rows can be told from: up to four."""
+    cycles = round(interval / machine.cycles.T_c)
+    return max(each for each in (1, 2, 4) if cycles % each == 0)

@@ -1,0 +1,189 @@
+"""A replay beside its record: what is left, in numbers, over time, as a spectrum and over the position."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from feedsim.analysis import Figure
+from feedsim.errors import InputError
+from feedsim.identify.position_loop import SpeedSetpoint, Taps, setpoint_delay, speed_setpoint
+from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
+from feedsim.scenario import Machine
+from feedsim.trace.trace import Array
+
+LARGEST, RMS = "largest", "rms"
+TO_RPM = 30 / np.pi
+BINS = 60  # of the position
+LATEST = 5e-3  # [s]: no channel of a control is later than that against another
+HELPS = 0.99  # of what is left without a delay
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """A signal of the record and of the simulation.
+
+    recorded, simulated: (N,) in `unit`. meaning: in words.
+    """
+
+    recorded: Array
+    simulated: Array
+    unit: str
+    meaning: str
+
+    @property
+    def error(self) -> Array:
+        """(N,) simulated less recorded."""
+        return self.simulated - self.recorded
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """An axis of a replay.
+
+    Attributes:
+        axis: its name. each: the record, with the rows that count.
+        channels: "position" [m], "torque" [N.m], "speed setpoint" [rad/s] where it is recorded.
+        taps, speed: the position loop of the record by regression; None where it does not hold it.
+        lag: following error of the record, setpoint less position, rms over the motion [m].
+        delay: by how much the torque of the record is later than the simulated one [s]; it is taken out.
+    """
+
+    axis: str
+    each: AxisRecord
+    channels: Mapping[str, Channel]
+    taps: Taps | None
+    speed: SpeedSetpoint | None
+    lag: float
+    delay: float = 0.0
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """Figures over the rows in which the axis moves, by name."""
+        rows = self.each.moving
+        found: dict[str, Figure] = {}
+        for name, channel in self.channels.items():
+            scale, unit = {"m": (1e6, "um"), "rad/s": (TO_RPM, "rpm")}.get(channel.unit, (1.0, channel.unit))
+            error = scale * channel.error[rows]
+            key = name.replace(" ", "_")
+            told = f"{channel.meaning}: simulated less recorded, while the axis moves"
+            found[f"{self.axis}.{key}_rms"] = Figure(_rms(error), unit, f"{told}, root mean square")
+            found[f"{self.axis}.{key}_largest"] = Figure(
+                float(np.max(np.abs(error), initial=0.0)) if len(error) else nan, unit, f"{told}, largest magnitude"
+            )
+        position = self.channels["position"].error[rows]
+        found[f"{self.axis}.lag"] = Figure(
+            1e3 * self.lag, "mm", "distance of the position behind the setpoint in the record, root mean square"
+        )
+        found[f"{self.axis}.share_of_lag"] = Figure(
+            100 * _rms(position) / self.lag if self.lag else nan, "%", "position error as a share of that distance"
+        )
+        found[f"{self.axis}.torque_delay"] = Figure(
+            1e3 * self.delay,
+            "ms",
+            "by how much the record has its torque later than the simulation, which is taken out",
+        )
+        if self.taps is not None:
+            found[f"{self.axis}.setpoint_delay"] = Figure(
+                1e3 * self.taps.delay, "ms", "delay of the position setpoint in the control, by regression"
+            )
+            found[f"{self.axis}.deviation_left"] = Figure(
+                1e9 * self.each.I_P * self.taps.rms, "nm",
+                "contour deviation of the record that setpoint and position do not explain by that delay, "
+                "root mean square",
+            )  # fmt: skip
+        if self.speed is not None:
+            found[f"{self.axis}.K_v"] = Figure(
+                0.06 * self.speed.K_v, "(m/min)/mm", "position controller gain of the control, by regression"
+            )
+            found[f"{self.axis}.speed_setpoint_left"] = Figure(
+                1e3 * self.each.I_P * self.speed.rms, "mm/s",
+                "speed setpoint of the record that setpoint, position and feedforward do not explain, root mean square",
+            )  # fmt: skip
+        return found
+
+    def spectrum(self, name: str) -> tuple[Array, Array]:
+        """Frequency [Hz] and amplitude spectrum of what is left of a channel over the window, Hann window."""
+        rows = np.flatnonzero(self.each.rows)
+        error = self.channels[name].error[rows]
+        window = np.hanning(len(error))
+        amplitude = 2 * np.abs(np.fft.rfft((error - np.mean(error)) * window)) / np.sum(window)
+        frequency = np.fft.rfftfreq(len(error), self.each.record.interval)
+        return np.asarray(frequency, dtype=np.float64), np.asarray(amplitude, dtype=np.float64)
+
+    def over_position(self, name: str) -> tuple[Array, Array, Array]:
+        """Centres of bins of the position [m] (B,), and the mean of what is left of a channel in either direction,
+        forwards (B,) and backwards (B,); nan where the axis has not been."""
+        rows = self.each.moving
+        x, v, error = self.each.position[rows], self.each.speed[rows], self.channels[name].error[rows]
+        edges = np.linspace(np.min(x, initial=0.0), np.max(x, initial=1e-9), BINS + 1) if len(x) else np.arange(2.0)
+        bins = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
+        means = []
+        for side in (1.0, -1.0):
+            own = np.sign(v) == side
+            count = np.bincount(bins[own], minlength=len(edges) - 1)
+            total = np.bincount(bins[own], weights=error[own], minlength=len(edges) - 1)
+            means.append(np.where(count > 0, total / np.maximum(count, 1), nan))
+        return 0.5 * (edges[1:] + edges[:-1]), means[0], means[1]
+
+
+def replayed(machine: Machine, records: Mapping[str, AxisRecord], fmus: Path | None = None) -> dict[str, Comparison]:
+    """The records of some axes of a machine through its units, axis by axis beside what was recorded.
+
+    By how much a control logs its torque later than its position is not known ahead: the delay with which it agrees
+    best is taken out, and told.
+    """
+    replay = Replay(machine, records, fmus=fmus)
+    per_row = per_row_of(replay.interval, machine)
+    found = replay.follow(machine, ("x_a", "M_a"), per_row)
+    return {axis: compared(each, found[axis], per_row) for axis, each in records.items()}
+
+
+def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1) -> Comparison:
+    """An axis beside its record. simulated: x_a [m] and M_a [N.m], `per_row` samples from row to row."""
+    record = each.record
+    assert record.setpoint is not None
+    taps = speed = None
+    with suppress(InputError):  # the record has no deviation, or nothing moves
+        taps = setpoint_delay([record])
+    with suppress(InputError):
+        speed = speed_setpoint([record])
+    x_a = simulated["x_a"][::per_row]
+    delay, torque = _delayed(each, simulated["M_a"], per_row)
+    channels = {
+        "position": Channel(each.position, x_a, "m", "position"),
+        "torque": Channel(record.torque, torque, "N.m", "motor torque"),
+    }
+    if speed is not None and record.speed_setpoint is not None:
+        asked = speed.of(record.setpoint, x_a / each.I_P, record.feedforward)
+        channels["speed setpoint"] = Channel(record.speed_setpoint, asked, "rad/s", "speed setpoint of the control")
+    lag = _rms((each.setpoint - each.position)[each.moving])
+    return Comparison(each.axis, each, channels, taps, speed, lag, delay)
+
+
+def _delayed(each: AxisRecord, torque: Array, per_row: int) -> tuple[float, Array]:
+    """The delay [s] with which the simulated torque agrees best with the recorded one, and that torque at the rows."""
+    time, h = each.record.time, each.record.interval
+    fine = time[0] + h / per_row * np.arange(len(torque))
+    rows = each.moving if np.any(each.moving) else each.rows
+
+    def at(delay: float) -> Array:
+        return np.asarray(np.interp(time - delay, fine, torque), dtype=np.float64)
+
+    def left(delay: float) -> float:
+        return _rms((at(delay) - each.record.torque)[rows])
+
+    best = minimize_scalar(left, bounds=(-LATEST, LATEST), method="bounded", options={"xatol": 1e-6}).x
+    # A delay that hardly helps is none.
+    delay = float(best) if left(float(best)) < HELPS * left(0.0) else 0.0
+    return delay, at(delay)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else nan

@@ -1,0 +1,379 @@
+"""The drive of an axis out of a record: its position loop by regression, the rest by output error in closed loop.
+
+What the control shows of its position loop is regression, exact to the last digits of the record
+(identify/position_loop.py).
+What the torque tells, speed controller, inertia, friction, and how far the feedforward lies beside neutral, is fitted
+so that the units, on the record's setpoints, give its position and its torque:
+
+    residuals = ((x_a - x_a,recorded)/s_x, (M_a(t - delay) - M_a,recorded)/s_M)     rows in which the axis moves
+
+s_x and s_M are what is left, so that both channels have their weight of themselves. Parts of the friction law that an
+axis may do without are added only where the record itself asks for them: fitted to three quarters of its motion, they
+must predict the fourth one better (cross-validation). Intervals are those of residuals that hang together over
+stretches of time, as errors of a model do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import hypot, inf, log, nan
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from feedsim import variables
+from feedsim.errors import InputError
+from feedsim.identify.fit import Fit
+from feedsim.identify.parameters import estimate
+from feedsim.identify.position_loop import SpeedSetpoint, Taps, setpoint_delay, speed_setpoint
+from feedsim.identify.record import Record
+from feedsim.identify.result import NORMAL_95, Estimate
+from feedsim.replay.closed_loop import AxisRecord, Replay
+from feedsim.replay.tuning import Problem, Rows, rms, together
+from feedsim.scenario import Machine
+from feedsim.structure import checked_modes
+from feedsim.trace.trace import Array
+
+_CONTROLLER = variables.parameters("controller")
+Told = TypeVar("Told")
+Progress = Callable[[str, int, int], None]
+
+# Parts of the friction law that an axis may do without, in the order in which they are tried.
+BLOCKS: Mapping[str, tuple[str, ...]] = {
+    "logarithmic rise": ("F_log",),
+    "engaging zone": ("W", "gamma"),
+    "Stribeck effect": ("excess", "v_s"),
+    "asymmetry": ("asymmetry",),
+}
+# What friction begins with where nothing tells it: full friction after 5 um, an engaging zone of a hundredth of a turn.
+PRESLIDING, ZONE = 5e-6, 0.06
+# Of the way per row, of the top speed: a regression that leaves more is a start, not an answer.
+EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
+FOLDS = 4
+APART = 2.0  # of the logarithm of the likelihood: nearer cycles of the position loop are as likely as one another
+FAST = 0.1  # of the top speed: what is faster is another kind of motion
+BETTER = 2.0  # of the logarithm of the likelihood: what predicts hardly better is not worth having
+BLOCK = 0.05  # [s]: residuals further apart than that are taken to be independent
+VAGUE = 0.5  # relative half width of an interval beyond which a value is not determined
+HIDDEN = 0.8  # share of the usual deviation that is left: the record has not told it
+
+
+@dataclass(frozen=True, eq=False)
+class DriveFound:
+    """The drive of an axis, and what is left.
+
+    Attributes:
+        estimates: name -> value with interval: K_v, k_ffw, T_dyn, T_sym, K_p, T_n, J, M_0, friction, delay.
+        taps, speed: the position loop by regression; None where the record does not hold it.
+        machine: with these values. parts: what the friction has besides LuGre and viscous friction, and what
+            cross-validation says of every part: name -> gain of the logarithm of the likelihood.
+        position, torque: rms of what is left [m], [N.m].
+        predicted: the same, of every quarter of the motion by a fit to the other three.
+        position_cycles: those that were tried [s] -> how much less likely the record is than with the best
+            (logarithm of the likelihood; 0 is the best).
+        runs: of the units.
+    """
+
+    axis: str
+    estimates: Mapping[str, Estimate]
+    taps: Taps | None
+    speed: SpeedSetpoint | None
+    machine: Machine
+    parts: Mapping[str, float]
+    chosen: tuple[str, ...]
+    position: float
+    torque: float
+    predicted: tuple[float, float]
+    position_cycles: Mapping[float, float]
+    runs: int
+
+
+def identify_drive(
+    machine: Machine,
+    each: AxisRecord,
+    records: Sequence[Record],
+    *,
+    structure_known: bool,
+    start: Mapping[str, float],
+    position_cycles: Sequence[float] = (),
+    progress: Progress = lambda what, done, total: None,
+    fmus: Path | None = None,
+) -> DriveFound:
+    """Identify the drive of `each.axis`, with inertia (unless the structure is known) and friction.
+
+    Args:
+        machine: begins with its values; its cycles, structure and what is not identified stay.
+        each: the stretch that is fitted. records: all stretches, for the regression.
+        structure_known: the inertia is that of the machine's modes, and the friction has the parts that it has there.
+        start: what the record alone says (start.py), in place of the machine's values.
+        position_cycles: cycles of the position loop [s] that are tried, the one to be taken first where several are as
+            likely; none: that of the machine.
+
+    Raises:
+        InputError: a record without motion; no start that the units can run.
+    """
+    taps = _told(setpoint_delay, records)
+    speed = _told(speed_setpoint, records)
+    top = float(np.max(np.abs(each.speed))) / each.I_P
+    exact_delay = taps is not None and taps.rms <= EXACT_DELAY * top * each.record.interval
+    exact_gain = speed is not None and speed.rms <= EXACT_GAIN * top
+    J = checked_modes(machine).J_tot(each.axis)
+    values = start_of(machine, each.axis) | dict(start)
+    if speed is not None and speed.K_v > 0:
+        values["K_v"] = speed.K_v
+    total = taps.delay if taps is not None and exact_delay else None
+    if total is not None:
+        values["T_sym"] = min(values["T_sym"], total)
+    problem = Problem(
+        machine, each, Replay(machine, {each.axis: each}, fmus=fmus), values, total, J,
+        {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9},
+    )  # fmt: skip
+    rows = np.flatnonzero(each.moving)
+    if len(rows) < 50:
+        raise InputError(
+            f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least 50 are needed"
+        )
+    free = ["K_p", "K_i", "T_sym", "k_ffw", "M_0", "delay", "F_C", "sigma_0", "sigma_1", "sigma_2"]
+    free += [] if structure_known else ["J"]
+    free += [] if exact_gain else ["K_v"]
+    free += [] if total is not None else ["T_dyn"]
+    drive = machine.shipped_drive(each.axis, "the identification of a drive")
+    free += ["omega_0", "D"] if drive.reference_model else []
+    progress("first fit", 0, 2 + len(BLOCKS))
+    tried = {T_pos: _likely(problem, free, rows, T_pos) for T_pos in position_cycles}
+    if tried:
+        best = max(tried, key=lambda T_pos: tried[T_pos])
+        first = position_cycles[0]
+        problem.machine = _with_cycle(machine, best if tried[best] > tried[first] + APART else first)
+    parts: dict[str, float] = {}
+    chosen: tuple[str, ...] = ()
+    if structure_known:
+        own = {name for name, block in BLOCKS.items() if _has(values, block)}
+        chosen = tuple(name for name in BLOCKS if name in own)
+        free += [name for part in chosen for name in BLOCKS[part]]
+        found = _first(problem, free, rows)
+    else:
+        chosen, parts, free, found = _parts(problem, free, rows, progress)
+    progress("last fit", 1 + len(BLOCKS), 2 + len(BLOCKS))
+    result = None
+    for _ in range(3):
+        problem.weigh(found, rows)
+        result = problem.fitted(free, found, rows, limit=25)
+        moved = max(abs(problem.away(n, v) - problem.away(n, found.get(n, problem.start[n])))
+                    for n, v in result.mapping().items())  # fmt: skip
+        found = result.mapping()
+        if moved < 1e-3:
+            break
+    assert result is not None
+    unseen = _left_out(problem, result, np.array_split(np.arange(len(rows)), FOLDS))
+    predicted = unseen[0] * problem.weights["position"], unseen[1] * problem.weights["torque"]
+    estimates = _estimates(
+        problem, result, rows, taps if exact_delay else None, speed if exact_gain else None, structure_known
+    )
+    position, torque = problem.errors(found)
+    return DriveFound(
+        each.axis, estimates, taps, speed, problem.machine_of(found), parts, chosen,
+        rms(position[rows]), rms(torque[rows]), predicted,
+        {T_pos: likely - max(tried.values()) for T_pos, likely in tried.items()}, problem.runs,
+    )  # fmt: skip
+
+
+def _told(of: Callable[[Sequence[Record]], Told], records: Sequence[Record]) -> Told | None:
+    try:
+        return of(records)
+    except InputError:
+        return None
+
+
+def start_of(machine: Machine, axis: str) -> dict[str, float]:
+    """What the machine's axis has, as the parameters of a fit."""
+    drive = machine.shipped_drive(axis, "the identification of a drive")
+    friction = machine.shipped_friction(axis, "the identification of a drive")
+    values = {name: float(getattr(friction, name)) for name in
+              ("F_C", "sigma_0", "sigma_1", "sigma_2", "v_s", "F_log", "W", "gamma", "asymmetry")}  # fmt: skip
+    T_n = drive.T_n if drive.T_n is not None else 1.0
+    return values | {
+        "excess": float(friction.F_S) / values["F_C"] - 1.0, "M_0": machine.axes[axis].M_0,
+        "K_v": drive.K_v, "k_ffw": drive.k_ffw, "T_sym": drive.T_sym, "T_dyn": drive.T_dyn, "delay": 0.0,
+        "K_p": drive.K_p, "K_i": drive.K_p / T_n, "J": checked_modes(machine).J_tot(axis),
+        "omega_0": drive.omega_0 or 1.0, "D": drive.D or 1.0,
+    }  # fmt: skip
+
+
+def _has(values: Mapping[str, float], block: Sequence[str]) -> bool:
+    """Whether the friction has the part that a block is of."""
+    return values[block[0]] != 0
+
+
+def _with_cycle(machine: Machine, T_pos: float) -> Machine:
+    return machine.model_copy(update={"cycles": machine.cycles.model_copy(update={"position": T_pos})})
+
+
+def _likely(problem: Problem, free: Sequence[str], rows: Rows, T_pos: float) -> float:
+    """Logarithm of the likelihood of the whole motion with a cycle of the position loop."""
+    problem.machine = _with_cycle(problem.machine, T_pos)
+    position, torque = problem.errors(_first(problem, free, rows))
+    return -_independent(problem, len(rows)) * (log(rms(position[rows])) + log(rms(torque[rows])))
+
+
+def _independent(problem: Problem, count: int) -> float:
+    """How many of `count` rows say something of their own: neighbouring ones say the same."""
+    return count * problem.each.record.interval / BLOCK
+
+
+def _first(problem: Problem, free: Sequence[str], rows: Rows) -> dict[str, float]:
+    """A first fit, whose weights are those of what is left."""
+    found: dict[str, float] = {}
+    for limit in (8, 8):
+        found = problem.fitted(free, found, rows, limit=limit).mapping()
+        problem.weigh(found, rows)
+    return found
+
+
+def _parts(
+    problem: Problem, free: Sequence[str], rows: Rows, progress: Progress
+) -> tuple[tuple[str, ...], dict[str, float], list[str], dict[str, float]]:
+    """Parts of the friction law that the record asks for: chosen, the gain of each, what is free then, and a fit."""
+    gains: dict[str, float] = {}
+    chosen: list[str] = []
+    now, found = list(free), _first(problem, free, rows)
+    while len(chosen) < len(BLOCKS):
+        progress("cross-validation", 1 + len(chosen), 2 + len(BLOCKS))
+        # As near to its end as what it is compared with.
+        best = problem.fitted(now, found, rows, limit=8)
+        score, found = _predicted(problem, best, rows), best.mapping()
+        tried = {}
+        for part, block in BLOCKS.items():
+            if part in chosen:
+                continue
+            wider = [*now, *block]
+            begin = found | {name: _begin(problem, name) for name in block}
+            with_part = problem.fitted(wider, begin, rows, limit=6)
+            tried[part] = (_predicted(problem, with_part, rows) - max(score, -1e9), wider, with_part.mapping())
+            gains[part] = tried[part][0]
+        gain, part = max((gain, part) for part, (gain, _, _) in tried.items())
+        _, wider, begin = tried[part]
+        if not gain >= BETTER:
+            break
+        chosen.append(part)
+        now, found = wider, begin
+        problem.weigh(found, rows)
+    return tuple(chosen), gains, now, found
+
+
+def _begin(problem: Problem, name: str) -> float:
+    F_C = problem.start["F_C"]
+    return {"F_log": 0.1 * F_C, "gamma": 0.5, "excess": 0.1, "asymmetry": 0.0}.get(name, problem.start[name])
+
+
+def _predicted(problem: Problem, found: Fit, rows: Rows) -> float:
+    """Logarithm of the likelihood of every part of the motion, predicted from the others; -inf where a part sits at a
+    bound, since what has no end there is not told.
+
+    Parts are stretches of time, and then kinds of motion: either direction, slow and fast. What predicts only motion
+    that it has seen elsewhere is no law. The fit to the others is a Gauss-Newton step away from the one to all.
+    """
+    if any(problem.at_end(name, found[name]) for block in BLOCKS.values() for name in block if name in found.names):
+        return -inf
+    speed = problem.each.speed[rows]
+    kinds = 2 * (speed > 0) + (np.abs(speed) > FAST * np.max(np.abs(speed)))
+    every = np.arange(len(rows))
+    partitions = np.array_split(every, FOLDS), [every[kinds == kind] for kind in np.unique(kinds)]
+    return sum(_likelihood(problem, found, folds) for folds in partitions if len(folds) > 1)
+
+
+def _likelihood(problem: Problem, found: Fit, folds: Sequence[Rows]) -> float:
+    """Of the folds, each predicted from the others."""
+    count = sum(map(len, folds))
+    position, torque = _left_out(problem, found, folds)
+    return -_independent(problem, count) * (log(position) + log(torque))
+
+
+def _left_out(problem: Problem, found: Fit, folds: Sequence[Rows]) -> tuple[float, float]:
+    """Rms of position and torque, in their weights, where each fold is predicted from the others."""
+    count = sum(map(len, folds))
+    J, r = found.jacobian * problem.slopes(found), found.residuals
+    prior = np.arange(2 * count, len(r))
+    left = np.empty(2 * count)
+    for fold in folds:
+        out = np.concatenate([fold, fold + count])
+        others = np.concatenate([np.setdiff1d(np.arange(2 * count), out), prior])
+        step = np.linalg.lstsq(J[others], -r[others], rcond=None)[0]
+        left[out] = r[out] + J[out] @ step
+    return rms(left[:count]), rms(left[count:])
+
+
+def _estimates(
+    problem: Problem, found: Fit, rows: Rows, taps: Taps | None, speed: SpeedSetpoint | None, known: bool
+) -> dict[str, Estimate]:
+    """In the parameters of drive and friction, with intervals."""
+    values = problem.start | found.mapping()
+    covariance = _covariance(problem, found, len(rows))
+    spread = dict(zip(found.names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    told: dict[str, Estimate] = {}
+
+    def put(name: str, value: float, sigma: float, by: str) -> None:
+        told[name] = _judged(name, value, sigma, spread.get(by, nan) / problem.spread(by, values))
+
+    for name in found.names:
+        if name not in ("K_i", "excess", "K_v", "T_dyn"):
+            put(name, values[name], spread[name], name)
+    ratio = np.array([(n == "K_p") / values["K_p"] - (n == "K_i") / values["K_i"] for n in found.names])
+    T_n = values["K_p"] / values["K_i"]
+    put("T_n", T_n, T_n * float(np.sqrt(ratio @ covariance @ ratio)), "K_p")
+    if speed is not None:
+        told["K_v"] = _judged("K_v", values["K_v"], speed.sigma[0], 0.0)
+    else:
+        put("K_v", values["K_v"], spread["K_v"], "K_v")
+        if not known:
+            told["K_v"] = replace(told["K_v"], status="undetermined", reason=ON_THE_MODEL)
+    if taps is not None:
+        told["T_dyn"] = _judged("T_dyn", problem.T_dyn(values), hypot(spread["T_sym"], taps.sigma), 0.0)
+    else:
+        put("T_dyn", values["T_dyn"], spread["T_dyn"], "T_dyn")
+        if not known:
+            told["T_dyn"] = replace(told["T_dyn"], status="undetermined", reason=ON_THE_MODEL)
+    if "excess" in found.names:
+        rise = np.array([(n == "F_C") * (1 + values["excess"]) + (n == "excess") * values["F_C"] for n in found.names])
+        put("F_S", values["F_C"] * (1 + values["excess"]), float(np.sqrt(rise @ covariance @ rise)), "excess")
+    if known:
+        told["J"] = replace(estimate("J", values["J"]), status="given", reason="of the machine's modes")
+    return {name: told[name] for name in ORDER if name in told}
+
+
+ON_THE_MODEL = (
+    "without the control's own speed setpoint or following error it rests on an axis that is taken to be rigid"
+)
+ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "J", "M_0", "F_C", "F_S", "v_s", "F_log",
+         "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
+
+
+def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:
+    """An estimate that says what it is worth. left: the deviation over the usual one."""
+    if name in _CONTROLLER:
+        row = _CONTROLLER[name]
+        found = Estimate(name, value, row.unit, row.short, sigma)
+    else:
+        found = estimate(name, value, sigma)
+    if left > HIDDEN:
+        return replace(found, status="undetermined", reason="the record hardly depends on it")
+    relative = name not in ("k_ffw", "T_sym", "T_dyn", "M_0", "asymmetry", "delay")
+    if relative and NORMAL_95 * sigma > VAGUE * abs(value):
+        return replace(
+            found, status="undetermined", reason=f"told to {100 * NORMAL_95 * sigma / abs(value):.0f} % only"
+        )
+    return found
+
+
+def _covariance(problem: Problem, found: Fit, count: int) -> Array:
+    """Covariance (P, P), where residuals hang together as long as they do: every channel counts as many times less."""
+    scale = problem.slopes(found)
+    J, r = found.jacobian * scale, found.residuals
+    channels = slice(0, count), slice(count, 2 * count)
+    prior = J[2 * count :].T @ J[2 * count :]
+    parts = [(J[rows].T @ J[rows], together(r[rows]), float(np.mean(r[rows] ** 2))) for rows in channels]
+    whole = np.linalg.pinv(sum((part for part, _, _ in parts), prior), hermitian=True)
+    middle = sum((part * longer * variance for part, longer, variance in parts), prior)
+    return np.asarray(whole @ middle @ whole * np.outer(scale, scale))

@@ -1,0 +1,127 @@
+"""From records to drives and a machine: each axis on its own, on the machine that is known, or on a rigid one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from math import pi
+from pathlib import Path
+
+from feedsim.identify import Recorded
+from feedsim.owned import TemporaryFolder
+from feedsim.replay.closed_loop import AxisRecord
+from feedsim.replay.compare import Comparison, replayed
+from feedsim.replay.drive import DriveFound, identify_drive
+from feedsim.replay.machine_files import (
+    RigidAxis,
+    control_cycle,
+    drive_file,
+    drive_text,
+    friction_axis_text,
+    friction_file,
+    machine_files,
+    simple_drive,
+)
+from feedsim.replay.start import limits, start_values
+from feedsim.scenario import Friction, Machine, load_machine
+
+OF_MACHINE = "of the machine"
+
+
+@dataclass(frozen=True, eq=False)
+class DrivesFound:
+    """Drives of the axes of a record.
+
+    drives: axis -> what was found. comparisons: each axis with it, beside its record. files: name -> text: a whole
+    machine folder where none was known, else drive_A.yaml and friction_A.yaml of every axis.
+    """
+
+    drives: Mapping[str, DriveFound]
+    comparisons: Sequence[Comparison]
+    files: Mapping[str, str]
+
+
+def identify_drives(
+    read: Mapping[str, Recorded],
+    records: Mapping[str, AxisRecord],
+    machine: Machine | None,
+    head: Sequence[str],
+    name: str,
+    note: str,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+    fmus: Path | None = None,
+) -> DrivesFound:
+    """Identify the drive of every axis.
+
+    Args:
+        read, records: axis -> all of its record, and the stretch that is fitted.
+        machine: whose structure and friction are known; None: the axes are taken to be rigid.
+        head: comment at the top of the files. name, note: of the machine that is written. fmus: folder of the archives.
+
+    Raises InputError: of an axis, what :func:`identify_drive` refuses.
+    """
+    found: dict[str, DriveFound] = {}
+    files: dict[str, str] = {}
+    rigid: dict[str, RigidAxis] = {}
+    interval = next(iter(records.values())).record.interval
+    for axis, each in records.items():
+        begin = start_values(each) if machine is None else {}
+
+        def tell(what: str, done: int, total: int, axis: str = axis) -> None:
+            progress(f"{axis}: {what}", done, total)
+
+        with _begun(machine, name, note, {axis: rigid_axis(each, begin)} if begin else {}, interval) as own:
+            found[axis] = one = identify_drive(
+                own, each, read[axis].records, structure_known=machine is not None, start=begin,
+                position_cycles=() if machine is not None else (control_cycle(interval), interval), progress=tell,
+                fmus=fmus,
+            )  # fmt: skip
+        drive, friction = one.machine.shipped_drive(axis, "a drive file"), friction_of(one, axis)
+        if machine is not None:
+            files[drive_file(axis)] = drive_text(drive, one.estimates, OF_MACHINE, head)
+            files[friction_file(axis)] = friction_axis_text(axis, friction, one.estimates, head)
+        else:
+            values = friction | {"J": one.estimates["J"].value, "M_0": one.machine.axes[axis].M_0}
+            rigid[axis] = replace(
+                rigid_axis(each, begin), drive=drive, values=values, estimates=one.estimates, head=head
+            )  # fmt: skip
+    if rigid:
+        files = machine_files(name, note, rigid, interval, max(one.machine.cycles.T_pos for one in found.values()))
+    with _folder(files if rigid else {}) as folder:
+        made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
+        comparisons = [replayed(made[axis], {axis: each}, fmus)[axis] for axis, each in records.items()]
+    return DrivesFound(found, comparisons, files)
+
+
+@contextmanager
+def _folder(files: Mapping[str, str]) -> Iterator[Path]:
+    """A temporary folder with files."""
+    with TemporaryFolder() as folder:
+        for file, text in files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        yield folder
+
+
+@contextmanager
+def _begun(
+    known: Machine | None, name: str, note: str, axes: Mapping[str, RigidAxis], interval: float
+) -> Iterator[Machine]:
+    """The machine that is known, or one of rigid axes, for as long as its files are there."""
+    files = machine_files(name, note, axes, interval, control_cycle(interval)) if known is None else {}
+    with _folder(files) as folder:
+        yield known or load_machine(folder)
+
+
+def rigid_axis(each: AxisRecord, begin: Mapping[str, float]) -> RigidAxis:
+    """An axis to begin on. begin: as start_values gives them."""
+    most = limits(each)
+    friction = {**begin, "F_S": begin["F_C"] * (1 + begin["excess"])}
+    pitch = 2 * pi * each.I_P
+    return RigidAxis(pitch, float(each.setpoint[0]), most, simple_drive(begin, most["torque"]), friction, {})
+
+
+def friction_of(found: DriveFound, axis: str) -> dict[str, float]:
+    """The parameters of an axis's friction."""
+    friction = found.machine.shipped_friction(axis, "a friction file")
+    return {name: float(getattr(friction, name)) for name in Friction.model_fields if name != "identified"}

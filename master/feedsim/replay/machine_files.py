@@ -1,0 +1,176 @@
+"""A machine folder out of what was identified: machine.yaml, modes.csv, and per axis drive_A.yaml and friction_A.yaml.
+
+The axes are rigid and move independently: one mode of frequency 0 each, with the inertia that was found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, pi, sqrt
+
+from pydantic.fields import FieldInfo
+
+from feedsim.fields import Quantity
+from feedsim.identify.friction_file import DIGITS, Line, friction_text, interval_text
+from feedsim.identify.result import Estimate
+from feedsim.scenario import Drive, Filter, Friction
+from feedsim.scenario.machine import ParameterGroup
+
+TOOL = ("X", "Y", "Z")
+CONTROL = 125e-6  # [s] control cycle of a machine that tells none
+ASSUMED = "assumed: the record does not show it"
+
+
+def simple_drive(values: Mapping[str, float], torque: float) -> Drive:
+    """A drive with what a record tells, and without what it does not: no reference model, no filters, an ideal current
+    loop. values: K_v, k_ffw, T_dyn, T_sym, K_p, K_i = K_p/T_n. torque: limit [N.m]."""
+    told = {name: values[name] for name in ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p")}
+    assumed = {"ramp_speed_setpoint": False, "reference_model": False, "ideal_current_loop": True, "K_t": 1.0}
+    return Drive.model_validate({**told, "T_n": values["K_p"] / values["K_i"], "M_max": torque, **assumed})
+
+
+@dataclass(frozen=True)
+class RigidAxis:
+    """An axis as it goes into the folder.
+
+    limits: as start.limits gives them. values: of the friction, J and M_0, SI; estimates: of what was told.
+    """
+
+    pitch: float
+    position: float
+    limits: Mapping[str, float]
+    drive: Drive
+    values: Mapping[str, float]
+    estimates: Mapping[str, Estimate]
+    head: Sequence[str] = ()
+
+
+def control_cycle(interval: float) -> float:
+    """The usual control cycle, or the nearest that rows `interval` [s] apart are whole multiples of."""
+    return interval / max(round(interval / CONTROL), 1)
+
+
+def machine_files(
+    name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, position_cycle: float
+) -> dict[str, str]:
+    """File name -> text, of the whole folder. interval: of the record's rows [s]."""
+    files = {"machine.yaml": _machine(name, note, axes, interval, position_cycle), "modes.csv": _modes(axes)}
+    for axis, each in axes.items():
+        files[drive_file(axis)] = drive_text(each.drive, each.estimates, ASSUMED, each.head)
+        files[friction_file(axis)] = friction_axis_text(axis, each.values, each.estimates, each.head)
+    return files
+
+
+def drive_file(axis: str) -> str:
+    return f"drive_{axis}.yaml"
+
+
+def friction_file(axis: str) -> str:
+    return f"friction_{axis}.yaml"
+
+
+def _modes(axes: Mapping[str, RigidAxis]) -> str:
+    ports = [f"{kind}_{axis}" for kind in ("n", "x") for axis in axes] + [f"tcp_{axis}" for axis in TOOL]
+    lines = [",".join(["mode", "frequency [Hz]", "damping ratio [1]", *ports])]
+    for k, (axis, each) in enumerate(axes.items()):
+        n = 1.0 / sqrt(each.values["J"])
+        x = n * each.pitch / (2 * pi)
+        moved = {f"n_{axis}": n, f"x_{axis}": x, f"tcp_{axis}": x}
+        lines.append(",".join([str(k), "0.0", "0.0", *(repr(float(moved.get(port, 0.0))) for port in ports)]))
+    return "\n".join(lines) + "\n"
+
+
+def _machine(name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, position_cycle: float) -> str:
+    pose = ", ".join(f"{axis}: {_text(1e3 * each.position)} mm" for axis, each in axes.items())
+    control = control_cycle(interval)
+    lines = [
+        f"name: {_quoted(name)}", f"note: {_quoted(note)}", "", "modes: modes.csv", f"pose: {{{pose}}}", "",
+        f"cycles: {{control: {_text(1e6 * control)} us, position: {_text(1e6 * position_cycle)} us, "
+        f"interpolation: {_text(1e6 * interval)} us}}",
+        f"path: {{jerk: {_text(max(each.limits['jerk'] for each in axes.values()))} m/s^3, "
+        f"acceleration: {_text(max(each.limits['acceleration'] for each in axes.values()))} m/s^2}}",
+        "", "# Travel, speed and acceleration are those of the record with a reserve of a half.", "axes:",
+    ]  # fmt: skip
+    for axis, each in axes.items():
+        own = each.limits
+        lines += [
+            f"  {axis}:",
+            f"    pitch: {_text(1e3 * each.pitch)} mm",
+            f"    travel: [{_text(1e3 * own['low'])} mm, {_text(1e3 * own['high'])} mm]",
+            f"    max_speed: {_text(own['speed'])} m/s",
+            f"    max_acceleration: {_text(own['acceleration'])} m/s^2",
+            f"    constant_load: {_text(each.values['M_0'])} N.m{_remark(each.estimates.get('M_0'))}",
+            f"    drive: {drive_file(axis)}",
+            f"    friction: {friction_file(axis)}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def drive_text(drive: Drive, estimates: Mapping[str, Estimate], rest: str, head: Sequence[str] = ()) -> str:
+    """Text of a drive file: what was found with its interval; all else as the drive has it, with the remark `rest`."""
+    entries: list[tuple[str, str]] = []
+    for key, info in Drive.model_fields.items():
+        value = getattr(drive, key)
+        remark = _remark(estimates[key]).removeprefix("  # ") if key in estimates else rest
+        if isinstance(value, ParameterGroup):
+            if not (isinstance(value, Filter) and value.type == "off"):
+                entries.append((f"{key}: {{{_group(value)}}}", remark))
+        elif value is not None:
+            entries.append((f"{key}: {_shown(value, info)}", remark))
+    column = max(len(entry) for entry, _ in entries) + 3
+    lines = [f"# {line}".rstrip() for line in head]
+    return (
+        "\n".join([*lines, *(f"{entry:<{column}}# {remark}" if remark else entry for entry, remark in entries)]) + "\n"
+    )
+
+
+def _group(group: ParameterGroup) -> str:
+    fields = type(group).model_fields
+    given = {key: getattr(group, key) for key in fields if getattr(group, key) is not None}
+    return ", ".join(f"{key}: {_shown(value, fields[key])}" for key, value in given.items())
+
+
+def _shown(value: float | int | bool | str, info: FieldInfo) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    quantity = Quantity.of(info)
+    if quantity is None or isinstance(value, str):
+        return str(value)
+    return f"{_number(value)} {quantity.unit}".removesuffix(" 1")
+
+
+def friction_axis_text(
+    axis: str, values: Mapping[str, float], estimates: Mapping[str, Estimate], head: Sequence[str] = ()
+) -> str:
+    """Text of a friction file: what was found with its interval."""
+    lines = {
+        name: Line(values[name], _remark(estimates.get(name)).removeprefix("  # "))
+        for name in Friction.model_fields
+        if name in values
+    }
+    return friction_text(lines, {}, head, name=friction_file(axis))
+
+
+def _remark(found: Estimate | None) -> str:
+    if found is None:
+        return ""
+    interval = interval_text(found)
+    told = f"95 %: {interval}" if interval else ""
+    if found.status == "undetermined":
+        told = f"not determined: {found.reason}" + (f" ({told})" if told else "")
+    return f"  # {told}" if told else ""
+
+
+def _number(value: float) -> str:
+    return f"{value:.{DIGITS}g}"
+
+
+def _text(value: float) -> str:
+    """To a number of digits that a person reads; without an exponent."""
+    assert isfinite(value)
+    return f"{float(f'{value:.6g}'):.10f}".rstrip("0").rstrip(".")
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -1,0 +1,192 @@
+"""The units on one record, over the parameters of a drive: what they leave of position and torque, by least squares.
+
+The parameters are those of the drive and the friction, but for three: K_i = K_p/T_n, `excess` = F_S/F_C - 1, and
+`delay`, by how much the torque is logged later than the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, inf, log, nan, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.errors import FeedsimError, InputError
+from feedsim.identify.fit import Fit, Parameter, fit
+from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
+from feedsim.scenario import Machine
+from feedsim.trace.trace import Array
+
+Rows = NDArray[np.int64]
+
+# Deviations of the logarithm (of the value itself where it is not in LOGARITHMIC) about the start: what is usual. The
+# inertia begins with the rigid line's, which accelerations tell well.
+LOGARITHMIC = ("J", "K_p", "K_i", "K_v", "omega_0", "D", "F_C", "sigma_0", "sigma_1", "sigma_2", "v_s", "W")
+USUAL = {
+    "J": 0.05, "K_p": 1.0, "K_i": 1.5, "K_v": 1.0, "omega_0": 0.7, "D": 0.5, "F_C": 0.7, "sigma_0": 1.5,
+    "sigma_1": 2.0, "sigma_2": 1.5, "v_s": 1.5, "W": 1.5, "gamma": 0.5, "excess": 0.5, "asymmetry": 0.2,
+    "T_sym": 3e-3, "T_dyn": 10e-3, "k_ffw": 0.5, "delay": 1e-3,
+}  # fmt: skip
+BOUNDS = {"gamma": (1e-3, 1.0), "excess": (0.0, 3.0), "asymmetry": (-0.6, 0.6), "F_log": (0.0, inf),
+          "T_sym": (0.0, 0.02), "T_dyn": (0.0, 0.1), "k_ffw": (0.0, 1.5), "delay": (-5e-3, 5e-3)}  # fmt: skip
+# A tuned speed loop has this damping at least, give or take BARELY of the logarithm.
+DAMPED, BARELY = 0.7, 0.2
+SPAN = 4.0  # usual deviations that a logarithm may be off its start
+LEAST = {"position": 1e-9, "torque": 1e-3}  # [m], share of the torque: no channel is weighted as better than that
+
+
+@dataclass(eq=False)
+class Problem:
+    """The units on one record, over the parameters that are free."""
+
+    machine: Machine
+    each: AxisRecord
+    replay: Replay
+    start: dict[str, float]
+    total: float | None  # T_dyn + T_sym where it is known
+    J: float
+    weights: dict[str, float]
+    runs: int = 0
+
+    def tuned(self, values: Mapping[str, float]) -> tuple[Machine, float]:
+        """The machine with values, and what its torques are to be multiplied with.
+
+        Another inertia is the same motion under torques that are that many times larger: no plant is made anew.
+        """
+        scale = (self.start | dict(values))["J"] / self.J
+        return self.machine_of(values, scale), scale
+
+    def machine_of(self, values: Mapping[str, float], scale: float = 1.0) -> Machine:
+        """The machine with values, all torques of the axis divided by `scale`."""
+        values = self.start | dict(values)
+        own = self.machine.axes[self.each.axis]
+        shipped = self.machine.shipped_drive(self.each.axis, "the identification of a drive")
+        T_dyn = self.T_dyn(values)
+        drive = shipped.model_copy(
+            update={
+                "K_v": values["K_v"], "k_ffw": values["k_ffw"], "T_sym": values["T_sym"], "T_dyn": T_dyn,
+                "K_p": values["K_p"] / scale, "T_n": values["K_p"] / values["K_i"], "M_max": shipped.M_max / scale,
+                **{name: values[name] for name in ("omega_0", "D") if shipped.reference_model},
+            }
+        )  # fmt: skip
+        torques = {name: values[name] / scale for name in ("F_C", "sigma_0", "sigma_1", "sigma_2", "F_log")}
+        friction = self.machine.shipped_friction(self.each.axis, "the identification of a drive").model_copy(
+            update={
+                **torques, "F_S": torques["F_C"] * (1 + values["excess"]),
+                **{name: values[name] for name in ("v_s", "W", "gamma", "asymmetry")},
+            }
+        )  # fmt: skip
+        load = {"constant_load": values["M_0"] / scale, "drive": drive, "friction": friction}
+        axes = self.machine.axes | {self.each.axis: own.model_copy(update=load)}
+        return self.machine.model_copy(update={"axes": axes})
+
+    def T_dyn(self, values: Mapping[str, float]) -> float:
+        """What T_sym leaves of the whole delay, where that is known."""
+        return values["T_dyn"] if self.total is None else max(self.total - values["T_sym"], 0.0)
+
+    @property
+    def per_row(self) -> int:
+        """Samples of the simulation per row: the delay of the torque lies between rows."""
+        return per_row_of(self.replay.interval, self.machine)
+
+    def errors(self, values: Mapping[str, float]) -> tuple[Array, Array]:
+        """(N,) of the position [m] and (N,) of the torque [N.m], at the rows of the record."""
+        machine, scale = self.tuned(values)
+        self.runs += 1
+        try:
+            found = self.replay.follow(machine, ("x_a", "M_a"), self.per_row)[self.each.axis]
+        except FeedsimError as error:  # a drive that is unstable runs away until its numbers do
+            raise InputError(str(error)) from None
+        delay = (self.start | dict(values))["delay"]
+        time, h = self.replay.time, self.replay.interval / self.per_row
+        fine = time[0] + h * np.arange(len(found["M_a"]))
+        torque = scale * np.interp(time - delay, fine, found["M_a"])
+        return found["x_a"][:: self.per_row] - self.each.position, torque - self.each.record.torque
+
+    def residuals(self, values: Mapping[str, float], rows: Rows) -> Array:
+        """Both channels over their weights; then how far every free parameter is off its start, in usual deviations."""
+        position, torque = self.errors(values)
+        usual = [*(self.away(name, value) for name, value in values.items()), self.rings(values)]
+        return np.concatenate(
+            [position[rows] / self.weights["position"], torque[rows] / self.weights["torque"], usual]
+        )  # fmt: skip
+
+    def rings(self, values: Mapping[str, float]) -> float:
+        """How far the speed loop is less damped than anybody leaves it: J s^2 + K_p s + K_i."""
+        values = self.start | dict(values)
+        damping = values["K_p"] / (2 * sqrt(values["J"] * values["K_i"]))
+        return max(0.0, log(DAMPED / damping)) / BARELY
+
+    def away(self, name: str, value: float) -> float:
+        start = self.start[name]
+        usual = self.usual(name)
+        return log(value / start) / usual if name in LOGARITHMIC else (value - start) / usual
+
+    def at_end(self, name: str, value: float) -> bool:
+        """Whether a value has run to where the parameter ends."""
+        if name in LOGARITHMIC:
+            return abs(self.away(name, value)) > 0.95 * SPAN
+        return any(abs(value - end) < 0.01 * self.usual(name) for end in BOUNDS.get(name, ()))
+
+    def usual(self, name: str) -> float:
+        """Deviation from the start that is usual, of the logarithm or of the value."""
+        return USUAL[name] if name in USUAL else 2.0 * self.start["F_C"] if name == "F_log" else 5 * self.start["F_C"]
+
+    def slopes(self, found: Fit) -> Array:
+        """(P,) what the solver's unit step changes a parameter by: columns of the Jacobian become alike in size."""
+        return np.array(
+            [value if name in LOGARITHMIC else self.usual(name) * 0.1 for name, value in found.mapping().items()]
+        )
+
+    def spread(self, name: str, values: Mapping[str, float]) -> float:
+        """The usual deviation of a parameter, in its own unit."""
+        return self.usual(name) * (abs(values[name]) if name in LOGARITHMIC else 1.0)
+
+    def weigh(self, values: Mapping[str, float], rows: Rows) -> None:
+        """Take what is left with `values` as what a residual is worth.
+
+        What is left of the position is what is left of the torque, integrated twice: it hangs together for longer, and
+        counts by as many rows as say something of their own.
+        """
+        position, torque = (error[rows] for error in self.errors(values))
+        least = LEAST["torque"] * rms(self.each.record.torque[rows])
+        self.weights = {
+            "position": max(rms(position), LEAST["position"]) * sqrt(together(position)),
+            "torque": max(rms(torque), least),
+        }
+
+    def fitted(self, free: Sequence[str], begin: Mapping[str, float], rows: Rows, limit: int = 12) -> Fit:
+        """From `begin`, with the weights as they are."""
+        parameters = []
+        for name in free:
+            low, high = BOUNDS.get(name, (-inf, inf))
+            value = begin.get(name, self.start[name])
+            if name in LOGARITHMIC:
+                span = exp(SPAN * USUAL[name])
+                low, high = self.start[name] / span, self.start[name] * span
+                parameters.append(Parameter(name, min(max(value, low), high), low, high, log=True))
+            else:
+                scale = self.usual(name) * 0.1
+                parameters.append(Parameter(name, min(max(value, low), high), low, high, scale=scale))
+        return fit(
+            lambda values: self.residuals(values, rows), parameters, difference=1e-3, tolerance=1e-5, limit=limit
+        )  # fmt: skip
+
+
+def rms(values: Array) -> float:
+    """Root mean square; nan of nothing."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else nan
+
+
+def together(residuals: Array) -> float:
+    """How many neighbouring residuals say the same: the sum of their autocorrelation to where it ends, 1 at least."""
+    centred = residuals - np.mean(residuals)
+    spectrum = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
+    correlation = np.fft.irfft(spectrum)[: len(centred) // 2]
+    if not correlation[0] > 0:
+        return 1.0
+    correlation = correlation / correlation[0]
+    end = np.flatnonzero(correlation <= 0)
+    return max(1.0, 1.0 + 2.0 * float(np.sum(correlation[1 : end[0] if len(end) else None])))

@@ -1,0 +1,222 @@
+"""The report of an identified drive: the files that were made of it, summary.json, report.html and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import Figure
+from feedsim.identify import Provenance
+from feedsim.identify.friction_file import interval_text, value_text
+from feedsim.replay.compare import Comparison
+from feedsim.replay.drive import DriveFound
+from feedsim.replay.identified import DrivesFound
+from feedsim.replay.machine_files import drive_file, friction_file
+from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.formatting import display_unit, minus, powers, typeset
+from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
+from feedsim.report.replay.plots import pictures_of
+from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.sections import figures_footer, figures_section, provenance_section
+from feedsim.report.style import remarked
+from feedsim.scenario import Subject
+from feedsim.trace import Mark
+
+MACHINE, MODES = "machine.yaml", "modes.csv"
+LEADING = {"position_rms": "position error, rms", "torque_rms": "torque error, rms"}
+PARTS = (
+    "A part is taken where the record predicts stretches and kinds of its motion better with it that the fit has not "
+    "seen (cross-validation): gain of the logarithm of the likelihood."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class DriveReport:
+    """What was identified, and what it rests on."""
+
+    found: DrivesFound
+    sources: Sequence[Provenance]
+    subject: Subject | None
+    name: str
+    settings: Mapping[str, str]
+    marks: Sequence[Mark]
+
+    @property
+    def comparisons(self) -> Sequence[Comparison]:
+        """Each axis with what was found, beside its record."""
+        return self.found.comparisons
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """Of all axes."""
+        return {name: figure for each in self.comparisons for name, figure in each.figures.items()}
+
+    @property
+    def notes(self) -> list[str]:
+        """What the numbers are worth."""
+        told = self.subject.notes if self.subject is not None else ()
+        return [note for note in dict.fromkeys((*told, *(source.note for source in self.sources))) if note]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should know."""
+        told = dict.fromkeys(text for source in self.sources for text in source.warnings)
+        for axis, one in self.found.drives.items():
+            open_ones = [name for name, each in one.estimates.items() if each.status == "undetermined"]
+            if open_ones:
+                told[f"axis {axis}: the record does not determine {', '.join(open_ones)}; their values fit together "
+                     "with the rest, and may be others"] = None  # fmt: skip
+            if len(one.position_cycles) > 1:
+                likely = sorted(one.position_cycles.values(), reverse=True)
+                if likely[0] - likely[1] < 2.0:
+                    cycles = " and ".join(f"{1e3 * cycle:g} ms" for cycle in one.position_cycles)
+                    told[f"axis {axis}: position cycles of {cycles} fit alike; "
+                         f"{1e3 * one.machine.cycles.T_pos:g} ms is taken"] = None  # fmt: skip
+        return list(told)
+
+
+def check_writable(axes: Sequence[str]) -> Callable[..., None]:
+    """What raises OutputError unless the results can be written to a directory without an input being lost."""
+    own = [file for axis in axes for file in (drive_file(axis), friction_file(axis))]
+
+    def check(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+        check_place(directory, (MACHINE, MODES, *own, REPORT, SUMMARY), inputs)
+
+    return check
+
+
+def head(record: Path, window: tuple[float, float] | None, day: str) -> list[str]:
+    """Comment at the top of the files."""
+    part = f", {window[0]:g} to {window[1]:g} s" if window is not None else ""
+    return [f"Identified by feedsim identify-drive from {record.name}{part}, {day}.",
+            "Intervals hold 95 % as far as the model is that of the axis."]  # fmt: skip
+
+
+def note(record: Path) -> str:
+    """Of the machine that is written."""
+    return f"Identified from {record.name}. Axes are rigid; what the record does not show is assumed (see the files)."
+
+
+def write(report: DriveReport, directory: Path | str) -> tuple[Path, ...]:
+    """Write the files that were made, summary.json, report.html and figures; returns the paths. Raises OutputError."""
+    return write_report(directory, report_of(report), lambda names: summary(report, names), report.found.files)
+
+
+def report_of(report: DriveReport) -> Report:
+    """Content of the report."""
+    pictures = []
+    with remarked(f"{report.name}, identified from {report.sources[0].file.name}"):
+        for each in report.comparisons:
+            pictures += pictures_of(each, report.marks)
+    drives = report.found.drives
+    rows = [
+        ("Record", report.sources[0].file.name),
+        ("Runs of the units", str(sum(one.runs for one in drives.values()))),
+    ]
+    return Report(
+        f"Drive of {', '.join(drives)}",
+        f"identified from {report.sources[0].file.name}",
+        warnings=report.warnings,
+        notes=report.notes,
+        tiles=[
+            Tile(tile_value(figure), f"{name.partition('.')[0]}: {LEADING[key]}", typeset(figure.meaning))
+            for name, figure in report.figures.items()
+            if (key := name.partition(".")[2]) in LEADING
+        ],
+        main=[
+            *(_parameters(axis, one) for axis, one in drives.items()),
+            *pictures,
+            *(_parts(axis, one) for axis, one in drives.items() if one.parts),
+            figures_section(report.figures),
+        ],
+        provenance=provenance_section(rows, hashed(_files(report))),
+        footer=figures_footer(
+            f"Values in full precision: summary.json; what machines take: {', '.join(report.found.files)}.",
+            "docs/replay.md",
+        ),
+    )
+
+
+def _parameters(axis: str, one: DriveFound) -> Section:
+    rows: list[tuple[Text, ...]] = []
+    for name, each in one.estimates.items():
+        interval = minus(powers(interval_text(each)))
+        remark: str = each.status if each.status != "estimated" else ""
+        if each.reason:
+            remark = f"{remark}: {each.reason}"
+        rows.append((code(name), typeset(each.meaning), minus(powers(value_text(each))), display_unit(each.unit),
+                     interval, remark))  # fmt: skip
+    heads = ("Parameter", "Meaning", "Value", "SI unit", "95 % interval", "Remark")
+    return Section(f"Axis {axis}", [Table("lprllp", heads, rows)])
+
+
+def _parts(axis: str, one: DriveFound) -> Section:
+    rows = [
+        (
+            part,
+            "not credible" if gain == -float("inf") else minus(f"{gain:+.1f}"),
+            "taken" if part in one.chosen else "",
+        )
+        for part, gain in one.parts.items()
+    ]
+    table = Table("lrl", ("Part of the friction law", "Gain", ""), rows)
+    return Section(f"What the friction of {axis} needs", [Paragraph(PARTS), table])
+
+
+def _files(report: DriveReport) -> list[tuple[str, Path]]:
+    found = [("record", source.file) for source in report.sources]
+    found += [("mapping", source.mapping) for source in report.sources if source.mapping is not None]
+    return [*found, *(report.subject.files if report.subject is not None else ())]
+
+
+def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
+    """Content of summary.json."""
+    return {
+        "kind": "drive",
+        "settings": dict(report.settings),
+        "axes": {
+            axis: {
+                "parameters": {
+                    name: {"value": each.value, "unit": each.unit, "sigma": finite(each.sigma), "status": each.status,
+                           "reason": each.reason}
+                    for name, each in one.estimates.items()
+                },
+                "parts": {
+                    part: {"gain": finite(gain), "taken": part in one.chosen} for part, gain in one.parts.items()
+                },
+                "predicted": {
+                    "position": {"value": one.predicted[0], "unit": "m"},
+                    "torque": {"value": one.predicted[1], "unit": "N.m"},
+                },
+                "position_cycle": {"value": one.machine.cycles.T_pos, "unit": "s"},
+                "runs": one.runs,
+            }
+            for axis, one in report.found.drives.items()
+        },
+        "figures": figures_part(report.figures),
+        "software": software(),
+        "inputs": inputs_part(hashed(_files(report))),
+        "files": list(files),
+    }  # fmt: skip
+
+
+def summary_lines(report: DriveReport, directory: Path) -> list[str]:
+    """For the terminal: parameters with intervals, and what is left, by axis."""
+    lines = [f"drive of {', '.join(report.found.drives)} from {report.sources[0].file.name} -> {directory / REPORT}"]
+    for each in report.comparisons:
+        one = report.found.drives[each.axis]
+        lines.append(f"  axis {each.axis}")
+        for name, found in one.estimates.items():
+            interval = f"{interval_text(found)}" if found.status == "estimated" else found.status
+            lines.append(f"    {name:<10} {value_text(found):>12} {found.unit:<10} {interval}")
+        own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
+        lines.append(f"    left: position {own['position_rms']} rms, torque {own['torque_rms']} rms, while it moves;")
+        lines.append(
+            f"    of every quarter of the motion by a fit to the others: {1e6 * one.predicted[0]:.4g} um, "
+            f"{one.predicted[1]:.4g} N.m"
+        )
+    if MACHINE in report.found.files:
+        lines.append(f"  feedsim replay RECORD --machine {directory} replays records on it")
+    return lines

@@ -1,0 +1,146 @@
+"""The report of a replay: replay.csv, summary.json, report.html and figures, written whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import Figure
+from feedsim.identify import Provenance
+from feedsim.replay.compare import Comparison
+from feedsim.report.content import Report, Section, Table, Tile, tile_value
+from feedsim.report.formatting import typeset
+from feedsim.report.provenance import figures_part, hashed, inputs_part, machine_part, quantity, software
+from feedsim.report.replay.plots import pictures_of
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.sections import figures_footer, figures_section, parameters_section, provenance_section
+from feedsim.report.style import remarked
+from feedsim.scenario import Subject
+from feedsim.trace import Mark, Trace, write_csv
+
+REPLAY = "replay.csv"
+LEADING = {"position_rms": "position error, rms", "torque_rms": "torque error, rms", "share_of_lag": "of the lag"}
+MOST_MARKS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """A replay with what it rests on.
+
+    comparisons: of the axes. subject: the machine. sources: of the records. marks: events of the record, such as NC
+    blocks. settings: option -> value, as the user gave them.
+    """
+
+    comparisons: Sequence[Comparison]
+    subject: Subject
+    sources: Sequence[Provenance]
+    marks: Sequence[Mark]
+    settings: Mapping[str, str]
+    warnings: Sequence[str]
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """Of all axes."""
+        return {name: figure for each in self.comparisons for name, figure in each.figures.items()}
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
+    check_place(directory, (REPLAY, REPORT, SUMMARY), inputs)
+
+
+def write(replayed: Replayed, directory: Path | str) -> tuple[Path, ...]:
+    """Write replay.csv, summary.json, report.html and figures; returns the paths. Raises OutputError."""
+    files: dict[str, Content] = {REPLAY: partial(write_csv, trace=trace_of(replayed.comparisons))}
+    return write_report(directory, report_of(replayed), partial(summary, replayed), files)
+
+
+def trace_of(comparisons: Sequence[Comparison]) -> Trace:
+    """Record and simulation side by side, within the window."""
+    rows = comparisons[0].each.rows
+    columns, units = {}, {}
+    for each in comparisons:
+        columns[f"{each.axis}.x_s"], units[f"{each.axis}.x_s"] = each.each.setpoint[rows], "m"
+        names = {"position": "x_a", "torque": "M_a", "speed setpoint": "n_s"}
+        for name, channel in each.channels.items():
+            for side, values in (("recorded", channel.recorded), ("simulated", channel.simulated)):
+                column = f"{each.axis}.{names[name]}_{side}"
+                columns[column], units[column] = values[rows], channel.unit
+    return Trace(comparisons[0].each.record.time[rows], columns, units)
+
+
+def report_of(replayed: Replayed) -> Report:
+    """Content of the report."""
+    machine = replayed.subject.machine
+    pictures = []
+    with remarked(f"{machine.name}. {machine.note}"):
+        for each in replayed.comparisons:
+            pictures += pictures_of(each, replayed.marks)
+    record = replayed.sources[0].file.name
+    rows = [("Record", record), ("Machine", machine.name)]
+    return Report(
+        f"Replay of {record}",
+        f"{machine.name} · axes {', '.join(each.axis for each in replayed.comparisons)}",
+        warnings=replayed.warnings,
+        notes=[note for note in (*replayed.subject.notes, *(source.note for source in replayed.sources)) if note],
+        tiles=list(_tiles(replayed.figures)),
+        main=[*pictures, figures_section(replayed.figures), _events(replayed), parameters_section(machine)],
+        provenance=provenance_section(rows, hashed(_files(replayed))),
+        footer=figures_footer("Values in full precision: summary.json; time series: replay.csv.", "docs/replay.md"),
+    )
+
+
+def _tiles(figures: Mapping[str, Figure]) -> list[Tile]:
+    found = []
+    for name, figure in figures.items():
+        axis, _, key = name.partition(".")
+        if key in LEADING:
+            found.append(Tile(tile_value(figure), f"{axis}: {LEADING[key]}", typeset(figure.meaning)))
+    return found
+
+
+def _events(replayed: Replayed) -> Section | None:
+    time = replayed.comparisons[0].each.record.time[replayed.comparisons[0].each.rows]
+    rows = [(f"{mark.time:.3f}", mark.text) for mark in replayed.marks if time[0] <= mark.time <= time[-1]]
+    if not rows:
+        return None
+    note = f"The first {MOST_MARKS} of {len(rows)}." if len(rows) > MOST_MARKS else ""
+    return Section("Events in the record", [Table("rp", ("time [s]", "what"), rows[:MOST_MARKS], note)])
+
+
+def _files(replayed: Replayed) -> list[tuple[str, Path]]:
+    found = [("record", source.file) for source in replayed.sources]
+    found += [("mapping", source.mapping) for source in replayed.sources if source.mapping is not None]
+    return [*found, *replayed.subject.files, ("modes", replayed.subject.machine.modes)]
+
+
+def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
+    """Content of summary.json."""
+    each = replayed.comparisons[0].each
+    time = each.record.time[each.rows]
+    return {
+        "kind": "replay",
+        "machine": machine_part(replayed.subject.machine),
+        "settings": dict(replayed.settings),
+        "window": [quantity(float(time[0]), "s"), quantity(float(time[-1]), "s")],
+        "figures": figures_part(replayed.figures),
+        "software": software(),
+        "inputs": inputs_part(hashed(_files(replayed))),
+        "files": list(files),
+    }
+
+
+def summary_lines(replayed: Replayed, directory: Path) -> list[str]:
+    """For the terminal: what is left, by axis."""
+    lines = [f"{replayed.subject.machine.name} on {replayed.sources[0].file.name} -> {directory / REPORT}"]
+    for each in replayed.comparisons:
+        own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
+        text = f"  {each.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
+        text += f" ({own['share_of_lag']} of the lag); torque {own['torque_rms']} rms"
+        if "speed_setpoint_rms" in own:
+            text += f"; speed setpoint {own['speed_setpoint_rms']} rms"
+        lines.append(text)
+    return lines

@@ -1,0 +1,128 @@
+"""Replays from outside: a log of a run on the machine that it was made with, on another one, windows, gaps, faults."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from feedsim.cli import main
+from feedsim.cosim import run
+from feedsim.scenario import load
+from feedsim.trace import Trace, read_csv, write_csv
+
+ROOT = Path(__file__).resolve().parents[2]
+MACHINE = ROOT / "scenarios" / "machines" / "test_centre"
+SCENARIO = f"""
+name: log of Z
+machine: {MACHINE}
+motions:
+  - {{kind: dwell, duration: 0.1 s}}
+  - {{kind: move, by: {{Z: 12 mm}}, feed: 6000 mm/min}}
+  - {{kind: move, by: {{Z: -5 mm}}, feed: 600 mm/min}}
+  - {{kind: dwell, duration: 0.1 s}}
+recording: {{interval: 1 ms}}
+logging: {{interval: 2 ms, axes: [Z], signals: [x_s, x_a, x_e, n_s, n_ffw, M_a]}}
+"""
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What the control of the simulated machine shows of a few moves."""
+    folder = tmp_path_factory.mktemp("log")
+    (folder / "z.yaml").write_text(SCENARIO)
+    found = run(load(folder / "z.yaml")).log
+    assert found is not None
+    write_csv(folder / "log.csv", found)
+    return folder / "log.csv"
+
+
+def replayed(log: Path, out: Path, *more: str) -> dict[str, float]:
+    code = main(["replay", str(log), "--machine", str(MACHINE), "--axes", "Z", "--out", str(out), "--quiet", *more])
+    assert code == 0
+    summary = json.loads((out / "summary.json").read_text())
+    return {name.partition(".")[2]: each["value"] for name, each in summary["figures"].items()}
+
+
+def test_a_log_of_the_machine_itself(log: Path, tmp_path: Path) -> None:
+    """From rest on it is the same run: the setpoints of the log, splined, are those of the run but for rounding."""
+    figures = replayed(log, tmp_path / "out")
+    assert figures["position_rms"] < 1e-3  # um
+    assert figures["torque_rms"] < 1e-4
+    assert figures["torque_delay"] == 0
+    beside = read_csv(tmp_path / "out" / "replay.csv")
+    assert np.max(np.abs(beside["Z.x_a_simulated"] - beside["Z.x_a_recorded"])) < 1e-9
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"report.html", "summary.json", "replay.csv"}
+
+
+def test_a_window_is_the_same_stretch(log: Path, tmp_path: Path) -> None:
+    """What is compared is the window; what the run has gone through ahead of it is as before."""
+    figures = replayed(log, tmp_path / "out", "--window", "0.2 s..0.4 s")
+    assert figures["position_rms"] < 1e-3
+    beside = read_csv(tmp_path / "out" / "replay.csv")
+    assert beside.time[0] == pytest.approx(0.2)
+    assert beside.time[-1] == pytest.approx(0.4)
+
+
+def test_another_machine_shows(log: Path, tmp_path: Path) -> None:
+    """Without feedforward the axis lags by v/K_v: 6 m/min by 25 mm/s; the record does not."""
+    figures = replayed(log, tmp_path / "out", "--set", "axes.Z.drive.k_ffw=0 %")
+    v, K_v = 0.1, 4e3 / 60
+    assert figures["position_largest"] == pytest.approx(1e6 * v / K_v, rel=0.02)
+
+
+def test_a_torque_logged_late_is_told(log: Path, tmp_path: Path) -> None:
+    whole = read_csv(log)
+    late = np.interp(whole.time - 0.7e-3, whole.time, whole["Z.M_a"])
+    columns = {name: whole[name] for name in whole} | {"Z.M_a": late}
+    write_csv(tmp_path / "late.csv", Trace(whole.time, columns, whole.units))
+    figures = replayed(tmp_path / "late.csv", tmp_path / "out")
+    # The log has lost what the torque does between its rows, 2 ms apart.
+    assert figures["torque_delay"] == pytest.approx(0.7, abs=0.1)
+
+
+def test_a_record_that_begins_in_motion(log: Path, tmp_path: Path) -> None:
+    """A run-in leads to its speed; what it leaves is gone after a few time constants of the loops."""
+    whole = read_csv(log)
+    moving = whole.between(0.16, 1.0)
+    write_csv(tmp_path / "cut.csv", moving)
+    assert abs(np.diff(moving["Z.x_s"])[0]) > 1e-6
+    figures = replayed(tmp_path / "cut.csv", tmp_path / "out", "--window", "0.35 s..0.5 s")
+    assert figures["position_rms"] < 2.0  # um; the bed rings at 21 Hz for longer than that
+
+
+def test_gaps_are_not_bridged(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = read_csv(log)
+    keep = (whole.time < 0.25) | (whole.time > 0.3)
+    write_csv(tmp_path / "gap.csv", Trace(whole.time[keep], {n: whole[n][keep] for n in whole}, whole.units))
+    arguments = ["replay", str(tmp_path / "gap.csv"), "--machine", str(MACHINE), "--axes", "Z", "--out"]
+    assert main([*arguments, str(tmp_path / "out"), "--window", "0.2 s..0.4 s"]) == 2
+    assert "no stretch without a gap holds the window 0.2 to 0.4 s; there is 0 to" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert main([*arguments, str(tmp_path / "out"), "--window", "0.05 s..0.2 s"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("left_out", "more", "told"),
+    [
+        ("Z.x_s", [], "no position setpoint is read"),
+        ("Z.x_a", [], "position or speed"),
+        ("", ["--window", "1 s"], "BEGIN..END is needed"),
+        ("", ["--window", "0.3 s..0.2 s"], "not ahead of the end"),
+        ("", ["--axes", "Q"], "no axis"),
+        ("", ["--set=cycles.control=300 us", "--set=cycles.position=300 us", "--set=cycles.interpolation=3 ms"],
+         "no whole multiple of the control cycle"),
+    ],
+)  # fmt: skip
+def test_faults_are_told(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], left_out: str, more: list[str], told: str
+) -> None:
+    whole = read_csv(log)
+    kept = [name for name in whole if name != left_out]
+    write_csv(tmp_path / "some.csv", Trace(whole.time, {n: whole[n] for n in kept}, {n: whole.units[n] for n in kept}))
+    arguments = ["replay", str(tmp_path / "some.csv"), "--machine", str(MACHINE), "--axes", "Z", *more]
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

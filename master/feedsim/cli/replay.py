@@ -127,6 +127,7 @@ def identify_drive(options: Namespace) -> None:
     window = _window(options.window)
     inputs = [options.record, *(file for _, file in (subject.files if subject is not None else ()))]
     name = options.name or options.record.stem
+    cycle = quantity("position-cycle", options.position_cycle, "s", "1 ms") if options.position_cycle else None
     with (
         progress_bar(options.quiet) as progress,
         results_in(directory, report.check_writable(axes), inputs, [*options.overrides, *_given(options)]),
@@ -138,7 +139,7 @@ def identify_drive(options: Namespace) -> None:
             announce(machine, options.fmus)
         found = identify_drives(
             read, records, machine, report.head(options.record, window, date.today().isoformat()), name,
-            report.note(options.record), progress, options.fmus,
+            report.note(options.record), progress, options.fmus, cycle,
         )  # fmt: skip
         sources = [each.provenance for each in read.values()]
         done = report.DriveReport(
@@ -176,6 +177,9 @@ IDENTIFY_DRIVE = Command(
         Option("--machine", "MACHINE-or-SCENARIO",
                "whose structure and friction are known (default: rigid axes, with what the record tells)", type=Path),
         _COLUMNS, _WINDOW,
+        Option("--position-cycle", "VALUE",
+               "cycle of the position loop of rigid axes, e.g. '2 ms' (default: the control cycle, as where the "
+               "drive closes that loop itself)"),
         Option("--name", "NAME", "of the machine that is written (default: name of the record)"),
         out("drive_<name of the record>"),
         settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,

@@ -6,7 +6,7 @@ into the table of the whole run before it is overwritten.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -22,7 +22,7 @@ from feedsim.cosim.signals import held
 from feedsim.cosim.unit import Floats, Log
 from feedsim.errors import InputError
 from feedsim.nc import Program
-from feedsim.scenario import Scenario
+from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.roles import DRIVE, FRICTION
 from feedsim.trace import Table, Trace, matching
 
@@ -44,20 +44,20 @@ def recorded_columns(scenario: Scenario) -> list[str]:
     """
     wanted = scenario.recording.variables
     if wanted is None:
-        return columns_of(scenario)
+        return columns_of(scenario.machine, loaded_inputs(scenario))
     try:
-        return matching(columns_of(scenario, residual=True), wanted)
+        return matching(columns_of(scenario.machine, loaded_inputs(scenario), residual=True), wanted)
     except InputError as error:
         raise InputError(f"{scenario.file}: recording.variables: {error}") from None
 
 
-def columns_of(scenario: Scenario, *, residual: bool = False) -> list[str]:
-    """All columns that can be recorded, in the order of a trace."""
+def columns_of(machine: Machine, loaded: Sequence[str] = (), *, residual: bool = False) -> list[str]:
+    """All columns that can be recorded, in the order of a trace. loaded: the plant's variables at which loads act."""
     found: list[str] = []
-    for name, axis in scenario.machine.axes.items():
+    for name, axis in machine.axes.items():
         shown = (*DRIVE.shown(axis.drive), *FRICTION.shown(axis.friction), *([RESIDUAL] if residual else []))
         found += (f"{name}.{signal}" for signal in (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *shown))
-    return [*found, *TOOL_SIGNALS, *loaded_inputs(scenario)]
+    return [*found, *TOOL_SIGNALS, *loaded]
 
 
 def loaded_inputs(scenario: Scenario) -> list[str]:
@@ -76,7 +76,7 @@ class Recording:
     def __init__(
         self,
         cycle: Cycle,
-        scenario: Scenario,
+        loaded: Sequence[str],
         program: Program,
         cycles: int,
         ratio: int,
@@ -88,6 +88,7 @@ class Recording:
     ) -> None:
         """
         Args:
+            loaded: the plant's variables at which loads act.
             cycles: control cycles of the run; `ratio` of them are a position cycle.
             columns: of the trace to be; the units are asked for nothing else but their limits.
             scratch: folder for the file that holds a long trace.
@@ -100,7 +101,7 @@ class Recording:
         system = cycle.system
         self._axes = system.axes
         self.every, self._ratio, self._T_c = every, ratio, cycle.cycle
-        self._columns = matching(columns_of(scenario, residual=True), columns)
+        self._columns = matching(columns_of(system.machine, loaded, residual=True), columns)
         total = cycles // every + 1
         self._ring = min(total, max(RING, 2 * (REPORTED_EVERY // every + 1)))
         self._table = Table(1 + len(self._columns), total, scratch)
@@ -114,7 +115,7 @@ class Recording:
                     self._setpoints[name] = values[axis]
                     self._units[name] = wiring.SETPOINT_UNITS[setpoint]
         plant = [f"{axis}.{signal}" for axis in system.axes for signal in PLANT_SIGNALS]
-        self._log(wiring.PLANT, {name: name for name in (*plant, *TOOL_SIGNALS, *loaded_inputs(scenario))}, cycle)
+        self._log(wiring.PLANT, {name: name for name in (*plant, *TOOL_SIGNALS, *loaded)}, cycle)
         self.limited: dict[str, int] = {}
         for axis, described in system.machine.axes.items():
             drive, friction = DRIVE.shown(described.drive), FRICTION.shown(described.friction)

@@ -14,7 +14,7 @@ from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.loads import Loads, Work, acting
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
 from feedsim.cosim.loop import Loop, Progress, Setpoints
-from feedsim.cosim.recording import Recording, Sink, recorded_columns
+from feedsim.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
 from feedsim.cosim.schedule import SCHEMES, Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.trust import PoseUse, pose_use
@@ -98,7 +98,7 @@ def run(
     """
     program = program or plan(scenario, scratch=scratch)
     recorded = recorded_columns(scenario)
-    loads = acting(scenario, program)
+    loads, loaded = acting(scenario, program), loaded_inputs(scenario)
     modes = checked_modes(scenario.machine)
     cycles = scenario.machine.cycles
     ratio = round(cycles.T_pos / cycles.T_c)
@@ -108,11 +108,11 @@ def run(
     library, told = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
     with System(scenario.machine, fmus) as system:
         cycle = Cycle(system, SCHEMES[scenario.coupling.scheme], cycles.T_c, scenario.coupling.substeps)
-        recording = Recording(cycle, scenario, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
+        recording = Recording(cycle, loaded, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
         recordings, at_full_rate = [recording], None
         if scenario.logging:
             columns = full_rate_columns(scenario)
-            at_full_rate = Recording(cycle, scenario, program, total, ratio, 1, columns, scratch=scratch)
+            at_full_rate = Recording(cycle, loaded, program, total, ratio, 1, columns, scratch=scratch)
             recordings.append(at_full_rate)
         drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
         # What is recorded of a cycle is the load that acts in it.
@@ -182,10 +182,10 @@ def follow(
     ratio, every = round(cycles.T_pos / cycles.T_c), round(interval / cycles.T_c)
     total = (len(program.time) - 1) * ratio
     fmus = fmus or fmus_directory()
-    library = chosen(native, fmus, fmus_directory())
+    library, _ = chosen(native, fmus, fmus_directory())
     with System(machine, fmus) as system:
         cycle = Cycle(system, SCHEMES[coupling.scheme], cycles.T_c, coupling.substeps)
-        recording = Recording(cycle, program, total, ratio, every, columns)
+        recording = Recording(cycle, (), program, total, ratio, every, columns)
         drives = Setpoints(system, program, ratio)
         loop = Loop(cycle, [*drives.operations, *recording.operations], (), library, (drives, recording))
         system.initialise(program, stop=total * cycles.T_c)

@@ -52,7 +52,6 @@ PRESLIDING, ZONE = 5e-6, 0.06
 # Of the way per row, of the top speed: a regression that leaves more is a start, not an answer.
 EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
 FOLDS = 4
-APART = 2.0  # of the logarithm of the likelihood: nearer cycles of the position loop are as likely as one another
 FAST = 0.1  # of the top speed: what is faster is another kind of motion
 BETTER = 2.0  # of the logarithm of the likelihood: what predicts hardly better is not worth having
 BLOCK = 0.05  # [s]: residuals further apart than that are taken to be independent
@@ -71,8 +70,8 @@ class DriveFound:
             cross-validation says of every part: name -> gain of the logarithm of the likelihood.
         position, torque: rms of what is left [m], [N.m].
         predicted: the same, of every quarter of the motion by a fit to the other three.
-        position_cycles: those that were tried [s] -> how much less likely the record is than with the best
-            (logarithm of the likelihood; 0 is the best).
+        other_cycles: cycle of the position loop [s] -> by how much the record is likelier with it than with the
+            machine's (logarithm of the likelihood).
         runs: of the units.
     """
 
@@ -86,7 +85,7 @@ class DriveFound:
     position: float
     torque: float
     predicted: tuple[float, float]
-    position_cycles: Mapping[float, float]
+    other_cycles: Mapping[float, float]
     runs: int
 
 
@@ -97,7 +96,7 @@ def identify_drive(
     *,
     structure_known: bool,
     start: Mapping[str, float],
-    position_cycles: Sequence[float] = (),
+    other_cycle: float | None = None,
     progress: Progress = lambda what, done, total: None,
     fmus: Path | None = None,
 ) -> DriveFound:
@@ -108,8 +107,7 @@ def identify_drive(
         each: the stretch that is fitted. records: all stretches, for the regression.
         structure_known: the inertia is that of the machine's modes, and the friction has the parts that it has there.
         start: what the record alone says (start.py), in place of the machine's values.
-        position_cycles: cycles of the position loop [s] that are tried, the one to be taken first where several are as
-            likely; none: that of the machine.
+        other_cycle: of the position loop [s], in place of the machine's, that what was found is held against.
 
     Raises:
         InputError: a record without motion; no start that the units can run.
@@ -142,11 +140,6 @@ def identify_drive(
     drive = machine.shipped_drive(each.axis, "the identification of a drive")
     free += ["omega_0", "D"] if drive.reference_model else []
     progress("first fit", 0, 2 + len(BLOCKS))
-    tried = {T_pos: _likely(problem, free, rows, T_pos) for T_pos in position_cycles}
-    if tried:
-        best = max(tried, key=lambda T_pos: tried[T_pos])
-        first = position_cycles[0]
-        problem.machine = _with_cycle(machine, best if tried[best] > tried[first] + APART else first)
     parts: dict[str, float] = {}
     chosen: tuple[str, ...] = ()
     if structure_known:
@@ -173,10 +166,10 @@ def identify_drive(
         problem, result, rows, taps if exact_delay else None, speed if exact_gain else None, structure_known
     )
     position, torque = problem.errors(found)
+    likelier = {} if other_cycle is None else {other_cycle: _likelier(problem, free, found, rows, other_cycle)}
     return DriveFound(
         each.axis, estimates, taps, speed, problem.machine_of(found), parts, chosen,
-        rms(position[rows]), rms(torque[rows]), predicted,
-        {T_pos: likely - max(tried.values()) for T_pos, likely in tried.items()}, problem.runs,
+        rms(position[rows]), rms(torque[rows]), predicted, likelier, problem.runs,
     )  # fmt: skip
 
 
@@ -207,15 +200,20 @@ def _has(values: Mapping[str, float], block: Sequence[str]) -> bool:
     return values[block[0]] != 0
 
 
-def _with_cycle(machine: Machine, T_pos: float) -> Machine:
-    return machine.model_copy(update={"cycles": machine.cycles.model_copy(update={"position": T_pos})})
+def _likelier(problem: Problem, free: Sequence[str], found: Mapping[str, float], rows: Rows, T_pos: float) -> float:
+    """By how much the whole motion is likelier (logarithm) with another cycle of the position loop."""
 
+    def likely(values: Mapping[str, float]) -> float:
+        position, torque = problem.errors(values)
+        return -_independent(problem, len(rows)) * (log(rms(position[rows])) + log(rms(torque[rows])))
 
-def _likely(problem: Problem, free: Sequence[str], rows: Rows, T_pos: float) -> float:
-    """Logarithm of the likelihood of the whole motion with a cycle of the position loop."""
-    problem.machine = _with_cycle(problem.machine, T_pos)
-    position, torque = problem.errors(_first(problem, free, rows))
-    return -_independent(problem, len(rows)) * (log(rms(position[rows])) + log(rms(torque[rows])))
+    own, machine = likely(found), problem.machine
+    cycles = machine.cycles.model_copy(update={"position": T_pos})
+    problem.machine = machine.model_copy(update={"cycles": cycles})
+    try:
+        return likely(problem.fitted(free, found, rows, limit=10).mapping()) - own
+    finally:
+        problem.machine = machine
 
 
 def _independent(problem: Problem, count: int) -> float:

@@ -51,6 +51,7 @@ def identify_drives(
     note: str,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
     fmus: Path | None = None,
+    position_cycle: float | None = None,
 ) -> DrivesFound:
     """Identify the drive of every axis.
 
@@ -58,6 +59,7 @@ def identify_drives(
         read, records: axis -> all of its record, and the stretch that is fitted.
         machine: whose structure and friction are known; None: the axes are taken to be rigid.
         head: comment at the top of the files. name, note: of the machine that is written. fmus: folder of the archives.
+        position_cycle: of rigid axes [s]; None: the control cycle.
 
     Raises InputError: of an axis, what :func:`identify_drive` refuses.
     """
@@ -65,17 +67,19 @@ def identify_drives(
     files: dict[str, str] = {}
     rigid: dict[str, RigidAxis] = {}
     interval = next(iter(records.values())).record.interval
+    # A drive that closes the position loop itself (DSC) does so in its own cycle.
+    position_cycle = position_cycle or control_cycle(interval)
     for axis, each in records.items():
         begin = start_values(each) if machine is None else {}
 
         def tell(what: str, done: int, total: int, axis: str = axis) -> None:
             progress(f"{axis}: {what}", done, total)
 
-        with _begun(machine, name, note, {axis: rigid_axis(each, begin)} if begin else {}, interval) as own:
+        axes = {axis: rigid_axis(each, begin)} if begin else {}
+        with _begun(machine, name, note, axes, interval, position_cycle) as own:
             found[axis] = one = identify_drive(
                 own, each, read[axis].records, structure_known=machine is not None, start=begin,
-                position_cycles=() if machine is not None else (control_cycle(interval), interval), progress=tell,
-                fmus=fmus,
+                other_cycle=_other(position_cycle, interval) if machine is None else None, progress=tell, fmus=fmus,
             )  # fmt: skip
         drive, friction = one.machine.shipped_drive(axis, "a drive file"), friction_of(one, axis)
         if machine is not None:
@@ -87,11 +91,16 @@ def identify_drives(
                 rigid_axis(each, begin), drive=drive, values=values, estimates=one.estimates, head=head
             )  # fmt: skip
     if rigid:
-        files = machine_files(name, note, rigid, interval, max(one.machine.cycles.T_pos for one in found.values()))
+        files = machine_files(name, note, rigid, interval, position_cycle)
     with _folder(files if rigid else {}) as folder:
         made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
         comparisons = [replayed(made[axis], {axis: each}, fmus)[axis] for axis, each in records.items()]
     return DrivesFound(found, comparisons, files)
+
+
+def _other(position_cycle: float, interval: float) -> float:
+    """The other usual cycle of a position loop: of the interpolator in place of the drive's."""
+    return interval if position_cycle < interval else control_cycle(interval)
 
 
 @contextmanager
@@ -105,10 +114,10 @@ def _folder(files: Mapping[str, str]) -> Iterator[Path]:
 
 @contextmanager
 def _begun(
-    known: Machine | None, name: str, note: str, axes: Mapping[str, RigidAxis], interval: float
+    known: Machine | None, name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, cycle: float
 ) -> Iterator[Machine]:
     """The machine that is known, or one of rigid axes, for as long as its files are there."""
-    files = machine_files(name, note, axes, interval, control_cycle(interval)) if known is None else {}
+    files = machine_files(name, note, axes, interval, cycle) if known is None else {}
     with _folder(files) as folder:
         yield known or load_machine(folder)
 

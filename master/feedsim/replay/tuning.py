@@ -31,6 +31,8 @@ USUAL = {
 }  # fmt: skip
 BOUNDS = {"gamma": (1e-3, 1.0), "excess": (0.0, 3.0), "asymmetry": (-0.6, 0.6), "F_log": (0.0, inf),
           "T_sym": (0.0, 0.02), "T_dyn": (0.0, 0.1), "k_ffw": (0.0, 1.5), "delay": (-5e-3, 5e-3)}  # fmt: skip
+# Where a part of the friction law has no effect, or runs away.
+ENDS = {"gamma": (1.0,), "excess": (0.0, 3.0), "asymmetry": (-0.6, 0.6), "F_log": (0.0,)}
 # A tuned speed loop has this damping at least, give or take BARELY of the logarithm.
 DAMPED, BARELY = 0.7, 0.2
 SPAN = 4.0  # usual deviations that a logarithm may be off its start
@@ -125,10 +127,10 @@ class Problem:
         return log(value / start) / usual if name in LOGARITHMIC else (value - start) / usual
 
     def at_end(self, name: str, value: float) -> bool:
-        """Whether a value has run to where the parameter ends."""
+        """Whether a value has run to where it has no effect, or to where it ends."""
         if name in LOGARITHMIC:
             return abs(self.away(name, value)) > 0.95 * SPAN
-        return any(abs(value - end) < 0.01 * self.usual(name) for end in BOUNDS.get(name, ()))
+        return any(abs(value - end) < 0.01 * self.usual(name) for end in ENDS.get(name, ()))
 
     def usual(self, name: str) -> float:
         """Deviation from the start that is usual, of the logarithm or of the value."""

@@ -32,6 +32,9 @@ PARTS = (
 )
 
 
+APART = 2.0  # of the logarithm of the likelihood: below it two cycles are as likely as one another
+
+
 @dataclass(frozen=True, eq=False)
 class DriveReport:
     """What was identified, and what it rests on."""
@@ -68,12 +71,13 @@ class DriveReport:
             if open_ones:
                 told[f"axis {axis}: the record does not determine {', '.join(open_ones)}; their values fit together "
                      "with the rest, and may be others"] = None  # fmt: skip
-            if len(one.position_cycles) > 1:
-                likely = sorted(one.position_cycles.values(), reverse=True)
-                if likely[0] - likely[1] < 2.0:
-                    cycles = " and ".join(f"{1e3 * cycle:g} ms" for cycle in one.position_cycles)
-                    told[f"axis {axis}: position cycles of {cycles} fit alike; "
-                         f"{1e3 * one.machine.cycles.T_pos:g} ms is taken"] = None  # fmt: skip
+            for cycle, likelier in one.other_cycles.items():
+                own = one.machine.cycles.T_pos
+                cycles = f"position cycles of {1e3 * own:g} ms (taken) and {1e3 * cycle:g} ms (--position-cycle)"
+                if likelier > APART:
+                    told[f"axis {axis}: of {cycles} the record speaks for the latter"] = None
+                elif likelier > -APART:
+                    told[f"axis {axis}: {cycles} fit alike"] = None
         return list(told)
 
 

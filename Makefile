@@ -12,7 +12,7 @@ VENV    := .venv
 PY      := $(VENV)/bin/python
 PIP     := $(PY) -m pip --disable-pip-version-check --quiet
 
-UNITS   := plant controller friction setpoint
+UNITS   := plant controller friction setpoint machine
 FMUS    := $(UNITS:%=fmus/%.fmu)
 SCENARIOS := z_positioning xz_circle
 
@@ -77,7 +77,7 @@ ansys: $(VENV)/.ansys ## install the optional reader of ANSYS .full files
 
 # --- the units -----------------------------------------------------------------------------------------------------
 
-fmus: $(FMUS) ## build the four FMUs and the native cycle loop into fmus/
+fmus: $(FMUS) ## build the five FMUs and the native cycle loop into fmus/
 
 PACKAGER := $(wildcard src/packager/feedsim_packager/*.py src/fmi2/terminals/*)
 SHELL_SOURCES := $(wildcard src/fmi2/*.[ch] src/fmi2/standard/*.h)
@@ -103,6 +103,9 @@ fmus/friction.fmu: $(wildcard src/friction_fmu/*.*)
 fmus/controller.fmu: $(wildcard src/controller_fmu/*.*)
 fmus/setpoint.fmu: $(wildcard src/setpoint_fmu/*.* src/setpoint_fmu/resources/*)
 fmus/plant.fmu: $(wildcard src/plant_fmu/*.* src/plant_fmu/resources/*) scenarios/machines/test_centre/modes.csv
+# Its parts are the other units.
+MACHINE_SOURCES := $(foreach unit,$(UNITS),$(wildcard src/$(unit)_fmu/*.* src/$(unit)_fmu/resources/*)) scenarios/machines/test_centre/modes.csv
+fmus/machine.fmu: $(MACHINE_SOURCES)
 # Built aside and copied into fmus/ last: `make fmus` leaves them there while they are newer than their sources, and
 # builds for this machine alone when they are not; `make fmus-all` puts those of all platforms back.
 ALL_FMUS := $(UNITS:%=$(BUILD)/fmus-all/%.fmu)
@@ -115,6 +118,7 @@ $(BUILD)/fmus-all/%.fmu: $(VENV)/.run $(ZIG_HERE) $(PACKAGER) $(SHELL_SOURCES) p
 	$(PY) -m feedsim_packager build $* --platforms all --cc '$(ZIG)' --out $@ --build-dir $(BUILD)/fmus-all
 
 $(foreach unit,$(UNITS),$(eval $(BUILD)/fmus-all/$(unit).fmu: $(wildcard src/$(unit)_fmu/*.* src/$(unit)_fmu/resources/*)))
+$(BUILD)/fmus-all/machine.fmu: $(MACHINE_SOURCES)
 $(BUILD)/fmus-all/plant.fmu: scenarios/machines/test_centre/modes.csv
 
 # Archives carry the reference results of their unit.

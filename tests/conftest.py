@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pint_registry import Registry
 
 ROOT = Path(__file__).resolve().parent.parent
-UNITS = ("plant", "controller", "friction", "setpoint")
+UNITS = ("plant", "controller", "friction", "setpoint", "machine")
 
 # A shell's job in the background ignores Ctrl-C, and so would all that is started here.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

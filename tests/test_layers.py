@@ -54,7 +54,7 @@ SOLE_USERS = {
     "distributed": {"sweep"},
     "dask": {"sweep"},
     "pyarrow": {"sweep"},
-    "feedsim_packager": {"units.py", "structure/pack.py", "ssp/setpoints.py"},
+    "feedsim_packager": {"units.py", "structure/pack.py", "ssp/setpoints.py", "cosim/one_unit.py"},
 }
 
 

@@ -10,32 +10,12 @@
  *
  * Instant k lies at t_k = start + k T_c; k is counted, so that nothing drifts. A step [t, t + H) works the instants in
  * that interval and reads the inputs at each, value + slope (t_k - t). H may be anything. */
-#include <float.h>
 #include <math.h>
 
 #include "drive.h"
+#include "instants.h"
 #include "numbers.h"
 #include "unit.h"
-
-/* An importer's sum of steps runs off the grid: adding 125 us ten million times ends 1.6e-3 cycles late. An instant
- * that lies so little ahead of the end of a step belongs to the next one, as it was meant; reading the inputs a
- * hundredth of a cycle late instead (extrapolated by the slope) is far below a cycle's own effect. In parts of the
- * cycle or of the step, whichever is shorter: an instant at the start of a step is worked in that step, however short.
- * Steps much shorter than a cycle may drift further than that. Then an instant is worked one of them early, still with
- * its inputs run on to t_k; instants are counted, so that none is skipped or worked twice. */
-#define DRIFT 1e-2
-
-/* A clock that runs since t has no finer grain than this [parts of t], a few units in the last place. */
-#define GRAIN (16 * DBL_EPSILON)
-
-/* More instants in one step are taken for a mistake: the unit would not come back for minutes. */
-#define MOST_INSTANTS 1e9
-
-/* Instants are counted up to here, where doubles can still tell them apart; 285 years of the shortest cycle. */
-#define MOST_COUNTED ((int64_t)1 << 53)
-
-/* An end of a step so close to the end of a cycle [T_c] is the end of the cycle. */
-#define ROUNDING 1e-6
 
 typedef struct State {
     DriveState drive;
@@ -162,7 +142,7 @@ static bool accepts(Unit *unit, const Scalars *scalars, const void *state, size_
         const char *name;
         int64_t value, end;
     } counts[] = {
-        {"sample instant", x->instant, MOST_COUNTED},
+        {"sample instant", x->instant, INSTANTS_COUNTED},
         {"cycle within T_pos", x->tick, p.ticks},
         {"place in the delay line of x_s", x->position.x_newest, p.position.x_delay.length},
         {"place in the delay line of n_ffw", x->position.n_newest, p.position.n_delay.length},
@@ -213,13 +193,6 @@ static void start(Unit *unit) {
     v->x_e = v->x_s - v->x_a;
 }
 
-/* How far ahead of the end of a step from t to t + h an instant belongs to the next step [s]. */
-static double margin(double t, double h, double T_c) {
-    const double part = DRIFT * (T_c < h ? T_c : h), grain = GRAIN * (fabs(t) + h);
-    const double drift = part > grain ? part : grain;
-    return drift < 0.5 * h ? drift : 0.5 * h; /* steps of a few grains */
-}
-
 /* Inputs `since` the start of the step [s]. */
 static DriveInputs inputs_at(Unit *unit, double since) {
     const Scalars *v = unit_scalars(unit);
@@ -249,15 +222,15 @@ static bool step(Unit *unit, double t, double h) {
     const double start_time = unit_start_time(unit);
     const double end = t + h;
     double t_k = start_time + (double)x->instant * p->T_c;
-    if (end - t_k > MOST_INSTANTS * p->T_c) {
+    if (end - t_k > INSTANTS_MOST * p->T_c) {
         char text[3][NUMBER_TEXT_SIZE];
         return unit_fail(unit,
                          "the step would hold %s sample instants, T_c = %s s apart; allowed are at most %.0e, which is "
                          "a step of %s s",
-                         number_text(text[0], ceil((end - t_k) / p->T_c)), number_text(text[1], p->T_c), MOST_INSTANTS,
-                         number_text(text[2], MOST_INSTANTS * p->T_c));
+                         number_text(text[0], ceil((end - t_k) / p->T_c)), number_text(text[1], p->T_c), INSTANTS_MOST,
+                         number_text(text[2], INSTANTS_MOST * p->T_c));
     }
-    const double last = end - margin(t, h, p->T_c);
+    const double last = end - instants_margin(t, h, p->T_c);
     while (t_k < last) {
         const DriveInputs in = inputs_at(unit, t_k - t);
         drive_instant(p, x, state->lines, &in);
@@ -267,7 +240,7 @@ static bool step(Unit *unit, double t, double h) {
     if (x->instant > 0) {
         const double ahead = t_k - end; /* of the cycle, what lies behind the end of the step [s] */
         show_instant(v, x);
-        show_cycle(v, x, ahead < ROUNDING * p->T_c ? 1.0 : fmax(1.0 - ahead / p->T_c, 0.0));
+        show_cycle(v, x, instants_share(ahead, p->T_c));
     }
     return true;
 }

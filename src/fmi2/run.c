@@ -30,6 +30,10 @@ bool run_derived_for(const Unit *unit, const unsigned char *block) {
     return unit->derived_valid && !parameters_differ(unit, block);
 }
 
+bool unit_derived_for(const Unit *unit, const Scalars *scalars) {
+    return run_derived_for(unit, (const unsigned char *)scalars - SCALARS_AT);
+}
+
 bool run_derive(Unit *unit, bool may_resize) {
     if (unit->derived_valid && !(unit->parameters_touched && parameters_differ(unit, unit->block))) {
         unit->parameters_touched = false;

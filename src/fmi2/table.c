@@ -17,7 +17,7 @@
     ROW(Scalars, kind, field, name, causality, variability, start, start_text, unit, min, min_text, max, max_text)
 #define AXIS_VARIABLE(...)
 const VariableInfo table_scalars[SCALAR_ROWS + 1] = {
-#include "variables.def"
+#include UNIT_TABLE
     CLOSING_ROW};
 #undef VARIABLE
 #undef AXIS_VARIABLE
@@ -27,7 +27,7 @@ const VariableInfo table_scalars[SCALAR_ROWS + 1] = {
                       max_text, depends, text)                                                                         \
     ROW(AxisBlock, kind, field, name, causality, variability, start, start_text, unit, min, min_text, max, max_text)
 const VariableInfo table_axis[AXIS_ROWS + 1] = {
-#include "variables.def"
+#include UNIT_TABLE
     CLOSING_ROW};
 #undef VARIABLE
 #undef AXIS_VARIABLE

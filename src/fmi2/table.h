@@ -31,27 +31,36 @@
 #define NO_MIN (-INFINITY)
 #define NO_MAX (INFINITY)
 
+/* A unit that holds others as its parts includes their tables in its own, with these two defined anew meanwhile. */
+#define SCALAR_ROW(...) VARIABLE(__VA_ARGS__)
+#define AXIS_ROW(...) AXIS_VARIABLE(__VA_ARGS__)
+
+/* A unit's own table; of a part of another unit, the name under which it lies there. */
+#ifndef UNIT_TABLE
+#define UNIT_TABLE "variables.def"
+#endif
+
 /* Forwarders: VARIABLE(kind, field, name, causality, variability, start, start text, unit, display unit,
  *                      min, min text, max, max text, depends, description) */
 #define REAL(s, c, v, start, unit, display, min, max, depends, text)                                                   \
-    VARIABLE(REAL, s, #s, c, v, start, #start, unit, display, min, #min, max, #max, depends, text)
+    SCALAR_ROW(REAL, s, #s, c, v, start, #start, unit, display, min, #min, max, #max, depends, text)
 #define REAL_OF(g, s, c, v, start, unit, display, min, max, depends, text)                                             \
-    VARIABLE(REAL, g##_##s, #g "." #s, c, v, start, #start, unit, display, min, #min, max, #max, depends, text)
+    SCALAR_ROW(REAL, g##_##s, #g "." #s, c, v, start, #start, unit, display, min, #min, max, #max, depends, text)
 #define INTEGER(s, c, v, start, min, max, depends, text)                                                               \
-    VARIABLE(INTEGER, s, #s, c, v, start, #start, "", "", min, #min, max, #max, depends, text)
+    SCALAR_ROW(INTEGER, s, #s, c, v, start, #start, "", "", min, #min, max, #max, depends, text)
 #define INTEGER_OF(g, s, c, v, start, min, max, depends, text)                                                         \
-    VARIABLE(INTEGER, g##_##s, #g "." #s, c, v, start, #start, "", "", min, #min, max, #max, depends, text)
+    SCALAR_ROW(INTEGER, g##_##s, #g "." #s, c, v, start, #start, "", "", min, #min, max, #max, depends, text)
 #define BOOLEAN(s, c, v, start, depends, text)                                                                         \
-    VARIABLE(BOOLEAN, s, #s, c, v, start, #start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", depends, text)
+    SCALAR_ROW(BOOLEAN, s, #s, c, v, start, #start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", depends, text)
 #define BOOLEAN_OF(g, s, c, v, start, depends, text)                                                                   \
-    VARIABLE(BOOLEAN, g##_##s, #g "." #s, c, v, start, #start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", depends,    \
-             text)
+    SCALAR_ROW(BOOLEAN, g##_##s, #g "." #s, c, v, start, #start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", depends,  \
+               text)
 #define STRING(s, c, v, start, text)                                                                                   \
-    VARIABLE(STRING, s, #s, c, v, 0, start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", "", text)
+    SCALAR_ROW(STRING, s, #s, c, v, 0, start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", "", text)
 #define AXIS_REAL(s, c, v, start, unit, display, min, max, depends, text)                                              \
-    AXIS_VARIABLE(REAL, s, #s, c, v, start, #start, unit, display, min, #min, max, #max, depends, text)
+    AXIS_ROW(REAL, s, #s, c, v, start, #start, unit, display, min, #min, max, #max, depends, text)
 #define AXIS_BOOLEAN(s, c, v, start, depends, text)                                                                    \
-    AXIS_VARIABLE(BOOLEAN, s, #s, c, v, start, #start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", depends, text)
+    AXIS_ROW(BOOLEAN, s, #s, c, v, start, #start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", depends, text)
 
 typedef double FIELD_REAL;
 typedef int FIELD_INTEGER;
@@ -62,7 +71,7 @@ typedef char FIELD_STRING[STRING_SIZE];
 #define VARIABLE(kind, field, ...) FIELD_##kind field;
 #define AXIS_VARIABLE(...)
 typedef struct Scalars {
-#include "variables.def"
+#include UNIT_TABLE
 } Scalars;
 #undef VARIABLE
 #undef AXIS_VARIABLE
@@ -71,7 +80,7 @@ typedef struct Scalars {
 #define VARIABLE(...)
 #define AXIS_VARIABLE(kind, field, ...) FIELD_##kind field;
 typedef struct AxisBlock {
-#include "variables.def"
+#include UNIT_TABLE
     char placeholder;
 } AxisBlock;
 #undef VARIABLE
@@ -81,7 +90,7 @@ typedef struct AxisBlock {
 #define VARIABLE(kind, field, ...) VR_##field,
 #define AXIS_VARIABLE(...)
 enum {
-#include "variables.def"
+#include UNIT_TABLE
     SCALAR_ROWS
 };
 #undef VARIABLE
@@ -90,7 +99,7 @@ enum {
 #define VARIABLE(...)
 #define AXIS_VARIABLE(kind, field, ...) AXIS_VR_##field,
 enum {
-#include "variables.def"
+#include UNIT_TABLE
     AXIS_ROWS
 };
 #undef VARIABLE

@@ -213,6 +213,11 @@ AxisBlock *unit_axis(Unit *unit, size_t axis) {
     return (AxisBlock *)(void *)(unit->block + AXES_AT) + axis;
 }
 
+const AxisBlock *unit_axis_behind(const Scalars *scalars, size_t axis) {
+    const unsigned char *axes = (const unsigned char *)scalars + (AXES_AT - SCALARS_AT);
+    return (const AxisBlock *)(const void *)axes + axis;
+}
+
 size_t unit_axes(const Unit *unit) {
     return unit->axes;
 }

@@ -44,6 +44,15 @@ const char *unit_resource_hash(const Unit *unit);
 /* load() tells the shell which axes there are; names are copied. false (with a logged error) when memory is short. */
 bool unit_set_axes(Unit *unit, size_t count, const char *const *names);
 
+/* load() gives the parameter of that name the start value `value` spells, within its range; false with the reason
+ * logged. Behind unit_set_axes(), which begins anew. */
+bool unit_set_start(Unit *unit, const char *name, const char *value);
+
+/* The block of an axis that lies behind `scalars`: those of accepts() as well. */
+const AxisBlock *unit_axis_behind(const Scalars *scalars, size_t axis);
+/* accepts(): whether the derived data of now belongs to the parameters among `scalars` and behind them. */
+bool unit_derived_for(const Unit *unit, const Scalars *scalars);
+
 /* To be called in step(), where it leaves the late outputs (see Model) for when they are asked for. */
 void unit_leave_late(Unit *unit);
 

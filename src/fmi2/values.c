@@ -211,6 +211,46 @@ bool values_set_string(Unit *unit, size_t count, const fmi2ValueReference refere
     return true;
 }
 
+/* --- start values from the model's own files */
+
+static const Variable *named(const Unit *unit, const char *name) {
+    for (size_t i = 0; i < SCALAR_ROWS; i++)
+        if (strcmp(unit->variables[i].info->name, name) == 0)
+            return &unit->variables[i];
+    for (size_t axis = 0; axis < unit->axes; axis++) {
+        const size_t length = strlen(unit->axis_names[axis]);
+        if (strncmp(name, unit->axis_names[axis], length) != 0 || name[length] != '.')
+            continue;
+        const Variable *rows = unit->variables + SCALAR_ROWS + axis * (size_t)AXIS_ROWS;
+        for (size_t row = 0; row < AXIS_ROWS; row++)
+            if (strcmp(rows[row].info->name, name + length + 1) == 0)
+                return &rows[row];
+    }
+    return NULL;
+}
+
+bool unit_set_start(Unit *unit, const char *name, const char *value) {
+    const Variable *variable = named(unit, name);
+    if (variable == NULL || variable->info->causality != CAUSALITY_parameter || variable->info->kind == KIND_STRING)
+        return unit_fail(unit, "'%s' is no parameter of this unit that a number can be the value of", name);
+    const Kind kind = variable->info->kind;
+    double number = 0;
+    const char *end = value;
+    if (!number_parse(value, &end, &number) || *end != '\0' || (kind == KIND_BOOLEAN && number != 0 && number != 1) ||
+        (kind == KIND_INTEGER && number != floor(number)))
+        return unit_fail(unit, "the value of parameter '%s' is '%s', which is no %s", name, value,
+                         kind == KIND_REAL      ? "number with a decimal point"
+                         : kind == KIND_INTEGER ? "whole number"
+                                                : "0 or 1");
+    if (!in_range(unit, variable, number))
+        return false;
+    if (kind == KIND_REAL)
+        *(double *)unit_address(unit, variable) = number;
+    else
+        *(int *)unit_address(unit, variable) = (int)number;
+    return true;
+}
+
 /* --- check a whole block */
 
 static bool real_sound(Unit *unit, const Variable *variable, double value, bool results) {

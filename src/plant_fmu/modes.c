@@ -15,18 +15,18 @@
 static const char *const directions[TOOL_DIRECTIONS] = {"X", "Y", "Z"};
 
 /* What is read, and where complaints go. */
-typedef struct Reader {
+typedef struct ModesReader {
     const char *source;
     size_t axes, width;
     const char *const *axis_names;
     char *message;
     size_t message_size;
-} Reader;
+} ModesReader;
 
 #ifdef __GNUC__
 __attribute__((format(printf, 3, 4)))
 #endif
-static bool modes_fail(const Reader *reader, unsigned line, const char *format, ...) {
+static bool modes_fail(const ModesReader *reader, unsigned line, const char *format, ...) {
     const int length = line > 0 ? snprintf(reader->message, reader->message_size, "%s, line %u: ", reader->source, line)
                                 : snprintf(reader->message, reader->message_size, "%s: ", reader->source);
     if (length >= 0 && (size_t)length < reader->message_size) {
@@ -52,7 +52,7 @@ size_t modes_capacity(const char *text, size_t size) {
 
 /* Header of a column of values; the column behind the last stands for the mode's number, which is read for form only.
  */
-static const char *modes_header(const Reader *reader, size_t column, char header[HEADER_SIZE]) {
+static const char *modes_header(const ModesReader *reader, size_t column, char header[HEADER_SIZE]) {
     const size_t axes = reader->axes;
     if (column == MODES_FREQUENCY) {
         snprintf(header, HEADER_SIZE, "frequency [Hz]");
@@ -71,7 +71,7 @@ static const char *modes_header(const Reader *reader, size_t column, char header
 }
 
 /* Column that a header cell names; beyond width: none. */
-static size_t modes_column(const Reader *reader, CsvCell cell) {
+static size_t modes_column(const ModesReader *reader, CsvCell cell) {
     char header[HEADER_SIZE];
     size_t column = 0;
     while (column <= reader->width && !csv_equal(cell, modes_header(reader, column, header))) {
@@ -80,7 +80,7 @@ static size_t modes_column(const Reader *reader, CsvCell cell) {
     return column;
 }
 
-static bool modes_fail_unknown(const Reader *reader, unsigned line, CsvCell cell) {
+static bool modes_fail_unknown(const ModesReader *reader, unsigned line, CsvCell cell) {
     if (cell.length > 2 && (strncmp(cell.text, "n_", 2) == 0 || strncmp(cell.text, "x_", 2) == 0)) {
         char names[200] = "";
         size_t length = 0;
@@ -98,7 +98,7 @@ static bool modes_fail_unknown(const Reader *reader, unsigned line, CsvCell cell
         modes_shown(cell), cell.text);
 }
 
-static bool modes_check_header(const Reader *reader, unsigned line, CsvRow header) {
+static bool modes_check_header(const ModesReader *reader, unsigned line, CsvRow header) {
     CsvRow row = header;
     CsvCell cell;
     while (csv_next_cell(&row, &cell)) {
@@ -120,7 +120,7 @@ static bool modes_check_header(const Reader *reader, unsigned line, CsvRow heade
     return true;
 }
 
-static bool modes_read_row(const Reader *reader, unsigned line, CsvRow header, CsvRow row, double *values) {
+static bool modes_read_row(const ModesReader *reader, unsigned line, CsvRow header, CsvRow row, double *values) {
     const size_t expected = csv_cells(header), found = csv_cells(row);
     if (found != expected) {
         return modes_fail(reader, line, "the row has %lu cells, the header has %lu", (unsigned long)found,
@@ -153,7 +153,7 @@ static bool modes_read_row(const Reader *reader, unsigned line, CsvRow header, C
 
 /* Every axis needs a rotor that turns and a scale that moves; a direction in which the tool stands still is legitimate.
  */
-static bool modes_check_ports(const Reader *reader, const double *values, size_t modes) {
+static bool modes_check_ports(const ModesReader *reader, const double *values, size_t modes) {
     for (size_t column = MODES_SHAPES; column < reader->width; column++) {
         bool moves = column >= MODES_SHAPES + reader->axes && column < MODES_SHAPES + reader->axes + TOOL_DIRECTIONS;
         for (size_t mode = 0; mode < modes; mode++) {
@@ -170,7 +170,7 @@ static bool modes_check_ports(const Reader *reader, const double *values, size_t
 
 bool modes_read(const char *text, size_t size, const char *source, size_t axes, const char *const *axis_names,
                 double *values, size_t *modes, char *message, size_t message_size) {
-    const Reader reader = {source, axes, modes_width(axes), axis_names, message, message_size};
+    const ModesReader reader = {source, axes, modes_width(axes), axis_names, message, message_size};
     Csv csv = csv_open(text, size);
     CsvRow header, row;
     if (!csv_next_row(&csv, &header)) {

@@ -27,7 +27,7 @@ def test_they_are_those_of_the_initial_values(archive: Archive) -> None:
     rng = np.random.default_rng(zlib.crc32(archive.unit.encode()))
     slave = instantiate(archive)
     try:
-        initialize(slave)
+        initialize(slave, archive)
         point = rng.uniform(-1.0, 1.0, len(known))
         reacting = set()
         for column, name in enumerate(inputs):
@@ -47,6 +47,7 @@ def test_they_are_those_of_the_initial_values(archive: Archive) -> None:
             "friction": {("M_fr", "n_fr")},
             "plant": set(),
             "setpoint": set(),
+            "machine": {(f"{axis}.x_e", f"{axis}.x_s") for axis in "XYZ"},
         }
         assert reacting == expected[archive.unit]
         both = slave.getDirectionalDerivative(unknown, known, list(point))
@@ -55,7 +56,7 @@ def test_they_are_those_of_the_initial_values(archive: Archive) -> None:
 
         # Once initialised, what the controller shows belongs to its sample instants.
         slave.exitInitializationMode()
-        if archive.unit == "controller":
+        if archive.unit in ("controller", "machine"):
             assert not any(_partials(slave, unknown, one).any() for one in known)
     finally:
         slave.freeInstance()

@@ -103,7 +103,7 @@ def test_relative_locations_are_those_of_the_current_folder(archive: Archive, tm
 @apart
 def test_places_that_are_none(archive: Archive, tmp_path: Path) -> None:
     """A unit that needs its resources says which file it misses and where; the others do not mind."""
-    needs = archive.unit in ("plant", "setpoint")
+    needs = archive.unit in ("plant", "setpoint", "machine")
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").write_text("no folder\n")
     for place in ("nowhere at all", "empty", "file", "x" * 1000):

@@ -204,10 +204,10 @@ def test_the_setpoint_plays_its_rows(setpoint: Archive, h: float, start: float) 
 @pytest.mark.parametrize("start", [1000.0, 1e6, -7.25])
 @pytest.mark.parametrize("h", [T_C, 130.7e-6])
 def test_a_start_elsewhere_gives_the_same_results(archive: Archive, start: float, h: float) -> None:
-    """To the last bit; but where the controller's instants lie within steps, it reads and shows what is linear in t,
+    """To the last bit; but where a drive's instants lie within steps, it reads and shows what is linear in t,
     and t is rounded to 2^-53 of itself."""
     here, there = (np.array([values for _, values in run(archive, h, each)]) for each in (0.0, start))
-    if archive.unit != "controller" or h == T_C:
+    if archive.unit not in ("controller", "machine") or h == T_C:
         assert np.array_equal(here, there)
         return
     rounding = 2 * np.spacing(abs(start) + END)  # of t_k and of t + h, by which inputs are read and outputs shown

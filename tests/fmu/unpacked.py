@@ -14,7 +14,7 @@ from fmpy.fmi2 import FMU2Slave
 from feedsim_packager import compile
 
 ROOT = Path(__file__).resolve().parents[2]
-UNITS = ("plant", "controller", "friction", "setpoint")
+UNITS = ("plant", "controller", "friction", "setpoint", "machine")
 PLATFORM = compile.host_target()
 
 
@@ -64,10 +64,13 @@ def instantiate(archive: Archive, folder: Path | None = None, guid: str | None =
     return slave
 
 
-def initialize(slave: FMU2Slave) -> None:
-    """Into initialisation mode: the standard lets values be read from there on."""
+def initialize(slave: FMU2Slave, archive: Archive | None = None) -> None:
+    """Into initialisation mode: the standard lets values be read from there on. Of an archive with a motion inside, with
+    its inputs in use."""
     slave.setupExperiment(startTime=0.0)
     slave.enterInitializationMode()
+    if archive and (switch := archive.variables().get("motion.built_in")) is not None:
+        slave.setBoolean([int(switch.attrib["valueReference"])], [False])
 
 
 MACROS = {  # columns of each row macro in table.h
@@ -79,11 +82,49 @@ MACROS = {  # columns of each row macro in table.h
 
 
 def declared(unit: str) -> Iterator[dict[str, str]]:
+    """Rows of a unit's table."""
+    return _machine() if unit == "machine" else _own(unit)
+
+
+INSIDE = ("x_a", "n_a", "M_a", "M_fr", "n_fr")  # what the parts of the machine exchange
+
+
+def _machine() -> Iterator[dict[str, str]]:
+    """The machine's own rows and, by the rules that its README tells, those of its parts."""
+    rows = list(_own("machine"))
+    assert not any(row["axis"] for row in rows)
+    yield from rows
+    drive = [row | {"axis": "AXIS_"} for row in _own("controller")]
+    friction = [row | {"axis": "AXIS_"} for row in _own("friction")]
+    plant, motion = list(_own("plant")), list(_own("setpoint"))
+    yield from (_part("motion", row, held=True) for row in motion if not row["axis"])
+    yield from (row | {"depends": ""} for row in plant if not row["axis"])
+    yield from (
+        _part("plant", row) if row["causality"] == "input" and row["name"] in INSIDE else row
+        for row in plant
+        if row["axis"]
+    )
+    yield from (row for row in drive if row["causality"] == "input" and row["name"] not in INSIDE)
+    yield from (_part("drive", row) for row in drive)
+    yield from (_part("friction", row) for row in friction)
+    yield from (_part("motion", row, held=True) for row in motion if row["axis"])
+
+
+def _part(part: str, row: dict[str, str], held: bool = False) -> dict[str, str]:
+    """A part's row: outputs keep their names, unless they are `held` back; inputs are locals."""
+    depends = {"depends": "(x_s)" if row["name"] == "x_e" else ""}
+    if row["causality"] == "output" and not held:
+        return row | depends
+    named = row | depends | {"name": f"{part}.{row['name']}"}
+    return named if row["causality"] == "parameter" else named | {"causality": "local", "start": "0"}
+
+
+def _own(unit: str) -> Iterator[dict[str, str]]:
     """Rows of variables.def by a parser of our own: one row a line, comma-separated, quotes as in CSV."""
     for line in (ROOT / "src" / f"{unit}_fmu" / "variables.def").read_text(encoding="utf-8").splitlines():
         match = re.fullmatch(r"(AXIS_)?(REAL|INTEGER|BOOLEAN|STRING)(_OF)?\((.*)\)", line)
         if match is None:
-            assert re.match(r"\s*(/?\*.*)?$", line), f"line not understood: {line}"
+            assert re.match(r"\s*(/?\*.*)?$|#", line), f"line not understood: {line}"
             continue
         fields = next(csv.reader([match[4]], skipinitialspace=True))
         if match[3]:
@@ -99,6 +140,7 @@ def declared(unit: str) -> Iterator[dict[str, str]]:
 RESOURCES = {
     "plant": ("axes.csv", "modes.csv", "poses.bin"),
     "setpoint": ("setpoints.csv",),
+    "machine": ("settings.csv",),  # which holds the hashes of the others
 }  # in the order of the hash
 
 
@@ -113,13 +155,18 @@ def expected_variables(archive: Archive) -> list[dict[str, str]]:
     found = [row for row in rows if not row["axis"]]
     resources = archive.folder / "resources"
     named: list[tuple[str, str]] = []
-    if archive.unit == "plant":
+    given: dict[str, str] = {}
+    if archive.unit == "machine":
+        given = dict(line.split(",") for line in (resources / "settings.csv").read_text("utf-8").splitlines())
+    if archive.unit in ("plant", "machine"):
         named = axes(resources / "axes.csv")
     elif archive.unit == "setpoint":
         header = (resources / "setpoints.csv").read_text(encoding="utf-8").splitlines()[0]
         named = [(axis, "") for axis in re.findall(r",(\w+)\.x_s \[m\]", header)]
+    found = [row | {"start": given.get(row["name"], row["start"])} for row in found]
     for axis, x_0 in named:
         for row in (row for row in rows if row["axis"]):
-            start = x_0 if row["name"] == "x_0" else row["start"]
-            found.append(row | {"name": f"{axis}.{row['name']}", "start": start})
+            name = f"{axis}.{row['name']}"
+            start = x_0 if row["name"] == "x_0" else given.get(name, row["start"])
+            found.append(row | {"name": name, "start": start})
     return found

@@ -19,7 +19,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from feedsim.cli import circle, compare, compensate, example, files, frf, identify, machine, replay, run, sweep
+from feedsim.cli import circle, compare, compensate, example, files, frf, identify, machine, pack, replay, run, sweep
 from feedsim.cli.terminal import prepare_streams
 from feedsim.owned import remove_orphans
 
@@ -42,6 +42,7 @@ examples:
   feedsim replay capture.json --machine results/my_machine
   feedsim compensate scenarios/xz_circle.yaml
   feedsim circle ballbar.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
+  feedsim pack scenarios/xz_circle.yaml --out machine.fmu
   feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
   feedsim run xz_circle.ssp
   feedsim sweep scenarios/studies/friction_wear.yaml
@@ -51,8 +52,8 @@ examples:
 
 COMMANDS = (
     example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, replay.IDENTIFY_DRIVE,
-    replay.REPLAY, compensate.COMMAND, circle.COMMAND, run.SSP, sweep.COMMAND, compare.COMMAND, files.SCHEMA,
-    files.CONVERT,
+    replay.REPLAY, compensate.COMMAND, circle.COMMAND, pack.COMMAND, run.SSP, sweep.COMMAND, compare.COMMAND,
+    files.SCHEMA, files.CONVERT,
 )  # fmt: skip
 
 

@@ -153,6 +153,7 @@ class Subject:
         settings: what the scenario itself sets, as KEY=VALUE.
         overrides: what was set from outside, as KEY=VALUE.
         files: what was read, each with what it is.
+        scenario: None where a machine was named.
     """
 
     machine: Machine
@@ -163,6 +164,7 @@ class Subject:
     settings: tuple[str, ...]
     overrides: tuple[str, ...]
     files: tuple[tuple[str, Path], ...]
+    scenario: Scenario | None = None
 
 
 def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
@@ -172,6 +174,7 @@ def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
     """
     path = Path(path)
     settings: tuple[str, ...]
+    scenario = None
     if path.is_dir() or _is_machine(path):
         machine = load_machine(path, overrides)
         file = path / Machine.IN_FOLDER if path.is_dir() else path
@@ -183,7 +186,8 @@ def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
         files = tuple((place or "scenario", named) for place, named in scenario.files)
         name, kind, notes, settings = scenario.name, "scenario", [machine.note, scenario.note], scenario.settings
     kept = tuple(note for note in notes if note)
-    return Subject(machine, kind, name, file, kept, settings, tuple(overrides), (*files, ("modes", machine.modes)))
+    files = (*files, ("modes", machine.modes))
+    return Subject(machine, kind, name, file, kept, settings, tuple(overrides), files, scenario)
 
 
 def _is_machine(path: Path) -> bool:

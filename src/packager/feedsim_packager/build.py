@@ -16,6 +16,7 @@ from . import (
     compile,
     description,
     documentation,
+    flat,
     kinds,
     reference,
     table,
@@ -149,7 +150,7 @@ def _sources(unit: str, directory: Path, given: Resources | None) -> dict[str, b
             found[path.name] = path
     if problems:
         raise InputError(f"{directory}: file names must differ, as the archive's sources folder is flat", problems)
-    files = {name: path.read_bytes() for name, path in found.items() if path.parent != STANDARD}
+    files = {name: flat.content(path) for name, path in found.items() if path.parent != STANDARD}
     if given:
         files[EMBEDDED] = given.embedded_source()
     listed = [name for name in files if name.endswith(".c")]

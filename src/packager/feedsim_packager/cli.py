@@ -23,6 +23,8 @@ exit codes:
   4  the archive cannot be written
 """
 
+_UNIT_HELP = "plant, controller, friction, setpoint, machine, or a unit's folder"
+
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
@@ -36,9 +38,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_resources(common)
     common.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
     packing = commands.add_parser("build", parents=[common], help="compile and pack units")
-    packing.add_argument(
-        "unit", nargs="+", metavar="UNIT", help="plant, controller, friction, setpoint, or a unit's folder"
-    )
+    packing.add_argument("unit", nargs="+", metavar="UNIT", help=_UNIT_HELP)
     packing.add_argument("--out", type=Path, help="archive to write (default: fmus/UNIT.fmu); for one UNIT")
     packing.add_argument(
         "--platforms",
@@ -47,7 +47,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     packing.add_argument("--build-dir", type=Path, help="keep staged sources and library in this folder")
     describing = commands.add_parser("describe", parents=[common], help="print modelDescription.xml")
-    describing.add_argument("unit", metavar="UNIT", help="plant, controller, friction, setpoint, or a unit's folder")
+    describing.add_argument("unit", metavar="UNIT", help=_UNIT_HELP)
     declaring = commands.add_parser("variables", help="write the tables of all units as one JSON file")
     declaring.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
     declaring.add_argument("--out", type=Path, required=True, help="file to write")
@@ -63,11 +63,15 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_resources(parser: argparse.ArgumentParser) -> None:
+    takers: dict[str, list[str]] = {}
     for kind_name, kind in kinds.KINDS.items():
-        for name, option in kind.options.items():
-            parser.add_argument(
-                f"--{name}", type=Path, help=f"{option.help}; only for a unit with resources of the kind '{kind_name}'"
-            )
+        for name in kind.options:
+            takers.setdefault(name, []).append(kind_name)
+    for name, kind_names in takers.items():
+        option, named = kinds.KINDS[kind_names[0]].options[name], " or ".join(f"'{each}'" for each in kind_names)
+        parser.add_argument(
+            f"--{name}", type=Path, help=f"{option.help}; only for a unit with resources of the kind {named}"
+        )
     parser.add_argument("--name", default="", help="name of the machine or motion, for description and documentation")
     parser.add_argument("--note", default="", help="a remark that goes with the name")
 

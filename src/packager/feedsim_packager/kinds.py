@@ -7,10 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import machine_tables, setpoints
-from .checkout import DEFAULT_MODES
+from . import machine_tables, setpoints, whole_machine
+from .checkout import DEFAULT_MODES, SOURCES
 from .errors import InputError
 from .resources import File, Resources
+
+# What the units whose parts a machine has are built with.
+_DEFAULT_AXES = SOURCES / "plant_fmu" / "resources" / "axes.csv"
+_DEFAULT_SETPOINTS = SOURCES / "setpoint_fmu" / "resources" / "setpoints.csv"
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,13 @@ def _read_setpoints(files: Mapping[str, Path]) -> Resources:
     return setpoints.check(File.at(files["setpoints"]))
 
 
+def _read_whole_machine(files: Mapping[str, Path]) -> Resources:
+    motion = setpoints.check(File.at(files["setpoints"])) if "setpoints" in files else None
+    return whole_machine.check(
+        machine_tables.read(files["axes"], files["modes"], files.get("poses")), File.at(files["settings"]), motion
+    )
+
+
 KINDS: Mapping[str, Kind] = {
     "machine": Kind(
         {
@@ -53,6 +64,20 @@ KINDS: Mapping[str, Kind] = {
             "setpoints": Option("setpoints.csv of the motion", True, lambda unit: unit / "resources" / "setpoints.csv"),
         },
         _read_setpoints,
+    ),
+    "whole_machine": Kind(
+        {
+            "axes": Option("axes.csv of the machine", True, lambda unit: _DEFAULT_AXES),
+            "modes": Option("modes.csv of the machine", True, lambda unit: DEFAULT_MODES),
+            "poses": Option("poses.bin of the machine: modes of a grid of poses", False, lambda unit: None),
+            "settings": Option(
+                "settings.csv of the machine: start values of its parameters",
+                True,
+                lambda unit: unit / "resources" / "settings.csv",
+            ),
+            "setpoints": Option("setpoints.csv of the motion inside", False, lambda unit: _DEFAULT_SETPOINTS),
+        },
+        _read_whole_machine,
     ),
 }
 

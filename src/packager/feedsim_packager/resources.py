@@ -66,6 +66,10 @@ class Resources(ABC):
     def start(self, axis: str, row: str) -> str:
         """Start value of a row that `columns` names."""
 
+    def given(self) -> Mapping[str, str]:
+        """Start values of further parameters by the variables' names, as spelled."""
+        return {}
+
     @abstractmethod
     def summary(self) -> str:
         """What they hold, in sentences."""

@@ -126,6 +126,8 @@ def find(variables: Iterable[Variable]) -> tuple[Terminal, ...]:
             giver = dict.fromkeys(kind.gives, "output") | dict.fromkeys(kind.takes, "input")
             other = dict.fromkeys(kind.gives, "input") | dict.fromkeys(kind.takes, "output")
             name = kind.name if group in ("", kind.name) else f"{group}.{kind.name}"
+            if kind.takes and set(found_as.values()) == {"output"}:
+                continue  # both sides are within the unit, which shows what they exchange
             if found_as not in (giver, other):
                 stated = ", ".join(f"{present[member].name} {causality}" for member, causality in found_as.items())
                 problems.append(

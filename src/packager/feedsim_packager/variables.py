@@ -61,12 +61,16 @@ def expand(table: Table, resources: Resources | None) -> tuple[Variable, ...]:
     count = Counter(name for _, name, _, _ in rows)
     if doubled := [name for name in count if count[name] > 1]:
         raise InputError(table.unit, [f"variable {name} would exist {count[name]} times" for name in doubled])
+    given = resources.given() if resources else {}
+    parameters = {name for row, name, _, _ in rows if row.causality == "parameter"}
+    if unknown := [name for name in given if name not in parameters]:
+        raise InputError(table.unit, [f"its resources give {name}, which is no parameter" for name in unknown])
     return tuple(
         Variable(
             name=name,
             reference=reference,
             row=row,
-            start=start if row.causality in ("parameter", "input") else None,
+            start=given.get(name, start) if row.causality in ("parameter", "input") else None,
             depends=tuple(sorted(references[other] for other in row.depends)),
             depends_initially=tuple(sorted(references[other] for other in row.depends + row.depends_initially)),
         )

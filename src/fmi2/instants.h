@@ -1,0 +1,41 @@
+/* Sample instants t_k = start + k T_c that are counted, against communication steps of any size. */
+#ifndef FEEDSIM_INSTANTS_H
+#define FEEDSIM_INSTANTS_H
+
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+
+/* An importer's sum of steps runs off the grid: adding 125 us ten million times ends 1.6e-3 cycles late. An instant
+ * that lies so little ahead of the end of a step belongs to the next one, as it was meant; reading the inputs a
+ * hundredth of a cycle late instead (extrapolated by the slope) is far below a cycle's own effect. In parts of the
+ * cycle or of the step, whichever is shorter: an instant at the start of a step is worked in that step, however short.
+ * Steps much shorter than a cycle may drift further than that. Then an instant is worked one of them early, still with
+ * its inputs run on to t_k; instants are counted, so that none is skipped or worked twice. */
+#define INSTANTS_DRIFT 1e-2
+
+/* A clock that runs since t has no finer grain than this [parts of t], a few units in the last place. */
+#define INSTANTS_GRAIN (16 * DBL_EPSILON)
+
+/* More instants in one step are taken for a mistake: the unit would not come back for minutes. */
+#define INSTANTS_MOST 1e9
+
+/* Instants are counted up to here, where doubles can still tell them apart; 285 years of the shortest cycle. */
+#define INSTANTS_COUNTED ((int64_t)1 << 53)
+
+/* An end of a step so close to the end of a cycle [T_c] is the end of the cycle. */
+#define INSTANTS_ROUNDING 1e-6
+
+/* How far ahead of the end of a step from t to t + h an instant belongs to the next step [s]. */
+static inline double instants_margin(double t, double h, double T_c) {
+    const double part = INSTANTS_DRIFT * (T_c < h ? T_c : h), grain = INSTANTS_GRAIN * (fabs(t) + h);
+    const double drift = part > grain ? part : grain;
+    return drift < 0.5 * h ? drift : 0.5 * h; /* steps of a few grains */
+}
+
+/* Share [1] of the cycle, the last one begun, that lies behind where its end, t_k, is `ahead` [s] of the step's. */
+static inline double instants_share(double ahead, double T_c) {
+    return ahead < INSTANTS_ROUNDING * T_c ? 1.0 : fmax(1.0 - ahead / T_c, 0.0);
+}
+
+#endif

@@ -1,0 +1,304 @@
+/* One control cycle: who steps when, and what each part is told of its inputs within the step. It is the cycle of the
+ * master (feedsim/cosim/schedule.py), operation by operation and rounding by rounding, so that both give the same bits.
+ *
+ * The drives sample at t_k and run first. The stiff bond is plant <-> friction; a Scheme says how the two see each
+ * other within an exchange step. */
+#include <string.h>
+
+#include "machine.h"
+
+/* An exchange step as its operations see it: vectors with an entry per axis, all at its start but n_end. */
+typedef struct Exchange {
+    Unit *unit;
+    Machine *machine;
+    const Scheme *scheme;
+    AxisState *axes;
+    double h; /* [s] */
+    double *M_a, *M_a_start, *M_a_slope, *M_fr_start, *n_start, *n, *n_slope;
+    double *forces; /* as the importer has set them */
+} Exchange;
+
+/* --- inputs from outside -------------------------------------------------------------------------------------------
+ */
+
+/* An input of the plant that is the importer's, a force: its row in the part, and where it lies in the machine. */
+typedef struct Force {
+    unsigned row;
+    size_t offset;
+} Force;
+
+#define FORCE_parameter(field, row, offset)
+#define FORCE_local(field, row, offset)
+#define FORCE_output(field, row, offset)
+#define FORCE_INSIDE(row, offset)
+#define FORCE_OUTSIDE(row, offset) {row, offset},
+#define FORCE_input(field, row, offset) ROWS_JOINED(FORCE_, FROM_plant_##field)(row, offset)
+#undef SCALAR_ROW
+#undef AXIS_ROW
+#define AXIS_ROW(...)
+#define SCALAR_ROW(kind, field, name, c, ...)                                                                          \
+    FORCE_##c(field, VR_plant_##field - PLANT_FIRST, offsetof(Scalars, plant_##field))
+static const Force machine_forces[] = {
+#include "plant_variables.def"
+};
+#undef SCALAR_ROW
+#undef AXIS_ROW
+#define SCALAR_ROW(...)
+#define AXIS_ROW(kind, field, name, c, ...)                                                                            \
+    FORCE_##c(field, AXIS_VR_plant_##field - PLANT_AXIS_FIRST, offsetof(AxisBlock, plant_##field))
+static const Force axis_forces[] = {
+#include "plant_variables.def"
+};
+enum {
+    MACHINE_FORCES = sizeof machine_forces / sizeof machine_forces[0],
+    AXIS_FORCES = sizeof axis_forces / sizeof axis_forces[0]
+};
+
+size_t machine_scratch(size_t axes) {
+    return MACHINE_FORCES + axes * (AXIS_FORCES + (size_t)VECTORS);
+}
+
+/* Force i of all: its value, its slope to the plant, and its reference in the machine. */
+typedef struct ForcePlace {
+    double *value, *slope;
+    unsigned vr;
+} ForcePlace;
+
+static ForcePlace force_place(const Exchange *x, size_t i) {
+    double *slopes = x->machine->plant.slopes;
+    if (i < MACHINE_FORCES) {
+        const Force *force = &machine_forces[i];
+        return (ForcePlace){(double *)(void *)((unsigned char *)unit_scalars(x->unit) + force->offset),
+                            slopes + force->row, PLANT_FIRST + force->row};
+    }
+    const size_t axis = (i - MACHINE_FORCES) / AXIS_FORCES;
+    const Force *force = &axis_forces[(i - MACHINE_FORCES) % AXIS_FORCES];
+    return (ForcePlace){(double *)(void *)((unsigned char *)unit_axis(x->unit, axis) + force->offset),
+                        slopes + plant_part.scalar_rows + axis * plant_part.axis_rows + force->row,
+                        (unsigned)(SCALAR_ROWS + axis * AXIS_ROWS) + PLANT_AXIS_FIRST + force->row};
+}
+
+static size_t force_count(const Exchange *x) {
+    return unit_sloped(x->unit) ? MACHINE_FORCES + x->machine->axes * AXIS_FORCES : 0; /* else they stay as they are */
+}
+
+static void keep_forces(const Exchange *x) {
+    for (size_t i = 0; i < force_count(x); i++) {
+        x->forces[i] = *force_place(x, i).value;
+    }
+}
+
+/* Forces run linearly from the beginning of the communication step: their value `since` then [s], and their slope. */
+static void tell_forces(const Exchange *x, double since) {
+    for (size_t i = 0; i < force_count(x); i++) {
+        const ForcePlace force = force_place(x, i);
+        *force.slope = unit_slope(x->unit, force.vr);
+        *force.value = x->forces[i] + *force.slope * since;
+    }
+}
+
+/* What the importer has set stays as it has set it. */
+static void hand_back_forces(const Exchange *x) {
+    for (size_t i = 0; i < force_count(x); i++) {
+        const ForcePlace force = force_place(x, i);
+        *force.value = x->forces[i];
+        *force.slope = 0;
+    }
+}
+
+/* What the drive of an axis reads at t_k, `since` the beginning of the communication step [s]. */
+static void tell_drive(Unit *unit, size_t i, double since) {
+    AxisBlock *axis = unit_axis(unit, i);
+    const bool built_in = unit_scalars(unit)->motion_built_in;
+    axis->drive_n_add = axis->n_add;
+    axis->drive_M_add = axis->M_add;
+    axis->drive_release = axis->release;
+    axis->drive_x_s = built_in ? axis->motion_x_s : axis->x_s;
+    axis->drive_n_ffw = built_in ? axis->motion_n_ffw : axis->n_ffw;
+    if (unit_sloped(unit)) {
+        const unsigned first = (unsigned)(SCALAR_ROWS + i * AXIS_ROWS);
+        axis->drive_n_add += unit_slope(unit, first + AXIS_VR_n_add) * since;
+        axis->drive_M_add += unit_slope(unit, first + AXIS_VR_M_add) * since;
+        if (!built_in) {
+            axis->drive_x_s += unit_slope(unit, first + AXIS_VR_x_s) * since;
+            axis->drive_n_ffw += unit_slope(unit, first + AXIS_VR_n_ffw) * since;
+        }
+    }
+}
+
+/* --- drives --------------------------------------------------------------------------------------------------------
+ */
+
+static bool step_drives(const Exchange *x, double t, double t_k) {
+    const double T_c = x->machine->T_c;
+    for (size_t i = 0; i < x->machine->axes; i++) {
+        Part *drive = &x->machine->drives[i];
+        AxisState *own = &x->axes[i];
+        const AxisBlock *axis = unit_axis(x->unit, i);
+        tell_drive(x->unit, i, t_k - t);
+        if (!controller_part.step(drive, t_k, T_c)) {
+            return false;
+        }
+        own->M_a = axis->drive_M_a;
+        own->i_d = axis->drive_i_d;
+        own->i_q = axis->drive_i_q;
+        own->M_a_slope = controller_part.output_derivative(drive, AXIS_VR_drive_M_a - DRIVE_FIRST);
+        if (x->scheme->torque_ramp) {
+            /* From the end backwards: a drive whose torque jumps at t_k then acts as it does, without a delay. */
+            x->M_a_slope[i] = own->M_a_slope;
+            x->M_a_start[i] = own->M_a + -T_c * own->M_a_slope;
+        } else {
+            x->M_a_slope[i] = 0;
+            x->M_a_start[i] = own->M_a_before;
+            own->M_a_before = own->M_a;
+        }
+    }
+    return true;
+}
+
+/* --- plant and friction --------------------------------------------------------------------------------------------
+ */
+
+static bool step_plant(const Exchange *x) {
+    Machine *machine = x->machine;
+    for (size_t i = 0; i < machine->axes; i++) {
+        AxisBlock *axis = unit_axis(x->unit, i);
+        double *slopes = machine->plant.slopes + plant_part.scalar_rows + i * plant_part.axis_rows;
+        axis->plant_M_a = x->M_a[i];
+        axis->plant_M_fr = x->axes[i].M_fr;
+        slopes[AXIS_VR_plant_M_a - PLANT_AXIS_FIRST] = x->M_a_slope[i];
+        slopes[AXIS_VR_plant_M_fr - PLANT_AXIS_FIRST] = x->scheme->friction_ramp ? x->axes[i].M_fr_slope : 0;
+    }
+    return plant_part.step(&machine->plant, 0, x->h); /* the structure does not change with time */
+}
+
+/* What friction learns of the speed at its contact. */
+static void tell_speed(const Exchange *x) {
+    for (size_t i = 0; i < x->machine->axes; i++) {
+        const double n_end = unit_axis(x->unit, i)->plant_n_fr;
+        const double slope = (n_end - x->n_start[i]) / x->h;
+        x->n[i] = x->scheme->speed == SPEED_AT_END ? n_end : x->n_start[i];
+        x->n_slope[i] = x->scheme->speed == SPEED_WITHIN         ? slope
+                        : x->scheme->speed == SPEED_EXTRAPOLATED ? x->axes[i].n_slope
+                                                                 : 0;
+        x->axes[i].n_slope = slope;
+    }
+}
+
+static bool step_friction(const Exchange *x) {
+    for (size_t i = 0; unit_scalars(x->unit)->coupling_friction && i < x->machine->axes; i++) {
+        Part *contact = &x->machine->contacts[i];
+        AxisBlock *axis = unit_axis(x->unit, i);
+        axis->friction_n_fr = x->n[i];
+        contact->slopes[AXIS_VR_friction_n_fr - FRICTION_FIRST] = x->n_slope[i];
+        if (!friction_part.step(contact, 0, x->h)) { /* nor does its law */
+            return false;
+        }
+        x->axes[i].M_fr = axis->friction_M_fr;
+        if (x->scheme->friction_ramp) {
+            x->axes[i].M_fr_slope = friction_part.output_derivative(contact, AXIS_VR_friction_M_fr - FRICTION_FIRST);
+        }
+    }
+    return true;
+}
+
+/* --- steps that are taken again ------------------------------------------------------------------------------------
+ */
+
+/* Copy what plant and friction are made of between the block and `kept`. */
+static void keep(const Exchange *x, bool back) {
+    const Machine *machine = x->machine;
+    const size_t first = machine->places[0], states = machine->places[1 + machine->axes] - first;
+    const size_t axes = machine->axes * sizeof(AxisBlock);
+    const struct {
+        void *own;
+        size_t size;
+    } pieces[] = {{(unsigned char *)unit_state(x->unit) + first, states},
+                  {unit_scalars(x->unit), sizeof(Scalars)},
+                  {unit_axis(x->unit, 0), axes}};
+    unsigned char *kept = machine->kept;
+    for (size_t i = 0; i < sizeof pieces / sizeof pieces[0]; kept += pieces[i++].size) {
+        memcpy(back ? pieces[i].own : kept, back ? kept : pieces[i].own, pieces[i].size);
+    }
+}
+
+static void go_back(const Exchange *x) {
+    keep(x, true);
+    for (size_t i = 0; i < x->machine->axes; i++) {
+        x->axes[i].M_fr = x->M_fr_start[i];
+    }
+}
+
+static bool exchange_step(const Exchange *x) {
+    const Scheme *scheme = x->scheme;
+    for (size_t i = 0; i < x->machine->axes; i++) {
+        x->n_start[i] = unit_axis(x->unit, i)->plant_n_fr;
+        x->M_fr_start[i] = x->axes[i].M_fr;
+    }
+    if (scheme->passes > 1) {
+        keep(x, false);
+    }
+    for (int pass = 0; pass < scheme->passes; pass++) {
+        if (pass > 0) {
+            go_back(x);
+        }
+        if (scheme->friction_first) {
+            tell_speed(x);
+            if (!step_friction(x) || !step_plant(x)) {
+                return false;
+            }
+        } else {
+            if (!step_plant(x)) {
+                return false;
+            }
+            tell_speed(x);
+            if (!step_friction(x)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* -------------------------------------------------------------------------------------------------------------------
+ */
+
+static Exchange exchange_of(Unit *unit, Machine *machine) {
+    double *v = machine->vectors;
+    const size_t n = machine->axes;
+    return (Exchange){.unit = unit,
+                      .machine = machine,
+                      .scheme = machine->scheme,
+                      .axes = machine_axis_states(unit),
+                      .h = machine->T_c / (double)machine->substeps,
+                      .M_a = v,
+                      .M_a_start = v + n,
+                      .M_a_slope = v + 2 * n,
+                      .M_fr_start = v + 3 * n,
+                      .n_start = v + 4 * n,
+                      .n = v + 5 * n,
+                      .n_slope = v + 6 * n,
+                      .forces = v + VECTORS * n};
+}
+
+bool machine_cycle(Unit *unit, double t, double t_k) {
+    Machine *machine = unit_derived(unit);
+    const Exchange x = exchange_of(unit, machine);
+    keep_forces(&x);
+    bool good = step_drives(&x, t, t_k);
+    for (size_t j = 0; good && j < machine->substeps; j++) {
+        const double start = (double)j * x.h;
+        for (size_t i = 0; i < machine->axes; i++) {
+            x.M_a[i] = x.M_a_start[i] + start * x.M_a_slope[i];
+        }
+        tell_forces(&x, t_k - t + start);
+        good = exchange_step(&x);
+    }
+    hand_back_forces(&x);
+    for (size_t i = 0; i < machine->axes; i++) {
+        AxisBlock *axis = unit_axis(unit, i);
+        axis->drive_x_a = axis->plant_x_a;
+        axis->drive_n_a = axis->plant_n_a;
+    }
+    return good && (!machine->has_motion || setpoint_part.step(&machine->motion, t_k, machine->T_c));
+}

@@ -1,0 +1,107 @@
+/* What the rooms of the machine share: its parts, what is derived of the parameters, and the layout of the state. */
+#ifndef FEEDSIM_MACHINE_H
+#define FEEDSIM_MACHINE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "hash.h"
+#include "part.h"
+#include "unit.h"
+
+/* How plant and friction see each other within an exchange step; the schemes of the master (feedsim/cosim/schedule.py),
+ * where each of them is told. */
+typedef enum Speed { SPEED_WITHIN, SPEED_AT_END, SPEED_AT_START, SPEED_EXTRAPOLATED } Speed;
+typedef struct Scheme {
+    const char *name;
+    Speed speed;         /* friction: n_fr linear within the step, held at its end or its start, or extrapolated */
+    bool torque_ramp;    /* plant: M_a runs linearly over the control cycle; else M_a(t_k) is held */
+    bool friction_ramp;  /* plant: M_fr is extrapolated with the slope of its last step; else held */
+    bool friction_first; /* friction steps ahead of the plant, which holds the torque found; else the plant does */
+    int passes;          /* plant and friction go back and take the step again, with the slope of M_fr found */
+} Scheme;
+
+enum { SCHEMES = 7 };
+extern const Scheme machine_schemes[SCHEMES]; /* in the order of the parameter coupling.scheme */
+
+/* Derived data. */
+typedef struct Machine {
+    size_t axes;
+    bool has_motion;         /* the archive holds one */
+    Part plant, motion;      /* motion: has_motion alone */
+    Part *drives, *contacts; /* [axes] */
+    char *labels;            /* of those, LABEL_SIZE each */
+    double *slopes;          /* memory of the parts' slopes */
+    size_t *motion_axes;     /* axis of each axis of the motion */
+    char plant_hash[HASH_TEXT_SIZE], motion_hash[HASH_TEXT_SIZE];
+
+    /* Of the parameters: */
+    bool ready;
+    double T_c;
+    const Scheme *scheme;
+    size_t substeps;
+    size_t *places;   /* [2 + 2 axes] where the state of a part begins: plant, contacts, drives; the end */
+    double *vectors;  /* scratch of an exchange step, machine_scratch() */
+    size_t kept_size; /* bytes that an exchange step that is taken again goes back to */
+    unsigned char *kept;
+} Machine;
+
+enum { LABEL_SIZE = 48, VECTORS = 7 };
+
+/* State block: this head, an AxisState per axis, the parts' states as `places` says. */
+typedef struct StateHead {
+    int64_t cycle;    /* control cycles worked */
+    uint64_t end;     /* places[2 axes + 1]: which layout the state has */
+    double share;     /* of the last cycle, that lies behind the communication point [1] */
+    double tool[3];   /* at the start of the last cycle, where share is below 1: tool.x [m] */
+    double tool_v[3]; /* and its speed [m/s] */
+} StateHead;
+
+/* What an axis had at the ends of the last control cycle. Position and speed at its end: drive.x_a, drive.n_a. */
+typedef struct AxisState {
+    double M_fr, M_fr_slope;         /* at its end, and over its last exchange step */
+    double n_slope;                  /* of the last exchange step, as the extrapolating schemes need it */
+    double M_a, M_a_slope, i_d, i_q; /* at its end; over it */
+    double x_a, x_a_v, n_a, M_fr_0;  /* at its start, where share is below 1 */
+    double M_a_before;               /* at its start, as those schemes know it that hold it */
+} AxisState;
+
+static inline StateHead *machine_head(Unit *unit) {
+    return unit_state(unit);
+}
+
+static inline AxisState *machine_axis_states(Unit *unit) {
+    return (AxisState *)(machine_head(unit) + 1);
+}
+
+/* First rows of the parts in the machine's table; rows.c holds the rest against the parts'. */
+enum {
+    MOTION_FIRST = VR_motion_finished,
+    PLANT_FIRST = VR_plant_modes_file,
+    PLANT_AXIS_FIRST = AXIS_VR_plant_M_a,
+    DRIVE_FIRST = AXIS_VR_drive_x_s,
+    FRICTION_FIRST = AXIS_VR_friction_n_fr,
+    MOTION_AXIS_FIRST = AXIS_VR_motion_x_s
+};
+
+/* --- rows.c: whether the parts' rows lie in the machine's table as in the parts themselves; false with the reason
+ * logged */
+bool machine_rows_agree(Unit *unit);
+
+/* --- load.c: the archive */
+bool machine_load(Unit *unit);
+void machine_release(Unit *unit);
+
+/* --- derive.c */
+bool machine_derive(Unit *unit);
+bool machine_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size);
+/* Point the parts at where their variables and, behind derive(), their states lie now. */
+void machine_bind(Unit *unit, bool with_states);
+
+/* --- exchange.c: one control cycle from t_k on, in a step that began at t [s] */
+bool machine_cycle(Unit *unit, double t, double t_k);
+/* Doubles of scratch that it needs. */
+size_t machine_scratch(size_t axes);
+
+#endif

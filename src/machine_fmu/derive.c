@@ -124,11 +124,12 @@ bool machine_derive(Unit *unit) {
     const Scalars *v = unit_scalars(unit);
     if (machine->places == NULL) {
         machine->places = unit_alloc(unit, 2 + 2 * machine->axes, sizeof *machine->places);
-        machine->vectors =
-            machine->places != NULL ? unit_alloc(unit, machine_scratch(machine->axes), sizeof *machine->vectors) : NULL;
-        if (machine->vectors == NULL) {
-            return false;
-        }
+    }
+    if (machine->vectors == NULL) {
+        machine->vectors = unit_alloc(unit, machine_scratch(machine->axes), sizeof *machine->vectors);
+    }
+    if (machine->places == NULL || machine->vectors == NULL) {
+        return false;
     }
     if (v->motion_built_in && !machine->has_motion) {
         return unit_fail(unit, "parameter 'motion.built_in' is true, but the archive holds no motion "

@@ -44,7 +44,9 @@ class Packed:
 
 
 def packed(folder: Path, fmus: Path, name: str, *changes: str) -> Packed:
-    scenario = load_scenario(ROOT / "scenarios" / f"{name}.yaml", ["recording.interval=125 us", *changes])
+    scenario = load_scenario(ROOT / "scenarios" / f"{name}.yaml", changes)
+    cycle = scenario.machine.cycles.T_c
+    scenario = load_scenario(ROOT / "scenarios" / f"{name}.yaml", [*changes, f"recording.interval={cycle!r} s"])
     program = plan(scenario)
     archive = folder / "machine.fmu"
     pack_whole(fmus / "machine.fmu", archive, scenario.machine, coupling=scenario.coupling, program=program)
@@ -160,7 +162,7 @@ def test_every_scheme_is_the_masters(tmp_path: Path, fmus: Path, scheme: str) ->
     "changes",
     [
         ("machine.axes.*.drive.ideal_current_loop=true",),
-        ("machine.axes.*.drive.ramp_speed_setpoint=false", "machine.cycles.control=250 us", "recording.interval=250 us"),
+        ("machine.axes.*.drive.ramp_speed_setpoint=false", "machine.cycles.control=250 us"),
         ("machine.axes.Z.drive.speed_window=4", "machine.axes.Z.constant_load=3 N.m"),
         ("machine.axes.Z.drive.symmetry_lag=true", "machine.axes.Z.friction.asymmetry=0.1"),
     ],

@@ -293,8 +293,13 @@ def test_command_line_packs_the_same(packed: Archive, fmus: Path, tmp_path: Path
 @pytest.mark.parametrize(
     ("base", "words", "said"),
     [
-        ("setpoint", ["--axes", "a.csv", "--modes", "m.csv", "--setpoints", "t.csv"], "files of one kind are needed"),
-        ("setpoint", [], "files of one kind are needed (axes, modes, poses; or setpoints), given are none"),
+        ("setpoint", ["--axes", "a.csv", "--setpoints", "t.csv"], "goes modes, settings, which is not given"),
+        (
+            "setpoint",
+            [],
+            "files of one kind are needed (axes, modes, poses; or setpoints; or axes, modes, poses, settings, "
+            "setpoints), given are none",
+        ),
         ("plant", ["--setpoints", "t.csv"], "plant: has resources of the kind 'machine', those given are of the kind"),
         ("plant", ["--axes", "a.csv"], "with axes goes modes, which is not given"),
         ("friction", ["--setpoints", "t.csv"], "friction: takes no resources (given are those of the kind 'setpoints'"),

@@ -65,8 +65,8 @@ def instantiate(archive: Archive, folder: Path | None = None, guid: str | None =
 
 
 def initialize(slave: FMU2Slave, archive: Archive | None = None) -> None:
-    """Into initialisation mode: the standard lets values be read from there on. Of an archive with a motion inside, with
-    its inputs in use."""
+    """Into initialisation mode: the standard lets values be read from there on. An archive that is named has its inputs
+    in use, where a motion could take their place."""
     slave.setupExperiment(startTime=0.0)
     slave.enterInitializationMode()
     if archive and (switch := archive.variables().get("motion.built_in")) is not None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from feedsim.cli.options import FMUS, Command, Option, settings
 from feedsim.cli.terminal import announce_archive, warn
-from feedsim.errors import OutputError
+from feedsim.errors import InputError, OutputError
 from feedsim.owned import TemporaryFolder
 
 TEXT = """Pack structure, drives and friction of all axes, coupled at the control cycle, into one FMI 2.0 co-simulation
@@ -38,6 +38,11 @@ def pack(options: Namespace) -> None:
     fmus = options.fmus or cosim.fmus_directory()
     base = options.base or fmus / f"{UNIT}.fmu"
     program = nc.plan(plan) if plan is not None and not options.inputs else None
+    if plan is not None and plan.loads and program is not None:
+        raise InputError(
+            f"{plan.file}: loads over time are inputs of the unit (Z.F_a, tool.F_X), never inside; leave the key "
+            "'loads' out, or pack with --inputs"
+        )
     if plan is not None and program is not None:
         warn(cosim.check(plan, program, fmus=fmus))  # what a run would refuse should not be packed
     else:

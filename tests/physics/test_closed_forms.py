@@ -101,7 +101,7 @@ def test_equivalent_time_of_the_speed_loop(fmus: Path, tmp_path: Path) -> None:
 
 def test_circle_setpoint_has_the_programmed_radius(fmus: Path) -> None:
     """The oracle of the radius itself: the setpoints lie on the circle to far below what is measured on it."""
-    program = cosim.run(scenario.load(CIRCLE), fmus=fmus).program
+    program = cosim.run(scenario.load(CIRCLE, ["motions.0.direction=counterclockwise"]), fmus=fmus).program
     x, z = program.x_s["X"] - program.x_s["X"][0] + RADIUS, program.x_s["Z"] - program.x_s["Z"][0]
     # A cubic spline through points 2 ms apart on a circle errs by 5/384 h^4 R omega^4 = 4e-14 m.
     np.testing.assert_allclose(np.hypot(x, z), RADIUS, atol=1e-11)

@@ -19,7 +19,21 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from feedsim.cli import circle, compare, compensate, example, files, frf, identify, machine, pack, replay, run, sweep
+from feedsim.cli import (
+    circle,
+    compare,
+    compensate,
+    example,
+    files,
+    frf,
+    identify,
+    machine,
+    pack,
+    replay,
+    run,
+    show,
+    sweep,
+)
 from feedsim.cli.terminal import prepare_streams
 from feedsim.owned import remove_orphans
 
@@ -43,6 +57,7 @@ examples:
   feedsim compensate scenarios/xz_circle.yaml
   feedsim circle ballbar.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
   feedsim pack scenarios/xz_circle.yaml --out machine.fmu
+  feedsim show results/as_is results/worn
   feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
   feedsim run xz_circle.ssp
   feedsim sweep scenarios/studies/friction_wear.yaml
@@ -52,8 +67,8 @@ examples:
 
 COMMANDS = (
     example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, replay.IDENTIFY_DRIVE,
-    replay.REPLAY, compensate.COMMAND, circle.COMMAND, pack.COMMAND, run.SSP, sweep.COMMAND, compare.COMMAND,
-    files.SCHEMA, files.CONVERT,
+    replay.REPLAY, compensate.COMMAND, circle.COMMAND, show.COMMAND, pack.COMMAND, run.SSP, sweep.COMMAND,
+    compare.COMMAND, files.SCHEMA, files.CONVERT,
 )  # fmt: skip
 
 

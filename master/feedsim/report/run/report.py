@@ -247,6 +247,7 @@ def summary(
         "answer": answers(causes),
         "warnings": [*run.warnings, *doubts(figures, causes)],
         "figures": figures_part(figures),
+        "circles": _circles(run, causes),
         "diagnosis": {prefix: diagnosis_part(diagnosis) for prefix, diagnosis in causes.items()},
         "scenario": {
             "name": scenario.name,
@@ -298,6 +299,26 @@ def summary(
             "cycle_loop": "native" if run.native else "Python",
         },
         "files": list(files),
+    }
+
+
+def _circles(run: Run, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
+    """The turns that figures are of: who lays them over others needs no scenario."""
+    found = [task for task in tasks(run.scenario, run.program) if task.prefix in causes] if causes else []
+    return {
+        task.prefix: [
+            {
+                "axes": list(turn.axes),
+                "centre": quantity(list(turn.centre), "m"),
+                "radius": quantity(turn.radius, "m"),
+                "direction": "counterclockwise" if turn.sense > 0 else "clockwise",
+                "begin": quantity(turn.begin, "s"),
+                "end": quantity(turn.end, "s"),
+            }
+            for turn in task.turns
+        ]
+        for task in found
+        if not isinstance(task, PositioningTask)
     }
 
 

@@ -1,0 +1,146 @@
+"""Results and records side by side: what they hold in common, and in what their figures and parameters differ."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feedsim import units
+from feedsim.analysis.circularity import Turn
+from feedsim.analysis.figures import Array
+from feedsim.errors import InputError
+from feedsim.trace import Recording, read_recording
+
+RESULT, SUMMARY = "result.csv", "summary.json"
+# Columns that are laid over each other, of every axis: name -> SI unit.
+SIGNALS = {"x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
+TIMES = ("time", "t")
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A result's folder, or a file of curves.
+
+    Attributes:
+        name: short, and of no other one. recording: its curves. time: (N,) [s], from its first row on.
+        figures: name -> value and unit. parameters: dotted name -> value as text. circles: prefix -> turns.
+    """
+
+    name: str
+    path: Path
+    recording: Recording
+    time: Array
+    figures: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    circles: Mapping[str, tuple[Turn, ...]] = field(default_factory=dict)
+    answer: tuple[str, ...] = ()
+
+    def curve(self, name: str, unit: str) -> Array | None:
+        """A column in an SI unit; None where there is none of that name and kind."""
+        if name not in self.recording.names:
+            return None
+        try:
+            factor = float(units.factor(self.recording.units[name] or "1", unit))
+        except InputError:
+            return None
+        return np.asarray(self.recording.read([name])[name], dtype=np.float64) * factor
+
+    @property
+    def axes(self) -> list[str]:
+        """Axes of which there is a signal."""
+        found = [name.partition(".") for name in self.recording.names]
+        return list(dict.fromkeys(axis for axis, dot, signal in found if dot and signal in SIGNALS))
+
+
+def read_sources(paths: Sequence[Path]) -> list[Source]:
+    """Folders of `feedsim run`, or CSV files with a column of time. InputError lists all that is no such."""
+    found, problems = [], []
+    for path, name in zip(paths, _names(paths), strict=True):
+        try:
+            found.append(_read(path, name))
+        except InputError as error:
+            problems += list(error.problems)
+    if problems:
+        raise InputError.of("nothing can be shown", problems)
+    return found
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """The shortest ends of the paths that differ."""
+    parts = [path.absolute().parts for path in paths]
+    for count in range(1, max(map(len, parts)) + 1):
+        names = ["/".join(each[-count:]) for each in parts]
+        if len(set(names)) == len(names):
+            return names
+    return [f"{path} ({k})" for k, path in enumerate(paths, 1)]
+
+
+def _read(path: Path, name: str) -> Source:
+    curves = path / RESULT if path.is_dir() else path
+    if path.is_dir() and not curves.is_file():
+        raise InputError(f"{path}: has no {RESULT}; a folder of `feedsim run`, or a CSV file, is needed")
+    recording = read_recording(curves)
+    column = next((each for each in recording.names if each.lower() in TIMES), None)
+    if column is None:
+        raise InputError(f"{recording.header}: has no column of time; it is called time [s] or t [s]")
+    factor = float(units.factor(recording.units[column] or "s", "s"))
+    time = np.asarray(recording.read([column])[column], dtype=np.float64) * factor
+    if len(time) < 2 or not np.all(np.diff(time) > 0):
+        raise InputError(f"{curves}: its time does not rise from row to row; two rows or more are needed")
+    summary = curves.with_name(SUMMARY)
+    if curves.name != RESULT or not summary.is_file():
+        return Source(name, path, recording, time)
+    try:
+        told = json.loads(summary.read_text(encoding="utf-8"))
+        return Source(
+            name, path, recording, time,
+            figures={
+                key: (math.nan if each["value"] is None else float(each["value"]), str(each["unit"]))
+                for key, each in told["figures"].items()
+            },
+            parameters=_parameters(told),
+            circles={prefix: tuple(map(_turn, turns)) for prefix, turns in told.get("circles", {}).items()},
+            answer=tuple(map(str, told.get("answer", ()))),
+        )  # fmt: skip
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{summary}: is no summary of `feedsim run`: {type(error).__name__}: {error}") from None
+
+
+def _turn(told: Mapping[str, Any]) -> Turn:
+    first, second = map(str, told["axes"])
+    x, y = map(float, told["centre"]["value"])
+    span = float(told["begin"]["value"]), float(told["end"]["value"])
+    sense = 1 if told["direction"] == "counterclockwise" else -1
+    return Turn((first, second), (x, y), float(told["radius"]["value"]), sense, *span)
+
+
+def _parameters(summary: Mapping[str, Any]) -> dict[str, str]:
+    """Everything that a person sets, dotted: of the machine, and of the scenario."""
+    found = {"scenario.motions": "; ".join(each["description"] for each in summary["scenario"]["motions"])}
+    for group in ("coupling", "recording_interval"):
+        found |= _flat(f"scenario.{group}", summary["scenario"][group])
+    return found | _flat("machine", {key: summary["machine"][key] for key in ("name", "pose", "axes")})
+
+
+def _flat(name: str, value: Any) -> dict[str, str]:
+    if isinstance(value, Mapping):
+        if set(value) == {"value", "unit"}:
+            return {name: f"{value['value']:.9g} {value['unit']}" if value["value"] is not None else "none"}
+        return {key: text for part, each in value.items() for key, text in _flat(f"{name}.{part}", each).items()}
+    return {name: str(value)}
+
+
+def differing(sources: Sequence[Source]) -> list[tuple[str, list[str]]]:
+    """Parameters in which the results among the sources differ: name, and the value of every source, "" of records."""
+    told = [source.parameters for source in sources]
+    names = dict.fromkeys(name for each in told for name in each)
+    rows = [(name, [each.get(name, "") for each in told]) for name in names]
+    return [
+        (name, values) for name, values in rows if len({v for v, each in zip(values, told, strict=True) if each}) > 1
+    ]

@@ -1,0 +1,148 @@
+"""The report of results and records side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import Figure
+from feedsim.analysis.side_by_side import SUMMARY as OF_RESULT
+from feedsim.analysis.side_by_side import Source, differing
+from feedsim.report import sections
+from feedsim.report.content import Bullets, Report, Section, Table, Text, code
+from feedsim.report.formatting import display_unit, minus, shown
+from feedsim.report.provenance import hashed, inputs_part, quantity, software
+from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.show.pictures import pictures_of
+
+FORMAT = 1
+# Figures whose change is told first, by what stands behind the last dot.
+FIRST = ("G", "G_b", "peak_", "servo_mismatch", "overshoot", "settling_time")
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the report can be written to ``directory`` without one of ``inputs`` being lost."""
+    check_place(directory, (REPORT, SUMMARY), inputs)
+
+
+def files_of(sources: Sequence[Source]) -> list[Path]:
+    """Files that are read."""
+    found = []
+    for source in sources:
+        found += [source.recording.path]
+        if source.figures:
+            found += [source.recording.path.with_name(OF_RESULT)]
+    return found
+
+
+def write(sources: Sequence[Source], directory: Path | str) -> tuple[Path, ...]:
+    """Write summary.json, report.html and figures; returns the paths. Raises OutputError."""
+    return write_report(directory, report_of(sources), partial(summary, sources), {})
+
+
+def lines(sources: Sequence[Source]) -> list[str]:
+    """What the command says: parameters that differ, and the leading figures of every source."""
+    rows = differing(sources)
+    said = [f"differs: {name}: {' | '.join(value or '–' for value in values)}" for name, values in rows[:10]]
+    if len(rows) > 10:
+        said.append(f"and {len(rows) - 10} parameters more, in the report")
+    for name in _leading(sources):
+        values = [source.figures.get(name) for source in sources]
+        said.append(f"{name}: {' | '.join('–' if v is None else str(Figure(*v, '')) for v in values)}")
+    return said or ["the sources have neither figures nor parameters to compare; the pictures do"]
+
+
+def _leading(sources: Sequence[Source]) -> list[str]:
+    names = dict.fromkeys(name for source in sources for name in source.figures)
+    return [name for name in names if name.count(".") == 1 and name.partition(".")[2].startswith(FIRST)
+            and name.partition(".")[2].rstrip("+-") == name.partition(".")[2]]  # fmt: skip
+
+
+def report_of(sources: Sequence[Source]) -> Report:
+    """Content of the report."""
+    names = [source.name for source in sources]
+    rows = [(f"Source {k}", f"{source.name}: {len(source.time)} rows") for k, source in enumerate(sources, 1)]
+    return Report(
+        " against ".join(names) if len(names) <= 3 else f"{len(names)} results side by side",
+        f"{len(sources)} source(s)",
+        answer=lines(sources)[:4],
+        main=[
+            *pictures_of(sources),
+            _figures(sources),
+            _parameters(sources),
+            Section("What each says of itself", [Bullets([f"{s.name}: {line}" for s in sources for line in s.answer])])
+            if any(source.answer for source in sources)
+            else None,
+        ],
+        provenance=sections.provenance_section(rows, hashed([("source", file) for file in files_of(sources)])),
+        footer="Differences are to the first source that has the figure. Values in full precision: summary.json.",
+    )
+
+
+def _figures(sources: Sequence[Source]) -> Section | None:
+    """Every figure of every source, with its difference to the first one."""
+    names = list(dict.fromkeys(name for source in sources for name in source.figures))
+    if not names:
+        return None
+    rows: list[tuple[Text, ...]] = []
+    for name in names:
+        unit = next(source.figures[name][1] for source in sources if name in source.figures)
+        first = math.nan
+        cells: list[str] = []
+        for k, source in enumerate(sources):
+            value, own = source.figures.get(name, (math.nan, unit))
+            cells.append(shown(Figure(value, unit, ""))[0] if name in source.figures and own == unit else "–")
+            if k:
+                difference = value - first
+                cells.append(minus(f"{float(_rounded(difference)):+.4g}") if math.isfinite(difference) else "–")
+            if math.isnan(first) and own == unit:
+                first = value
+        rows.append((code(name), *cells, display_unit(unit)))
+    heads = ["Figure", sources[0].name]
+    for source in sources[1:]:
+        heads += [source.name, "difference"]
+    return Section("Figures", [Table("l" + "r" * (len(heads) - 1) + "l", [*heads, "Unit"], rows)])
+
+
+def _rounded(value: float) -> str:
+    """Four digits, and no difference where rounding alone made one."""
+    return f"{value:.4g}" if abs(value) > 1e-9 else "0"
+
+
+def _parameters(sources: Sequence[Source]) -> Section | None:
+    if sum(bool(source.parameters) for source in sources) < 2:
+        return None
+    rows: list[tuple[Text, ...]] = [
+        (code(name), *(value or "–" for value in values)) for name, values in differing(sources)
+    ]
+    if not rows:
+        return Section(
+            "Parameters that differ", [Bullets(["None: machine, motion, coupling and recording are the same."])]
+        )
+    heads = ("Parameter", *(source.name for source in sources))
+    return Section("Parameters that differ", [Table("l" + "p" * len(sources), heads, rows)])
+
+
+def summary(sources: Sequence[Source], names: Sequence[str]) -> dict[str, Any]:
+    """Content of summary.json."""
+    return {
+        "format": FORMAT,
+        "sources": [
+            {
+                "name": source.name,
+                "rows": len(source.time),
+                "figures": {name: quantity(value, unit) for name, (value, unit) in source.figures.items()},
+            }
+            for source in sources
+        ],
+        "differing": {
+            name: dict(zip([source.name for source in sources], values, strict=True))
+            for name, values in differing(sources)
+        },
+        "inputs": inputs_part(hashed([("source", file) for file in files_of(sources)])),
+        "software": software(),
+        "files": list(names),
+    }

@@ -65,7 +65,7 @@ def identified(
     return found.drives[axis], dict(found.files)
 
 
-@pytest.mark.parametrize(("machine", "axis"), [("one_axis", "X"), ("test_centre", "Z")])
+@pytest.mark.parametrize(("machine", "axis"), [("one_axis", "X")])
 def test_the_shipped_drive_comes_back(machine: str, axis: str, tmp_path: Path) -> None:
     """From a log of 2 ms without noise, beginning with other values, within 1 %: in fact to the digits of the log."""
     true = load_machine(MACHINES / machine).axes[axis].drive
@@ -129,6 +129,6 @@ def test_a_real_machine(axis: str, position: float, torque: float) -> None:
     found, _ = identified(Path(os.environ["FEEDSIM_CAPTURE"]), axis)
     assert found.position < position
     assert found.torque < torque
-    assert found.estimates["K_p"].status == "undetermined" or axis == "X"
+    assert found.estimates["K_p"].status == "undetermined"
     assert "asymmetry" not in found.chosen
     assert found.estimates["T_dyn"].value + found.estimates["T_sym"].value == pytest.approx(8.25e-3, abs=1e-6)

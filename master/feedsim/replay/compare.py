@@ -162,6 +162,7 @@ def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1)
     }
     if speed is not None and record.speed_setpoint is not None:
         asked = speed.of(record.setpoint, x_a / each.I_P, record.feedforward)
+        asked[: speed.taps.reach] = record.speed_setpoint[: speed.taps.reach]  # there is no past to form it from
         channels["speed setpoint"] = Channel(record.speed_setpoint, asked, "rad/s", "speed setpoint of the control")
     lag = _rms((each.setpoint - each.position)[each.moving])
     return Comparison(each.axis, each, channels, taps, speed, lag, delay)

@@ -118,7 +118,8 @@ def test_a_rigid_machine_is_written_whole(tmp_path: Path) -> None:
     assert checked_modes(own).J_tot("X") == pytest.approx(J, rel=0.05)
     # Nothing in this record tells K_v without the structure: it is not offered as an estimate.
     assert found.estimates["K_v"].status == "undetermined"
-    assert found.position < 2e-6
+    # The structure bends, a rigid axis does not: some micrometres are left of a way of 20 mm.
+    assert found.position < 5e-6
 
 
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")

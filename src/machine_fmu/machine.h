@@ -28,6 +28,7 @@ extern const Scheme machine_schemes[SCHEMES]; /* in the order of the parameter c
 /* Derived data. */
 typedef struct Machine {
     size_t axes;
+    bool warned;             /* of held setpoints */
     bool has_motion;         /* the archive holds one */
     Part plant, motion;      /* motion: has_motion alone */
     Part *drives, *contacts; /* [axes] */

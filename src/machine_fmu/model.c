@@ -11,6 +11,7 @@
  * inside, at t + H: currents, torques and speeds linear between its ends, positions and displacements cubic by their
  * speeds there. What is sampled belongs to the last instant. So the cycles, and with them the results at common
  * instants, are the same whatever the steps. */
+#include <float.h>
 #include <math.h>
 
 #include "instants.h"
@@ -46,6 +47,8 @@ static void machine_start(Unit *unit) {
         axis->drive_x_s = unit_scalars(unit)->motion_built_in ? axis->motion_x_s : axis->x_s;
         controller_part.start(&machine->drives[i]);
         axis->plant_M_a = axis->drive_M_a;
+        axis->x_e_min = axis->x_e_max = axis->drive_x_e;
+        axis->M_a_min = axis->M_a_max = axis->drive_M_a;
     }
 }
 
@@ -158,6 +161,63 @@ static bool too_long(Unit *unit, const Machine *machine, double cycles) {
         number_text(text[2], INSTANTS_MOST * machine->T_c));
 }
 
+/* Steps longer than the position cycle, and nobody told how the setpoints go on: the drives see stairs. */
+static void warn_of_held(Unit *unit, Machine *machine, double h) {
+    const double T_pos = unit_axis(unit, 0)->drive_T_pos;
+    if (machine->warned || unit_scalars(unit)->motion_built_in || unit_sloped(unit) ||
+        h < (1 + INSTANTS_ROUNDING) * T_pos) {
+        return;
+    }
+    char text[2][NUMBER_TEXT_SIZE];
+    unit_warn(
+        unit,
+        "steps of %s s are longer than the position cycle, %s s, and the setpoints have no slopes: they are held, "
+        "and the axes are driven over stairs; give slopes (fmi2SetRealInputDerivatives), shorter steps, or a motion "
+        "inside (motion.built_in)",
+        number_text(text[0], h), number_text(text[1], T_pos));
+    machine->warned = true;
+}
+
+/* Motor torque is linear from instant to instant, so that its extremes are there or at the end of the step. */
+static void begin_extremes(Unit *unit, const Machine *machine) {
+    for (size_t i = 0; i < machine->axes; i++) {
+        AxisBlock *axis = unit_axis(unit, i);
+        axis->x_e_min = axis->M_a_min = DBL_MAX;
+        axis->x_e_max = axis->M_a_max = -DBL_MAX;
+    }
+}
+
+static void take_torque(AxisBlock *axis, double M_a) {
+    axis->M_a_min = M_a < axis->M_a_min ? M_a : axis->M_a_min;
+    axis->M_a_max = M_a > axis->M_a_max ? M_a : axis->M_a_max;
+}
+
+static void take_error(AxisBlock *axis) {
+    const double x_e = axis->drive_x_e;
+    axis->x_e_min = x_e < axis->x_e_min ? x_e : axis->x_e_min;
+    axis->x_e_max = x_e > axis->x_e_max ? x_e : axis->x_e_max;
+}
+
+/* At the instant that the last cycle began with. */
+static void take_instant(Unit *unit, const Machine *machine) {
+    for (size_t i = 0; i < machine->axes; i++) {
+        const AxisState *own = &machine_axis_states(unit)[i];
+        take_torque(unit_axis(unit, i), own->M_a - machine->T_c * own->M_a_slope);
+        take_error(unit_axis(unit, i));
+    }
+}
+
+/* At the end of the step; where no instant lies in it, the following error is that of the last one. */
+static void take_end(Unit *unit, const Machine *machine, bool none) {
+    for (size_t i = 0; i < machine->axes; i++) {
+        AxisBlock *axis = unit_axis(unit, i);
+        take_torque(axis, axis->drive_M_a);
+        if (none) {
+            take_error(axis);
+        }
+    }
+}
+
 static bool machine_step(Unit *unit, double t, double h) {
     Machine *machine = unit_derived(unit);
     StateHead *head = machine_head(unit);
@@ -171,6 +231,9 @@ static bool machine_step(Unit *unit, double t, double h) {
     if (head->share < 1) {
         show_end(unit, machine);
     }
+    warn_of_held(unit, machine, h);
+    begin_extremes(unit, machine);
+    const int64_t first = head->cycle;
     while (t_k < last) {
         const double next = start_time + (double)(head->cycle + 1) * T_c;
         if (instants_share(next - end, T_c) < 1) {
@@ -179,6 +242,7 @@ static bool machine_step(Unit *unit, double t, double h) {
         if (!machine_cycle(unit, t, t_k)) {
             return false;
         }
+        take_instant(unit, machine);
         head->cycle++;
         t_k = next;
     }
@@ -186,6 +250,7 @@ static bool machine_step(Unit *unit, double t, double h) {
     if (head->share < 1) {
         show_inside(unit, machine, head->share);
     }
+    take_end(unit, machine, head->cycle == first);
     unit_leave_late(unit);
     return true;
 }
@@ -227,8 +292,9 @@ static double machine_partial(Unit *unit, unsigned output, unsigned input, bool 
     if (!initial || output < SCALAR_ROWS || unit_scalars(unit)->motion_built_in) {
         return 0;
     }
-    const unsigned first = output - (output - SCALAR_ROWS) % AXIS_ROWS;
-    return output == first + AXIS_VR_drive_x_e && input == first + AXIS_VR_x_s ? 1 : 0;
+    const unsigned row = (output - SCALAR_ROWS) % AXIS_ROWS, first = output - row;
+    const bool error = row == AXIS_VR_drive_x_e || row == AXIS_VR_x_e_min || row == AXIS_VR_x_e_max;
+    return error && input == first + AXIS_VR_x_s ? 1 : 0;
 }
 
 const Model MODEL = {

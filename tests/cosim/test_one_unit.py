@@ -10,7 +10,15 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi2 import (
+    FMU2Slave,
+    calloc,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    free,
+)
 from fmpy.model_description import ModelDescription
 
 from feedsim import load_scenario, run
@@ -53,10 +61,23 @@ def packed(folder: Path, fmus: Path, name: str, *changes: str) -> Packed:
     return Packed(scenario, run(scenario, program=program, fmus=fmus), archive)
 
 
+def callbacks(said: list[str]) -> fmi2CallbackFunctions:
+    def log(_environment: object, _name: bytes, _status: int, category: bytes, message: bytes) -> None:
+        if category in (b"logStatusWarning", b"logStatusError"):
+            said.append(message.decode())
+
+    made = fmi2CallbackFunctions()
+    made.logger = fmi2CallbackLoggerTYPE(log)
+    made.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+    made.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+    return made
+
+
 class Unit:
     """The packed unit, stepped call by call."""
 
-    def __init__(self, case: Packed, folder: Path) -> None:
+    def __init__(self, case: Packed, folder: Path, said: list[str] | None = None) -> None:
+        """said: takes the unit's warnings and errors."""
         folder = Path(fmpy.extract(str(case.archive), str(folder)))
         self.description: ModelDescription = fmpy.read_model_description(str(folder))
         self.references = {each.name: each.valueReference for each in self.description.modelVariables}
@@ -64,7 +85,8 @@ class Unit:
             guid=self.description.guid, unzipDirectory=str(folder), instanceName="machine",
             modelIdentifier=self.description.coSimulation.modelIdentifier,
         )  # fmt: skip
-        self.slave.instantiate(loggingOn=False)
+        self.callbacks = callbacks(said if said is not None else [])
+        self.slave.instantiate(loggingOn=said is not None, callbacks=self.callbacks)
         self.begin()
         self.names = case.names
 
@@ -255,6 +277,55 @@ def test_inside_a_cycle_outputs_are_smooth(z_move: Packed, tmp_path: Path) -> No
         inside = slice(start, start + 16)
         np.testing.assert_allclose(np.diff(M[inside], 2), 0, atol=1e-12)
         np.testing.assert_allclose(np.diff(n[inside], 2), 0, atol=1e-12)
+    unit.close()
+
+
+@pytest.mark.parametrize("step", [10e-3, 7.3e-3, 40e-6])
+def test_nothing_is_missed_between_communication_points(z_move: Packed, tmp_path: Path, step: float) -> None:
+    """Extremes over a step are those of the run's rows in it; the torque's at its end besides, where no row may be."""
+    unit = Unit(z_move, tmp_path)
+    trace, cycle = z_move.result.trace, 125e-6
+    names = ["Z.x_e_min", "Z.x_e_max", "Z.M_a_min", "Z.M_a_max", "Z.M_a"]
+    start = 0.1  # the axis accelerates
+    unit.step_to(start)
+    for k in range(1, 12):
+        begin, end = start + (k - 1) * step, start + k * step
+        unit.step_to(end)
+        low_x, high_x, low_M, high_M, shown = unit.get(names)
+        first, behind = (int(np.ceil(time / cycle - 1e-6)) for time in (begin, end))
+        rows = np.arange(first, behind)
+        torques = [*trace["Z.M_a"][rows], shown]
+        # the torque at an instant, M_a(t_k+1) less slope x T_c, is rounded once more
+        assert (low_M, high_M) == pytest.approx((min(torques), max(torques)), rel=1e-14)
+        # x_e of the run's row k + 1 is that of instant k
+        errors = trace["Z.x_e"][rows + 1] if len(rows) else trace["Z.x_e"][[behind]]
+        assert (low_x, high_x) == (errors.min(), errors.max())
+    unit.close()
+
+
+def test_held_setpoints_at_long_steps_are_told(z_move: Packed, tmp_path: Path) -> None:
+    said: list[str] = []
+    unit = Unit(z_move, tmp_path, said)
+    unit.step_to(0.01)
+    assert not said  # the motion is inside
+    unit.slave.reset()
+    unit.slave.setupExperiment(startTime=0.0)
+    unit.slave.enterInitializationMode()
+    unit.slave.setBoolean([unit.references["motion.built_in"]], [False])
+    unit.set(setpoints_at(z_move.result.program, z_move.scenario.machine.axes, 0))
+    unit.slave.exitInitializationMode()
+    unit.time = 0.0
+    unit.step_to(1e-3)
+    assert not said  # as long as the position cycle
+    inputs = [unit.references[name] for name in ("X.x_s", "Y.x_s", "Z.x_s")]
+    unit.slave.setRealInputDerivatives(inputs, [1] * 3, [0.0] * 3)
+    unit.step_to(11e-3)
+    assert not said
+    unit.step_to(21e-3)
+    unit.step_to(31e-3)
+    assert len(said) == 1
+    assert "steps of 0.01" in said[0]
+    assert "position cycle, 0.001 s" in said[0]
     unit.close()
 
 

@@ -47,7 +47,7 @@ def test_they_are_those_of_the_initial_values(archive: Archive) -> None:
             "friction": {("M_fr", "n_fr")},
             "plant": set(),
             "setpoint": set(),
-            "machine": {(f"{axis}.x_e", f"{axis}.x_s") for axis in "XYZ"},
+            "machine": {(f"{axis}.{x_e}", f"{axis}.x_s") for axis in "XYZ" for x_e in ("x_e", "x_e_min", "x_e_max")},
         }
         assert reacting == expected[archive.unit]
         both = slave.getDirectionalDerivative(unknown, known, list(point))

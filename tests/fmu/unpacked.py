@@ -91,9 +91,8 @@ INSIDE = ("x_a", "n_a", "M_a", "M_fr", "n_fr")  # what the parts of the machine 
 
 def _machine() -> Iterator[dict[str, str]]:
     """The machine's own rows and, by the rules that its README tells, those of its parts."""
-    rows = list(_own("machine"))
-    assert not any(row["axis"] for row in rows)
-    yield from rows
+    own = list(_own("machine"))
+    yield from (row for row in own if not row["axis"])
     drive = [row | {"axis": "AXIS_"} for row in _own("controller")]
     friction = [row | {"axis": "AXIS_"} for row in _own("friction")]
     plant, motion = list(_own("plant")), list(_own("setpoint"))
@@ -108,6 +107,7 @@ def _machine() -> Iterator[dict[str, str]]:
     yield from (_part("drive", row) for row in drive)
     yield from (_part("friction", row) for row in friction)
     yield from (_part("motion", row, held=True) for row in motion if row["axis"])
+    yield from (row for row in own if row["axis"])
 
 
 def _part(part: str, row: dict[str, str], held: bool = False) -> dict[str, str]:

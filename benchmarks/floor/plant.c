@@ -16,7 +16,7 @@ void plant_floor_prepare(void *unit, double h, PlantMotion *motion) {
     const Unit *u = unit;
     Plant *plant = plant_of(unit);
     modal_prepare(&plant->modal[0], h);
-    motion->now = (double *)((StateHead *)(void *)(u->block + u->state_at) + 1) + plant_inputs(plant);
+    motion->now = (double *)((StateHead *)(void *)(u->block + u->state_at) + 1) + plant_ports(plant);
     motion->next = plant->end;
 }
 
@@ -39,9 +39,9 @@ void plant_floor_step(void *unit, PlantMotion *motion, const double *M_a, const 
 
 void plant_floor_measure(void *unit, const PlantMotion *motion, const double *n, double *x_a_n_a) {
     const Plant *plant = plant_of(unit);
-    const size_t inputs = plant_inputs(plant);
+    const size_t slides = plant_slides(plant);
     for (size_t i = 0; i < plant->axes; i++) {
-        x_a_n_a[2 * i] = axis_of(unit, i)->x_0 + modal_sum(&plant->modal[0], inputs + i, motion->now);
+        x_a_n_a[2 * i] = axis_of(unit, i)->x_0 + modal_sum(&plant->modal[0], slides + i, motion->now);
         x_a_n_a[2 * i + 1] = n[i];
     }
 }

@@ -47,7 +47,7 @@ def examples() -> list[Example]:
     """All that there are, by kind and name.
 
     >>> [each.name for each in examples() if each.kind == "machine"]
-    ['emps', 'one_axis', 'test_centre']
+    ['emps', 'one_axis', 'sinumerik_840d', 'test_centre']
     """
     root = shipped("scenarios")
     found = [

@@ -222,9 +222,9 @@ static const Variable *named(const Unit *unit, const char *name) {
         if (strncmp(name, unit->axis_names[axis], length) != 0 || name[length] != '.')
             continue;
         const Variable *rows = unit->variables + SCALAR_ROWS + axis * (size_t)AXIS_ROWS;
-        for (size_t row = 0; row < AXIS_ROWS; row++)
-            if (strcmp(rows[row].info->name, name + length + 1) == 0)
-                return &rows[row];
+        for (const Variable *end = rows + AXIS_ROWS; rows < end; rows++)
+            if (strcmp(rows->info->name, name + length + 1) == 0)
+                return rows;
     }
     return NULL;
 }

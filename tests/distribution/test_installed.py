@@ -117,7 +117,7 @@ def test_every_way_of_use(installed: Installation) -> None:
     run("run", "z.ssp", "--out", "from_ssp")
     run("machine", "pack", "machines/test_centre", "--out", "my_plant.fmu")
     run("validate", "z_positioning.yaml")
-    fewer = ("--set", "motions.1.speeds.count=5", "--set", "motions.1.duration=1 s")
+    fewer = ("--set=motions.2.speeds.count=5", "--set=motions.1.duration=1 s", "--set=motions.2.duration=1 s")
     run("run", "identify_z_constant.yaml", *fewer, "--out", "constant")
     run("identify", "constant/log.csv", "--axis", "Z", "--machine", "machines/test_centre", "--out", "friction")
     run("sweep", "studies/z_stop.yaml", "--runs", "2", "--workers", "1", "--out", "study")

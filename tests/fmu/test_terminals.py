@@ -271,10 +271,10 @@ def test_a_unit_without_icon_may_have_terminals(tmp_path: Path, compiler: tuple[
 
 
 def test_a_pair_that_nothing_fits_is_refused(tmp_path: Path, compiler: tuple[str, ...]) -> None:
-    rows = [REAL.format("M_fr", "output"), REAL.format("n_fr", "output")]
+    rows = [REAL.format("M_fr", "input"), REAL.format("n_fr", "input")]
     with pytest.raises(InputError) as caught:
         _pack(tmp_path / "toy", compiler, *rows)
     assert (
-        "friction: M_fr output, n_fr output; a connection needs M_fr as output, n_fr as input, "
+        "friction: M_fr input, n_fr input; a connection needs M_fr as output, n_fr as input, "
         "or all of them the other way round" in str(caught.value)
     )

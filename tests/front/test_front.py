@@ -21,8 +21,9 @@ from feedsim.errors import InputError
 ROOT = Path(__file__).resolve().parents[2]
 DWELL = {"motions": [{"kind": "dwell", "duration": "20 ms"}], "evaluate": []}
 LOGGED = {
-    "motions.1.speeds.count": 4,
+    "motions.2.speeds.count": 4,
     "motions.1.duration": "1 s",
+    "motions.2.duration": "1 s",
 }
 
 

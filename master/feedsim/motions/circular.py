@@ -130,7 +130,7 @@ class Circle(PlaneMotion):
 
     returns: ClassVar[bool] = True
     kind: Literal["circle"] = "circle"
-    direction: Direction | Literal["both"] = Field(
+    direction: Literal["counterclockwise", "clockwise", "both"] = Field(
         default="counterclockwise",
         description="Counterclockwise turns the first axis towards the second; both: so first, then clockwise",
     )

@@ -99,7 +99,9 @@ def test_changes_are_those_of_the_changelog(made: Path) -> None:
 
 def test_archives_that_are_missing_are_told(tmp_path: Path) -> None:
     (tmp_path / "plant.fmu").write_bytes(b"")
-    with pytest.raises(InputError, match=r"has no controller\.fmu, friction\.fmu, setpoint\.fmu; make fmus-all"):
+    with pytest.raises(
+        InputError, match=r"has no controller\.fmu, friction\.fmu, machine\.fmu, setpoint\.fmu; make fmus-all"
+    ):
         shipped.for_platform("any", ("cc",), tmp_path)
     with pytest.raises(InputError, match="platform amiga: no wheel is made for it"):
         shipped.for_platform("amiga", ("cc",), tmp_path)

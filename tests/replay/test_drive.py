@@ -133,3 +133,21 @@ def test_a_real_machine(axis: str, position: float, torque: float) -> None:
     assert found.estimates["K_p"].status == "undetermined"
     assert "asymmetry" not in found.chosen
     assert found.estimates["T_dyn"].value + found.estimates["T_sym"].value == pytest.approx(8.25e-3, abs=1e-6)
+
+
+@pytest.mark.skipif("FEEDSIM_EMPS" not in os.environ, reason="FEEDSIM_EMPS names no measured record")
+def test_the_published_controller_of_a_measured_axis() -> None:
+    """Gains, friction and offset as published for EMPS lie in the intervals of six seconds of its record."""
+    machine = load_machine(MACHINES / "emps")
+    mapping = load_columns(MACHINES / "emps" / "columns.yaml")
+    read = read_axes(Path(os.environ["FEEDSIM_EMPS"]), ["X"], machine, mapping)
+    records = {"X": windowed("X", read["X"], (0.0, 6.0))}
+    found = identify_drives(read, records, machine, [], "", "").drives["X"]
+    axis = machine.axes["X"]
+    published = {"K_v": axis.drive.K_v, "K_p": axis.drive.K_p, "F_C": axis.friction.F_C,
+                 "sigma_2": axis.friction.sigma_2, "M_0": axis.M_0}  # fmt: skip
+    for name, value in published.items():
+        each = found.estimates[name]
+        assert each.status == "estimated", name
+        assert each.interval[0] <= value <= each.interval[1], name
+    assert found.position < 2.5e-6

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log
+from math import log, nan
 
 import numpy as np
 
@@ -154,14 +154,14 @@ def _window(
     # Widest windows first: where one of them holds the whole interpolation, the residual falls to the rounding.
     width = min(WIDEST, longest + 1)
     for first in range(longest - width + 2):
-        rms = _solved(records, targets, others, first, width, longest, gain)[1]
-        if best is None or rms < best[0]:
-            best = rms, first, width
+        left = _solved(records, targets, others, first, width, longest, gain)[1]
+        if best is None or left < best[0]:
+            best = left, first, width
     assert best is not None
     floor, begin, _ = best
     rows = sum(len(record) - longest for record in records)
     steps = np.concatenate([np.diff(np.asarray(record.setpoint)) for record in records])
-    digits = DIGITS * _rms(steps) * (1.0 if gain is None else 1.0 / records[0].interval)
+    digits = DIGITS * rms(steps) * (1.0 if gain is None else 1.0 / records[0].interval)
     rounding = (ROUNDING * max(float(np.ptp(target)) for target in targets)) ** 2
     chosen = begin, width
     for narrow in range(1, width):
@@ -173,14 +173,14 @@ def _window(
         if grown <= max(BY_CHANCE * (width - narrow) / rows, 2 * GROWS if floor < digits else 0.0):
             chosen = found[1], narrow
             break
-    coefficients, rms, largest, covariance = _solved(records, targets, others, *chosen, longest, gain)
+    coefficients, left, largest, covariance = _solved(records, targets, others, *chosen, longest, gain)
     first, width = chosen
     weights, further = coefficients[:width], coefficients[width:]
     total = 1.0 if gain is None else float(further[gain])
     ages = (first + np.arange(width)) * records[0].interval
     lean = (ages - float(weights @ ages) / float(np.sum(weights))) / total
     variance = float(lean @ covariance[:width, :width] @ lean)
-    taps = Taps(first, weights / np.sum(weights), records[0].interval, np.sqrt(max(variance, 0.0)), rms, largest)
+    taps = Taps(first, weights / np.sum(weights), records[0].interval, np.sqrt(max(variance, 0.0)), left, largest)
     return taps, further, covariance
 
 
@@ -216,7 +216,7 @@ def _solved(
         weights = np.append(x, 1.0 - np.sum(x))
         turn = np.vstack([np.eye(width - 1), -np.ones(width - 1)]) if width > 1 else np.zeros((1, 0))
         residual = b - A @ weights
-        return weights, _rms(residual), float(np.max(np.abs(residual))), turn @ cov @ turn.T
+        return weights, rms(residual), float(np.max(np.abs(residual))), turn @ cov @ turn.T
     at = width + gain
     keep = [i for i in range(A.shape[1]) if i != width - 1]
     reduced = A.copy()
@@ -229,7 +229,7 @@ def _solved(
     full[width - 1, keep.index(at)] = 1.0
     solution = full @ x
     residual = b - A @ solution
-    return solution, _rms(residual), float(np.max(np.abs(residual))), full @ cov @ full.T
+    return solution, rms(residual), float(np.max(np.abs(residual))), full @ cov @ full.T
 
 
 def _least_squares(A: Array, b: Array) -> tuple[Array, Array]:
@@ -244,5 +244,6 @@ def _least_squares(A: Array, b: Array) -> tuple[Array, Array]:
     return x, variance * ((Vt.T * inverse**2) @ Vt) / np.outer(scale, scale)
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+def rms(values: Array) -> float:
+    """Root mean square; nan of nothing."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else nan

@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from feedsim.analysis import Figure
 from feedsim.errors import InputError
-from feedsim.identify.position_loop import SpeedSetpoint, Taps, setpoint_delay, speed_setpoint
+from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
 from feedsim.scenario import Machine
 from feedsim.trace.trace import Array
@@ -73,7 +73,7 @@ class Comparison:
             error = scale * channel.error[rows]
             key = name.replace(" ", "_")
             told = f"{channel.meaning}: simulated less recorded, while the axis moves"
-            found[f"{self.axis}.{key}_rms"] = Figure(_rms(error), unit, f"{told}, root mean square")
+            found[f"{self.axis}.{key}_rms"] = Figure(rms(error), unit, f"{told}, root mean square")
             found[f"{self.axis}.{key}_largest"] = Figure(
                 float(np.max(np.abs(error), initial=0.0)) if len(error) else nan, unit, f"{told}, largest magnitude"
             )
@@ -82,7 +82,7 @@ class Comparison:
             1e3 * self.lag, "mm", "distance of the position behind the setpoint in the record, root mean square"
         )
         found[f"{self.axis}.share_of_lag"] = Figure(
-            100 * _rms(position) / self.lag if self.lag else nan, "%", "position error as a share of that distance"
+            100 * rms(position) / self.lag if self.lag else nan, "%", "position error as a share of that distance"
         )
         found[f"{self.axis}.torque_delay"] = Figure(
             1e3 * self.delay,
@@ -164,7 +164,7 @@ def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1)
         asked = speed.of(record.setpoint, x_a / each.I_P, record.feedforward)
         asked[: speed.taps.reach] = record.speed_setpoint[: speed.taps.reach]  # there is no past to form it from
         channels["speed setpoint"] = Channel(record.speed_setpoint, asked, "rad/s", "speed setpoint of the control")
-    lag = _rms((each.setpoint - each.position)[each.moving])
+    lag = rms((each.setpoint - each.position)[each.moving])
     return Comparison(each.axis, each, channels, taps, speed, lag, delay)
 
 
@@ -178,13 +178,9 @@ def _delayed(each: AxisRecord, torque: Array, per_row: int) -> tuple[float, Arra
         return np.asarray(np.interp(time - delay, fine, torque), dtype=np.float64)
 
     def left(delay: float) -> float:
-        return _rms((at(delay) - each.record.torque)[rows])
+        return rms((at(delay) - each.record.torque)[rows])
 
     best = minimize_scalar(left, bounds=(-LATEST, LATEST), method="bounded", options={"xatol": 1e-6}).x
     # A delay that hardly helps is none.
     delay = float(best) if left(float(best)) < HELPS * left(0.0) else 0.0
     return delay, at(delay)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else nan

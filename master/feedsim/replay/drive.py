@@ -27,11 +27,11 @@ from feedsim import variables
 from feedsim.errors import InputError
 from feedsim.identify.fit import Fit
 from feedsim.identify.parameters import estimate
-from feedsim.identify.position_loop import SpeedSetpoint, Taps, setpoint_delay, speed_setpoint
+from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
-from feedsim.replay.tuning import Problem, Rows, rms, together
+from feedsim.replay.tuning import Problem, Rows, together
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
 from feedsim.trace.trace import Array
@@ -47,10 +47,9 @@ BLOCKS: Mapping[str, tuple[str, ...]] = {
     "Stribeck effect": ("excess", "v_s"),
     "asymmetry": ("asymmetry",),
 }
-# What friction begins with where nothing tells it: full friction after 5 um, an engaging zone of a hundredth of a turn.
-PRESLIDING, ZONE = 5e-6, 0.06
 # Of the way per row, of the top speed: a regression that leaves more is a start, not an answer.
 EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
+LEAST_ROWS = 50  # in which the axis moves
 FOLDS = 4
 FAST = 0.1  # of the top speed: what is faster is another kind of motion
 BETTER = 2.0  # of the logarithm of the likelihood: what predicts hardly better is not worth having
@@ -129,9 +128,9 @@ def identify_drive(
         {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9},
     )  # fmt: skip
     rows = np.flatnonzero(each.moving)
-    if len(rows) < 50:
+    if len(rows) < LEAST_ROWS:
         raise InputError(
-            f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least 50 are needed"
+            f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least {LEAST_ROWS} are needed"
         )
     free = ["K_p", "K_i", "T_sym", "k_ffw", "M_0", "delay", "F_C", "sigma_0", "sigma_1", "sigma_2"]
     free += [] if structure_known else ["J"]

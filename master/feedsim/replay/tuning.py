@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, inf, log, nan, sqrt
+from math import exp, inf, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import FeedsimError, InputError
 from feedsim.identify.fit import Fit, Parameter, fit
+from feedsim.identify.position_loop import rms
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
 from feedsim.scenario import Machine
 from feedsim.trace.trace import Array
@@ -175,11 +176,6 @@ class Problem:
         return fit(
             lambda values: self.residuals(values, rows), parameters, difference=1e-3, tolerance=1e-5, limit=limit
         )  # fmt: skip
-
-
-def rms(values: Array) -> float:
-    """Root mean square; nan of nothing."""
-    return float(np.sqrt(np.mean(values**2))) if len(values) else nan
 
 
 def together(residuals: Array) -> float:

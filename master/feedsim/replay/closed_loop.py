@@ -33,7 +33,6 @@ BEFORE = 2.0  # [s] of the record ahead of a window that are run, too
 BEHIND = 4  # position cycles that the program goes on behind the last row
 # The setpoint moves where its speed is more than a share of the top speed; the axis follows for a while behind.
 MOVES, FOLLOWS = 1e-4, 0.02  # share, [s]
-SIGNALS = ("x_a", "M_a", "n_s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,9 +197,7 @@ class Replay:
             x_s[axis], n_ffw[axis] = x, v / machine.axes[axis].I_P
         return Program(time, x_s, n_ffw)
 
-    def follow(
-        self, machine: Machine, signals: Sequence[str] = SIGNALS, per_row: int = 1
-    ) -> dict[str, dict[str, Array]]:
+    def follow(self, machine: Machine, signals: Sequence[str], per_row: int = 1) -> dict[str, dict[str, Array]]:
         """Axis -> signal -> (N,) at the rows of the record, of the units with the parameters of `machine`.
 
         per_row: samples from one row to the next; ((N - 1) per_row + 1,) then.

@@ -18,7 +18,6 @@ from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
 from feedsim.scenario import Machine
 from feedsim.trace.trace import Array
 
-LARGEST, RMS = "largest", "rms"
 TO_RPM = 30 / np.pi
 BINS = 60  # of the position
 LATEST = 5e-3  # [s]: no channel of a control is later than that against another

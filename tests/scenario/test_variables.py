@@ -19,7 +19,7 @@ def test_the_packager_writes_what_is_loaded(tmp_path: Path) -> None:
 def test_a_table_that_is_missing_names_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(variables, "FILE", tmp_path / "none.json")
     variables._read.cache_clear()
-    with pytest.raises(InputError, match=r"none\.json is missing; `make fmus` makes it"):
+    with pytest.raises(InputError, match=r"none\.json is missing; `make fmus` builds it"):
         variables._read()
 
 

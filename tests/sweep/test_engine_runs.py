@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
-import sys
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -18,6 +16,7 @@ from feedsim.scenario import Base, Change, load
 from feedsim.sweep.bundle import Bundle
 from feedsim.sweep.design import Outcome, Task
 from feedsim.sweep.engine import open_engine
+from feedsim_packager import exchange, toolchain
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / "scenarios"
@@ -64,8 +63,7 @@ def bundle(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
     archives.mkdir()
     for unit in ("plant", "controller", "friction"):
         shutil.copy(fmus / f"{unit}.fmu", archives)
-    build = [sys.executable, str(ROOT / "src" / "exchange" / "build.py"), "--out", str(archives)]
-    subprocess.run(build, check=True, capture_output=True)
+    exchange.build(archives, toolchain.find_compiler())
     base = Base.read(folder / "z_positioning.yaml", SHORT)
     found = Bundle.of_base(base, base.files, archives)
     shutil.rmtree(folder)

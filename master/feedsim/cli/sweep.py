@@ -74,7 +74,7 @@ def sweep(options: Namespace) -> int:
                     progress=progress,
                     restart=options.restart,
                     format=options.format,
-                    command=sys.argv,
+                    command=("feedsim", *sys.argv[1:]),  # not where it is installed: a study is sent to others
                     say=None if options.quiet else lambda text: print(f"feedsim: {text}", file=sys.stderr),
                     discard=lambda: report.discard(directory),
                 )

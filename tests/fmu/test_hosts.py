@@ -58,9 +58,6 @@ def _slow_table(setpoint: Archive, folder: Path) -> Archive:
 
 
 def test_ten_million_steps_without_drift(archive: Archive, long_run: Path, tmp_path: Path) -> None:
-    if archive.unit == "machine":
-        # Steps on the cycle are held to the bits of a run elsewhere (tests/cosim/test_one_unit.py).
-        pytest.xfail("its following errors and extremes over a step are not yet told apart from what runs over a cycle")
     sampled: list[object] = []
     if archive.unit == "controller":
         # The following error is taken every T_pos = 1 ms and shows x_a; a step that is no part of it.

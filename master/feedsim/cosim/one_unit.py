@@ -3,20 +3,19 @@ archive machine.fmu. No compiler is needed: which machine it is, is data to the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.roles import controller_parameters
 from feedsim.cosim.schedule import SCHEMES
-from feedsim.errors import InputError, OutputError
+from feedsim.errors import InputError
 from feedsim.nc import Program
-from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine
 from feedsim.scenario.machine import Parameter
 from feedsim.scenario.model import Coupling
-from feedsim.structure.pack import POSES_IN_ARCHIVE, Packed
+from feedsim.structure.pack import POSES_IN_ARCHIVE, Packed, packaging, packed, plant_tables, setpoint_table
 
 UNIT = "machine"  # its archive is machine.fmu
 
@@ -46,43 +45,28 @@ def pack_whole(
         InputError: a role is filled by another maker's unit, a file is not what it should be, or the unit refuses.
         OutputError: `out` cannot be written.
     """
-    from feedsim_packager import errors, machine_tables, setpoints, whole_machine
-    from feedsim_packager.machine import named
-    from feedsim_packager.repack import repack
-    from feedsim_packager.resources import File
+    from feedsim_packager import whole_machine
 
     settings = parameters(machine, coupling or Coupling(), built_in=program is not None)
     pose = {axis: machine.pose[axis] for axis in machine.axes}
-    with ExitStack() as stack:
-        try:
-            poses = _poses(machine, stack)
-            tables = machine_tables.check(
-                File("axes.csv", machine_tables.axes_csv(pose)),
-                File.at(machine.modes),
-                File.at(poses) if poses is not None else None,
-            )
-            motion = None
-            if program is not None:
-                columns = {axis: (program.x_s[axis], program.n_ffw[axis]) for axis in machine.axes}
-                motion = setpoints.check(File("setpoints.csv", setpoints.write(program.time, columns)))
-            given = whole_machine.WholeMachine(
-                tables, motion, {name: whole_machine.spelled(value) for name, value in settings.items()}
-            )
-            stage = stack.enter_context(TemporaryFolder()) if trial else None
-            done = repack(base, given, named(name, note), out, trial_run=trial, level=level, stage=stage)
-        except errors.OutputError as error:
-            raise OutputError(str(error)) from error
-        except errors.InputError as error:
-            raise InputError(str(error), error.problems) from error
-    return Packed(done.path, done.size, done.guid, done.platforms)
+    with packaging(), _poses(machine) as poses:
+        given = whole_machine.WholeMachine(
+            plant_tables(machine.modes, pose, poses),
+            setpoint_table(program) if program is not None else None,
+            {name: whole_machine.spelled(value) for name, value in settings.items()},
+        )
+        return packed(base, out, given, name=name, note=note, trial=trial, level=level)
 
 
-def _poses(machine: Machine, stack: ExitStack) -> Path | None:
+@contextmanager
+def _poses(machine: Machine) -> Iterator[Path | None]:
     """The grid of poses of the machine's own plant archive, where it has one."""
     if machine.plant is None:
-        return None
-    file = stack.enter_context(Archive(machine.plant)).directory / POSES_IN_ARCHIVE
-    return file if file.is_file() else None
+        yield None
+        return
+    with Archive(machine.plant) as archive:
+        file = archive.directory / POSES_IN_ARCHIVE
+        yield file if file.is_file() else None
 
 
 def parameters(machine: Machine, coupling: Coupling, *, built_in: bool) -> Mapping[str, Parameter]:

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError, OutputError
 from feedsim.motions.circular import Circular
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment
 from feedsim.scenario import CircleTest, Positioning, Scenario
+from feedsim.structure.pack import packaging, packed, setpoint_table
 
 SETPOINTS_IN_ARCHIVE = "resources/setpoints.csv"
 UNEVEN = 1e-6  # of a row, as in the unit
@@ -53,30 +53,17 @@ def pack_setpoints(base: Path, out: Path, program: Program, *, name: str, note: 
         InputError: `base` is no such archive.
         OutputError: `out` cannot be written.
     """
-    from feedsim_packager import errors, setpoints
-    from feedsim_packager.machine import named
-    from feedsim_packager.repack import repack
-    from feedsim_packager.resources import File
-
-    columns = {axis: (program.x_s[axis], program.n_ffw[axis]) for axis in program.x_s}
-    try:
-        given = setpoints.check(File("setpoints.csv", setpoints.write(program.time, columns)))
-        repack(base, given, named(name, note), out, trial_run=False)
-    except errors.OutputError as error:
-        raise OutputError(str(error)) from error
-    except errors.InputError as error:
-        raise InputError(str(error), error.problems) from error
+    with packaging():
+        packed(base, out, setpoint_table(program), name=name, note=note, trial=False)
 
 
 def read_setpoints(content: bytes, where: str) -> Table:
     """Setpoints of an archive's table. InputError: it is not what it should be."""
-    from feedsim_packager import errors, setpoints
+    from feedsim_packager import setpoints
     from feedsim_packager.resources import File
 
-    try:
+    with packaging():
         table = setpoints.read_columns(File(where, content))
-    except errors.InputError as error:
-        raise InputError(str(error), error.problems) from error
     return Table(
         time=np.array(table.time, dtype=np.float64),
         cycle=float(table.cycle),

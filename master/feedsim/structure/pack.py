@@ -1,4 +1,5 @@
-"""A machine's modes, pose and grid of poses -> a plant archive of its own. Sole user of the packager.
+"""A machine's modes, pose and grid of poses -> a plant archive of its own; and what all that is packed into archives
+has in common.
 
 No compiler is needed: the binaries of an archive do not depend on the machine. Which axes there are, where they stand
 and how the structure moves is data that the archive holds in resources/.
@@ -6,14 +7,21 @@ and how the structure moves is data that the archive holds in resources/.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import nullcontext
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from feedsim.errors import InputError, OutputError
 from feedsim.owned import TemporaryFolder
 from feedsim.structure.modes import Modes, write_modes
+
+if TYPE_CHECKING:
+    from feedsim.nc import Program
+    from feedsim_packager.machine_tables import MachineTables
+    from feedsim_packager.resources import Resources
+    from feedsim_packager.setpoints import Setpoints
 
 AXES_IN_ARCHIVE = "resources/axes.csv"
 MODES_IN_ARCHIVE = "resources/modes.csv"
@@ -62,11 +70,6 @@ def pack(
         InputError: a file is not what it should be, or the unit refuses the machine.
         OutputError: `out` cannot be written.
     """
-    from feedsim_packager import errors, machine_tables
-    from feedsim_packager.machine import named
-    from feedsim_packager.repack import repack
-    from feedsim_packager.resources import File
-
     if isinstance(modes, Modes):
         with TemporaryFolder() as folder:
             written = folder / "modes.csv"
@@ -74,16 +77,51 @@ def pack(
             return pack(
                 base, out, modes=written, pose=pose, poses=poses, name=name, note=note, trial=trial, level=level
             )  # fmt: skip
+    with packaging():
+        return packed(base, out, plant_tables(modes, pose, poses), name=name, note=note, trial=trial, level=level)
+
+
+@contextmanager
+def packaging() -> Iterator[None]:
+    """The packager's errors within are InputError and OutputError of this house."""
+    from feedsim_packager import errors
+
     try:
-        given = machine_tables.check(
-            File("axes.csv", machine_tables.axes_csv(pose)),
-            File.at(modes),
-            File.at(poses) if poses is not None else None,
-        )
-        with TemporaryFolder() if trial else nullcontext() as stage:
-            done = repack(base, given, named(name, note), out, trial_run=trial, level=level, stage=stage)
+        yield
     except errors.OutputError as error:
         raise OutputError(str(error)) from error
     except errors.InputError as error:
         raise InputError(str(error), error.problems) from error
+
+
+def plant_tables(modes: Path, pose: Mapping[str, float], poses: Path | None) -> MachineTables:
+    """A machine's files as an archive holds them, checked; arguments as those of `pack`."""
+    from feedsim_packager import machine_tables
+    from feedsim_packager.resources import File
+
+    return machine_tables.check(
+        File("axes.csv", machine_tables.axes_csv(pose)),
+        File.at(modes),
+        File.at(poses) if poses is not None else None,
+    )
+
+
+def setpoint_table(program: Program) -> Setpoints:
+    """The setpoints of a program as an archive holds them, checked."""
+    from feedsim_packager import setpoints
+    from feedsim_packager.resources import File
+
+    columns = {axis: (program.x_s[axis], program.n_ffw[axis]) for axis in program.x_s}
+    return setpoints.check(File("setpoints.csv", setpoints.write(program.time, columns)))
+
+
+def packed(
+    base: Path, out: Path, given: Resources, *, name: str = "", note: str = "", trial: bool = True, level: int = 9
+) -> Packed:
+    """Pack the unit of the archive `base` with what is `given`; the rest as in `pack`."""
+    from feedsim_packager.machine import named
+    from feedsim_packager.repack import repack
+
+    with TemporaryFolder() if trial else nullcontext() as stage:
+        done = repack(base, given, named(name, note), out, trial_run=trial, level=level, stage=stage)
     return Packed(done.path, done.size, done.guid, done.platforms)

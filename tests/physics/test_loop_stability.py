@@ -11,7 +11,7 @@ import pytest
 from feedsim import cosim, nc, scenario
 from feedsim.analysis.linear import LinearSystem, unstable_poles
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
-from feedsim.scenario import Scenario, load_subject
+from feedsim.scenario import Friction, Scenario, load_subject
 from feedsim.structure import Modes, checked_modes
 
 MACHINES = Path(__file__).resolve().parents[2] / "scenarios" / "machines"
@@ -157,3 +157,19 @@ def test_axes_that_rest_are_judged_at_rest(tmp_path: Path) -> None:
     for state, severity in (("moving", "Wrong"), ("at rest", "str")):
         plan = planned(tmp_path, "Z", state, gain)
         assert type(cosim.check(plan, nc.plan(plan))[0]).__name__ == severity
+
+
+def test_loops_that_are_kept_know_all_that_they_depend_on() -> None:
+    """With another value of any parameter of friction they are judged as where nothing is kept."""
+    machine = scenario.load_subject(MACHINES / "one_axis").machine
+    axis, modes = machine.axes["X"], checked_modes(machine)
+    friction, kept = axis.friction, judge(machine, modes)
+    assert isinstance(friction, Friction)
+    others = set()
+    for name, value in friction.parameters().items():
+        changed = friction.model_copy(update={name: float(value) * 1.5 + 1e-3})
+        other = machine.model_copy(update={"axes": {"X": axis.model_copy(update={"friction": changed})}})
+        found = judge(other, modes)
+        assert found == judge(other, replace(modes))  # modes of the same numbers, of which nothing is kept
+        others |= {name} if found != kept else set()
+    assert others == {"sigma_0", "sigma_1", "sigma_2", "gamma"}

@@ -15,7 +15,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal, Self
+from functools import lru_cache
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from feedsim.linear.drive import LinearDrive
 from feedsim.linear.plant import CHUNK, Complexes, Floats, Hold, ModalPlant, modal_sums
 from feedsim.linear.stability import GROWTH, TURN
-from feedsim.scenario import Drive, Friction, Machine
+from feedsim.scenario import Cycles, Drive, Friction, Machine
 from feedsim.structure import Modes
 
 # "For satisfactory performance, the phase margin should be between 30 deg and 60 deg, and the gain margin should be
@@ -85,9 +86,37 @@ def judge(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
 
     The friction of another maker is left out at rest as well: what it does there is not known.
     """
-    if not any(isinstance(axis.drive, Drive) for axis in machine.axes.values()):
+    axes = {name: axis for name, axis in machine.axes.items() if isinstance(axis.drive, Drive)}
+    if not axes:
         return ()
-    return _Sampled.of(machine, modes).judged()
+    frictions = machine.shipped_frictions
+    held = tuple(_Bristles.of(frictions[name]) if name in frictions else None for name in axes)
+    driven = tuple((name, axis.drive, axis.I_P) for name, axis in axes.items() if isinstance(axis.drive, Drive))
+    return _judged_axes(driven, held, machine.cycles, modes)
+
+
+class _Bristles(NamedTuple):
+    """All that the loops know of an axis's friction: stiffness [N.m/rad] and dampings [N.m.s/rad] where it sticks."""
+
+    stiffness: float
+    sigma_1: float
+    sigma_2: float
+
+    @classmethod
+    def of(cls, friction: Friction) -> _Bristles:
+        k = 0.5 * (1 + friction.gamma) if friction.W > 0 else 1.0
+        return cls(k * friction.sigma_0, friction.sigma_1, friction.sigma_2)
+
+
+# Most of the time of a short run; in a study many runs have the same loops, whatever else differs.
+@lru_cache(maxsize=8)
+def _judged_axes(
+    driven: tuple[tuple[str, Drive, float], ...], held: tuple[_Bristles | None, ...], cycles: Cycles, modes: Modes
+) -> tuple[Loop, ...]:
+    """`driven`: name, drive and I_P of the axes judged; `held`: what holds each at rest, where that is known."""
+    axes = tuple(name for name, _, _ in driven)
+    drives = tuple(LinearDrive(drive, cycles, I_P) for _, drive, I_P in driven)
+    return _Sampled(axes, drives, held, ModalPlant.of(modes, axes)).judged()
 
 
 def _judged(axis: str, kind: Kind, state: State, gain: float, L: Complexes, growing: int, closed: int) -> Loop:
@@ -161,18 +190,8 @@ class _Sampled:
 
     axes: tuple[str, ...]
     drives: tuple[LinearDrive, ...]
-    frictions: tuple[Friction | None, ...]
+    bristles: tuple[_Bristles | None, ...]
     plant: ModalPlant
-
-    @classmethod
-    def of(cls, machine: Machine, modes: Modes) -> Self:
-        drives = {
-            name: LinearDrive(axis.drive, machine.cycles, axis.I_P)
-            for name, axis in machine.axes.items()
-            if isinstance(axis.drive, Drive)
-        }
-        frictions = tuple(machine.shipped_frictions.get(axis) for axis in drives)
-        return cls(tuple(drives), tuple(drives.values()), frictions, ModalPlant.of(modes, tuple(drives)))
 
     def judged(self) -> tuple[Loop, ...]:
         """All loops in all states."""
@@ -311,10 +330,9 @@ class _Sampled:
         T_c = self.drives[0].cycles.T_c
         angle = 0.5 * T_c * (np.exp(s * T_c) + 1) / np.expm1(s * T_c)
         found = np.zeros((len(s), len(self.axes)), dtype=np.complex128)
-        for i, friction in enumerate(self.frictions):
-            if friction is not None:
-                k = 0.5 * (1 + friction.gamma) if friction.W > 0 else 1.0
-                found[:, i] = k * friction.sigma_0 * angle + friction.sigma_1 + friction.sigma_2
+        for i, each in enumerate(self.bristles):
+            if each is not None:
+                found[:, i] = each.stiffness * angle + each.sigma_1 + each.sigma_2
         return found
 
 

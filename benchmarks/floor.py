@@ -1,7 +1,8 @@
-"""What the FMI and the master cost: the circle in the native loop and in Python's, against the same algorithm without
-FMI: the units' models linked together and called directly (``benchmarks/floor``).
+"""What the FMI and the master cost: the circle in the native loop and in Python's, and as the one unit `machine` in
+steps from outside, against the same algorithm without FMI: the units' models linked together and called directly
+(``benchmarks/floor``).
 
-The three take turns in one process; a ratio is the median of those of neighbouring runs, with its quartiles. The floor
+They take turns in one process; a ratio is the median of those of neighbouring runs, with its quartiles. The floor
 must leave the same bits, or it is no floor for this work.
 """
 
@@ -10,8 +11,11 @@ from __future__ import annotations
 import ctypes
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from harness import ROOT, Contestant, arguments, digits, measure, table
@@ -19,7 +23,10 @@ from harness import ROOT, Contestant, arguments, digits, measure, table
 import numpy as np
 
 from feedsim import cosim, nc, scenario
+from feedsim.cosim.archive import Archive
+from feedsim.cosim.one_unit import pack_whole
 from feedsim.cosim.system import System
+from feedsim.cosim.unit import Unit
 from feedsim_packager import compile, toolchain
 
 FLOOR = ROOT / "benchmarks" / "floor"
@@ -35,6 +42,9 @@ EQUATIONS = {
 }  # fmt: skip
 CONTROLLER = ("M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q", "torque_limited", "voltage_limited")
 FRICTION = ("M_fr", "z", "c", "k", "lambda")
+FLAGS = ("torque_limited", "voltage_limited")  # Boolean: not among what one unit is asked for
+LOCALS = {"z": "friction.z", "c": "friction.c", "k": "friction.k", "lambda": "friction.lambda"}
+OUTER = {"one unit, steps of 10 ms": 80, "one unit, steps of 125 us": 1}  # cycles that the importer steps at once
 TOOL = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
 
 
@@ -47,7 +57,11 @@ def build(directory: Path, extra: tuple[str, ...] = ()) -> ctypes.CDLL:
     objects = []
     for unit, names in (*EQUATIONS.items(), ("floor", ())):
         folder = ROOT / "src" / f"{unit}_fmu"
-        for source in (FLOOR / f"{unit}.c", *(folder / name for name in names)):
+        for source in (
+            FLOOR / f"{unit}.c",
+            *([FLOOR / "machine.c"] if unit == "floor" else []),
+            *(folder / name for name in names),
+        ):
             made = directory / f"{unit}-{source.stem}.o"
             subprocess.run([*command, f"-I{folder}", *shared, "-c", str(source), "-o", str(made)], check=True)
             objects.append(str(made))
@@ -83,14 +97,54 @@ def floor(library: ctypes.CDLL, circle: scenario.Scenario, program: nc.Program) 
         return time.perf_counter() - begun, table, names
 
 
+@contextmanager
+def one_unit(circle: scenario.Scenario, program: nc.Program) -> Iterator[Archive]:
+    """The circle's machine packed as one unit, with the motion inside."""
+    with tempfile.TemporaryDirectory() as folder:
+        packed = Path(folder) / "machine.fmu"
+        pack_whole(cosim.fmus_directory() / "machine.fmu", packed, circle.machine, program=program, trial=False)
+        with Archive(packed) as archive:
+            yield archive
+
+
+def stepped(
+    library: ctypes.CDLL, archive: Archive, T_c: float, names: Sequence[str], outer: int, count: int, every: int
+) -> tuple[float, np.ndarray]:
+    """Seconds of `count` steps of `outer` cycles each, and a row of `names` at the start and at every `every` steps."""
+    unit = Unit(archive, "machine")
+    try:
+        unit.enter_initialisation(0.0, 2 * count * outer * T_c)
+        unit.exit_initialisation()
+        references, table = unit.references(names), np.zeros((count // every + 1, len(names)))
+        arguments = (
+            ctypes.c_void_p(unit.address("do_step")), ctypes.c_void_p(unit.address("get_real")),
+            ctypes.c_void_p(unit.component), ctypes.c_double(outer * T_c), ctypes.c_long(count), ctypes.c_long(every),
+            ctypes.c_void_p(references.ctypes.data), ctypes.c_size_t(len(names)), ctypes.c_void_p(table.ctypes.data),
+        )  # fmt: skip
+        library.machine_steps.restype = ctypes.c_long
+        begun = time.perf_counter()
+        failed = library.machine_steps(*arguments)
+        seconds = time.perf_counter() - begun
+    finally:
+        unit.close()
+    if failed:
+        raise SystemExit(f"the machine as one unit: {failed} calls have failed")
+    return seconds, table
+
+
 def main(given: Sequence[str] | None = None) -> int:
-    bench = arguments("floor", __doc__, given, rounds=ROUNDS, only=("native loop", "Python loop"))
+    bench = arguments("floor", __doc__, given, rounds=ROUNDS, only=("native loop", "Python loop", *OUTER))
     library = build(ROOT / "build" / "bench" / "floor")
     circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml", ["motions.0.direction=counterclockwise"])
     program = nc.plan(circle)
-    simulated = float(program.time[-1])
-    cycles = simulated / circle.machine.cycles.T_c
+    simulated, T_c = float(program.time[-1]), circle.machine.cycles.T_c
+    cycles, every = simulated / T_c, round(circle.recording.interval / T_c)
+    names = floor(library, circle, program)[2]
     left: dict[str, np.ndarray] = {}
+
+    def refuse(different: Sequence[str]) -> None:
+        if different:
+            raise SystemExit(f"the floor has computed something else: {', '.join(different)}")
 
     def whole() -> float:
         seconds, left["table"], _ = floor(library, circle, program)
@@ -98,18 +152,27 @@ def main(given: Sequence[str] | None = None) -> int:
 
     def looped(native: bool) -> float:
         run = cosim.run(circle, program=program, native=native)
-        different = [name for at, name in enumerate(names) if np.any(run.trace[name] != left["table"][:, at])]
-        if different:
-            raise SystemExit(f"the floor has computed something else: {', '.join(different)}")
+        refuse([name for at, name in enumerate(names) if np.any(run.trace[name] != left["table"][:, at])])
         return 1e6 * run.wall_time / cycles
 
-    names = floor(library, circle, program)[2]
-    contestants = [
-        Contestant("floor", whole),
-        Contestant("native loop", lambda: looped(True)),
-        Contestant("Python loop", lambda: looped(False), rounds=3),
-    ]
-    costs = measure([each for each in contestants if each.name in ("floor", *bench.only)], bench.rounds, title="circle")
+    def as_one(archive: Archive, outer: int) -> float:
+        wanted = {name: at for at, name in enumerate(names) if not name.endswith(FLAGS)}
+        own = [f"{axis}.{LOCALS.get(signal, signal)}" for axis, _, signal in (name.partition(".") for name in wanted)]
+        count, rows = int(cycles) // outer, max(outer, every)  # a row at every step, or as the floor has them
+        seconds, table = stepped(library, archive, T_c, own, outer, count, rows // outer)
+        rows_of_floor = left["table"][:: rows // every][: len(table)]
+        refuse([name for i, (name, at) in enumerate(wanted.items()) if np.any(table[:, i] != rows_of_floor[:, at])])
+        return 1e6 * seconds / (count * outer)
+
+    with one_unit(circle, program) as archive:
+        contestants = [
+            Contestant("floor", whole),
+            Contestant("native loop", lambda: looped(True)),
+            Contestant("Python loop", lambda: looped(False), rounds=3),
+            *(Contestant(name, partial(as_one, archive, outer)) for name, outer in OUTER.items()),
+        ]
+        wanted = [each for each in contestants if each.name in ("floor", *bench.only)]
+        costs = measure(wanted, bench.rounds, title="circle")
     rows = [
         [
             name, f"{costs.median(name):.3f} us", f"{costs.shortest(name):.3f} us",

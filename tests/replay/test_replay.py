@@ -73,6 +73,33 @@ def test_another_machine_shows(log: Path, tmp_path: Path) -> None:
     assert figures["position_largest"] == pytest.approx(1e6 * v / K_v, rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("load_of_run", "unit", "against"), [("slide", "N", -800.0), ("motor", "N.m", 4.0)], ids=["slide", "motor"]
+)
+def test_a_load_that_was_recorded_acts(
+    load_of_run: str, unit: str, against: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A pulse beside the motion, in the record as a column: the replay is the run again. Without it, it is not."""
+    # In a run a force counts in the direction of its axis; in a record a load counts against the motor.
+    value = -against if load_of_run == "slide" else against
+    table = f"{{time: [0.2 s, 0.21 s, 0.26 s, 0.28 s], values: [0 {unit}, {value} {unit}, {value} {unit}, 0 {unit}]}}"
+    (tmp_path / "z.yaml").write_text(SCENARIO + f"loads: [{{kind: {load_of_run}, axis: Z, table: {table}}}]\n")
+    found = run(load(tmp_path / "z.yaml")).log
+    assert found is not None
+    pulse = np.interp(found.time, [0.2, 0.21, 0.26, 0.28], [0, against, against, 0])
+    columns = {**{name: found[name] for name in found}, "pulse": pulse}
+    write_csv(tmp_path / "log.csv", Trace(found.time, columns, {**found.units, "pulse": unit}))
+    roles = {"position": "x_a", "setpoint": "x_s", "deviation": "x_e", "torque": "M_a"}
+    lines = [f"{role}: {{column: Z.{name}}}" for role, name in roles.items()]
+    (tmp_path / "with.yaml").write_text("\n".join([*lines, "load: {column: pulse}", ""]))
+    figures = replayed(tmp_path / "log.csv", tmp_path / "with", "--columns", str(tmp_path / "with.yaml"))
+    assert figures["position_rms"] < 1e-3
+    assert figures["torque_rms"] < 1e-4
+    (tmp_path / "without.yaml").write_text("\n".join([*lines, ""]))
+    assert replayed(tmp_path / "log.csv", tmp_path / "out", "--columns", str(tmp_path / "without.yaml"))["torque_rms"] > 0.5
+    assert "'pulse' may be a known load" in capsys.readouterr().err
+
+
 def test_a_torque_logged_late_is_told(log: Path, tmp_path: Path) -> None:
     whole = read_csv(log)
     late = np.interp(whole.time - 0.7e-3, whole.time, whole["Z.M_a"])

@@ -11,7 +11,7 @@ from feedsim.cosim import trust
 from feedsim.cosim.binaries import fmus_directory
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.feedforward import TorqueFeedforward, feeders
-from feedsim.cosim.loads import Loads, Work, acting
+from feedsim.cosim.loads import Acting, Loads, Work, acting
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
 from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
@@ -166,6 +166,7 @@ def follow(
     columns: Collection[str],
     interval: float,
     *,
+    loads: Sequence[Acting] = (),
     coupling: Coupling | None = None,
     fmus: Path | None = None,
     native: bool | None = None,
@@ -174,6 +175,7 @@ def follow(
 
     Args:
         columns: what is recorded, by name ("Z.x_a"). interval: of the rows [s], a whole multiple of the control cycle.
+        loads: what acts on the machine meanwhile.
 
     Raises:
         InputError, SimulationError: as :func:`run`.
@@ -186,8 +188,9 @@ def follow(
     with System(machine, fmus) as system:
         cycle = Cycle(system, SCHEMES[coupling.scheme], cycles.T_c, coupling.substeps)
         recording = Recording(cycle, (), program, total, ratio, every, columns)
-        drives = Setpoints(system, program, ratio)
-        loop = Loop(cycle, [*drives.operations, *recording.operations], (), library, (drives, recording))
+        drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
+        before = [*drives.operations, *loading.before, *recording.operations]
+        loop = Loop(cycle, before, loading.after, library, (drives, loading, recording))
         system.initialise(program, stop=total * cycles.T_c)
         loop.run(total)
         recording.record(total)

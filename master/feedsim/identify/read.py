@@ -122,6 +122,7 @@ def read_records(
             name=path.name if len(pieces) == 1 else f"{path.name}, {piece.time[0]:.6g} to {piece.time[-1]:.6g} s",
             time=piece.time,
             columns=columns,
+            load_on_slide="load" in chosen.channels and chosen.channels["load"].target == "N",
             **{role: whole[piece.first : piece.last] for role, whole in motor.items()},
         )
         for piece in pieces

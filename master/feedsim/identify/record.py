@@ -33,6 +33,7 @@ class Record:
         angle: (N,) motor angle [rad], or the scale's position over the lead I_P; None where there is only a speed.
         speed: (N,) motor speed [rad/s]; None where there is only a position.
         load: (N,) known torque against the motor torque [N.m], for example a measured disturbance; None: none.
+        load_on_slide: it is a force on the slide, as seen by the motor; else it acts at the motor.
         setpoint: (N,) commanded angle [rad]; None where it was not recorded, likewise those below.
         deviation: (N,) following error as the control forms it, of the delayed setpoint [rad].
         speed_setpoint, feedforward: (N,) speed that the position controller asks for, the feedforward in it [rad/s].
@@ -48,6 +49,7 @@ class Record:
     angle: Array | None = None
     speed: Array | None = None
     load: Array | None = None
+    load_on_slide: bool = False
     setpoint: Array | None = None
     deviation: Array | None = None
     speed_setpoint: Array | None = None

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from feedsim.cosim import follow
+from feedsim.cosim.loads import Acting
 from feedsim.errors import InputError
 from feedsim.files.columns import Columns
 from feedsim.identify import Record, Recorded
@@ -24,6 +25,7 @@ from feedsim.identify.read import read_records
 from feedsim.motions.profile import speed_change
 from feedsim.nc import Program
 from feedsim.scenario import Coupling, Machine
+from feedsim.scenario.loads import MotorLoad, SlideLoad
 from feedsim.trace.trace import Array
 
 Mask = NDArray[np.bool_]
@@ -166,10 +168,22 @@ class Replay:
         run_in = max(change.duration for change in self._into.values())
         self.lead = self.interval * np.ceil((SETTLED + run_in) / self.interval)
         self._programs: dict[float, Program] = {}
+        self._loads = [self._load(each) for each in records.values() if each.record.load is not None]
 
     @staticmethod
     def _spline(each: AxisRecord) -> CubicSpline:
         return CubicSpline(each.record.time - each.record.time[0], each.setpoint)
+
+    def _load(self, each: AxisRecord) -> Acting:
+        """The known load of a record over the time of the run; ahead of the record it is that of the first row."""
+        record = each.record
+        assert record.load is not None
+        time = np.concatenate([[0.0], self.time - self.time[0] + self.lead])
+        torque = np.concatenate([record.load[:1], record.load])
+        place = f"load of {record.name}"
+        if record.load_on_slide:  # a force counts in the direction of the axis there
+            return Acting(place, SlideLoad.model_construct(axis=each.axis), time, -torque / each.I_P)
+        return Acting(place, MotorLoad.model_construct(axis=each.axis), time, torque)
 
     def program(self, machine: Machine) -> Program:
         """The setpoints at the position cycle of a machine."""
@@ -207,8 +221,9 @@ class Replay:
         machine = machine.model_copy(update={"pose": machine.pose | self.pose})
         columns = [f"{axis}.{signal}" for axis in self.records for signal in signals]
         trace = follow(
-            machine, self.program(machine), columns, self.interval / per_row, coupling=self._coupling, fmus=self._fmus
-        )
+            machine, self.program(machine), columns, self.interval / per_row,
+            loads=self._loads, coupling=self._coupling, fmus=self._fmus,
+        )  # fmt: skip
         first = round(self.lead / self.interval) * per_row
         rows = slice(first, first + (len(self.time) - 1) * per_row + 1)
         return {

@@ -190,6 +190,39 @@ def test_known_load_is_none_of_it(general: Record, law: FrictionLaw) -> None:
     assert_true(found(record, law, estimates(OFF)), EXACT)
 
 
+def drifting(record: Record, change: float, noise: float = 0.0, seed: int = 0) -> Record:
+    """The same motion while the load changes evenly by `change` over the record [N.m], around what it was."""
+    drift = change * (record.time / record.time[-1] - 0.5)
+    scatter = noise * np.random.default_rng(seed).normal(size=len(record))
+    return replace(record, torque=record.torque + drift + scatter)
+
+
+def test_a_load_that_drifts(general: Record, law: FrictionLaw) -> None:
+    """An hour's warming in a minute or less: F_C and M_0, that of the middle, are as without it; the rate is told."""
+    change = 0.1 * TRUE["F_C"]
+    balance = found(drifting(general, change), law, estimates(OFF))
+    assert_true(balance, EXACT)
+    rate = balance.load_rates["axis"]
+    assert rate.value * general.time[-1] == pytest.approx(change, abs=EXACT * TRUE["F_C"])
+    assert rate.unit == "N.m/s"
+    with_the_load_held = found(drifting(general, change), law, estimates({"F_C": OFF["F_C"]}), hold={"M_0"})
+    assert not with_the_load_held.load_rates
+
+
+def test_the_interval_of_a_drift_holds_it(general: Record, law: FrictionLaw) -> None:
+    """Noise of the torque, and a viscous friction that is 5 % off. Of 30 such logs 29 hold the truth within 95 %; the
+    axis that sticks at another reversal than the true one is the rest."""
+    change, held = 0.05 * TRUE["F_C"], 0
+    for seed in range(6):
+        record = drifting(general, change, 0.12, seed)
+        balance = found(record, law, estimates({**OFF, "sigma_2": 1.05 * TRUE["sigma_2"]}))
+        rate = next(iter(balance.load_rates.values()))
+        low, high = (end * general.time[-1] for end in rate.interval)
+        held += low < change < high
+        assert high - low < 0.1 * TRUE["F_C"]  # and it says something
+    assert held >= 5
+
+
 @pytest.mark.parametrize("rows", [2, 5])
 def test_delay_of_the_torque(general: Record, law: FrictionLaw, rows: int) -> None:
     late = replace(general, torque=np.concatenate([np.full(rows, general.torque[0]), general.torque[:-rows]]))
@@ -381,9 +414,9 @@ def test_published_parameters_of_a_measured_axis(law: FrictionLaw) -> None:
     balance = found(record, law, estimates(published | rest | {"asymmetry": 0.0}))
     assert balance.applied
     before, after = (I_P * rms for rms in balance.position)
-    # The constant load of this record drifts: with Coulomb and viscous friction it gets no further than 3.3 mm.
+    # The constant load of this record drifts: without that, Coulomb and viscous friction get no further than 3.3 mm.
     assert 4e-3 < before < 6e-3
-    assert 2.5e-3 < after < 3.5e-3
+    assert after < 2.2e-3
     assert abs(balance.estimates["F_C"].value / I_P - 20.39) < 1.0
     assert abs(balance.estimates["M_0"].value / I_P + 3.165) < 0.3
     assert 0 < torque_change(balance) / I_P < 0.1

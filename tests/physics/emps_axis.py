@@ -85,11 +85,13 @@ class Parameters:
     """A parameter set of the axis, motor side; without friction file the machine's friction.
 
     J: inertia [kg.m^2]; M_0: constant load [N.m]; friction: file with the friction parameters.
+    rate: at which the load changes over the record, whose middle has M_0 [N.m/s].
     """
 
     J: float
     M_0: float
     friction: Path | None = None
+    rate: float = 0.0
 
     @classmethod
     def published(cls) -> Parameters:
@@ -101,7 +103,9 @@ class Parameters:
         """What `feedsim identify` left in its friction file."""
         found = yaml.safe_load(file.read_text(encoding="utf-8"))["identified"]
         J, M_0 = (found[name]["value"].split(maxsplit=1) for name in ("inertia", "constant_load"))
+        rates = [each["value"].split(maxsplit=1) for each in found["constant_load"].get("drift", ())]
         return cls(
+            rate=sum(float(value) * float(units.factor(unit, "N.m/s")) for value, unit in rates),
             J=float(J[0]) * float(units.factor(J[1], "kg.m2")),
             M_0=float(M_0[0]) * float(units.factor(M_0[1], "N.m")),
             friction=file,
@@ -219,7 +223,8 @@ def open_loop(measured: Measured, parameters: Parameters, fmus: Path, folder: Pa
         ahead = float(brentq(too_fast, 0.0, np.copysign(most, wanted), xtol=1e-3))
     # A force between two rows is not in the record: the mean of its neighbours by their distance.
     cycles = T * np.arange(measured.every * (len(measured) - 1) + 1)
-    force = np.concatenate([np.full(RUN_IN, ahead), np.interp(cycles, measured.time, measured.force)])
+    drifts = parameters.rate / I_P * (cycles - cycles[-1] / 2)
+    force = np.concatenate([np.full(RUN_IN, ahead), np.interp(cycles, measured.time, measured.force) - drifts])
     x, _ = driven(force * I_P)
     # The last force acts behind the last position.
     position = x[RUN_IN :: measured.every][: len(measured)] - x[RUN_IN] + measured.position[0]

@@ -96,7 +96,10 @@ def test_a_load_that_was_recorded_acts(
     assert figures["position_rms"] < 1e-3
     assert figures["torque_rms"] < 1e-4
     (tmp_path / "without.yaml").write_text("\n".join([*lines, ""]))
-    assert replayed(tmp_path / "log.csv", tmp_path / "out", "--columns", str(tmp_path / "without.yaml"))["torque_rms"] > 0.5
+    assert (
+        replayed(tmp_path / "log.csv", tmp_path / "out", "--columns", str(tmp_path / "without.yaml"))["torque_rms"]
+        > 0.5
+    )
     assert "'pulse' may be a known load" in capsys.readouterr().err
 
 

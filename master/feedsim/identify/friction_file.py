@@ -17,7 +17,7 @@ from feedsim.errors import OutputError
 from feedsim.fields import Quantity
 from feedsim.identify.read import Provenance, distinct
 from feedsim.identify.record import Record
-from feedsim.identify.result import NORMAL_95, Estimate, Identification
+from feedsim.identify.result import NORMAL_95, Balance, Estimate, Identification
 from feedsim.scenario import Friction, Subject
 
 FRICTION = "friction.yaml"
@@ -115,7 +115,18 @@ def open_loop_line(found: Identification) -> str:
             words.setdefault(f"{new - old:+.3g} N.m" if name == "M_0" else change_text(old, new), []).append(name)
     if words:
         parts.append(", ".join(f"{' and '.join(names)} {text}" for text, names in words.items()))
-    return "; ".join([*parts, f"torque residual {change_text(*balance.torque)}"])
+    parts.append(f"torque residual {change_text(*balance.torque)}")
+    return "; ".join([*parts, *drift_texts(balance)])
+
+
+def drift_texts(balance: Balance) -> list[str]:
+    """How the constant load drifted, a clause for each record; none where the open loop was not applied."""
+    rates = balance.load_rates if balance.applied else {}
+    said = {
+        record: "{:.2g} N.m/s (95 %: {:.2g} to {:.2g})".format(rate.value, *rate.interval)
+        for record, rate in rates.items()
+    }
+    return [f"M_0 drifts by {text}" + (f" in {record}" if len(said) > 1 else "") for record, text in said.items()]
 
 
 def change_text(before: float, after: float) -> str:
@@ -198,6 +209,11 @@ def _origin(identified: Identified, software: Mapping[str, str]) -> dict[str, An
     for name, key in named.items():
         if (estimate := found.estimates.get(name)) is not None:
             content[key] = {"value": _quantity(estimate.value, estimate.unit), **_interval(estimate)}
+    if found.balance is not None and found.balance.applied and found.balance.load_rates:
+        content["constant_load"]["drift"] = [
+            {"record": record, "value": _quantity(rate.value, rate.unit), **_interval(rate)}
+            for record, rate in found.balance.load_rates.items()
+        ]
     if line := open_loop_line(found):
         content["open_loop"] = line
     content["parameters"] = {name: _interval(each) for name, each in found.estimates.items() if name not in named}

@@ -1,4 +1,4 @@
-"""Step 3, for records of general motion: constant load and Coulomb friction from the position in open loop.
+"""Step 3, for records of general motion: load with its drift, and Coulomb friction, from the position in open loop.
 
 Stage 2 compares torques. To it 1 % of the friction that is wrong all through the record weighs no more than 1 % that
 changes its sign with every turn of the screw; where its model lacks something (ripple, a load that drifts) it gives
@@ -10,6 +10,11 @@ left to the inverse dynamics, these two to the position.
 Therefore M_0 and F_C are estimated once more by least squares on the position in open loop: recorded angle less the
 angle that a rigid axis with this friction reaches under the recorded torque, from the recorded speed at the start.
 F_S moves by as much as F_C, and all else is held. The step refuses itself where the drift is no such evidence.
+
+A load is never quite constant: an amplifier's offset moves as it warms, grease leaves the rail. A change by 1 % of the
+friction over the record takes the position as far away as all else. With M_0, which is that in the middle of the
+record, goes its rate dM_0/dt, one for each record. The residual of the torque tells the rate, too, by a regression on
+time; as the two criteria weigh the record differently, the interval holds both.
 """
 
 from __future__ import annotations
@@ -43,6 +48,8 @@ STEP = 0.25  # of the quickest time of bristles and inertia: the longest step of
 MOST_STEPS = 32  # per interval: beyond that the bristles are too stiff to be told by this record
 START = 0.01, 9  # [s], rows, whichever is more: what the cubic for the first speed goes through
 OUTLIER = 5.0  # standard deviations from that cubic that no sample of it may lie off
+BLOCKS, DRAWS = 10, 24  # stretches of a record whose torque residual may be turned, and how often they are drawn
+CHANGE = "change of M_0 over record"  # with its number, among the values
 SINES = "sines; the open loop needs general motion"
 NEEDED = (*FRICTION, "M_0", "J")
 
@@ -82,7 +89,7 @@ def balanced(
         if why:
             whys.append((record.name, why))
         elif model is not None:
-            axes.append(_OpenLoop(record, model))
+            axes.append(_OpenLoop(record, model, f"{CHANGE} {len(axes)}"))
             directions |= _directions(model)
     if not axes:
         sines = bool(whys) and all(why == SINES for _, why in whys)
@@ -91,6 +98,9 @@ def balanced(
         return refused("neither F_C nor M_0 is free")
     if len(free) > 1 and len(directions) < 2:
         return refused("motion in one direction only does not tell load from friction")
+
+    drifting = [axis.change for axis in axes] if "M_0" in free else []
+    values |= dict.fromkeys((axis.change for axis in axes), 0.0)
 
     def moved(found: Mapping[str, float]) -> dict[str, float]:
         new = values | dict(found)
@@ -105,11 +115,16 @@ def balanced(
     if any(substeps(values, axis.record.interval) > MOST_STEPS for axis in axes):
         return refused("sigma_0 or sigma_1 is so large that the axis cannot be moved by the recorded torque")
     try:
-        start = [axis.residual(moved({})) for axis in axes]  # here the law refuses what it does
+        for axis in axes:
+            axis.residual(values)  # here the law refuses what it does
     except SimulationError as error:
         return refused(f"the axis cannot be moved by the recorded torque: {error}")
     try:
-        found = _solve(residuals, values, free, "F_S" in hold)
+        # Before and after differ by F_C and M_0 alone: the drift of the load is nothing that was known before.
+        if drifting:
+            values |= _Solver(residuals, values).best(drifting, tolerance=1e-4).mapping()
+        start = [axis.residual(values) for axis in axes]
+        found = _Solver(residuals, values, "F_S" in hold).solve([*free, *drifting])
     except (SimulationError, InputError) as error:
         return refused(f"no least squares in open loop: {error}")
     new = moved(found)
@@ -118,34 +133,68 @@ def balanced(
     torque = _torque_rms(axes, values), _torque_rms(axes, new)
     changes = {name: (values[name], new[name]) for name in ("F_C", "F_S", "M_0")}
     drifts = tuple(axis.drift(*both) for axis, *both in zip(axes, start, end, strict=True))
+    loads = _load_rates(residuals, axes, values, new, [*free, *drifting]) if drifting else {}
     why = _doubt(values, new, position, torque)
     if why:
-        return refused(why, position=position, torque=torque, changes=changes, drifts=drifts)
+        return refused(why, position=position, torque=torque, changes=changes, drifts=drifts, load_rates=loads)
     changed = {name: _changed(estimates[name], after) for name, (before, after) in changes.items() if after != before}
     names = tuple(axis.record.name for axis in axes)
-    return Balance({**estimates, **changed}, True, "", names, position, torque, changes, drifts)
+    return Balance({**estimates, **changed}, True, "", names, position, torque, changes, drifts, loads)
 
 
 class _OpenLoop:
     """One record: where the model goes under its torque."""
 
-    def __init__(self, record: Record, model: RecordTorque) -> None:
+    def __init__(self, record: Record, model: RecordTorque, change: str) -> None:
+        """change: name of the load's change over this record among the values [N.m]."""
         assert record.angle is not None
-        self.record, self.model = record, model
+        self.record, self.model, self.change = record, model, change
+        self.duration = record.interval * (len(record) - 1)
         self.angle = record.angle
         first, self.n = first_speed(self.angle, record.interval)
         self.origin = float(first)
         self._torque: tuple[float, Array] | None = None
 
-    def residual(self, values: Mapping[str, float]) -> Array:
-        """(N,) recorded less reached angle [rad]."""
-        torque, h = self.torque(values["delay"]), self.record.interval
+    def residual(self, values: Mapping[str, float], push: Array | float = 0.0) -> Array:
+        """(N,) recorded less reached angle [rad]. push: (N - 1,) added to the torque [N.m]."""
+        h = self.record.interval
+        drifts = values[self.change] * self._elapsed(self.record.time[:-1] + h / 2)
+        torque = self.torque(values["delay"]) - drifts + push
         parameters = {name: values[name] for name in FRICTION}
         z = first_deflection(values, self.n, float(torque[0]) - values["M_0"])
         steps = substeps(values, h)
         free_axis = self.model.law.free_axis
         angle, _ = free_axis(parameters, values["J"], values["M_0"], torque, h, n=self.n, z=z, substeps=steps)
         return np.asarray(self.angle - self.origin - angle, dtype=np.float64)
+
+    def torque_residual(self, values: Mapping[str, float]) -> Array:
+        """(rows,) model less record at the rows of stage 2 [N.m]."""
+        # The state at the begin as shares of what is possible, in the words of the model.
+        load = values["M_0"] - values[self.change] / 2
+        z = first_deflection(values, self.n, float(self.torque(values["delay"])[0]) - load)
+        share = min(max(z / deflection(values), -1.0), 1.0)
+        return self.model.residual(values, share, 0.0) + values[self.change] * self._elapsed(
+            self.record.time[self.model.rows]
+        )
+
+    def _elapsed(self, time: Array) -> Array:
+        """Time since the middle of the record, as a share of its duration."""
+        return np.asarray((time - self.record.time[0]) / self.duration - 0.5, dtype=np.float64)
+
+    def slope(self, values: Mapping[str, float]) -> float:
+        """Change of the load over the record by a regression of the torque residual [N.m]."""
+        known = {**values, self.change: 0.0}
+        elapsed, speed = self._elapsed(self.record.time[self.model.rows]), self.model.moved(values["delay"])[1]
+        columns = np.column_stack([elapsed, np.ones_like(elapsed), np.sign(speed), speed])
+        return -float(np.linalg.lstsq(columns, self.torque_residual(known), rcond=None)[0][0])
+
+    def disturbed(self, values: Mapping[str, float], rng: np.random.Generator) -> Array:
+        """(N,) residual of the position [rad] had the torque been off in another way: by the torque residual that it
+        has, with the sign of each of BLOCKS stretches drawn anew."""
+        off = np.zeros(len(self.record))
+        off[self.model.rows] = self.torque_residual(values)
+        turned = np.repeat(rng.choice([-1.0, 1.0], BLOCKS), ceil(len(off) / BLOCKS))[: len(off)]
+        return self.residual(values, (turned * off)[:-1])
 
     def drift(self, before: Array, after: Array) -> Drift:
         return Drift(self.record.name, self.record.time, self.angle - self.origin, before, after)
@@ -160,6 +209,35 @@ class _OpenLoop:
                 torque = torque - np.interp(middle, time, self.record.load)
             self._torque = delay, np.asarray(torque, dtype=np.float64)
         return self._torque[1]
+
+
+def _load_rates(
+    residuals: Residuals,
+    axes: Sequence[_OpenLoop],
+    old: Mapping[str, float],
+    new: Mapping[str, float],
+    free: Sequence[str],
+) -> dict[str, Estimate]:
+    """Record -> dM_0/dt [N.m/s], as the position has it. residuals: over `free`, of the position of all axes.
+
+    The interval is that of the least squares, linearised, under a torque that is off as much as it is, and for as long
+    at a time. By as much as the torque's residual says another rate it is wider: two criteria disagree by that.
+    """
+    step = 1e-4 * new["F_C"]
+    found = {name: new[name] for name in free}
+    undisturbed = residuals(found)
+    slopes = np.column_stack([(residuals({**found, n: found[n] + step}) - undisturbed) / step for n in free])
+    rng = np.random.default_rng(0)
+    disturbed = [np.concatenate([axis.disturbed(new, rng) for axis in axes]) for _ in range(DRAWS)]
+    moved = np.linalg.lstsq(slopes, np.column_stack(disturbed) - undisturbed[:, None], rcond=None)[0]
+    scatter = dict(zip(free, np.sqrt(np.mean(moved**2, axis=1)).tolist(), strict=True))
+
+    def rate(axis: _OpenLoop) -> Estimate:
+        change = new[axis.change]
+        sigma = float(np.hypot(scatter[axis.change], change - axis.slope(old))) / axis.duration
+        return Estimate("dM_0/dt", change / axis.duration, "N.m/s", "rate at which the constant load drifts", sigma)
+
+    return {axis.record.name: rate(axis) for axis in axes}
 
 
 def first_speed(angle: Array, h: float) -> tuple[float, float]:
@@ -238,57 +316,64 @@ def _directions(model: RecordTorque) -> set[float]:
     return {float(side) for side in np.unique(np.sign(speed[np.abs(speed) > 0.1 * float(np.max(np.abs(speed)))]))}
 
 
-def _solve(residuals: Residuals, values: Mapping[str, float], free: Sequence[str], below: bool) -> dict[str, float]:
-    """The least squares. Whether the model still sticks or already slips where the record all but stops changes the
-    drift from there on: there are several minima over F_C. Therefore M_0 is fitted along a row of F_C first."""
+class _Solver:
+    """The least squares from `values`; below: F_C stays below F_S, which is held."""
 
-    def best(held: Mapping[str, float], started: Mapping[str, float], names: Sequence[str], tolerance: float) -> Fit:
+    def __init__(self, residuals: Residuals, values: Mapping[str, float], below: bool = False) -> None:
+        self._residuals, self._values, self._below = residuals, dict(values), below
+
+    def best(
+        self,
+        names: Sequence[str],
+        started: Mapping[str, float] | None = None,
+        held: Mapping[str, float] | None = None,
+        *,
+        tolerance: float,
+    ) -> Fit:
+        """Over `names`, from `started` (default: the values); `held` replaces values that are not free."""
+        values, fixed = self._values, held or {}
+        begin = started or values
         return fit(
-            lambda found: residuals({**held, **found}),
-            [_parameter(name, values, started[name], below) for name in names],
+            lambda found: self._residuals({**fixed, **found}),
+            [Parameter(n, begin[n], *_room(n, values, self._below), scale=values["F_C"]) for n in names],
             normalised=False,
             difference=1e-4,  # small against what a change is worth, large against rounding over the record
             tolerance=tolerance,
             limit=30,
         )
 
-    begin = {name: values[name] for name in free}
-    if "F_C" in free:
-        found: list[tuple[float, dict[str, float]]] = []
-        low, high = _room("F_C", values, below)
-        for side in (1, -1):
-            now = dict(begin)
-            for k in range(ROW + 1):
-                now["F_C"] = min(max((1 + side * k * ROW_STEP) * values["F_C"], low), high)
-                if "M_0" in free:
-                    now["M_0"] = best({"F_C": now["F_C"]}, now, ["M_0"], 1e-4)["M_0"]
-                found.append((_rms(residuals(now)), dict(now)))
-        begin = min(found, key=lambda each: each[0])[1]
-    return best({}, begin, free, 1e-8).mapping()
+    def solve(self, free: Sequence[str]) -> dict[str, float]:
+        """Whether the model still sticks or already slips where the record all but stops changes the drift from there
+        on: there are several minima over F_C. Therefore the load is fitted along a row of F_C first."""
+        values = self._values
+        begin = {name: values[name] for name in free}
+        load = [name for name in free if name != "F_C"]
+        if "F_C" in free:
+            found: list[tuple[float, dict[str, float]]] = []
+            low, high = _room("F_C", values, self._below)
+            for side in (1, -1):
+                now = dict(begin)
+                for k in range(ROW + 1):
+                    now["F_C"] = min(max((1 + side * k * ROW_STEP) * values["F_C"], low), high)
+                    if load:
+                        now |= self.best(load, now, {"F_C": now["F_C"]}, tolerance=1e-4).mapping()
+                    found.append((_rms(self._residuals(now)), dict(now)))
+            begin = min(found, key=lambda each: each[0])[1]
+        return self.best(free, begin, tolerance=1e-8).mapping()
 
 
 def _room(name: str, values: Mapping[str, float], below_static: bool) -> tuple[float, float]:
     """Bounds: enough to see a change that is too large."""
     F_C = values["F_C"]
-    if name == "M_0":
-        return values["M_0"] - 2 * LOAD_MOVES * F_C, values["M_0"] + 2 * LOAD_MOVES * F_C
+    if name != "F_C":  # M_0, and what it changes by
+        return values[name] - 2 * LOAD_MOVES * F_C, values[name] + 2 * LOAD_MOVES * F_C
     upper = (1 + 2 * FRICTION_MOVES) * F_C
     return (1 - 2 * FRICTION_MOVES) * F_C, max(min(upper, values["F_S"]), F_C * (1 + 1e-9)) if below_static else upper
 
 
-def _parameter(name: str, values: Mapping[str, float], start: float, below_static: bool) -> Parameter:
-    return Parameter(name, start, *_room(name, values, below_static), scale=values["F_C"])
-
-
 def _torque_rms(axes: Sequence[_OpenLoop], values: Mapping[str, float]) -> float:
     """Of the torque residual over all records [N.m]."""
-    found = []
-    for axis in axes:
-        # As shares of what is possible, in the words of the model.
-        z = first_deflection(values, axis.n, float(axis.torque(values["delay"])[0]) - values["M_0"])
-        share = min(max(z / deflection(values), -1.0), 1.0)
-        found.append(axis.model.residual(values, share, 0.0))
-    return _rms(np.concatenate(found))
+    return _rms(np.concatenate([axis.torque_residual(values) for axis in axes]))
 
 
 def _doubt(

@@ -179,6 +179,7 @@ class Balance:
             rows of stage 2, before and after. After is what was tried where it was refused; nan where nothing was.
         changes: F_C, F_S and M_0 before and after (what was tried where it was refused); empty where nothing was tried.
         drifts: the records in open loop; empty where nothing was tried.
+        load_rates: record -> dM_0/dt [N.m/s]; M_0 is that in the middle of a record. Empty where M_0 was not free.
         applies: False where all records are of sines, which the step is not meant for.
     """
 
@@ -190,6 +191,7 @@ class Balance:
     torque: tuple[float, float] = (nan, nan)
     changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     drifts: tuple[Drift, ...] = ()
+    load_rates: Mapping[str, Estimate] = field(default_factory=dict)
     applies: bool = True
 
 

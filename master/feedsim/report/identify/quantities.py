@@ -72,6 +72,8 @@ def at_slide(name: str, I_P: float) -> tuple[float, str] | None:
     """
     if name in ("F_C", "F_S", "F_log", "M_0"):
         return 1 / I_P, "N"
+    if name == "dM_0/dt":
+        return 1 / I_P, "N/s"
     if name == "sigma_0":
         return 1e-6 / I_P**2, "N/um"
     if name in ("sigma_1", "sigma_2"):

@@ -30,7 +30,8 @@ METHOD = (
 OPEN_LOOP_METHOD = (
     "Driven by the recorded torque, a rigid axis with this friction drifts away from the recorded position: what is "
     "wrong all through the record shows there, and is lost in the residual of the torque. Constant load M_0 and "
-    "Coulomb friction F_C are therefore taken from the position in open loop, F_S moves with F_C."
+    "Coulomb friction F_C are therefore taken from the position in open loop, F_S moves with F_C. The load may drift "
+    "over a record: M_0 is that in the middle of it."
 )
 
 
@@ -170,6 +171,7 @@ def _open_loop(found: Identification) -> Section | None:
         last = "After" if balance.applied else "Tried"
         heads = ("", "Before", last, "Unit", "At the slide before", last.lower(), "Unit", "Change")
         parts.append(Table("lrrlrrlr", heads, rows))
+    parts += [Paragraph(typeset(f"{text}.")) for text in friction_file.drift_texts(balance)]
     parts.append(Paragraph(OPEN_LOOP_METHOD, "muted"))
     return Section("Position in open loop", parts, "position-in-open-loop")
 

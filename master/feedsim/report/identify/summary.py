@@ -232,6 +232,7 @@ def _open_loop(found: Identification) -> dict[str, Any] | None:
         },
         "torque": {**_pair(balance.torque, "N.m"), "meaning": "rms of the torque residual"},
         "changes": {name: _pair(pair, "N.m") for name, pair in balance.changes.items()},
+        "load_rates": {record: _estimate(rate, found.I_P) for record, rate in balance.load_rates.items()},
     }
 
 

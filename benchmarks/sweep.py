@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from harness import ROOT, Contestant, Costs, arguments, digits, measure, progress, table
@@ -52,7 +52,8 @@ class Case:
 
 CIRCLE = Case("circle", "xz_circle.yaml", ("motions.0.direction=counterclockwise",), 40)
 SHORT = Case("short move", "z_positioning.yaml", ("motions.0.by.Z=1 mm", "motions.1.duration=0.05 s"), 400)
-CASES = {"circle": CIRCLE, "short": SHORT}
+ONE = replace(SHORT, name="short move, one unit", overrides=(*SHORT.overrides, "coupling.units=one"))
+CASES = {"circle": CIRCLE, "short": SHORT, "one": ONE}
 MEMORY = "memory"
 
 

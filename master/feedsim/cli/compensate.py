@@ -33,7 +33,7 @@ def compensate(options: Namespace) -> None:
     from feedsim.report.provenance import input_paths
 
     plan = scenario.load(options.scenario, options.overrides)
-    announce(plan.machine, options.fmus)
+    announce(plan.machine, options.fmus, coupling=plan.coupling)
     directory: Path = options.out or Path("results") / f"compensate_{options.scenario.stem}"
     program = nc.plan(plan)
     analysis.circle_task(plan, program)

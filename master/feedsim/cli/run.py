@@ -18,16 +18,18 @@ if TYPE_CHECKING:
     from feedsim.nc import Program
     from feedsim.report.partial import Partial
     from feedsim.scenario import Scenario
+    from feedsim.ssp import Exported
 
     # Warnings of a run -> all that is to be said: what the archives' own are called in an SSP file, and what it lacks.
     Wording = Callable[[Iterable[str]], tuple[str, ...]]
 
 SSP_TEXT = """Write a scenario as one SSP file (System Structure and Parameterization 1.0): the plant packed with the
 machine, a controller and a friction unit per axis with their parameters, the setpoints of the motion in a unit that
-plays them, and the wiring. Other simulators run it without anything of feedsim (docs/ssp.md); feedsim run FILE.ssp runs
-it here."""
+plays them, and the wiring; with --one, the machine as one unit with the motion inside. Other simulators run it without
+anything of feedsim (docs/ssp.md); feedsim run FILE.ssp runs it here."""
 SSP_EXAMPLES = """examples:
   feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
+  feedsim ssp scenarios/xz_circle.yaml --one --out one.ssp
   feedsim ssp scenarios/z_positioning.yaml --set "machine.axes.Z.friction.W=0 rad" --out lugre.ssp
 """
 
@@ -39,7 +41,7 @@ def run(options: Namespace) -> None:
 
     directory: Path = options.out or Path("results") / options.scenario.stem
     with _subject(options) as (plan, program, fmus, worded, named):
-        announce(plan.machine, fmus, named)
+        announce(plan.machine, fmus, named, plan.coupling)
         analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
         with (
             results_in(directory, report.check_writable, report.input_paths(plan), options.overrides),
@@ -107,13 +109,20 @@ def write_ssp(options: Namespace) -> None:
         raise InputError(f"{options.scenario}: is an SSP file already; a scenario is expected")
     if not options.out.absolute().parent.is_dir():
         raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
-    plan = scenario.load(options.scenario, options.overrides)
+    plan = scenario.load(options.scenario, [*options.overrides, *(["coupling.units=one"] if options.one else [])])
     done = ssp.export(plan, options.out, fmus=options.fmus)
     warn(done.warnings)
     print(
-        f"{done.path}: {done.size / 1024:.0f} KiB, {len(done.instances)} instances, {done.duration:.4g} s at "
-        f"{plan.machine.cycles.T_c * 1e6:.6g} us; parameters in resources/*.ssv; "
+        f"{done.path}: {done.size / 1024:.0f} KiB, {_inside(done, plan.machine.cycles.T_c)}; "
         f"runs on {', '.join(done.platforms) or 'no platform'}"
+    )
+
+
+def _inside(done: Exported, T_c: float) -> str:
+    if len(done.instances) == 1:
+        return f"one instance, {done.duration:.4g} s at any step; parameters in its archive"
+    return (
+        f"{len(done.instances)} instances, {done.duration:.4g} s at {T_c * 1e6:.6g} us; parameters in resources/*.ssv"
     )
 
 
@@ -170,6 +179,12 @@ SSP = Command(
     (
         Option("scenario", "SCENARIO.yaml", "scenario file (docs/scenarios.md)", type=Path),
         Option("--out", "FILE.ssp", "the SSP file to write", type=Path, required=True),
+        Option(
+            "--one",
+            "",
+            "one component, the machine as one unit with its motion inside, for any step size; as "
+            "--set coupling.units=one",
+        ),
         FMUS,
         settings(),
     ),

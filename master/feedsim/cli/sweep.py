@@ -50,7 +50,7 @@ def sweep(options: Namespace) -> int:
     if options.row is not None:
         print(_command(study, planned, options.row, options.fmus))
         return 0
-    announce(study.base.scenario.machine, options.fmus)
+    announce(study.base.scenario.machine, options.fmus, coupling=study.base.scenario.coupling)
     if options.dry_run:
         return _dry_run(study, planned, options)
     directory: Path = options.out or Path("results") / options.study.stem

@@ -14,7 +14,7 @@ from feedsim.findings import WRONG, Note, ranked, severity
 from feedsim.owned import claimed
 
 if TYPE_CHECKING:
-    from feedsim.scenario import Machine
+    from feedsim.scenario import Coupling, Machine
 
 
 class Progress:
@@ -110,12 +110,14 @@ def warn(warnings: Iterable[str]) -> None:
         print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr)
 
 
-def announce(machine: Machine, fmus: Path | None, named: Callable[[str], str] = str) -> None:
+def announce(
+    machine: Machine, fmus: Path | None, named: Callable[[str], str] = str, coupling: Coupling | None = None
+) -> None:
     """Say on standard error, ahead of a run, whose programs are executed besides the shipped ones; `named`: what is to
-    be said for a sentence."""
+    be said for a sentence; `coupling`: of the run, where a scenario has it."""
     from feedsim import cosim
 
-    for sentence in cosim.executed(machine, fmus):
+    for sentence in cosim.executed(machine, fmus, coupling):
         print(f"feedsim: {named(sentence)}", file=sys.stderr)
 
 

@@ -70,6 +70,13 @@ class Archive:
         self.directory, self.description = self._content.directory, self._content.description
         self.variables, self.platforms = self._content.variables, self._content.platforms
 
+    def part(self, prefix: str) -> Archive:
+        """The same archive, of which only the variables `prefix`NAME are seen, as NAME. It is not to be closed."""
+        part = copy.copy(self)
+        names = (name for name in self.variables if name.startswith(prefix))
+        part.variables = {name.removeprefix(prefix): self.variables[name] for name in names}
+        return part
+
     @property
     def guid(self) -> str:
         return str(self.description.guid)

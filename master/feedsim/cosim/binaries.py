@@ -19,10 +19,10 @@ from feedsim.cosim.archive import Archive, folders
 from feedsim.cosim.roles import archive_path
 from feedsim.errors import InputError
 from feedsim.installation import shipped
-from feedsim.scenario import Machine
+from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.roles import DRIVE, FRICTION
 
-SHIPPED = ("plant.fmu", "controller.fmu", "friction.fmu", "setpoint.fmu")
+SHIPPED = ("plant.fmu", "controller.fmu", "friction.fmu", "setpoint.fmu", "machine.fmu")
 Programs = Mapping[str, str]  # path inside the archive -> SHA-256, of all files beside the library for this platform
 
 
@@ -44,16 +44,19 @@ def programs(archive: Archive) -> dict[str, str]:
     return {file.relative_to(root).as_posix(): _digest(file.read_bytes()) for file in sorted(found)}
 
 
-def executed(machine: Machine, fmus: Path | None) -> list[str]:
+def executed(machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> list[str]:
     """What a run of the machine executes that is not shipped, a sentence for each file: who, where, SHA-256.
 
-    What cannot be opened is left out: the run says why. fmus: folder of the archives, where one was named.
+    What cannot be opened is left out: the run says why. fmus: folder of the archives, where one was named. coupling:
+    of the run; None: of units of their own.
     """
     folder = fmus or fmus_directory()
     parts: dict[Path, list[str]] = {machine.plant or folder / "plant.fmu": ["plant"]}
     for axis in machine.axes:
         for role in (DRIVE, FRICTION):
             parts.setdefault(archive_path(machine, axis, role, folder), []).append(f"{role.name} of {axis}")
+    if coupling is not None and coupling.units == "one":
+        parts = {folder / "machine.fmu": ["machine"]}
     told = [sentence for path, who in parts.items() for sentence in executing(path, ", ".join(who))]
     loop, ours = folder / exchange.NAME, fmus_directory() / exchange.NAME
     with suppress(OSError):

@@ -58,6 +58,16 @@ def pack_whole(
         return packed(base, out, given, name=name, note=note, trial=trial, level=level)
 
 
+def pack_tables(base: Path, out: Path, machine: Machine) -> None:
+    """Pack the machine's axes and modes alone, for a run that tells the unit all else; errors as `pack_whole`."""
+    from feedsim_packager import whole_machine
+
+    pose = {axis: machine.pose[axis] for axis in machine.axes}
+    with packaging(), _poses(machine) as poses:
+        given = whole_machine.WholeMachine(plant_tables(machine.modes, pose, poses), None, {})
+        packed(base, out, given, name=machine.name, note=machine.note, trial=False, level=0)
+
+
 @contextmanager
 def _poses(machine: Machine) -> Iterator[Path | None]:
     """The grid of poses of the machine's own plant archive, where it has one."""

@@ -5,13 +5,14 @@ And the modes that it has where the machine stands: the table's, or those of a c
 
 from __future__ import annotations
 
-import hashlib
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from feedsim import units
 from feedsim.cosim.archive import Archive
+from feedsim.cosim.unpacked import STORE
 from feedsim.errors import FeedsimError, InputError
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine
@@ -22,7 +23,8 @@ from feedsim.structure.poses_file import read_cell
 
 _START = ".x_0"  # of every axis of a plant
 KEPT = 4  # packed archives, of about 1 MB each: studies run the same machine again and again
-_PACKED: dict[Any, bytes] = {}  # by content of what they are packed from; those used last stand last
+# With the archive in it, by content of what it is packed from; those used last stand last.
+_PACKED: dict[Any, TemporaryFolder] = {}
 _PACKING = threading.Lock()
 
 
@@ -37,46 +39,53 @@ def open_plant(machine: Machine, fmus: Path) -> tuple[Archive, Path | None]:
         InputError: no such archive, or it does not fit the machine.
     """
     if machine.plant is not None:
-        archive = Archive(machine.plant)
-        try:
-            _check_own(archive, machine)
-        except InputError:
-            archive.close()
-            raise
-        return archive, None
+        return open_own(machine.plant, machine), None
     general = Archive(fmus / "plant.fmu")
     if set(axes_of(general)) == set(machine.axes):
         return general, machine.modes
     general.close()
-    return _packed_for(machine, general.path), None
+
+    def make(out: Path) -> None:
+        pack(
+            general.path, out, modes=machine.modes, pose={axis: machine.pose[axis] for axis in machine.axes},
+            name=machine.name, note=machine.note, trial=False, level=0,
+        )  # fmt: skip
+
+    return packed_for(machine, general.path, make), None
 
 
-def _packed_for(machine: Machine, general: Path) -> Archive:
-    """The machine packed into the plant archive `general`; what it was packed to is kept for further runs."""
+def open_own(plant: Path, machine: Machine) -> Archive:
+    """The machine's own plant archive. InputError: it is not of this machine."""
+    archive = Archive(plant)
     try:
-        content, modes = general.read_bytes(), machine.modes.read_bytes()
+        _check_own(archive, machine)
+    except InputError:
+        archive.close()
+        raise
+    return archive
+
+
+def packed_for(machine: Machine, general: Path, make: Callable[[Path], None]) -> Archive:
+    """The machine packed into the archive `general`, as `make` does; what it was packed to is kept for further runs.
+
+    `make` need not try it, which is instantiated next anyway, nor compress it: it is unpacked at once.
+    """
+    files = (general, machine.modes, *([machine.plant] if machine.plant is not None else []))
+    try:
+        contents = tuple(map(STORE.digest, files))
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from error
-    pose = {axis: machine.pose[axis] for axis in machine.axes}
-    key = hashlib.sha256(content).digest(), hashlib.sha256(modes).digest(), (*pose.items(),), machine.name, machine.note
-    with TemporaryFolder() as folder:
-        packed = folder / "plant.fmu"
-        with _PACKING:
-            known = _PACKED.pop(key, None)
-        if known is not None:
-            packed.write_bytes(known)
-        else:
-            # Without a trial: the unit is instantiated next anyway. Uncompressed: it is unpacked at once.
-            pack(
-                general, packed, modes=machine.modes, pose=pose, name=machine.name, note=machine.note, trial=False,
-                level=0,
-            )  # fmt: skip
-            known = packed.read_bytes()
-        with _PACKING:
-            _PACKED[key] = known
-            while len(_PACKED) > KEPT:
-                del _PACKED[next(iter(_PACKED))]
-        return Archive(packed)
+    key = *contents, *((axis, machine.pose[axis]) for axis in machine.axes), machine.name, machine.note
+    with _PACKING:
+        folder = _PACKED.pop(key, None)
+        # What cleans a folder for temporary files takes what has been idle for long.
+        if folder is None or not (folder.path / general.name).is_file():
+            folder = TemporaryFolder()
+            make(folder.path / general.name)
+        _PACKED[key] = folder
+        while len(_PACKED) > KEPT:
+            _PACKED.pop(next(iter(_PACKED))).close()
+        return Archive(folder.path / general.name)
 
 
 def axes_of(archive: Archive) -> tuple[str, ...]:

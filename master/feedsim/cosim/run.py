@@ -15,9 +15,8 @@ from feedsim.cosim.loads import Acting, Loads, Work, acting
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
 from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
-from feedsim.cosim.schedule import SCHEMES, Cycle
-from feedsim.cosim.system import System
 from feedsim.cosim.trust import PoseUse, pose_use
+from feedsim.cosim.whole import cycle_of, system_of
 from feedsim.errors import InputError
 from feedsim.linear.judgement import judge
 from feedsim.nc import Program, plan
@@ -80,7 +79,8 @@ def run(
 
     Args:
         program: the scenario's planned motions, where they are at hand already.
-        fmus: folder with plant.fmu, controller.fmu, friction.fmu; default :func:`fmus_directory`.
+        fmus: folder with plant.fmu, controller.fmu, friction.fmu, or machine.fmu; default
+            :func:`fmus_directory`.
         progress: called now and then with (cycles done, cycles in all).
         torque_feedforward: axis -> torque [N.m] added to its torque setpoint at the instants k T_c, from 0 to the
             program's end.
@@ -106,8 +106,8 @@ def run(
     total = (len(program.time) - 1) * ratio
     fmus = fmus or fmus_directory()
     library, told = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
-    with System(scenario.machine, fmus) as system:
-        cycle = Cycle(system, SCHEMES[scenario.coupling.scheme], cycles.T_c, scenario.coupling.substeps)
+    with system_of(scenario.machine, scenario.coupling, fmus) as system:
+        cycle = cycle_of(system, scenario.coupling)
         recording = Recording(cycle, loaded, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
         recordings, at_full_rate = [recording], None
         if scenario.logging:
@@ -185,8 +185,8 @@ def follow(
     total = (len(program.time) - 1) * ratio
     fmus = fmus or fmus_directory()
     library, _ = chosen(native, fmus, fmus_directory())
-    with System(machine, fmus) as system:
-        cycle = Cycle(system, SCHEMES[coupling.scheme], cycles.T_c, coupling.substeps)
+    with system_of(machine, coupling, fmus) as system:
+        cycle = cycle_of(system, coupling)
         recording = Recording(cycle, (), program, total, ratio, every, columns)
         drives, loading = Setpoints(system, program, ratio), Loads(system, loads, cycles.T_c)
         before = [*drives.operations, *loading.before, *recording.operations]
@@ -210,11 +210,11 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
     recorded_columns(scenario)
     loads = acting(scenario, program)
     modes = checked_modes(scenario.machine)
-    with System(scenario.machine, fmus or fmus_directory(), only_shipped=True) as system:
+    fmus = fmus or fmus_directory()
+    with system_of(scenario.machine, scenario.coupling, fmus, only_shipped=True) as system:
         system.initialise(program, stop=float(program.time[-1]))
         pose = pose_use(scenario.machine, program, system)
-        cycles, coupling = scenario.machine.cycles, scenario.coupling
-        cycle = Cycle(system, SCHEMES[coupling.scheme], cycles.T_c, coupling.substeps)
+        cycle = cycle_of(system, scenario.coupling)
         told = trust.foreseen(scenario, modes, program, judge(scenario.machine, modes), loads)
         return (*system.warnings, *cycle.warnings, *told, *pose.warnings)
 

@@ -171,10 +171,13 @@ class Cycle:
             yield from op.set_slopes(system.plant_torque)
         yield op.do_step(system.plant, start, h)
         yield from op.get_real(system.plant_outputs)
-        if scheme.friction_ramp:
-            yield op.line(self.assumed_torque, system.M_fr, h, system.M_fr_slope)
-        else:
-            yield op.copy(self.assumed_torque, system.M_fr)
+        yield self._assume_torque()
+
+    def _assume_torque(self) -> Operation:
+        """What the plant takes the friction torque to be at the end of the step, from what is at hand before it."""
+        if self.scheme.friction_ramp:
+            return op.line(self.assumed_torque, self.system.M_fr, self.step, self.system.M_fr_slope)
+        return op.copy(self.assumed_torque, self.system.M_fr)
 
     def _tell_speed(self) -> Iterator[Operation]:
         """What friction learns of the speed at its contact."""

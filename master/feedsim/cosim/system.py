@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -93,6 +94,7 @@ class System:
             if wiring.RELEASE in role.signals:
                 self.units[name].set_parameters({role.signals[wiring.RELEASE].name: True})
         self._share_buffers()
+        self._wire()
 
     def _fill(self, machine: Machine, fmus: Path) -> dict[str, RoleUnit]:
         """Instance -> what fills its role; nothing of it is executed yet."""
@@ -140,18 +142,12 @@ class System:
         self.M_a, self.M_a_slope = inputs[:count], slopes[:count]
         self.M_fr, self.M_fr_slope = inputs[count:], slopes[count:]
         self.n_end, self.measured = outputs[:count], outputs[count:]
-
-        plant = self.plant
-        torques, frictions = [f"{axis}.M_a" for axis in axes], [f"{axis}.M_fr" for axis in axes]
         contacts = [f"{axis}.n_fr" for axis in axes]
         measured = [f"{axis}.{y}" for axis in axes for y in ("x_a", "n_a")]
-        self.plant_torque = Port(plant, torques, self.M_a, self.M_a_slope)
-        self.plant_inputs = Port(plant, [*torques, *frictions], inputs, slopes)
-        self.plant_outputs = Port(plant, [*contacts, *measured], outputs)
+        self.plant_outputs = Port(self.plant, [*contacts, *measured], outputs)
+        self._plant_inputs = inputs, slopes
         self.controllers: list[Control] = []
-        self.contacts: list[Contact] = []
         for i, axis in enumerate(axes):
-            own = slice(i, i + 1)
             name = wiring.controller(axis)
             role, control = self.roles[name], self.units[name]
             setpoint, both = ([name for name in group if name in role.signals] for group in (SETPOINT, MEASURED))
@@ -161,11 +157,18 @@ class System:
                     unit=control,
                     setpoint=Port(control, setpoint),
                     measured=Port(control, both, self.measured[2 * i : 2 * i + len(both)]),
-                    torque=Port(control, ["M_a"], self.M_a_end[own], self.M_a_slope[own]),
+                    torque=Port(control, ["M_a"], self.M_a_end[i : i + 1], self.M_a_slope[i : i + 1]),
                 )
             )
-            if not self.friction:
-                continue
+
+    def _wire(self) -> None:
+        """What the units hand over to one another."""
+        torques, frictions = ([f"{axis}.{torque}" for axis in self.axes] for torque in ("M_a", "M_fr"))
+        self.plant_torque = Port(self.plant, torques, self.M_a, self.M_a_slope)
+        self.plant_inputs = Port(self.plant, [*torques, *frictions], *self._plant_inputs)
+        self.contacts: list[Contact] = []
+        for i, axis in enumerate(self.axes if self.friction else ()):
+            own = slice(i, i + 1)
             name = wiring.friction(axis)
             role, contact = self.roles[name], self.units[name]
             self.contacts.append(
@@ -180,9 +183,7 @@ class System:
 
     def initialise(self, program: Program, stop: float) -> None:
         """Initialise every unit at t = 0 and bring the buffers to the initial outputs. The run ends at `stop` [s]."""
-        for unit in self.units.values():
-            unit.enter_initialisation(0.0, stop)
-            unit.check_parameters()
+        self._enter_initialisation(stop)
         self.plant_outputs.get()
         self.n_start[:] = self.n[:] = self.n_end
         for contact in self.contacts:
@@ -194,7 +195,15 @@ class System:
             control.torque.get()
         self.M_a[:] = self.M_a_end
         self.plant_inputs.set()
-        for unit in self.units.values():
+        self._exit_initialisation()
+
+    def _enter_initialisation(self, stop: float) -> None:
+        for unit in self.instances.values():
+            unit.enter_initialisation(0.0, stop)
+            unit.check_parameters()
+
+    def _exit_initialisation(self) -> None:
+        for unit in self.instances.values():
             unit.exit_initialisation()
 
     def set_setpoints(self, program: Program, i: int) -> None:
@@ -205,18 +214,23 @@ class System:
             control.setpoint.set()
 
     @property
+    def instances(self) -> Mapping[str, Unit]:
+        """What there is to be initialised and to be told of, by its name."""
+        return self.units
+
+    @property
     def archives(self) -> dict[str, dict[str, str]]:
         """Instance -> GUID and version of its archive, and the name of one that is another maker's."""
         return {
             name: {"guid": unit.archive.guid, "version": unit.archive.version}
             | ({"name": unit.archive.path.stem} if name in self.roles and self.roles[name].foreign else {})
-            for name, unit in self.units.items()
+            for name, unit in self.instances.items()
         }
 
     @property
     def warnings(self) -> list[str]:
         ahead = [warning for role in self.roles.values() for warning in role.warnings]
-        return [*ahead, *(warning for unit in self.units.values() for warning in unit.warnings)]
+        return [*ahead, *(warning for unit in self.instances.values() for warning in unit.warnings)]
 
     def close(self) -> None:
         for part in reversed(self._open):

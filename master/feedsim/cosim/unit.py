@@ -7,13 +7,14 @@ addresses go straight into the FMI calls: wiring two units is sharing memory, an
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import re
 import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Self
 
 import numpy as np
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
@@ -156,13 +157,25 @@ class Unit:
         """
         real, integer, flag = (self._fmu.setReal, float), (self._fmu.setInteger, int), (self._fmu.setBoolean, bool)
         kinds: dict[str, Any] = {"Real": real, "Integer": integer, "Enumeration": integer, "Boolean": flag}
+        groups: dict[Any, list[tuple[str, int, Any]]] = {}
         for name, value in parameters.items():
             variable = self.archive.variables.get(name)
             if variable is None:
                 raise InputError(f"{self.archive.path.name}: no variable '{name}'")
             setter, of_type = kinds.get(variable.type, (self._fmu.setString, str))
+            groups.setdefault(setter, []).append((name, variable.valueReference, of_type(value)))
+        for setter, group in groups.items():
             try:
-                setter([variable.valueReference], [of_type(value)])
+                setter([reference for _, reference, _ in group], [value for _, _, value in group])
+            except Exception:
+                self._said()
+                self._set_each(setter, group)
+
+    def _set_each(self, setter: Any, group: Iterable[tuple[str, int, Any]]) -> None:
+        """Set start values one by one: name, reference, value. InputError names the one that is refused."""
+        for name, reference, value in group:
+            try:
+                setter([reference], [value])
             except Exception:
                 raise InputError(
                     f"unit {self.name} refuses {name} = {value!r}: {self._said() or 'no message'}"
@@ -201,6 +214,12 @@ class Unit:
         except Exception:
             self.fail(f"reading {name}")
         return float(values[0])
+
+    def part(self, signals: Mapping[str, Alias]) -> Self:
+        """The same instance, known by the signals of a part inside it. It is not to be closed."""
+        part = copy.copy(self)
+        part.signals = signals
+        return part
 
     def close(self) -> None:
         """Free the instance; never raises, so that it can stand in a `finally`."""

@@ -125,6 +125,11 @@ class Store:
             content.users += 1
             return content
 
+    def digest(self, path: Path) -> str:
+        """SHA-256 of a file. OSError: it cannot be read."""
+        with path.open("rb") as file, self._lock:
+            return self._digest(file)
+
     def _arrange_for_the_end(self) -> None:
         if self._ends:
             return

@@ -30,6 +30,10 @@ class Coupling(Model):
     substeps: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(
         default=1, description="Exchange steps of plant and friction per control cycle"
     )
+    units: Literal["separate", "one"] = Field(
+        default="separate",
+        description="Structure, drives and friction as units of their own, or as one unit (machine.fmu), same results",
+    )
 
 
 class Recording(Model):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from feedsim.cosim import check, fmus_directory, wiring
 from feedsim.cosim.archive import Archive, UnitDefinition
+from feedsim.cosim.one_unit import UNIT
 from feedsim.cosim.roles import RoleUnit, archive_path, filled
 from feedsim.cosim.system import plant_parameters
 from feedsim.cosim.unpacked import check_there
@@ -18,7 +19,7 @@ from feedsim.nc import Program, plan
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.roles import DRIVE, FRICTION, Role
-from feedsim.ssp import archive, described, parameter_set, system_structure
+from feedsim.ssp import archive, described, one, parameter_set, system_structure
 from feedsim.ssp.parameter_set import ParameterSet, Value
 from feedsim.ssp.setpoints import pack_setpoints
 from feedsim.ssp.system_structure import Binding, Component, Connector, Link, Structure
@@ -62,11 +63,15 @@ def export(scenario: Scenario, out: Path, *, program: Program | None = None, fmu
     program = program or plan(scenario)
     fmus = fmus or fmus_directory()
     warnings = check(scenario, program, fmus=fmus)
-    sources = _sources(scenario.machine, fmus)
     with TemporaryFolder() as folder, ExitStack() as stack:
-        content = _archives(scenario, program, fmus, sources, folder)
+        if scenario.coupling.units == "one":
+            one.pack(scenario, program, fmus, folder / f"{UNIT}.fmu")
+            content, instances = {UNIT: (folder / f"{UNIT}.fmu").read_bytes()}, {UNIT: UNIT}
+        else:
+            sources = _sources(scenario.machine, fmus)
+            content = _archives(scenario, program, fmus, sources, folder)
+            instances = _instances(scenario.machine, fmus, sources)
         archives = {name: stack.enter_context(Archive(folder / f"{name}.fmu")) for name in content}
-        instances = _instances(scenario.machine, fmus, sources)
         files = _files(scenario, program, archives, instances)
         platforms = sorted(set.intersection(*(set(each.platforms) for each in archives.values())))
     files |= {f"{RESOURCES}/{name}.fmu": data for name, data in content.items()}
@@ -136,10 +141,11 @@ def _files(
     machine = scenario.machine
     axes = tuple(machine.axes)
     units: dict[str, RoleUnit] = {}
-    for axis in axes:
+    whole = UNIT in instances  # which has its parameters inside, and nothing to be connected
+    for axis in () if whole else axes:
         for role, instance in ((DRIVE, wiring.controller(axis)), (FRICTION, wiring.friction(axis))):
             units[instance] = filled(machine, axis, role, archives[instances[instance]])
-    parameters: dict[str, Mapping[str, Value]] = {wiring.PLANT: plant_parameters(machine, None)}
+    parameters: dict[str, Mapping[str, Value]] = {} if whole else {wiring.PLANT: plant_parameters(machine, None)}
     parameters |= {instance: unit.parameters for instance, unit in units.items()}
 
     def end(variable: wiring.Variable) -> tuple[str, str]:
@@ -150,7 +156,7 @@ def _files(
 
     links = tuple(
         Link(end(connection.source), end(connection.target))
-        for connection in wiring.figure_2(axes, given={name: unit.signals for name, unit in units.items()})
+        for connection in wiring.figure_2(() if whole else axes, given={n: unit.signals for n, unit in units.items()})
         if connection.source.instance != wiring.ZERO  # an input that nothing drives keeps its start value, 0
     )
     components, files = [], {}
@@ -172,7 +178,7 @@ def _files(
             archives.values(), [c.unit for component in components for c in component.connectors if c.unit]
         ),
         stop=program.duration,
-        step=machine.cycles.T_c,
+        step=machine.cycles.T_pos if whole else machine.cycles.T_c,
         scenario=described.text(scenario),
         description=" ".join(filter(None, (f"{scenario.name}.", scenario.note, machine.note))),
         tool="feedsim",
@@ -182,6 +188,8 @@ def _files(
 
 def _box(instance: str, axes: tuple[str, ...]) -> tuple[float, float, float, float]:
     """Place in a picture: the signal flow from the left to the right, the axes from the top to the bottom."""
+    if instance == UNIT:
+        return 0.0, -HEIGHT, WIDTH, 0.0
     rows = {name(axis): i for i, axis in enumerate(axes) for name in (wiring.controller, wiring.friction)}
     kind = instance if instance not in rows else "friction" if instance.startswith("friction") else "controller"
     left = (WIDTH + GAP) * (SETPOINT, "controller", wiring.PLANT, "friction").index(kind)

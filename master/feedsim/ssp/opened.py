@@ -23,7 +23,7 @@ from feedsim.nc import Program, Segment, plan
 from feedsim.nc.program import LONGEST
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Scenario, load
-from feedsim.ssp import archive, rebuilt, setpoints, system_structure
+from feedsim.ssp import archive, one, rebuilt, setpoints, system_structure
 from feedsim.ssp.described import STRUCTURE
 from feedsim.ssp.rebuilt import Parts
 from feedsim.ssp.roles import roles
@@ -83,14 +83,17 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
     ):
         structure = system_structure.read(files[archive.STRUCTURE], f"{path}: {archive.STRUCTURE}")
         archives = _archives(structure, files, folder, path, stack)
-        found = roles(structure, archives, str(path))
+        found = one.roles(structure, archives, str(path)) or roles(structure, archives, str(path))
         table = _table(archives[found.setpoint], f"{path}: {found.setpoint}")
         given = values(structure, files, archives, found.foreign, str(path))
+        coupling = one.coupling(found, given, str(path))
+        if coupling is not None:
+            archives, given = one.split(found, archives, given)
         if problems := rebuilt.lacking(found, given, str(path)):
             raise InputError.of(str(path), problems)
         own = rebuilt.annotation(structure.scenario, files, str(path))
         T_c, T_pos, guessed = rebuilt.cycles(found, archives, given, table, own, structure.step, str(path))
-        parts = Parts(found, archives, given, table, T_c, T_pos)
+        parts = Parts(found, archives, given, table, T_c, T_pos, coupling)
         if problems := rebuilt.faults(parts, str(path)):
             raise InputError.of(str(path), problems)
         _lay_out(folder, files, parts, own, path)
@@ -141,10 +144,8 @@ def _table(setpoint: Archive, where: str) -> Table:
 def _lay_out(folder: Path, files: archive.Files, parts: Parts, own: Mapping[str, Any] | None, path: Path) -> None:
     """Put archives, modes, setpoints and what the annotation names where the scenario's data look for them."""
     roles = parts.roles
-    shipped = {"plant": [roles.plant], "controller": roles.shipped_drives, "friction": roles.shipped_frictions}
-    for kind, components in shipped.items():
-        if components:
-            parts.archives[components[0]].path.replace(folder / f"{kind}.fmu")
+    for component, name in parts.places.items():
+        parts.archives[component].path.replace(folder / name)
     inside = {rebuilt.MODES: (roles.plant, MODES_IN_ARCHIVE), rebuilt.SETPOINTS: (roles.setpoint, SETPOINTS_IN_ARCHIVE)}
     for name, (component, place) in inside.items():
         source = parts.archives[component].directory / place
@@ -160,9 +161,7 @@ def _lay_out(folder: Path, files: archive.Files, parts: Parts, own: Mapping[str,
 
 
 def _sources(structure: Structure, parts: Parts, folder: Path) -> dict[str, str]:
-    roles = parts.roles
-    moved = {"plant": [roles.plant], "controller": roles.shipped_drives, "friction": roles.shipped_frictions}
-    places = {component: f"{kind}.fmu" for kind, components in moved.items() for component in components[:1]}
+    places = parts.places
     return {
         places.get(each.name, str(parts.archives[each.name].path.relative_to(folder))): each.source
         for each in structure.components

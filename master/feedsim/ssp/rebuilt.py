@@ -14,6 +14,7 @@ import numpy as np
 
 from feedsim import units
 from feedsim.cosim.archive import Archive
+from feedsim.cosim.one_unit import UNIT
 from feedsim.errors import InputError
 from feedsim.scenario.machine import FILTER_TYPES
 from feedsim.scenario.roles import DRIVE, FRICTION, Role
@@ -41,6 +42,16 @@ class Parts:
     table: Table
     T_c: float
     T_pos: float
+    coupling: Mapping[str, Any] | None = None  # as the archive has it, where one unit holds all parts
+
+    @property
+    def places(self) -> dict[str, str]:
+        """Component, the first that is made from it -> file name of a shipped archive, as runs know it."""
+        if self.coupling is not None:
+            return {self.roles.plant: f"{UNIT}.fmu"}
+        shipped = {"controller": self.roles.shipped_drives, "friction": self.roles.shipped_frictions}
+        first = {found[0]: f"{kind}.fmu" for kind, found in shipped.items() if found}
+        return {self.roles.plant: "plant.fmu", **first}
 
 
 def cycles(
@@ -96,7 +107,8 @@ def faults(parts: Parts, where: str) -> list[str]:
             found.append(f"{where}: the controllers differ in {name}: {said}; all axes have one cycle here")
     plant = values[roles.plant]
     if plant.get("modes_file"):
-        found.append(f"{where}: {roles.plant}.modes_file: the modes are those inside plant.fmu; name no other file")
+        found.append(f"{where}: {roles.plant}.modes_file: the modes are those inside "
+                     f"{parts.archives[roles.plant].path.name}; name no other file")  # fmt: skip
     for axis, name in roles.setpoints.items():
         if name not in parts.table.x_s:
             found.append(f"{where}: axis {axis}: {roles.setpoint} has no setpoints of an axis {name!r}")
@@ -197,7 +209,7 @@ def scenario_data(
         "name": told.get("name", name),
         "note": told.get("note", ""),
         "modes": MODES,
-        "plant": "plant.fmu",
+        "plant": parts.places[roles.plant],
         "pose": {axis: f"{plant[f'{axis}.x_0']!r} m" for axis in roles.axes},
         "cycles": {"interpolation": f"{parts.T_pos!r} s"}
         | told.get("cycles", {})
@@ -207,6 +219,8 @@ def scenario_data(
     }
     if told.get("structure") == STRUCTURE:
         machine["structure"] = STRUCTURE
+    if parts.coupling is not None:
+        own["coupling"] = parts.coupling
     return {**own, "name": own.get("name", name), "machine": machine}
 
 

@@ -61,7 +61,7 @@ def roles(structure: Structure, archives: Mapping[str, Archive], where: str) -> 
                 f"{'is none' if not found else 'are ' + ', '.join(found)}"
             )
     for component in structure.components:
-        problems += _connector_faults(component, archives[component.name], where)
+        problems += connector_faults(component, archives[component.name], where)
     problems += [f"{where}: connection {link}: a transformation is not carried out here" for link in structure.links
                  if link.transformed]  # fmt: skip
     driven: dict[End, End] = {}
@@ -81,7 +81,7 @@ def _is_shipped(archive: Archive, role: Role) -> bool:
     return _kind(archive) == role.shipped and all(signal in archive.variables for signal in role.signals)
 
 
-def _connector_faults(component: Component, archive: Archive, where: str) -> list[str]:
+def connector_faults(component: Component, archive: Archive, where: str) -> list[str]:
     """What the SSP says of a component's variables and its archive does not."""
     faults = []
     for connector in component.connectors:

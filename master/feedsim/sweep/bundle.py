@@ -28,9 +28,9 @@ from feedsim.findings import WRONG, ranked, severity
 from feedsim.nc import Program, plan
 from feedsim.owned import PREFIX, TemporaryFolder
 from feedsim.scenario import Base, Scenario
-from feedsim.scenario.study import Study
+from feedsim.scenario.study import Parameter, Study
 from feedsim.sweep.design import Outcome, Task
-from feedsim.sweep.provenance import UNITS, read
+from feedsim.sweep.provenance import read, units_of
 
 # Figures come in units for people; tables hold these instead, where the dimension is the same.
 _TABLE_UNITS = ("m", "s")
@@ -64,13 +64,15 @@ class Bundle:
         Raises:
             InputError: a file is missing.
         """
-        return cls.of_base(study.base, study.files, fmus)
+        return cls.of_base(study.base, study.files, fmus, study.parameters)
 
     @classmethod
-    def of_base(cls, base: Base, files: Iterable[Path], fmus: Path | None = None) -> Bundle:
-        """The same for runs of a scenario, with the data files that they may read."""
+    def of_base(
+        cls, base: Base, files: Iterable[Path], fmus: Path | None = None, parameters: Iterable[Parameter] = ()
+    ) -> Bundle:
+        """The same for runs of a scenario, with the data files that they may read, and what is changed in it."""
         fmus = fmus or cosim.fmus_directory()
-        archives = {f"{unit}.fmu": fmus / f"{unit}.fmu" for unit in UNITS}
+        archives = {f"{unit}.fmu": fmus / f"{unit}.fmu" for unit in units_of(base, parameters)}
         for file in archives.values():
             check_there(file)
         native = fmus / NATIVE

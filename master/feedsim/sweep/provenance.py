@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.errors import InputError
-from feedsim.scenario.study import Study
+from feedsim.scenario import Base
+from feedsim.scenario.study import Parameter, Study
 from feedsim.sweep.design import Design
 
 # What a worker is asked, in words that every Python knows, whatever is installed there.
@@ -42,8 +43,14 @@ def parts(study: Study, design: Design, fmus: Path) -> dict[str, str]:
         "version of feedsim": _version("feedsim"),
         "parameters and sampling": _of_bytes(_canonical(_plan(study, hashes)) + _values(study, design)),
         "scenario and machine": _of_bytes(text.encode()),
-        **{f"{unit}.fmu": _of_bytes(read(fmus / f"{unit}.fmu")) for unit in UNITS},
+        **{f"{unit}.fmu": _of_bytes(read(fmus / f"{unit}.fmu")) for unit in units_of(study.base, study.parameters)},
     }
+
+
+def units_of(base: Base, parameters: Iterable[Parameter] = ()) -> tuple[str, ...]:
+    """Shipped units that runs of a scenario may need, where `parameters` change it."""
+    varied = any(key.startswith("coupling") for parameter in parameters for key in parameter.keys)
+    return (*UNITS, "machine") if varied or base.scenario.coupling.units == "one" else UNITS
 
 
 def fingerprint(found: Mapping[str, str]) -> str:

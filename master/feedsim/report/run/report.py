@@ -219,7 +219,11 @@ def provenance(run: Run) -> Section:
         ("Cycles", ", ".join(f"{n} {duration(getattr(cycles, n))}" for n in ("T_c", "T_pos", "T_ipo"))),
         ("Recording", f"every {duration(scenario.recording.interval)}, {len(run.trace)} rows"),
         *([("Log", log_text(scenario.logging, run.log))] if scenario.logging is not None else []),
-        ("Coupling", f"{coupling.scheme}, {coupling.substeps} exchange step(s) per control cycle"),
+        (
+            "Coupling",
+            f"{coupling.scheme}, {coupling.substeps} exchange step(s) per control cycle"
+            + (", inside one unit" if coupling.units == "one" else ""),
+        ),
     ]
     used, parameters = sections.archives_table(run.units), sections.parameters_section(machine)
     return sections.provenance_section(rows, input_files(scenario), used, _coupling(run.coupling), parameters)
@@ -256,7 +260,7 @@ def summary(
             "set": list(scenario.settings),
             "overrides": list(scenario.overrides),
             "duration": quantity(run.program.duration, "s"),
-            "coupling": {"scheme": scenario.coupling.scheme, "substeps": scenario.coupling.substeps},
+            "coupling": scenario.coupling.model_dump(),
             "recording_interval": quantity(scenario.recording.interval, "s"),
             "logging": logging_part(scenario.logging, run.log),
             "motions": [

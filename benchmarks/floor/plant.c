@@ -17,7 +17,7 @@ void plant_floor_prepare(void *unit, double h, PlantMotion *motion) {
     Plant *plant = plant_of(unit);
     modal_prepare(&plant->modal[0], h);
     motion->now = (double *)((StateHead *)(void *)(u->block + u->state_at) + 1) + plant_ports(plant);
-    motion->next = plant->end;
+    motion->next = motion->now + plant_state_doubles(plant);
 }
 
 void plant_floor_step(void *unit, PlantMotion *motion, const double *M_a, const double *M_a_slope, const double *M_fr,

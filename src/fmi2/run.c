@@ -82,20 +82,23 @@ RARE static bool results_not_finite(Unit *unit) {
     return not_finite(unit, variable);
 }
 
-/* One at a time, in one sum: a processor has to wait where it reads two numbers at once that were only just written one
- * by one. */
+/* One at a time: a processor has to wait where it reads two numbers at once that were only just written one by one. In
+ * sums of their own, which do not wait for one another. */
 static inline bool results_finite(Unit *unit) {
-    double probe = 0;
+    double probe = 0, second = 0, third = 0;
     const Stretch *const end = unit->results + unit->result_count;
     for (const Stretch *at = unit->results; at < end; at++) {
         const double *y = (const double *)(const void *)(unit->block + at->offset);
         size_t left = at->count;
-        for (; left >= 3; left -= 3, y += 3)
-            probe = ((probe + number_probe(y[0])) + number_probe(y[1])) + number_probe(y[2]);
+        for (; left >= 3; left -= 3, y += 3) {
+            probe += number_probe(y[0]);
+            second += number_probe(y[1]);
+            third += number_probe(y[2]);
+        }
         for (; left > 0; left--, y++)
             probe += number_probe(*y);
     }
-    return !isnan(probe) || results_not_finite(unit);
+    return !isnan((probe + second) + third) || results_not_finite(unit);
 }
 
 static bool late_finite(Unit *unit) {

@@ -45,6 +45,10 @@ void machine_bind(Unit *unit, bool with_states) {
     unsigned char *scalars = (unsigned char *)unit_scalars(unit), *state = with_states ? unit_state(unit) : NULL;
     unsigned char *first = machine->axes > 0 ? (unsigned char *)unit_axis(unit, 0) : NULL;
     const double start_time = unit_start_time(unit);
+    if (state != NULL && state == machine->bound && start_time == machine->plant.start_time) {
+        return; /* as they were: no step of many is to pay for it */
+    }
+    machine->bound = state;
     machine->plant.scalars = scalars + offsetof(Scalars, plant_modes_file);
     machine->plant.axis_block = first + offsetof(AxisBlock, plant_M_a);
     machine->motion.scalars = scalars + offsetof(Scalars, motion_finished);

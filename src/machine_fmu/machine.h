@@ -36,6 +36,7 @@ typedef struct Machine {
     double *slopes;          /* memory of the parts' slopes */
     size_t *motion_axes;     /* axis of each axis of the motion */
     char plant_hash[HASH_TEXT_SIZE], motion_hash[HASH_TEXT_SIZE];
+    const unsigned char *bound; /* the state that the parts point into; NULL: into none */
 
     /* Of the parameters: */
     bool ready;

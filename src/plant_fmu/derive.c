@@ -15,7 +15,7 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     const size_t ports = plant_ports(plant), size = modal_padded(modes);
     const size_t system = modal_memory(modes, ports);
     const size_t crossing = cells_scratch(plant->axes, size);
-    const size_t scratch = 4 * ports + plant->axes + crossing + ports + 2 * size;
+    const size_t scratch = 4 * ports + plant->axes + crossing;
     Modal *modal = unit_alloc(unit, cells, sizeof *modal);
     double *systems = modal != NULL ? unit_alloc(unit, cells, system * sizeof *systems) : NULL;
     double *memory = systems != NULL ? unit_alloc(unit, scratch, sizeof *memory) : NULL;
@@ -41,7 +41,6 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     plant->y_before = plant->y + ports;
     plant->x = plant->y_before + ports;
     plant->carried = plant->x + plant->axes;
-    plant->end = plant->carried + crossing;
     return true;
 }
 
@@ -145,6 +144,9 @@ bool plant_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t
                          "the state belongs to other contents of the mode table (modes_file '%s', hash %s) than this "
                          "instance finds there (hash %s)",
                          scalars->modes_file, hash_text(text[0], head.table_hash), hash_text(text[1], found));
+    }
+    if (head.place > 1) {
+        return unit_fail(unit, "the state is in place %.0f; allowed is 0 or 1", (double)head.place);
     }
     const size_t cells = scalars->modes_file[0] == '\0' && plant->poses.cells > 0 ? plant->poses.cells : 1;
     if (head.cell >= cells) {

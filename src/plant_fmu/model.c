@@ -28,15 +28,19 @@
 #include "plant.h"
 
 static size_t plant_state_size(const Unit *unit) {
-    return sizeof(StateHead) + plant_state_doubles(unit_derived(unit)) * sizeof(double);
+    return sizeof(StateHead) + 2 * plant_state_doubles(unit_derived(unit)) * sizeof(double);
 }
 
 static StateHead *plant_head(Unit *unit) {
     return unit_state(unit);
 }
 
+static double *plant_state_at(Unit *unit, const Plant *plant, uint64_t place) {
+    return (double *)(plant_head(unit) + 1) + place * plant_state_doubles(plant);
+}
+
 static double *plant_state(Unit *unit) {
-    return (double *)(plant_head(unit) + 1);
+    return plant_state_at(unit, unit_derived(unit), plant_head(unit)->place);
 }
 
 /* --- start and step ----------------------------------------------------------------------------------------------- */
@@ -182,7 +186,9 @@ static bool plant_step(Unit *unit, double t, double h) {
     Plant *plant = unit_derived(unit);
     Modal *modal = &plant->modal[plant_head(unit)->cell];
     const size_t ports = plant_ports(plant), size = plant->size;
-    double *state = plant_state(unit), *end = plant->end, *q_end = end + ports, *v_end = q_end + size;
+    const uint64_t place = 1 - plant_head(unit)->place;
+    double *state = plant_state(unit), *end = plant_state_at(unit, plant, place);
+    double *q_end = end + ports, *v_end = q_end + size;
     plant_gather(unit, h, plant->u, plant->du);
     size_t active = plant->axes; /* mostly, no force is on tool and slides: nothing to add then */
     for (size_t i = 0; i < ports; i++) {
@@ -197,7 +203,7 @@ static bool plant_step(Unit *unit, double t, double h) {
         (plant->cells > 1 && !plant_follow(unit, plant, q_end, v_end))) {
         return unit_fail(unit, "an output would be no finite number at the end of the step");
     }
-    memcpy(state, end, plant_state_doubles(plant) * sizeof *state);
+    plant_head(unit)->place = place;
     plant_show(unit, plant, plant->y);
     if (plant->cells > 1) {
         plant_show_tool(unit, plant, plant->y);

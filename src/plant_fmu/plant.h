@@ -40,16 +40,17 @@ typedef struct Plant {
     double *systems;         /* their memory */
     double *memory;          /* of what follows: scratch of a step */
     double *u, *du;          /* [ports] */
-    double *end;             /* [state's doubles] a step's result, until it is known to be sound */
     double *y, *y_before;    /* [ports] */
     double *x;               /* [axes] positions */
     double *carried;         /* [cells_scratch()] */
 } Plant;
 
-/* State block: this head, then inputs at the end of the last step [ports], q [size], v [size]. */
+/* State block: this head, then two places by turns for inputs at the end of the last step [ports], q [size], v [size]:
+ * a step leaves its result in the other one, which counts once it is known to be sound. */
 typedef struct StateHead {
     uint64_t table_hash; /* mode table that the state belongs to */
     uint64_t cell;       /* whose modes q and v belong to */
+    uint64_t place;      /* that counts, 0 or 1 */
 } StateHead;
 
 /* The first of the ports at the slides. */

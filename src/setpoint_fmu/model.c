@@ -46,7 +46,10 @@ static void setpoint_start(Unit *unit) {
 static bool setpoint_step(Unit *unit, double t, double h) {
     const Setpoints *table = unit_derived(unit);
     const double end = t + h;
-    setpoint_show(unit, table, setpoints_row(table, end - unit_start_time(unit), setpoints_slack(table, end, h)));
+    const size_t row = setpoints_row(table, end - unit_start_time(unit), setpoints_slack(table, end, h));
+    if ((int)row != unit_scalars(unit)->row) { /* else it is shown already */
+        setpoint_show(unit, table, row);
+    }
     return true;
 }
 

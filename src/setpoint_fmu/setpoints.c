@@ -243,9 +243,18 @@ bool setpoints_read_rows(const char *text, size_t size, const char *source, Setp
 
 /* --- look-up ------------------------------------------------------------------------------------------------------ */
 
+/* Of two numbers; fmax() and fmin() think of what is none, and are calls. */
+static inline double larger(double a, double b) {
+    return a > b ? a : b;
+}
+
+static inline double smaller(double a, double b) {
+    return a < b ? a : b;
+}
+
 double setpoints_slack(const Setpoints *table, double t, double h) {
-    const double rounding = fmax(fmax(1e-9 * fabs(t), 2e-9), 2 * UNEVEN * table->cycle);
-    return fmax(16 * DBL_EPSILON * fabs(t), fmin(rounding, 0.01 * fmin(h, table->cycle)));
+    const double rounding = larger(larger(1e-9 * fabs(t), 2e-9), 2 * UNEVEN * table->cycle);
+    return larger(16 * DBL_EPSILON * fabs(t), smaller(rounding, 0.01 * smaller(h, table->cycle)));
 }
 
 size_t setpoints_row(const Setpoints *table, double elapsed, double slack) {

@@ -7,6 +7,7 @@ Start with evaluate.py, which finds the figures that a scenario asks for; circul
 from feedsim.analysis.circle import Diagnosis, answer
 from feedsim.analysis.circularity import Contour, Glitch, Turn, circularity, contour
 from feedsim.analysis.evaluate import (
+    AccuracyTask,
     CircleTask,
     PositioningTask,
     Result,
@@ -19,9 +20,10 @@ from feedsim.analysis.evaluate import (
 )
 from feedsim.analysis.figures import Figure, Figures
 from feedsim.analysis.positioning import Approach, deviation, positioning
+from feedsim.analysis.positioning_accuracy import Accuracy
 
 __all__ = [
-    "Approach", "CircleTask", "Contour", "Diagnosis", "Figure", "Figures", "Glitch", "PositioningTask", "Result",
-    "Task", "Turn", "answer", "check", "circularity", "contour", "deviation", "diagnoses", "doubts", "evaluate",
-    "positioning", "tasks",
+    "Accuracy", "AccuracyTask", "Approach", "CircleTask", "Contour", "Diagnosis", "Figure", "Figures", "Glitch",
+    "PositioningTask", "Result", "Task", "Turn", "answer", "check", "circularity", "contour", "deviation", "diagnoses",
+    "doubts", "evaluate", "positioning", "tasks",
 ]  # fmt: skip

@@ -7,18 +7,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+import numpy as np
+
 from feedsim.analysis.circle import Diagnosis
 from feedsim.analysis.circle_figures import bidirectional, cause_figures, diagnosed, misleading
 from feedsim.analysis.circularity import EVEN, Turn, axis_letters, circularity, recorded_circle, speed_change
 from feedsim.analysis.figures import Figure
 from feedsim.analysis.positioning import LEAST_REST, Approach, positioning
+from feedsim.analysis.positioning_accuracy import Accuracy, readings
 from feedsim.errors import InputError
 from feedsim.findings import Note
 from feedsim.motions.circular import Circular
 from feedsim.motions.move import Straight
+from feedsim.motions.positioning_cycle import Visits
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment
-from feedsim.scenario import CircleTest, Positioning, Scenario
+from feedsim.scenario import CircleTest, Positioning, PositioningAccuracy, Scenario
 from feedsim.trace import Trace, matches
 
 # What acceleration leaves dies away in the run-in [s]: on the default machine it makes G 3 % too large after 0.2 s on
@@ -90,7 +94,40 @@ class CircleTask:
         return diagnosed(trace, self.turns, self.pitch)
 
 
-Task = PositioningTask | CircleTask
+@dataclass(frozen=True)
+class AccuracyTask:
+    """A positioning cycle; ``prefix`` of its figures; ``noise`` [m] of the measuring system, and its seed."""
+
+    prefix: str
+    visits: Visits
+    noise: float = 0.0
+    seed: int = 0
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Columns without which there is nothing to evaluate."""
+        return (f"{self.visits.axis}.x_a",)
+
+    def found(self, trace: Trace) -> dict[str, Accuracy]:
+        """By the linear scale (""), and by the tool point ("tool.") where that is recorded."""
+        names = {"": f"{self.visits.axis}.x_a", "tool.": f"tcp.x_{self.visits.axis}"}
+        rng = np.random.default_rng(self.seed)
+        return {
+            place: Accuracy(self.visits.targets, readings(trace, self.visits, name, self.noise, rng))
+            for place, name in names.items()
+            if not place or name in trace.columns
+        }
+
+    def figures(self, trace: Trace) -> dict[str, Figure]:
+        """Figures of the task, without prefix."""
+        return {
+            f"{place}{name}": figure
+            for place, each in self.found(trace).items()
+            for name, figure in each.figures.items()
+        }
+
+
+Task = PositioningTask | CircleTask | AccuracyTask
 
 
 def tasks(scenario: Scenario, program: Program) -> tuple[Task, ...]:
@@ -102,7 +139,7 @@ def tasks(scenario: Scenario, program: Program) -> tuple[Task, ...]:
     problems: list[str] = []
     for i, item in enumerate(scenario.evaluate):
         try:
-            task = _stop(item, program) if isinstance(item, Positioning) else _turn(item, scenario, program)
+            task = _task(item, scenario, program)
         except InputError as error:
             problems += [f"{scenario.at('evaluate', i)}: {problem}" for problem in error.problems]
             continue
@@ -158,6 +195,17 @@ def evaluate(result: Result) -> dict[str, Figure]:
         for task in tasks(result.scenario, result.program)
         for name, figure in task.figures(result.trace).items()
     }
+
+
+def _task(item: Positioning | CircleTest | PositioningAccuracy, scenario: Scenario, program: Program) -> Task:
+    if isinstance(item, Positioning):
+        return _stop(item, program)
+    if isinstance(item, CircleTest):
+        return _turn(item, scenario, program)
+    cycles = [s.geometry for s in _chosen(program, item.motion) if isinstance(s.geometry, Visits)]
+    if not cycles:
+        raise InputError("positioning accuracy: the program has no positioning cycle")
+    return AccuracyTask(cycles[-1].axis, cycles[-1], item.noise, item.seed)
 
 
 def _stop(item: Positioning, program: Program) -> PositioningTask:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +22,13 @@ from feedsim.errors import InputError
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program
 from feedsim.scenario import Machine, Scenario
-from feedsim.scenario.loads import LoadCourse, MotorLoad, ToolLoad
+from feedsim.scenario.loads import LoadCourse, MotorLoad, Noise, ToolLoad
 from feedsim.trace import read_signals
 
 # A load acts where it is more than this share of its largest value; and does work that tells something where that is
 # more than this share of the motor's, as much as the friction of a good model is off by.
 ACTS, TELLS = 0.1, 0.05
+NOISE_SAMPLES = 10  # of a random load per time constant of its low-pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +149,9 @@ def acting(scenario: Scenario, program: Program) -> tuple[Acting, ...]:
 
 def _course(load: LoadCourse, place: str, program: Program) -> Acting:
     torque = None
-    if load.table is not None:
+    if load.noise is not None:
+        time, values = _random(load.noise, program.duration)
+    elif load.table is not None:
         time, values = (np.array(column, dtype=np.float64) for column in (load.table.time, load.table.values))
     else:
         assert load.file is not None
@@ -164,6 +168,23 @@ def _course(load: LoadCourse, place: str, program: Program) -> Acting:
             f"{program.duration:.6g} s: it never acts; 'motion' names the motion that its time runs with"
         )
     return Acting(place, load, time, values * load.factor, torque)
+
+
+def _random(noise: Noise, duration: float) -> tuple[Floats, Floats]:
+    """Instants [s] over a run, and a load with the spectrum of white noise behind a first-order low-pass, (N,) each.
+
+    Of a sample the share exp(-2 pi f_c h) stays in the next one, h later. The course is linear in between, where its
+    variance is less; it is `rms` squared on average over time.
+    """
+    from scipy.signal import lfilter  # half a second that no other load needs
+
+    h = 1 / (NOISE_SAMPLES * 2 * pi * noise.bandwidth)
+    stays = np.exp(-1 / NOISE_SAMPLES)
+    drawn = np.random.default_rng(noise.seed).standard_normal(int(np.ceil(duration / h)) + 2)
+    drawn[1:] *= np.sqrt(1 - stays**2)  # the first one has the whole deviation: it has always been there
+    values = lfilter([1.0], [1.0, -stays], drawn)
+    rms = noise.rms / np.sqrt((2 + stays) / 3)
+    return h * np.arange(len(drawn), dtype=np.float64), float(rms) * np.asarray(values, dtype=np.float64)
 
 
 def _begin(load: LoadCourse, program: Program) -> float:

@@ -8,7 +8,15 @@ from feedsim.scenario.base import Base, Change
 from feedsim.scenario.load import Subject, load, load_machine, load_subject
 from feedsim.scenario.logging import Delay, Level, Logging, Noise, Quantisation
 from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine, PathLimits
-from feedsim.scenario.model import CircleTest, Coupling, Evaluation, Positioning, Recording, Scenario
+from feedsim.scenario.model import (
+    CircleTest,
+    Coupling,
+    Evaluation,
+    Positioning,
+    PositioningAccuracy,
+    Recording,
+    Scenario,
+)
 from feedsim.scenario.roles import ForeignUnit
 
 __all__ = [
@@ -31,6 +39,7 @@ __all__ = [
     "Noise",
     "PathLimits",
     "Positioning",
+    "PositioningAccuracy",
     "Quantisation",
     "Recording",
     "Scenario",

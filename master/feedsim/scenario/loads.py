@@ -1,4 +1,4 @@
-"""Loads: torques and forces over time that act on the axes and at the tool, from a recording or a table.
+"""Loads: torques and forces over time that act on the axes and at the tool, from a recording, a table, or at random.
 
 Each acts at one input of the plant; which, in which unit and with which sign, is said here alone.
 """
@@ -52,6 +52,30 @@ class ForceTable(Table):
     values: tuple[Annotated[float, Quantity("N", example="100 N")], ...] = Field(description="Force at each instant")
 
 
+class Noise(Model):
+    """A load at random: white noise through a first-order low-pass, from the begin of the run to its end."""
+
+    bandwidth: Annotated[float, Quantity("Hz", above=0, example="10 Hz")] = Field(
+        default=10.0, description="Corner frequency of the low-pass"
+    )
+    seed: Annotated[StrictInt, Field(ge=0)] = Field(default=0, description="Of the random numbers: the same ones again")
+    rms: float = Field(description="Standard deviation of the load")
+
+
+class TorqueNoise(Noise):
+    """A torque at random."""
+
+    rms: Annotated[float, Quantity("N.m", above=0, example="0.1 N.m")] = Field(
+        description="Standard deviation of the torque"
+    )
+
+
+class ForceNoise(Noise):
+    """A force at random."""
+
+    rms: Annotated[float, Quantity("N", above=0, example="10 N")] = Field(description="Standard deviation of the force")
+
+
 class LoadCourse(Model):
     """What all loads have in common: where their course over time is from."""
 
@@ -66,6 +90,7 @@ class LoadCourse(Model):
         "that, and tells a load of wrong sign or size",
     )
     table: Table | None = None
+    noise: Noise | None = None
     held: StrictBool = Field(
         default=False, description="Each value holds until the next instant; false: linear in between"
     )
@@ -87,9 +112,13 @@ class LoadCourse(Model):
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
-        if (self.file is None) == (self.table is None):
-            found = "neither is given" if self.table is None else "both are given"
-            raise fault(f"a load is in a 'file' with its 'column', or in a 'table' of 'time' and 'values'; {found}")
+        given = [name for name in ("file", "table", "noise") if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = f"{' and '.join(given)} are given" if given else "none is given"
+            raise fault(
+                "a load is in a 'file' with its 'column', in a 'table' of 'time' and 'values', or at random by "
+                f"'noise'; {found}"
+            )
         if (self.file is None) != (self.column is None):
             raise fault("a 'file' needs the 'column' of the load, and only a file has one")
         if self.motor_torque is not None and self.file is None:
@@ -120,6 +149,7 @@ class MotorLoad(LoadCourse):
     kind: Literal["motor"] = "motor"
     axis: AxisName
     table: TorqueTable | None = Field(default=None, description="The load over time, in place of a file")
+    noise: TorqueNoise | None = Field(default=None, description="The load at random, in place of a file")
 
     @property
     def input(self) -> str:
@@ -142,6 +172,7 @@ class SlideLoad(LoadCourse):
     kind: Literal["slide"] = "slide"
     axis: AxisName
     table: ForceTable | None = Field(default=None, description="The load over time, in place of a file")
+    noise: ForceNoise | None = Field(default=None, description="The load at random, in place of a file")
 
     @property
     def input(self) -> str:
@@ -164,6 +195,7 @@ class ToolLoad(LoadCourse):
     kind: Literal["tool"] = "tool"
     direction: Direction = Field(description="X, Y or Z, positive as in the machine's frame")
     table: ForceTable | None = Field(default=None, description="The load over time, in place of a file")
+    noise: ForceNoise | None = Field(default=None, description="The load at random, in place of a file")
 
     @property
     def input(self) -> str:

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, StrictInt, StrictStr, V
 
 from feedsim.fields import AxisName, Model, Quantity, Reading, fault, no_axis
 from feedsim.files.source import Place
-from feedsim.motions import Circle, MeasuredSetpoints, Motion
+from feedsim.motions import Circle, MeasuredSetpoints, Motion, PositioningCycle
 from feedsim.scenario.loads import Load, MotionIndex
 from feedsim.scenario.logging import Logging, interval_fault, on_the_grid
 from feedsim.scenario.machine import Machine
@@ -81,7 +81,20 @@ class CircleTest(Model):
     )
 
 
-Evaluation = Annotated[Positioning | CircleTest, Field(discriminator="kind")]
+class PositioningAccuracy(Model):
+    """Accuracy and repeatability of positioning (ISO 230-2) over a positioning cycle."""
+
+    kind: Literal["positioning_accuracy"] = "positioning_accuracy"
+    motion: MotionIndex | None = Field(
+        default=None, description="Place of the cycle in motions, from 0 (default: the last positioning cycle)"
+    )
+    noise: Annotated[float, Quantity("m", minimum=0, example="0.1 um")] = Field(
+        default=0.0, description="Standard deviation of the measuring system, drawn anew for every reading"
+    )
+    seed: Annotated[StrictInt, Field(ge=0)] = Field(default=0, description="Of that noise")
+
+
+Evaluation = Annotated[Positioning | CircleTest | PositioningAccuracy, Field(discriminator="kind")]
 
 
 class Scenario(Model):
@@ -243,6 +256,14 @@ def contradictions(scenario: Scenario) -> Iterator[tuple[Place, str]]:
             if not any(item.axis in motion.axes for motion in motions):
                 which = "no motion moves" if chosen is None else f"motions.{chosen} ({motions[0].kind}) does not move"
                 yield ("evaluate", i), f"positioning of axis {item.axis}, which {which}"
+            continue
+        if item.kind == "positioning_accuracy":
+            if not any(isinstance(motion, PositioningCycle) for motion in motions):
+                which = "no motion is" if chosen is None else f"motions.{chosen} ({motions[0].kind}) is not"
+                yield (
+                    ("evaluate", i),
+                    f"the accuracy of positioning is asked for, but {which} of kind positioning_cycle",
+                )
             continue
         circles = [motion for motion in motions if isinstance(motion, Circle)]
         recordings = [motion for motion in motions if isinstance(motion, MeasuredSetpoints)]

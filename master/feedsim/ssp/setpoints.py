@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.motions.circular import Circular
+from feedsim.motions.positioning_cycle import Visits
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment
-from feedsim.scenario import CircleTest, Positioning, Scenario
+from feedsim.scenario import CircleTest, Positioning, PositioningAccuracy, Scenario
 from feedsim.structure.pack import packaging, packed, setpoint_table
 
+EVALUATED = {"circle": "circularity", "positioning_accuracy": "positioning accuracy"}
 SETPOINTS_IN_ARCHIVE = "resources/setpoints.csv"
 UNEVEN = 1e-6  # of a row, as in the unit
 LEAST_REST = 0.050  # s, behind a motion whose positioning is evaluated (feedsim.analysis)
@@ -105,16 +107,19 @@ def evaluation(scenario: Scenario, planned: Program, program: Program) -> tuple[
         if needed is None or needed <= program.duration + 1e-9:
             kept.append(item)  # where nothing is found the evaluation itself says why
         else:
-            what = f"positioning of {item.axis}" if isinstance(item, Positioning) else "circularity"
+            what = f"positioning of {item.axis}" if isinstance(item, Positioning) else EVALUATED[item.kind]
             lost.append(f"evaluate.{i} ({what}, to {needed:.6g} s)")
     return (scenario.model_copy(update={"evaluate": tuple(kept)}), lost) if lost else (scenario, [])
 
 
-def _needed(item: Positioning | CircleTest, planned: Program) -> float | None:
+def _needed(item: Positioning | CircleTest | PositioningAccuracy, planned: Program) -> float | None:
     """Until when the motions must run for an evaluation [s]; None where they have nothing for it."""
     chosen = planned.segments if item.motion is None else planned.segments[item.motion : item.motion + 1]
     if isinstance(item, Positioning):
         moved = [each.end for each in chosen if each.origin[item.axis] != each.target[item.axis]]
         return min(moved[-1] + LEAST_REST, planned.duration) if moved else None
+    if isinstance(item, PositioningAccuracy):
+        cycles = [each.end for each in chosen if isinstance(each.geometry, Visits)]
+        return min(cycles[-1], planned.duration) if cycles else None
     circles = [each.end for each in chosen if isinstance(each.geometry, Circular | Recorded)]
     return min(circles[-1], planned.duration) if circles else None

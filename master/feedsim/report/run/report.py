@@ -8,7 +8,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from feedsim.analysis import Diagnosis, Figure, PositioningTask, answer, diagnoses, doubts, tasks
+from feedsim.analysis import (
+    AccuracyTask,
+    CircleTask,
+    Diagnosis,
+    Figure,
+    PositioningTask,
+    answer,
+    diagnoses,
+    doubts,
+    tasks,
+)
 from feedsim.cosim import Run
 from feedsim.report import sections
 from feedsim.report.content import Report, Section, Table, Tile, tile_value
@@ -24,6 +34,7 @@ from feedsim.report.provenance import (
     software,
 )
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.run.accuracy import accuracy_section
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
@@ -46,10 +57,15 @@ TILES = {
     "F_max": "largest radial deviation F max",
     "F_min": "smallest radial deviation F min",
     "mean": "mean radius deviation",
+    "A": "accuracy of positioning A",
+    "R": "repeatability R",
+    "B": "largest reversal value B",
+    "E": "systematic deviation E",
+    "M": "range of the mean deviations M",
 }
 MOST_MOTIONS = 200
-LINE = ("overshoot", "settling_time", "peak_torque", "G")
-HEADER = (*LINE, "duration", "ringing_frequency", "plateau_torque", "rest_torque", "F_max", "F_min", "mean")
+LINE = ("overshoot", "settling_time", "peak_torque", "G", "A", "R", "B")
+HEADER = (*LINE, "duration", "ringing_frequency", "plateau_torque", "rest_torque", "F_max", "F_min", "mean", "E", "M")
 FORMAT = 1
 COUPLING = {
     "residual": "interface energy residual: what the plant gave to the friction bond less what friction took from it",
@@ -123,6 +139,7 @@ def report_of(
         main=[
             *pictures,
             *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
+            *accuracy_sections(run),
             sections.figures_section(figures),
             motions_section(run),
             loads_section(run),
@@ -131,6 +148,16 @@ def report_of(
         provenance=provenance(run),
         footer=sections.figures_footer(footer) if figures else footer,
     )
+
+
+def accuracy_sections(run: Run) -> list[Section]:
+    """Every positioning cycle, by the scale and by the tool point."""
+    asked = [task for task in tasks(run.scenario, run.program) if isinstance(task, AccuracyTask)]
+    return [
+        accuracy_section(task.prefix, found, place.rstrip("."))
+        for task in asked
+        for place, found in task.found(run.trace).items()
+    ]
 
 
 def answers(causes: Mapping[str, Diagnosis]) -> list[str]:
@@ -167,7 +194,7 @@ def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
                 )
             )
             covered.add(axis)
-        else:
+        elif isinstance(task, CircleTask):
             pictures.append(contour_picture(run.trace, task.turn, own, f"contour-{stem}"))
             torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
             pictures += [torques] if torques is not None else []
@@ -322,7 +349,7 @@ def _circles(run: Run, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
             for turn in task.turns
         ]
         for task in found
-        if not isinstance(task, PositioningTask)
+        if isinstance(task, CircleTask)
     }
 
 

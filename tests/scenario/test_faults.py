@@ -103,7 +103,7 @@ def test_motions(refused: Refused, motion: str, message: str) -> None:
         ("slide, axis: X, table: {time: [0 s, 1 s], values: [0 N.m, 1 N]}",
          ".table.values.0: '0 N.m' is a torque; a force is expected, for example 100 N"),
         ("tool, direction: X, file: none.csv, column: F", ".file: no such file: "),
-        ("tool, direction: X", ": a load is in a 'file' with its 'column', in a 'table' of 'time' and 'values', or at random"),
+        ("tool, direction: X", ": a load is in a 'file' with its 'column', in a 'table' of 'time' and 'values',"),
         ("tool, direction: X, file: s.yaml, column: F, table: {time: [0 s, 1 s], values: [0 N, 1 N]}",
          ": a load is in a 'file' with its 'column', in a 'table' of 'time' and 'values', or at random by "
          "'noise'; file and table are given"),

@@ -20,7 +20,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 TESTS = HERE.parent
-# What has an iteration, an order or pinned digits in it. The rest of the three rooms, many minutes: --all.
+# What has an iteration, an order or pinned digits in it, but no statistics. The rest, many minutes: --all.
 REFERENCES = ("reference/test_reference.py", "identify/test_fit.py", "identify/test_stribeck.py")
 CORE = (
     "reference/test_reference.py",
@@ -131,7 +131,8 @@ def main(arguments: list[str] | None = None) -> int:
         tests = given.pytest or [str(TESTS / place) for place in (ALL if given.all else setting.tests)]
         begun = time.perf_counter()
         spread = ["-n", "auto", "--dist", "loadfile", "-p", "no:cacheprovider", "--durations=5"]
-        command = [sys.executable, "-m", "pytest", "-q", *spread, *plugin, *tests]
+        which = [] if given.all or given.pytest else ["-m", "not statistics"]
+        command = [sys.executable, "-m", "pytest", "-q", *spread, *plugin, *which, *tests]
         done = subprocess.run(command, env=environment, check=False)
         print(f"{setting.name}: {time.perf_counter() - begun:.0f} s", flush=True)
         if done.returncode:

@@ -46,7 +46,8 @@ def replay(options: Namespace) -> None:
     axes = _axes(options.axes, machine)
     mapping = load_columns(options.columns) if options.columns is not None else None
     directory: Path = options.out or Path("results") / f"replay_{options.record.stem}"
-    window = _window(options.window)
+    marks = _marks(options.record)
+    window = _window(options, marks)
     inputs = [options.record, *(file for _, file in subject.files), machine.modes]
     with (
         progress_bar(options.quiet) as progress,
@@ -62,7 +63,7 @@ def replay(options: Namespace) -> None:
         sources = [each.provenance for each in read.values()]
         told = dict.fromkeys(text for source in sources for text in source.warnings)
         done = Replayed(
-            comparisons, subject, sources, _marks(options.record), dict(text.split("=", 1) for text in _given(options)),
+            comparisons, subject, sources, marks, dict(text.split("=", 1) for text in _given(options)),
             list(told),
         )  # fmt: skip
         report.write(done, directory)
@@ -91,18 +92,10 @@ def _axes(text: str | None, machine: Machine | None) -> tuple[str, ...]:
     return found
 
 
-def _window(text: str | None) -> tuple[float, float] | None:
-    from feedsim.errors import InputError
+def _window(options: Namespace, marks: Sequence[Mark]) -> tuple[float, float] | None:
+    from feedsim.replay.window import window
 
-    if text is None:
-        return None
-    begin, dots, end = (part.strip() for part in text.partition(".."))
-    if not (begin and dots and end):
-        raise InputError(f"--window {text}: BEGIN..END is needed, such as '0.5 s..2 s'")
-    first, last = (quantity("window", part, "s", "0.5 s", whole=text) for part in (begin, end))
-    if not first < last:
-        raise InputError(f"--window {text}: the begin is not ahead of the end")
-    return first, last
+    return window(options.window, marks) if options.window is not None else None
 
 
 def _marks(path: Path) -> Sequence[Mark]:
@@ -124,7 +117,8 @@ def identify_drive(options: Namespace) -> None:
     axes = _axes(options.axes, machine)
     mapping = load_columns(options.columns) if options.columns is not None else None
     directory: Path = options.out or Path("results") / f"drive_{options.record.stem}"
-    window = _window(options.window)
+    marks = _marks(options.record)
+    window = _window(options, marks)
     inputs = [options.record, *(file for _, file in (subject.files if subject is not None else ()))]
     name = options.name or options.record.stem
     cycle = quantity("position-cycle", options.position_cycle, "s", "1 ms") if options.position_cycle else None
@@ -144,7 +138,7 @@ def identify_drive(options: Namespace) -> None:
         sources = [each.provenance for each in read.values()]
         done = report.DriveReport(
             found, sources, subject, name, dict(text.split("=", 1) for text in _given(options)),
-            _marks(options.record),
+            marks,
         )  # fmt: skip
         report.write(done, directory)
     finish(options.quiet, done.warnings, *report.summary_lines(done, directory))
@@ -152,7 +146,12 @@ def identify_drive(options: Namespace) -> None:
 
 _RECORD = Option("record", "RECORD", "CSV or MAT file, or a capture of a SINUMERIK (.json) (docs/traces.md)", type=Path)
 _AXES = Option("--axes", "NAMES", "axes, separated by commas, such as X,Y (default: all of the machine)")
-_WINDOW = Option("--window", "BEGIN..END", "the part of the record that counts, e.g. '0.5 s..2 s' (default: all of it)")
+_WINDOW = Option(
+    "--window",
+    "BEGIN..END",
+    "the part of the record that counts, by times or by blocks of its program, e.g. '0.5 s..2 s', 'N7..N20', 'N7' "
+    "(default: all of it)",
+)
 _COLUMNS = Option("--columns", "MAPPING.yaml", "which columns of the record are what (docs/traces.md)", type=Path)
 
 REPLAY = Command(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isinf
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,8 @@ def read_axes(
 def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> AxisRecord:
     """The stretch of an axis that holds the window, from BEFORE ahead of it on; without one the longest stretch.
 
+    window: begin and end [s]; an end of inf is that of the stretch.
+
     Raises InputError: no stretch without a gap holds the window, or less than ten rows of it.
     """
     pitch = read.provenance.pitch
@@ -114,8 +117,10 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
         begin, end = window
         slack = 0.5 * read.records[0].interval
         holding = [
-            each for each in read.records if each.time[0] <= begin + slack and each.time[-1] >= end - slack
-        ]  # fmt: skip
+            each
+            for each in read.records
+            if each.time[0] <= begin + slack and each.time[-1] >= (begin if isinf(end) else end) - slack
+        ]
         if not holding:
             stretches = ", ".join(f"{each.time[0]:.6g} to {each.time[-1]:.6g} s" for each in read.records)
             raise InputError(
@@ -123,6 +128,7 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
                 f"is {stretches}"
             )
         record = holding[0]
+        end = min(end, float(record.time[-1]))
     first = int(np.searchsorted(record.time, begin - BEFORE))
     last = int(np.searchsorted(record.time, end + 0.5 * record.interval))
     record = record.between(first, last)

@@ -1,0 +1,76 @@
+"""Windows of a record by times and by the blocks of its program."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+
+import pytest
+
+from feedsim.cli import main
+from feedsim.errors import InputError
+from feedsim.replay.window import window
+from feedsim.trace import Mark
+
+MARKS = [
+    Mark(0.5, "N1 G0 X10"),
+    Mark(1.0, "N10 G1 X20 F500"),
+    Mark(2.0, "STOPRE"),
+    Mark(3.0, "N20  G1 X0"),
+    Mark(4.5, "STOPRE"),
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("0.5 s..2 s", (0.5, 2.0)),
+        ("500 ms..2 s", (0.5, 2.0)),
+        ("N10", (1.0, 2.0)),
+        ("N1..N20", (0.5, 4.5)),  # N1 is not N10
+        ("n1 g0..2.5 s", (0.5, 2.5)),
+        ("N20 G1", (3.0, 4.5)),  # one blank or two
+        ("0.7 s .. STOPRE #1", (0.7, 3.0)),
+        ("STOPRE #2", (4.5, math.inf)),
+    ],
+)
+def test_begin_and_end(text: str, expected: tuple[float, float]) -> None:
+    assert window(text, MARKS) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("1 s", "BEGIN..END is needed"),
+        ("1 s..", "BEGIN..END is needed"),
+        ("..1 s", "BEGIN..END is needed"),
+        ("2 s..1 s", "not ahead of the end"),
+        ("N20..N1", "not ahead of the end"),
+        ("1 m..2 s", "a length; a time is expected"),
+        ("N3", "none begins with 'N3'; there is N1 G0 X10; N10 G1 X20 F500; STOPRE; N20  G1 X0"),
+        ("STOPRE", "2 blocks of the record begin with 'STOPRE', at 2 s, 4.5 s; say which, for example STOPRE #2"),
+        ("STOPRE #3", "'STOPRE' begins 2 of them"),
+    ],
+)
+def test_what_is_none_is_told(text: str, told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        window(text, MARKS)
+    assert told in str(caught.value)
+    with pytest.raises(InputError, match="it has none"):
+        window("N1", [])
+
+
+@pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
+def test_a_block_of_a_capture(tmp_path: Path) -> None:
+    """The rapid that is asked for by its block, on the shipped machine."""
+    machine = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "sinumerik_840d"
+    capture = os.environ["FEEDSIM_CAPTURE"]
+    words = ["replay", capture, "--machine", str(machine), "--axes", "Y", "--window", "N7 G0", "--quiet"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert 0 < summary["figures"]["Y.position_rms"]["value"] < 10
+    rows = (tmp_path / "out" / "replay.csv").read_text().splitlines()
+    assert float(rows[1].split(",")[0]) == pytest.approx(0.408)
+    assert float(rows[-1].split(",")[0]) == pytest.approx(0.58)

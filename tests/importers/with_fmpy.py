@@ -108,7 +108,8 @@ def _write(path: Path, system: System, experiment: Experiment) -> None:
     )
     text = (
         f'<ssd:SystemStructureDescription {_NAMESPACES} version="1.0" name="system"><ssd:System name="system">'
-        f"<ssd:Elements>{''.join(elements)}</ssd:Elements><ssd:Connections>{connections}</ssd:Connections>"
+        f"<ssd:Elements>{''.join(elements)}</ssd:Elements>"
+        f"{f'<ssd:Connections>{connections}</ssd:Connections>' if connections else ''}"
         "</ssd:System></ssd:SystemStructureDescription>"
     )
     with ZipFile(path, "w", ZIP_DEFLATED) as archive:

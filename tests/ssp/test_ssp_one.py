@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -47,6 +48,13 @@ def test_what_is_inside(one: Path) -> None:
     assert "<ssd:Connection " not in structure
     assert 'kind="input"' not in structure
     assert 'baseStepSize="0.001"' in structure
+
+
+def test_it_is_what_the_standard_wants(one: Path) -> None:
+    """By the schemas of the standard, as FMPy carries them."""
+    read: Any = pytest.importorskip("fmpy.ssp.ssd").read_ssd
+    (component,) = read(str(one), validate=True).system.elements
+    assert {"Z.x_a", "Z.M_fr", "tool.x_X", "Z.x_e_max"} <= {each.name for each in component.connectors}
 
 
 def test_another_machine(tmp_path: Path, fmus: Path) -> None:

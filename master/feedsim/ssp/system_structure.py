@@ -90,10 +90,11 @@ def to_bytes(structure: Structure) -> bytes:
     elements = xml.child(system, "ssd:Elements")
     for component in structure.components:
         _append(elements, component)
-    connections = xml.child(system, "ssd:Connections")
-    for link in structure.links:
-        names = {"startElement": link.start[0], "startConnector": link.start[1]}
-        xml.child(connections, "ssd:Connection", names | {"endElement": link.end[0], "endConnector": link.end[1]})
+    if structure.links:  # the schema has no empty ones
+        connections = xml.child(system, "ssd:Connections")
+        for link in structure.links:
+            names = {"startElement": link.start[0], "startConnector": link.start[1]}
+            xml.child(connections, "ssd:Connection", names | {"endElement": link.end[0], "endConnector": link.end[1]})
     if structure.step is not None:
         place = xml.child(xml.child(system, "ssd:Annotations"), "ssc:Annotation", {"type": MASTER})
         master = xml.child(xml.child(place, "oms:Annotations"), "oms:SimulationInformation")

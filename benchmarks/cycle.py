@@ -5,6 +5,7 @@ Units and loops take turns. Read the ratios, not the nanoseconds.
 
 from __future__ import annotations
 
+import argparse
 import os
 import shlex
 import subprocess
@@ -57,7 +58,7 @@ def unit_cost(program: Path, name: str) -> tuple[float, float]:
 
 
 def main(given: Sequence[str] | None = None) -> int:
-    bench = arguments("cycle", __doc__, given, rounds=ROUNDS, only=(*CASES, *LOOPS))
+    bench = arguments("cycle", __doc__, given, rounds=ROUNDS, only=(*CASES, *LOOPS), more=_beside)
     program = build(ROOT / "build" / "bench")
     circle = scenario.load(ROOT / "scenarios" / "xz_circle.yaml", ["motions.0.direction=counterclockwise"])
     planned = nc.plan(circle)
@@ -72,12 +73,15 @@ def main(given: Sequence[str] | None = None) -> int:
         left[name] += 1
         return alone
 
-    def looped(native: bool) -> float:
-        return 1e6 * cosim.run(circle, program=planned, native=native).wall_time / cycles
+    def looped(native: bool, fmus: Path | None = None) -> float:
+        return 1e6 * cosim.run(circle, program=planned, native=native, fmus=fmus).wall_time / cycles
 
     contestants = [Contestant(name, lambda name=name: stepped(name)) for name in CASES]  # type: ignore[misc]
     contestants += [Contestant(name, lambda native=native: looped(native)) for name, native in LOOPS.items()]  # type: ignore[misc]
-    costs = measure([each for each in contestants if each.name in bench.only], bench.rounds, title="cycle, round")
+    chosen = [each for each in contestants if each.name in bench.only]
+    others = {f"native loop, {folder}": folder for folder in bench.given.beside}
+    chosen += [Contestant(name, lambda folder=folder: looped(True, folder)) for name, folder in others.items()]  # type: ignore[misc]
+    costs = measure(chosen, bench.rounds, title="cycle, round")
     rows: list[list[object]] = [
         [name, f"{costs.median(name):.3f} us", f"{exchanged.median(name):.3f} us", CASES[name][3], ""]
         for name in CASES
@@ -91,10 +95,18 @@ def main(given: Sequence[str] | None = None) -> int:
             if name in costs.costs:
                 told = [f"the whole {name}", "", f"{digits(costs.median(name))} us", 7, costs.ratio_text(name, "units")]
                 rows.append(list(told))
+    rows += [[name, "", f"{digits(costs.median(name))} us", 7, ""] for name in others]
+    if others and "native loop" in costs.costs:
+        print(*(f"{name}: {costs.ratio_text(name, 'native loop')} of the native loop" for name in others), sep="\n")
     header = ["per 125 us cycle", "doStep alone", "with set, slope and get", "instances", "of all units (quartiles)"]
     baseline = "units" if "units" in costs.costs else None
     bench.tell(table(header, rows), {"us": costs.as_json(baseline), "us, set, slope and get": exchanged.as_json()})
     return 0
+
+
+def _beside(parser: argparse.ArgumentParser) -> None:
+    told = "the native loop with the archives in DIR, too, such as build/fmus-all (made by zig)"
+    parser.add_argument("--beside", type=Path, nargs="+", default=[], metavar="DIR", help=told)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ bool parameters_take(const double values[], Scalars *v) {
 #include "variables.def"
     return good;
 }
+#undef VARIABLE
 
 bool parameters_agree(const Scalars *v) {
     return v->F_S >= v->F_C;

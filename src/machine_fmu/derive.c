@@ -95,7 +95,7 @@ static bool derive_parts(Machine *machine) {
     return good;
 }
 
-static void lay_out(Machine *machine) {
+static void lay_out_parts(Machine *machine) {
     size_t at = ALIGNED(sizeof(StateHead) + machine->axes * sizeof(AxisState)), part = 0;
     machine->places[part++] = at;
     at += ALIGNED(plant_part.state_size(&machine->plant));
@@ -146,7 +146,7 @@ bool machine_derive(Unit *unit) {
     machine->T_c = unit_axis(unit, 0)->drive_T_c;
     machine->scheme = &machine_schemes[v->coupling_scheme];
     machine->substeps = (size_t)v->coupling_substeps;
-    lay_out(machine);
+    lay_out_parts(machine);
     return keep_room(unit, machine);
 }
 

@@ -49,6 +49,11 @@ static const Force machine_forces[] = {
 static const Force axis_forces[] = {
 #include "plant_variables.def"
 };
+/* as table.h has them */
+#undef SCALAR_ROW
+#undef AXIS_ROW
+#define SCALAR_ROW(...) VARIABLE(__VA_ARGS__)
+#define AXIS_ROW(...) AXIS_VARIABLE(__VA_ARGS__)
 enum {
     MACHINE_FORCES = sizeof machine_forces / sizeof machine_forces[0],
     AXIS_FORCES = sizeof axis_forces / sizeof axis_forces[0]

@@ -37,6 +37,11 @@ static const size_t motion_axis_places[] = {
 static const size_t plant_axis_places[] = {
 #include "plant_variables.def"
     0};
+/* as table.h has them */
+#undef SCALAR_ROW
+#undef AXIS_ROW
+#define SCALAR_ROW(...) VARIABLE(__VA_ARGS__)
+#define AXIS_ROW(...) AXIS_VARIABLE(__VA_ARGS__)
 
 static bool rows_same(Unit *unit, const char *part, const size_t *own, const size_t *its, size_t rows) {
     for (size_t i = 0; i < rows; i++) {

@@ -7,7 +7,7 @@
 #include "plant.h"
 #include "resources.h"
 
-#define MESSAGE_SIZE (STRING_SIZE + 512) /* a message that names modes_file must not lose the fault behind it */
+#define REPORT_SIZE (STRING_SIZE + 512) /* a message that names modes_file must not lose the fault behind it */
 
 static size_t plant_axis_named(const Plant *plant, const char *name) {
     for (size_t i = 0; i < plant->axes; i++) {
@@ -40,7 +40,7 @@ static bool plant_name_axes(Unit *unit, Plant *plant, const AxisRow *rows) {
 }
 
 static bool plant_load_axes(Unit *unit, Plant *plant, const Resources *resources) {
-    char source[64], message[MESSAGE_SIZE];
+    char source[64], message[REPORT_SIZE];
     snprintf(source, sizeof source, "%saxes.csv", resources->source);
     AxisRow *rows = unit_alloc(unit, axes_capacity(resources->axes, resources->axes_size), sizeof *rows);
     if (rows == NULL) {
@@ -55,7 +55,7 @@ static bool plant_load_axes(Unit *unit, Plant *plant, const Resources *resources
 }
 
 double *plant_table(Unit *unit, const Plant *plant, const char *text, size_t size, const char *source, size_t *modes) {
-    char message[MESSAGE_SIZE];
+    char message[REPORT_SIZE];
     double *values = unit_alloc(unit, modes_capacity(text, size) * modes_width(plant->axes), sizeof *values);
     if (values != NULL &&
         !modes_read(text, size, source, plant->axes, plant->axis_names, values, modes, message, sizeof message)) {
@@ -76,7 +76,7 @@ static bool plant_load_modes(Unit *unit, Plant *plant, const Resources *resource
 
 /* What was allocated goes with plant_release(), whether the file was sound or not. */
 static bool plant_load_poses(Unit *unit, Plant *plant, const Resources *resources) {
-    char source[64], message[MESSAGE_SIZE];
+    char source[64], message[REPORT_SIZE];
     if (resources->poses == NULL) {
         return true;
     }

@@ -1,6 +1,7 @@
 #include "modal.h"
 
 #include <math.h>
+#include <string.h>
 
 /* C99's restrict; compilers for C++ in the first place know it by another name. */
 #ifdef _MSC_VER
@@ -151,9 +152,60 @@ void modal_prepare(Modal *modal, double h) {
     modal->h = h;
 }
 
-/* The lanes of a step are written out: loops over them are left in memory by compilers that vectorise cautiously. */
-#define Q_END(j) (c[j] * q[k + (j)] + c[4 + (j)] * v[k + (j)]) + (c[8 + (j)] * f[j] + c[12 + (j)] * df[j])
-#define V_END(j) (c[16 + (j)] * q[k + (j)] + c[20 + (j)] * v[k + (j)]) + (c[24 + (j)] * f[j] + c[28 + (j)] * df[j])
+/* MODAL_LANES numbers side by side, each worked like the others. Compilers that have vectors are told that these are
+ * some: left to find them by themselves, one pairs lanes that lie apart. Written out, as loops are left in memory. */
+#ifdef __GNUC__
+typedef double LanePart __attribute__((vector_size(2 * sizeof(double))));
+#define EACH_PART(work) work(0) work(1)
+#else
+typedef double LanePart;
+#define EACH_PART(work) work(0) work(1) work(2) work(3)
+#endif
+
+#define LANES_OF_PART (sizeof(LanePart) / sizeof(double))
+
+typedef struct Lanes {
+    LanePart at[MODAL_LANES / LANES_OF_PART];
+} Lanes;
+
+static inline void lanes_read(Lanes *x, const double *from) {
+#define WORK(i) memcpy(&x->at[i], from + (i) * LANES_OF_PART, sizeof x->at[i]);
+    EACH_PART(WORK)
+#undef WORK
+}
+
+static inline void lanes_write(double *to, const Lanes *x) {
+#define WORK(i) memcpy(to + (i) * LANES_OF_PART, &x->at[i], sizeof x->at[i]);
+    EACH_PART(WORK)
+#undef WORK
+}
+
+static inline void lanes_add_scaled(Lanes *sum, const Lanes *a, double factor) {
+#define WORK(i) sum->at[i] += a->at[i] * factor;
+    EACH_PART(WORK)
+#undef WORK
+}
+
+static inline void lanes_add_product(Lanes *sum, const Lanes *a, const Lanes *b) {
+#define WORK(i) sum->at[i] += a->at[i] * b->at[i];
+    EACH_PART(WORK)
+#undef WORK
+}
+
+/* A mode's q or v at the end of a step, with its four coefficients at c. */
+static inline void lanes_end(double *end, const double *c, const Lanes *q, const Lanes *v, const Lanes *f,
+                             const Lanes *df) {
+    Lanes c_q, c_v, c_f, c_df, sum;
+    lanes_read(&c_q, c);
+    lanes_read(&c_v, c + MODAL_LANES);
+    lanes_read(&c_f, c + 2 * MODAL_LANES);
+    lanes_read(&c_df, c + 3 * MODAL_LANES);
+#define WORK(i)                                                                                                        \
+    sum.at[i] = (c_q.at[i] * q->at[i] + c_v.at[i] * v->at[i]) + (c_f.at[i] * f->at[i] + c_df.at[i] * df->at[i]);
+    EACH_PART(WORK)
+#undef WORK
+    lanes_write(end, &sum);
+}
 
 void modal_advance(const Modal *modal, size_t inputs, const double *UNALIASED u, const double *UNALIASED du,
                    const double *UNALIASED q, const double *UNALIASED v, double *UNALIASED q_end,
@@ -161,40 +213,34 @@ void modal_advance(const Modal *modal, size_t inputs, const double *UNALIASED u,
     const size_t size = modal->size;
     const double *UNALIASED c = modal->update;
     for (size_t k = 0; k < size; k += MODAL_LANES, c += COEFFICIENTS * MODAL_LANES) {
-        double f[MODAL_LANES] = {0}, df[MODAL_LANES] = {0};
+        Lanes f = {{{0}}}, df = {{{0}}}, q_k, v_k;
         const double *UNALIASED b = modal->shape + k;
         for (size_t i = 0; i < inputs; i++, b += size) {
-            f[0] += b[0] * u[i];
-            f[1] += b[1] * u[i];
-            f[2] += b[2] * u[i];
-            f[3] += b[3] * u[i];
-            df[0] += b[0] * du[i];
-            df[1] += b[1] * du[i];
-            df[2] += b[2] * du[i];
-            df[3] += b[3] * du[i];
+            Lanes b_k;
+            lanes_read(&b_k, b);
+            lanes_add_scaled(&f, &b_k, u[i]);
+            lanes_add_scaled(&df, &b_k, du[i]);
         }
-        q_end[k] = Q_END(0);
-        q_end[k + 1] = Q_END(1);
-        q_end[k + 2] = Q_END(2);
-        q_end[k + 3] = Q_END(3);
-        v_end[k] = V_END(0);
-        v_end[k + 1] = V_END(1);
-        v_end[k + 2] = V_END(2);
-        v_end[k + 3] = V_END(3);
+        lanes_read(&q_k, q + k);
+        lanes_read(&v_k, v + k);
+        lanes_end(q_end + k, c, &q_k, &v_k, &f, &df);
+        lanes_end(v_end + k, c + 4 * MODAL_LANES, &q_k, &v_k, &f, &df);
     }
 }
 
 double modal_sum(const Modal *modal, size_t port, const double *UNALIASED q) {
     const size_t size = modal->size;
     const double *UNALIASED b = modal->shape + port * size;
-    double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
+    Lanes sum = {{{0}}};
+    double s[MODAL_LANES];
     for (size_t k = 0; k < size; k += MODAL_LANES) {
-        s0 += b[k] * q[k];
-        s1 += b[k + 1] * q[k + 1];
-        s2 += b[k + 2] * q[k + 2];
-        s3 += b[k + 3] * q[k + 3];
+        Lanes b_k, q_k;
+        lanes_read(&b_k, b + k);
+        lanes_read(&q_k, q + k);
+        lanes_add_product(&sum, &b_k, &q_k);
     }
-    return (s0 + s1) + (s2 + s3);
+    lanes_write(s, &sum);
+    return (s[0] + s[1]) + (s[2] + s[3]);
 }
 
 double modal_acceleration(const Modal *modal, size_t port, size_t inputs, const double *u, const double *q,

@@ -7,7 +7,7 @@
 #include "hash.h"
 
 #define FILE_NAME "setpoints.csv"
-#define MESSAGE_SIZE 512
+#define REPORT_SIZE 512
 
 /* The file's bytes, closed by a zero that *size does not count; *source is what messages call it. */
 static char *setpoint_bytes(Unit *unit, const char **source, size_t *size) {
@@ -65,7 +65,7 @@ static bool setpoint_name_axes(Unit *unit, const SetpointAxis *names, size_t axe
 }
 
 static bool setpoint_read_axes(Unit *unit, Setpoints *table, const char *text, size_t size, const char *source) {
-    char message[MESSAGE_SIZE];
+    char message[REPORT_SIZE];
     SetpointAxis *names = unit_alloc(unit, setpoints_axes_capacity(text, size), sizeof *names);
     if (names == NULL) {
         return false;
@@ -79,7 +79,7 @@ static bool setpoint_read_axes(Unit *unit, Setpoints *table, const char *text, s
 
 /* What was allocated goes with setpoint_release(), whether the table was sound or not. */
 static bool setpoint_read(Unit *unit, Setpoints *table, const char *text, size_t size, const char *source) {
-    char message[MESSAGE_SIZE];
+    char message[REPORT_SIZE];
     if (!setpoint_read_axes(unit, table, text, size, source)) {
         return false;
     }

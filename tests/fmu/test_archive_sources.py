@@ -45,6 +45,26 @@ def test_sources_compile_without_a_warning(archive: Archive, tmp_path: Path) -> 
         assert done.returncode == 0, done.stderr
 
 
+def test_sources_compile_as_one_file_without_a_warning_and_to_the_same_tables(archive: Archive, tmp_path: Path) -> None:
+    """As zig is given them: a macro that one file leaves behind is another file's."""
+    sources = archive.folder / "sources"
+    text, apart = toolchain.together(archive.source_files)
+    whole = tmp_path / "whole.c"
+    whole.write_text(text, encoding="utf-8")
+    rebuilt = tmp_path / "unpacked"
+    shutil.copytree(archive.folder, rebuilt)
+    library = rebuilt / "binaries" / PLATFORM.folder / archive.library.name
+    library.unlink()
+    flags = [*compile.FLAGS, "-pedantic", "-Werror", HEADERS, "-I."]
+    done = subprocess.run(
+        [*_compiler(), *flags, "-shared", str(whole), *apart, "-lm", "-o", str(library)],
+        cwd=sources, capture_output=True, encoding="utf-8", check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    slave = instantiate(archive, rebuilt)  # the GUID holds the table's hash
+    slave.freeInstance()
+
+
 def test_sources_build_by_themselves(archive: Archive, tmp_path: Path) -> None:
     """As an importer of source-code FMUs does it: the files that the description lists, no definition, no option but
     where its own headers are."""

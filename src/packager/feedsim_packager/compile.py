@@ -96,7 +96,14 @@ def shared_library(
         command += [f"-ffile-prefix-map={sources.resolve()}=sources", f"-I{portable.HEADER.parent}"]
         command += [*_link_flags(compiler, target, library.name, stripped=not extra)]
         command += extra or toolchain.whole_program(tuple(compiler), target.suffix)
-        command += [*sorted(names), "-o", str(part), "-lm"]
+        if toolchain.is_zig(compiler) and not extra:
+            text, apart = toolchain.together(names)
+            whole = part.with_suffix(".whole.c")
+            whole.write_text(text, encoding="utf-8")
+            command += [*toolchain.ZIG_FLAGS, "-I.", str(whole), *apart]
+        else:
+            command += sorted(names)
+        command += ["-o", str(part), "-lm"]
         toolchain.run(command, sources)
         parts.append(part.read_bytes())
     content = universal.join(parts) if len(parts) > 1 else parts[0]

@@ -54,6 +54,7 @@ def for_target(command: Sequence[str], target: str) -> list[str]:
 @cache
 def whole_program(command: tuple[str, ...], suffix: str) -> tuple[str, ...]:
     """Flags with which gcc looks across the files of a library with that suffix; none where that is not sure to work.
+    zig is given them as one file (:func:`together`).
 
     Steps become a sixth faster: what the equations and the FMI call most is a few lines in another file. Every
     operation is rounded as before, so results stay the same to the last bit. Tried on two files, as some gcc are built
@@ -75,6 +76,22 @@ def whole_program(command: tuple[str, ...], suffix: str) -> tuple[str, ...]:
         except CompilerError:
             return ()
         return flags if mark.encode() in (folder / "tried.so").read_bytes() else ()
+
+
+# zig makes vectors of numbers that lie side by side by chance. In drive and friction that costs more than it saves; modes
+# are written as vectors (modal.c). Optimising while linking does it whatever is said, and not for every platform.
+ZIG_FLAGS = ("-fno-slp-vectorize",)
+
+
+def together(names: Sequence[str]) -> tuple[str, list[str]]:
+    """The C files `names` as one: its text, and those that stay by themselves, as they are several in one already.
+
+    A compiler then sees across files on every platform. Every operation is rounded as before.
+    """
+    apart = sorted(name for name in names if name.endswith("_part.c"))
+    # files.c ahead: it brings Windows' own headers, which do not bear our macros.
+    ordered = sorted(set(names) - set(apart), key=lambda name: (name != "files.c", name))
+    return "".join(f'#include "{name}"\n' for name in ordered), apart
 
 
 def run(command: Sequence[str], directory: Path) -> str:

@@ -78,8 +78,8 @@ def whole_program(command: tuple[str, ...], suffix: str) -> tuple[str, ...]:
         return flags if mark.encode() in (folder / "tried.so").read_bytes() else ()
 
 
-# zig makes vectors of numbers that lie side by side by chance. In drive and friction that costs more than it saves; modes
-# are written as vectors (modal.c). Optimising while linking does it whatever is said, and not for every platform.
+# zig makes vectors of numbers that lie side by side by chance. In drive and friction that costs more than it saves;
+# modes are written as vectors (modal.c). Optimising while linking does it whatever is said, and not on every platform.
 ZIG_FLAGS = ("-fno-slp-vectorize",)
 
 

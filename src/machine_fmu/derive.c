@@ -186,6 +186,11 @@ bool machine_accepts(Unit *unit, const Scalars *scalars, const void *state, size
     if (!(head->share >= 0 && head->share <= 1)) {
         return unit_fail(unit, "the state is out of range: the share of the last cycle is no number from 0 to 1");
     }
+    if (head->sampled < 0 || head->sampled > 1) {
+        return unit_fail(unit,
+                         "the state is out of range: samples of setpoints are there %.0f times; allowed is 0 or 1",
+                         (double)head->sampled);
+    }
     if (head->end != size || (unit_derived_for(unit, scalars) && machine->places[end_place(machine)] != size)) {
         return unit_fail(unit, "the state says that it has %.0f bytes of model state; it has %.0f", (double)head->end,
                          (double)size);

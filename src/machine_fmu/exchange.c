@@ -111,23 +111,22 @@ static void hand_back_forces(const Exchange *x) {
     }
 }
 
-/* What the drive of an axis reads at t_k, `since` the beginning of the communication step [s]. */
-static void tell_drive(Unit *unit, size_t i, double since) {
+/* What the drive of an axis reads at t_k in a communication step that began at t. */
+static void tell_drive(Unit *unit, size_t i, double t, double t_k) {
     AxisBlock *axis = unit_axis(unit, i);
-    const bool built_in = unit_scalars(unit)->motion_built_in;
     axis->drive_n_add = axis->n_add;
     axis->drive_M_add = axis->M_add;
     axis->drive_release = axis->release;
-    axis->drive_x_s = built_in ? axis->motion_x_s : axis->x_s;
-    axis->drive_n_ffw = built_in ? axis->motion_n_ffw : axis->n_ffw;
     if (unit_sloped(unit)) {
         const unsigned first = (unsigned)(SCALAR_ROWS + i * AXIS_ROWS);
-        axis->drive_n_add += unit_slope(unit, first + AXIS_VR_n_add) * since;
-        axis->drive_M_add += unit_slope(unit, first + AXIS_VR_M_add) * since;
-        if (!built_in) {
-            axis->drive_x_s += unit_slope(unit, first + AXIS_VR_x_s) * since;
-            axis->drive_n_ffw += unit_slope(unit, first + AXIS_VR_n_ffw) * since;
-        }
+        axis->drive_n_add += unit_slope(unit, first + AXIS_VR_n_add) * (t_k - t);
+        axis->drive_M_add += unit_slope(unit, first + AXIS_VR_M_add) * (t_k - t);
+    }
+    if (unit_scalars(unit)->motion_built_in) {
+        axis->drive_x_s = axis->motion_x_s;
+        axis->drive_n_ffw = axis->motion_n_ffw;
+    } else {
+        machine_path_tell(unit, i, t, t_k);
     }
 }
 
@@ -140,7 +139,7 @@ static bool step_drives(const Exchange *x, double t, double t_k) {
         Part *drive = &x->machine->drives[i];
         AxisState *own = &x->axes[i];
         const AxisBlock *axis = unit_axis(x->unit, i);
-        tell_drive(x->unit, i, t_k - t);
+        tell_drive(x->unit, i, t, t_k);
         if (!controller_part.step(drive, t_k, T_c)) {
             return false;
         }

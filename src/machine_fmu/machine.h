@@ -51,13 +51,19 @@ typedef struct Machine {
 
 enum { LABEL_SIZE = 48, VECTORS = 7 };
 
+/* Samples of setpoints that are kept, the newest first. They lie a position cycle apart, or an eighth of the delay,
+ * whichever is longer; so they reach back over the delay and two more. */
+enum { SAMPLES = 12, SAMPLES_IN_DELAY = 8 };
+
 /* State block: this head, an AxisState per axis, the parts' states as `places` says. */
 typedef struct StateHead {
-    int64_t cycle;    /* control cycles worked */
-    uint64_t end;     /* places[2 axes + 1]: which layout the state has */
-    double share;     /* of the last cycle, that lies behind the communication point [1] */
-    double tool[3];   /* at the start of the last cycle, where share is below 1: tool.x [m] */
-    double tool_v[3]; /* and its speed [m/s] */
+    int64_t cycle;            /* control cycles worked */
+    uint64_t end;             /* places[2 axes + 1]: which layout the state has */
+    double share;             /* of the last cycle, that lies behind the communication point [1] */
+    double tool[3];           /* at the start of the last cycle, where share is below 1: tool.x [m] */
+    double tool_v[3];         /* and its speed [m/s] */
+    int64_t sampled;          /* whether there are samples of setpoints */
+    double sample_t[SAMPLES]; /* [s] */
 } StateHead;
 
 /* What an axis had at the ends of the last control cycle. Position and speed at its end: drive.x_a, drive.n_a. */
@@ -67,6 +73,7 @@ typedef struct AxisState {
     double M_a, M_a_slope, i_d, i_q; /* at its end; over it */
     double x_a, x_a_v, n_a, M_fr_0;  /* at its start, where share is below 1 */
     double M_a_before;               /* at its start, as those schemes know it that hold it */
+    double x_s[SAMPLES], n_ffw[SAMPLES];
 } AxisState;
 
 static inline StateHead *machine_head(Unit *unit) {
@@ -100,6 +107,15 @@ bool machine_derive(Unit *unit);
 bool machine_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size);
 /* Point the parts at where their variables and, behind derive(), their states lie now. */
 void machine_bind(Unit *unit, bool with_states);
+
+/* --- path.c: setpoints from outside, between their samples */
+/* Whether the samples are needed, at all. */
+bool machine_path_used(Unit *unit);
+/* Keep the setpoints that hold at the start of a step of h from t on; false where the step is too long for the delay.
+ */
+bool machine_path_take(Unit *unit, double t, double h);
+/* What the drive of an axis reads at t_k in a step that began at t. */
+void machine_path_tell(Unit *unit, size_t axis, double t, double t_k);
 
 /* --- exchange.c: one control cycle from t_k on, in a step that began at t [s] */
 bool machine_cycle(Unit *unit, double t, double t_k);

@@ -164,16 +164,16 @@ static bool too_long(Unit *unit, const Machine *machine, double cycles) {
 /* Steps longer than the position cycle, and nobody told how the setpoints go on: the drives see stairs. */
 static void warn_of_held(Unit *unit, Machine *machine, double h) {
     const double T_pos = unit_axis(unit, 0)->drive_T_pos;
-    if (machine->warned || unit_scalars(unit)->motion_built_in || unit_sloped(unit) ||
-        h < (1 + INSTANTS_ROUNDING) * T_pos) {
+    if (machine->warned || unit_scalars(unit)->motion_built_in || unit_scalars(unit)->setpoints_delay > 0 ||
+        unit_sloped(unit) || h < (1 + INSTANTS_ROUNDING) * T_pos) {
         return;
     }
     char text[2][NUMBER_TEXT_SIZE];
     unit_warn(
         unit,
         "steps of %s s are longer than the position cycle, %s s, and the setpoints have no slopes: they are held, "
-        "and the axes are driven over stairs; give slopes (fmi2SetRealInputDerivatives), shorter steps, or a motion "
-        "inside (motion.built_in)",
+        "and the axes are driven over stairs; give slopes (fmi2SetRealInputDerivatives), shorter steps, a delay of "
+        "a step or two for a path through the last samples (setpoints.delay), or a motion inside (motion.built_in)",
         number_text(text[0], h), number_text(text[1], T_pos));
     machine->warned = true;
 }
@@ -230,6 +230,9 @@ static bool machine_step(Unit *unit, double t, double h) {
     machine_bind(unit, true);
     if (head->share < 1) {
         show_end(unit, machine);
+    }
+    if (machine_path_used(unit) && !machine_path_take(unit, t, h)) {
+        return false;
     }
     warn_of_held(unit, machine, h);
     begin_extremes(unit, machine);

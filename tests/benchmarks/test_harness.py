@@ -183,6 +183,7 @@ def test_numpy_comes_after_the_harness() -> None:
         "floor",
         "growth",
         "peers",
+        "setpoints",
         "stability",
         "startup",
         "sweep",

@@ -210,20 +210,49 @@ def setpoints_at(program: Program, axes: Iterable[str], i: int) -> dict[str, flo
     return values | {f"{axis}.n_ffw": float(program.n_ffw[axis][i]) for axis in axes}
 
 
-def test_setpoints_from_outside_at_the_position_cycle_are_the_motion_inside(z_move: Packed, tmp_path: Path) -> None:
-    machine, program = z_move.scenario.machine, z_move.result.program
-    unit = Unit(z_move, tmp_path)
+def outside(unit: Unit, given: dict[str, float], *, delay: float = 0.0, inside: bool = False) -> None:
+    """Begin anew with setpoints from outside, those `given` to begin with.
+
+    delay: of the path that they run on. inside: the unit forms n_ffw.
+    """
     unit.slave.reset()
     unit.slave.setupExperiment(startTime=0.0)
     unit.slave.enterInitializationMode()
-    unit.slave.setBoolean([unit.references["motion.built_in"]], [False])
-    unit.set(setpoints_at(program, machine.axes, 0))
+    flags = [unit.references[name] for name in ("motion.built_in", "setpoints.n_ffw_inside")]
+    unit.slave.setBoolean(flags, [False, inside])
+    unit.set({"setpoints.delay": delay} | given)
     unit.slave.exitInitializationMode()
     unit.time = 0.0
+
+
+def test_setpoints_from_outside_at_the_position_cycle_are_the_motion_inside(z_move: Packed, tmp_path: Path) -> None:
+    machine, program = z_move.scenario.machine, z_move.result.program
+    unit = Unit(z_move, tmp_path)
+    outside(unit, setpoints_at(program, machine.axes, 0))
     for i in range(1000):
         unit.set(setpoints_at(program, machine.axes, i))
         assert_same(z_move, unit, [(i + 1) * machine.cycles.T_pos])
     unit.close()
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_at_the_position_cycle_with_slopes_it_is_the_run(circle: Packed, tmp_path: Path, inside: bool) -> None:
+    """The shipped circle at 1 ms; n_ffw handed over, and formed inside from the slope of x_s."""
+    axes, program = circle.scenario.machine.axes, circle.result.program
+    found = []
+    unit = Unit(circle, tmp_path)
+    outside(unit, setpoints_at(program, axes, 0), inside=inside)
+    inputs = [unit.references[f"{axis}.x_s"] for axis in axes]
+    for i in range(len(program.time) - 1):
+        given = setpoints_at(program, axes, i)
+        unit.set({name: value for name, value in given.items() if not (inside and "n_ffw" in name)})
+        slopes = [given[f"{axis}.n_ffw"] * axes[axis].I_P for axis in axes]
+        unit.slave.setRealInputDerivatives(inputs, [1] * len(inputs), slopes)
+        unit.step_to((i + 1) * 1e-3)
+        found.append(unit.get(f"{axis}.x_a" for axis in axes))
+    unit.close()
+    run = np.column_stack([circle.result.trace[f"{axis}.x_a"][8::8] for axis in axes])
+    assert np.abs(np.array(found) - run[: len(found)]).max() < 1e-9
 
 
 def test_a_saved_state_brings_everything_back(z_move: Packed, tmp_path: Path) -> None:
@@ -308,13 +337,7 @@ def test_held_setpoints_at_long_steps_are_told(z_move: Packed, tmp_path: Path) -
     unit = Unit(z_move, tmp_path, said)
     unit.step_to(0.01)
     assert not said  # the motion is inside
-    unit.slave.reset()
-    unit.slave.setupExperiment(startTime=0.0)
-    unit.slave.enterInitializationMode()
-    unit.slave.setBoolean([unit.references["motion.built_in"]], [False])
-    unit.set(setpoints_at(z_move.result.program, z_move.scenario.machine.axes, 0))
-    unit.slave.exitInitializationMode()
-    unit.time = 0.0
+    outside(unit, setpoints_at(z_move.result.program, z_move.scenario.machine.axes, 0))
     unit.step_to(1e-3)
     assert not said  # as long as the position cycle
     inputs = [unit.references[name] for name in ("X.x_s", "Y.x_s", "Z.x_s")]

@@ -92,12 +92,14 @@ INSIDE = ("x_a", "n_a", "M_a", "M_fr", "n_fr")  # what the parts of the machine 
 def _machine() -> Iterator[dict[str, str]]:
     """The machine's own rows and, by the rules that its README tells, those of its parts."""
     own = list(_own("machine"))
-    yield from (row for row in own if not row["axis"])
+    outside = [row for row in own if row["name"].startswith("setpoints.")]
+    yield from (row for row in own if not row["axis"] and row not in outside)
     drive = [row | {"axis": "AXIS_"} for row in _own("controller")]
     friction = [row | {"axis": "AXIS_"} for row in _own("friction")]
     plant, motion = list(_own("plant")), list(_own("setpoint"))
     yield from (_part("motion", row, held=True) for row in motion if not row["axis"])
     yield from (row | {"depends": ""} for row in plant if not row["axis"])
+    yield from outside
     yield from (
         _part("plant", row) if row["causality"] == "input" and row["name"] in INSIDE else row
         for row in plant

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
 import pytest
 
+from feedsim.cli import main
 from feedsim.cosim import run
 from feedsim.files.columns import Columns, load_columns
 from feedsim.identify import Recorded
@@ -120,6 +122,31 @@ def test_a_rigid_machine_is_written_whole(tmp_path: Path) -> None:
     assert found.estimates["K_v"].status == "undetermined"
     # The structure bends, a rigid axis does not: some micrometres are left of a way of 20 mm.
     assert found.position < 5e-6
+
+
+def test_a_log_without_torque(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Position, setpoint and speed setpoint tell the position loop, and the position the speed controller, with the
+    machine's friction. The replay has no torque to compare. What needs one says so."""
+    path = logged(tmp_path, "X", machine=MACHINES / "one_axis")
+    roles = {"position": "x_a", "setpoint": "x_s", "deviation": "x_e", "speed_setpoint": "n_s", "feedforward": "n_ffw"}
+    mapping = tmp_path / "columns.yaml"
+    mapping.write_text("\n".join([f"{role}: {{column: X.{name}}}" for role, name in roles.items()] + ["pitch: 10 mm"]))
+    machine = ["--machine", str(MACHINES / "one_axis")]
+    words = [str(path), "--axes", "X", "--columns", str(mapping), "--quiet", "--out"]
+    assert main(["replay", *words, str(tmp_path / "replay"), *machine]) == 0
+    figures = json.loads((tmp_path / "replay" / "summary.json").read_text())["figures"]
+    assert figures["X.position_rms"]["value"] < 1e-3
+    assert not [name for name in figures if "torque" in name]
+    off = [f"--set=axes.X.drive.{each}" for each in ("K_v=3.5 (m/min)/mm", "T_sym=3 ms", "k_ffw=98 %", "T_n=16 ms")]
+    assert main(["identify-drive", *words, str(tmp_path / "drive"), *machine, *off]) == 0
+    true = load_machine(MACHINES / "one_axis").axes["X"].drive
+    found = json.loads((tmp_path / "drive" / "summary.json").read_text())["axes"]["X"]["parameters"]
+    for name in ("K_v", "k_ffw", "T_sym", "K_p"):
+        assert found[name]["value"] == pytest.approx(getattr(true, name), rel=0.01), name
+    assert main(["identify-drive", *words, str(tmp_path / "none")]) == 2
+    assert "no torque, current or force is recorded" in capsys.readouterr().err
+    assert main(["identify", str(path), "--axis", "X", "--columns", str(mapping), "--out", str(tmp_path / "none")]) == 2
+    assert "columns.yaml:1: missing: one of torque, current, force" in capsys.readouterr().err
 
 
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")

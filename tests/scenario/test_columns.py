@@ -129,8 +129,6 @@ def test_spellings_of_drives(unit: str, meant: str) -> None:
         (GOOD + "mass: 95 kg\ninertia: 0.01 kg.m^2", "m.yaml:7: mass: stands beside inertia; give one of both"),
         ("position: {column: x}\ntorque: {column: m}\ntorque_constant: 2 Nm/A",
          "m.yaml:3: torque_constant: is of no use: the trace's torque is taken, not a current"),
-        ("position: {column: x}",
-         "m.yaml:1: missing: one of torque, current, force, for example current: {column: i_q"),
         ("torque: {column: m}", "m.yaml:1: missing: position or speed, for example position: {column: x, unit: mm}"),
         ("time: {column: t, interval: 2 ms}\nposition: {column: x}\ntorque: {column: m}",
          "m.yaml:1: time: 'interval' is for traces without a column of time; give either the interval or the column"),

@@ -259,8 +259,6 @@ def contradictions(columns: Columns) -> Iterator[tuple[Place, str]]:
     if clock.column is None and clock.factor is not None:
         yield ("time",), "'factor' needs the 'column' that it belongs to"
     given = [role for role in DRIVING if columns.signal(role) is not None]
-    if not given:
-        yield (), f"missing: one of {', '.join(DRIVING)}, for example current: {{column: i_q, unit: A}}"
     for role in given[1:]:
         yield (role,), f"stands beside {given[0]}; one of both is enough, and they could contradict one another"
     if columns.position is None and columns.speed is None:

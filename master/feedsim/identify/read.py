@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
@@ -85,7 +85,12 @@ class _Drive:
 
 
 def read_records(
-    path: str | Path, mapping: Columns | None = None, axis: str | None = None, machine: Machine | None = None
+    path: str | Path,
+    mapping: Columns | None = None,
+    axis: str | None = None,
+    machine: Machine | None = None,
+    *,
+    driven: bool = True,
 ) -> Recorded:
     """Read a CSV or MAT file.
 
@@ -93,6 +98,7 @@ def read_records(
     axis: default that of the mapping, else the machine's only one, else the only one of feedsim's own names.
     machine: gives pitch and torque constant of the axis. A mapping may give them too; a torque constant of its own
         counts (with a warning), since currents are logged in different amplitudes; a pitch that differs is refused.
+    driven: torque, current or force is needed; else it is nan where there is none.
 
     The motor's angle is position/I_P with I_P = pitch/(2 pi), the torque K_t i_q or F I_P. Records are pieces without
     gaps; nothing is resampled (see record.even_pieces).
@@ -104,7 +110,7 @@ def read_records(
     path = Path(path)
     recording = read_recording(path)
     named = _axis(mapping, axis, machine)
-    chosen = choose(recording, mapping, named, machine.axes if machine else ())
+    chosen = choose(recording, mapping, named, machine.axes if machine else (), driven=driven)
     if machine is not None and chosen.axis and chosen.axis not in machine.axes:
         raise InputError(f"{path}: {no_axis(chosen.axis, machine.axes)}")
     drive = _drive(recording, chosen, mapping, machine)
@@ -116,7 +122,7 @@ def read_records(
     else:
         time = np.asarray(np.arange(len(next(iter(values.values())))) * chosen.interval, dtype=np.float64)
     pieces, gaps = even_pieces(time, recording.row)
-    motor = _motor_side(chosen.channels, signals, drive)
+    motor = {"torque": np.full(len(time), np.nan)} | _motor_side(chosen.channels, signals, drive)
     records = tuple(
         Record(
             name=path.name if len(pieces) == 1 else f"{path.name}, {piece.time[0]:.6g} to {piece.time[-1]:.6g} s",
@@ -128,9 +134,12 @@ def read_records(
         for piece in pieces
     )
     check_time(path, records)
-    signs = tuple(checked(path, records))
     check_slide(path, records, drive.pitch)
-    unread = _unread_load(recording, chosen, drive, records, [slice(piece.first, piece.last) for piece in pieces])
+    signs: Iterable[str] = ()
+    unread: Iterable[str] = ()
+    if records[0].driven:
+        signs = checked(path, records)
+        unread = _unread_load(recording, chosen, drive, records, [slice(piece.first, piece.last) for piece in pieces])
     warnings = (*recording.notes, *chosen.notes, *unread, *drive.warnings, *gaps, *signs)
     return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings))
 

@@ -29,7 +29,8 @@ class Record:
     Attributes:
         name: file, with the piece where the trace has gaps.
         time: (N,) [s], even.
-        torque: (N,) motor torque [N.m], positive where it accelerates in the positive direction.
+        torque: (N,) motor torque [N.m], positive where it accelerates in the positive direction; nan all through
+            where none was recorded (`driven`).
         angle: (N,) motor angle [rad], or the scale's position over the lead I_P; None where there is only a speed.
         speed: (N,) motor speed [rad/s]; None where there is only a position.
         load: (N,) known torque against the motor torque [N.m], for example a measured disturbance; None: none.
@@ -73,6 +74,11 @@ class Record:
     def interval(self) -> float:
         """Time between rows [s]."""
         return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+    @property
+    def driven(self) -> bool:
+        """Whether the torque was recorded."""
+        return bool(np.isfinite(self.torque[0]))
 
     def __len__(self) -> int:
         """Number of rows."""

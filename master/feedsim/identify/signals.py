@@ -65,21 +65,28 @@ class Chosen:
     pitch: float | None = None
 
 
-def choose(recording: Recording, mapping: Columns | None, axis: str, axes: Iterable[str]) -> Chosen:
+def choose(
+    recording: Recording, mapping: Columns | None, axis: str, axes: Iterable[str], *, driven: bool = True
+) -> Chosen:
     """Columns of an axis.
 
     axis: "" where it is not known; then feedsim's own names tell it if there is one only. axes: of the machine.
+    driven: torque, current or force is needed.
 
     Raises InputError: a column that the mapping names is not there; names that do not tell which column is meant, or
     none that is known (with what there is, and the line of a mapping to write); a unit missing or of a wrong dimension.
     """
     if mapping is not None:
-        return _mapped(recording, mapping, axis)
-    return _by_name(recording, axis, tuple(axes))
+        return _mapped(recording, mapping, axis, driven)
+    return _by_name(recording, axis, tuple(axes), driven)
 
 
-def _mapped(recording: Recording, mapping: Columns, axis: str) -> Chosen:
+def _mapped(recording: Recording, mapping: Columns, axis: str, driven: bool) -> Chosen:
     faults: list[str] = []
+    if driven and all(mapping.signal(role) is None for role in DRIVING):
+        faults.append(
+            f"{mapping.where()}missing: one of {', '.join(DRIVING)}, for example current: {{column: i_q, unit: A}}"
+        )
     channels: dict[str, Channel] = {}
     for role in DIMENSIONS:
         signal = _time(recording, mapping) if role == "time" else mapping.signal(role)
@@ -110,7 +117,7 @@ def _time(recording: Recording, mapping: Columns) -> Signal | None:
     return Signal(column=found, unit=clock.unit or (None if recording.units[found] else "s"))
 
 
-def _by_name(recording: Recording, axis: str, axes: tuple[str, ...]) -> Chosen:
+def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: bool) -> Chosen:
     own: dict[str, dict[str, str]] = {}
     for name in recording.names:
         if match := _OWN.fullmatch(name):
@@ -133,7 +140,7 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...]) -> Chosen:
     for role in driving[1:]:
         left = names.pop(role)
         notes.append(f"{recording.path}: {left!r} is not used; the {driving[0]} {names[driving[0]]!r} is")
-    missing = [] if driving else ["torque or current"]
+    missing = [] if driving or not driven else ["torque or current"]
     missing += [] if "position" in names or "speed" in names else ["position or speed"]
     if missing:
         known = f" known are {', '.join(names.values())};" if names else ""

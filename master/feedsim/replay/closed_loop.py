@@ -84,7 +84,7 @@ def read_axes(
     """The record of each axis. InputError: as read_records; no position setpoint, or no position."""
     found: dict[str, Recorded] = {}
     for axis in axes:
-        read = read_records(path, mapping, axis, machine)
+        read = read_records(path, mapping, axis, machine, driven=False)
         missing = [
             name
             for name, role in (("position setpoint", "setpoint"), ("position", "angle"))

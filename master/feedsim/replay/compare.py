@@ -48,10 +48,11 @@ class Comparison:
 
     Attributes:
         axis: its name. each: the record, with the rows that count.
-        channels: "position" [m], "torque" [N.m], "speed setpoint" [rad/s] where it is recorded.
+        channels: "position" [m], "torque" [N.m] and "speed setpoint" [rad/s] where they are recorded.
         taps, speed: the position loop of the record by regression; None where it does not hold it.
         lag: following error of the record, setpoint less position, rms over the motion [m].
-        delay: by how much the torque of the record is later than the simulated one [s]; it is taken out.
+        delay: by how much the torque of the record is later than the simulated one [s], which is taken out; None
+            where there is none.
     """
 
     axis: str
@@ -60,7 +61,7 @@ class Comparison:
     taps: Taps | None
     speed: SpeedSetpoint | None
     lag: float
-    delay: float = 0.0
+    delay: float | None = None
 
     @property
     def figures(self) -> dict[str, Figure]:
@@ -83,11 +84,12 @@ class Comparison:
         found[f"{self.axis}.share_of_lag"] = Figure(
             100 * rms(position) / self.lag if self.lag else nan, "%", "position error as a share of that distance"
         )
-        found[f"{self.axis}.torque_delay"] = Figure(
-            1e3 * self.delay,
-            "ms",
-            "by how much the record has its torque later than the simulation, which is taken out",
-        )
+        if self.delay is not None:
+            found[f"{self.axis}.torque_delay"] = Figure(
+                1e3 * self.delay,
+                "ms",
+                "by how much the record has its torque later than the simulation, which is taken out",
+            )
         if self.taps is not None:
             found[f"{self.axis}.setpoint_delay"] = Figure(
                 1e3 * self.taps.delay, "ms", "delay of the position setpoint in the control, by regression"
@@ -154,11 +156,11 @@ def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1)
     with suppress(InputError):
         speed = speed_setpoint([record])
     x_a = simulated["x_a"][::per_row]
-    delay, torque = _delayed(each, simulated["M_a"], per_row)
-    channels = {
-        "position": Channel(each.position, x_a, "m", "position"),
-        "torque": Channel(record.torque, torque, "N.m", "motor torque"),
-    }
+    channels = {"position": Channel(each.position, x_a, "m", "position")}
+    delay = None
+    if record.driven:
+        delay, torque = _delayed(each, simulated["M_a"], per_row)
+        channels["torque"] = Channel(record.torque, torque, "N.m", "motor torque")
     if speed is not None and record.speed_setpoint is not None:
         asked = speed.of(record.setpoint, x_a / each.I_P, record.feedforward)
         asked[: speed.taps.reach] = record.speed_setpoint[: speed.taps.reach]  # there is no past to form it from

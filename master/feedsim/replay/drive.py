@@ -50,6 +50,7 @@ BLOCKS: Mapping[str, tuple[str, ...]] = {
 # Of the way per row, of the top speed: a regression that leaves more is a start, not an answer.
 EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
 LEAST_ROWS = 50  # in which the axis moves
+MOST_TURNS = 8  # of fits and weights in turns; two or three do where the start is near
 FOLDS = 4
 FAST = 0.1  # of the top speed: what is faster is another kind of motion
 BETTER = 2.0  # of the logarithm of the likelihood: what predicts hardly better is not worth having
@@ -67,7 +68,7 @@ class DriveFound:
         taps, speed: the position loop by regression; None where the record does not hold it.
         machine: with these values. parts: what the friction has besides LuGre and viscous friction, and what
             cross-validation says of every part: name -> gain of the logarithm of the likelihood.
-        position, torque: rms of what is left [m], [N.m].
+        position, torque: rms of what is left [m], [N.m]; without a recorded torque nan.
         predicted: the same, of every quarter of the motion by a fit to the other three.
         other_cycles: cycle of the position loop [s] -> by how much the record is likelier with it than with the
             machine's (logarithm of the likelihood).
@@ -125,14 +126,17 @@ def identify_drive(
         values["T_sym"] = min(values["T_sym"], total)
     problem = Problem(
         machine, each, Replay(machine, {each.axis: each}, fmus=fmus), values, total, J,
-        {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9},
+        {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0},
     )  # fmt: skip
     rows = np.flatnonzero(each.moving)
     if len(rows) < LEAST_ROWS:
         raise InputError(
             f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least {LEAST_ROWS} are needed"
         )
-    free = ["K_p", "K_i", "T_sym", "k_ffw", "M_0", "delay", "F_C", "sigma_0", "sigma_1", "sigma_2"]
+    driven = each.record.driven
+    free = ["K_p", "K_i", "T_sym", "k_ffw"]
+    # Without a torque friction and load are the machine's: what they do to the position, the speed controller may, too.
+    free += ["M_0", "delay", "F_C", "sigma_0", "sigma_1", "sigma_2"] if driven else []
     free += [] if structure_known else ["J"]
     free += [] if exact_gain else ["K_v"]
     free += [] if total is not None else ["T_dyn"]
@@ -142,7 +146,7 @@ def identify_drive(
     parts: dict[str, float] = {}
     chosen: tuple[str, ...] = ()
     if structure_known:
-        own = {name for name, block in BLOCKS.items() if _has(values, block)}
+        own = {name for name, block in BLOCKS.items() if driven and _has(values, block)}
         chosen = tuple(name for name in BLOCKS if name in own)
         free += [name for part in chosen for name in BLOCKS[part]]
         found = _first(problem, free, rows)
@@ -150,7 +154,7 @@ def identify_drive(
         chosen, parts, free, found = _parts(problem, free, rows, progress)
     progress("last fit", 1 + len(BLOCKS), 2 + len(BLOCKS))
     result = None
-    for _ in range(3):
+    for _ in range(MOST_TURNS):
         problem.weigh(found, rows)
         result = problem.fitted(free, found, rows, limit=25)
         moved = max(abs(problem.away(n, v) - problem.away(n, found.get(n, problem.start[n])))
@@ -161,6 +165,8 @@ def identify_drive(
     assert result is not None
     unseen = _left_out(problem, result, np.array_split(np.arange(len(rows)), FOLDS))
     predicted = unseen[0] * problem.weights["position"], unseen[1] * problem.weights["torque"]
+    if not each.record.driven:
+        predicted = predicted[0], nan
     estimates = _estimates(
         problem, result, rows, taps if exact_delay else None, speed if exact_gain else None, structure_known
     )
@@ -168,7 +174,7 @@ def identify_drive(
     likelier = {} if other_cycle is None else {other_cycle: _likelier(problem, free, found, rows, other_cycle)}
     return DriveFound(
         each.axis, estimates, taps, speed, problem.machine_of(found), parts, chosen,
-        rms(position[rows]), rms(torque[rows]), predicted, likelier, problem.runs,
+        rms(position[rows]), rms(torque[rows]) if each.record.driven else nan, predicted, likelier, problem.runs,
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from math import pi
 from pathlib import Path
 
+from feedsim.errors import InputError
 from feedsim.identify import Recorded
 from feedsim.owned import TemporaryFolder
 from feedsim.replay.closed_loop import AxisRecord
@@ -61,7 +62,7 @@ def identify_drives(
         head: comment at the top of the files. name, note: of the machine that is written. fmus: folder of the archives.
         position_cycle: of rigid axes [s]; None: the control cycle.
 
-    Raises InputError: of an axis, what :func:`identify_drive` refuses.
+    Raises InputError: of an axis, what :func:`identify_drive` refuses; neither a torque nor a machine.
     """
     found: dict[str, DriveFound] = {}
     files: dict[str, str] = {}
@@ -70,6 +71,11 @@ def identify_drives(
     # A drive that closes the position loop itself (DSC) does so in its own cycle.
     position_cycle = position_cycle or control_cycle(interval)
     for axis, each in records.items():
+        if machine is None and not each.record.driven:
+            raise InputError(
+                f"{each.record.name}, axis {axis}: no torque, current or force is recorded; without it neither inertia "
+                "nor friction is told: give a machine that has them (--machine)"
+            )
         begin = start_values(each) if machine is None else {}
 
         def tell(what: str, done: int, total: int, axis: str = axis) -> None:

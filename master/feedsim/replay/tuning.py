@@ -106,7 +106,8 @@ class Problem:
         time, h = self.replay.time, self.replay.interval / self.per_row
         fine = time[0] + h * np.arange(len(found["M_a"]))
         torque = scale * np.interp(time - delay, fine, found["M_a"])
-        return found["x_a"][:: self.per_row] - self.each.position, torque - self.each.record.torque
+        off = torque - self.each.record.torque if self.each.record.driven else np.zeros(len(time))
+        return found["x_a"][:: self.per_row] - self.each.position, off
 
     def residuals(self, values: Mapping[str, float], rows: Rows) -> Array:
         """Both channels over their weights; then how far every free parameter is off its start, in usual deviations."""
@@ -154,7 +155,7 @@ class Problem:
         counts by as many rows as say something of their own.
         """
         position, torque = (error[rows] for error in self.errors(values))
-        least = LEAST["torque"] * rms(self.each.record.torque[rows])
+        least = LEAST["torque"] * rms(self.each.record.torque[rows]) if self.each.record.driven else 1.0
         self.weights = {
             "position": max(rms(position), LEAST["position"]) * sqrt(together(position)),
             "torque": max(rms(torque), least),

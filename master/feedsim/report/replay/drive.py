@@ -192,7 +192,7 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
                 },
                 "predicted": {
                     "position": {"value": one.predicted[0], "unit": "m"},
-                    "torque": {"value": one.predicted[1], "unit": "N.m"},
+                    "torque": {"value": finite(one.predicted[1]), "unit": "N.m"},
                 },
                 "position_cycle": {"value": one.machine.cycles.T_pos, "unit": "s"},
                 "runs": one.runs,
@@ -216,10 +216,11 @@ def summary_lines(report: DriveReport, directory: Path) -> list[str]:
             interval = f"{interval_text(found)}" if found.status == "estimated" else found.status
             lines.append(f"    {name:<10} {value_text(found):>12} {found.unit:<10} {interval}")
         own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
-        lines.append(f"    left: position {own['position_rms']} rms, torque {own['torque_rms']} rms, while it moves;")
+        torque = f", torque {own['torque_rms']} rms" if "torque_rms" in own else ""
+        lines.append(f"    left: position {own['position_rms']} rms{torque}, while it moves;")
+        torque = f", {one.predicted[1]:.4g} N.m" if torque else ""
         lines.append(
-            f"    of every quarter of the motion by a fit to the others: {1e6 * one.predicted[0]:.4g} um, "
-            f"{one.predicted[1]:.4g} N.m"
+            f"    of every quarter of the motion by a fit to the others: {1e6 * one.predicted[0]:.4g} um{torque}"
         )
     if MACHINE in report.found.files:
         lines.append(f"  feedsim replay RECORD --machine {directory} replays records on it")

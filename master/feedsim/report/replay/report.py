@@ -139,7 +139,8 @@ def summary_lines(replayed: Replayed, directory: Path) -> list[str]:
     for each in replayed.comparisons:
         own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
         text = f"  {each.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
-        text += f" ({own['share_of_lag']} of the lag); torque {own['torque_rms']} rms"
+        text += f" ({own['share_of_lag']} of the lag)"
+        text += f"; torque {own['torque_rms']} rms" if "torque_rms" in own else "; no torque is recorded"
         if "speed_setpoint_rms" in own:
             text += f"; speed setpoint {own['speed_setpoint_rms']} rms"
         lines.append(text)

@@ -185,7 +185,7 @@ test-importers: fmus $(VENV)/.importers ## the units in other simulators, three 
 reference: $(VENV)/.dev $(VARIABLES) ## make the pinned reference CSVs anew, from scipy and the monolithic implementation
 	$(PY) tests/reference/make_reference.py
 
-check-reference: fmus $(VENV)/.run ## compare all units and both scenarios with the pinned reference CSVs
+check-reference: fmus $(VENV)/.run ## compare all units and both scenarios, wired and as one unit, with the pinned reference CSVs
 	$(PY) tests/reference/check_reference.py --junit $(BUILD)/check-reference.xml
 
 bench: fmus $(VENV)/.importers ## measure everything, other simulators too; tables in build/bench (seven minutes)

@@ -228,6 +228,7 @@ static bool machine_step(Unit *unit, double t, double h) {
         return too_long(unit, machine, (end - t_k) / T_c);
     }
     machine_bind(unit, true);
+    unit_leave_late(unit); /* ahead: where a cycle fails they are of the state that it has left, shown before or not */
     if (head->share < 1) {
         show_end(unit, machine);
     }
@@ -254,7 +255,6 @@ static bool machine_step(Unit *unit, double t, double h) {
         show_inside(unit, machine, head->share);
     }
     take_end(unit, machine, head->cycle == first);
-    unit_leave_late(unit);
     return true;
 }
 

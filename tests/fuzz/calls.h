@@ -351,19 +351,27 @@ static Answer perform(Unit *unit, const Asked *asked) {
     return answer;
 }
 
-/* A controller works its cycles one by one: steps of millions of them, and states that lag far behind their time, are
- * slow, not wrong. */
-static bool takes_long(const Pair *pair, const Asked *asked) {
-    for (size_t i = 0; i < SCALAR_ROWS && asked->call == CALL_DoStep; i++) {
-        if (strcmp(table_scalars[i].name, "T_c") == 0 && pair->phase == PHASE_STEPPING) {
-            const double T_c = *unit_real(pair->unit, (unsigned)i), start = header_of(pair)->start_time;
-            int64_t instant;
-            memcpy(&instant, unit_state(pair->unit), sizeof instant);
-            const double cycles = (asked->t + asked->h - start) / T_c - (double)instant;
-            return cycles > MOST_CYCLES && cycles < 2e9;
-        }
+/* Where the variable of that name lies, or of that name behind a part's; NULL where there is none. */
+static const void *variable_named(const Unit *unit, const char *name) {
+    for (size_t i = 0; i < unit->variable_count; i++) {
+        const char *own = unit->variables[i].info->name, *last = strrchr(own, '.');
+        if (strcmp(own, name) == 0 || (last != NULL && strcmp(last + 1, name) == 0))
+            return unit->block + unit->variables[i].offset;
     }
-    return false;
+    return NULL;
+}
+
+/* A controller works its cycles one by one, and so does the machine, with exchanges in each: steps of millions of them,
+ * and states that lag far behind their time, are slow, not wrong. Their states begin with what they have worked. */
+static bool takes_long(const Pair *pair, const Asked *asked) {
+    const double *T_c = variable_named(pair->unit, "T_c");
+    const int *exchanges = variable_named(pair->unit, "substeps");
+    if (asked->call != CALL_DoStep || pair->phase != PHASE_STEPPING || T_c == NULL)
+        return false;
+    int64_t worked;
+    memcpy(&worked, unit_state(pair->unit), sizeof worked);
+    const double cycles = (asked->t + asked->h - header_of(pair)->start_time) / *T_c - (double)worked;
+    return cycles * (exchanges != NULL ? *exchanges : 1) > MOST_CYCLES && cycles < 2e9;
 }
 
 /* --- to both, and what must hold then */

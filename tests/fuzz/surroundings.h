@@ -17,7 +17,7 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 int LLVMFuzzerInitialize(int *count, char ***words);
 
-enum { MOST = 40, FILES = 4, FILE_ROOM = 8192, PATH_ROOM = 512, PAIRS = 2, DEEPEST = 2, MOST_CYCLES = 2000 };
+enum { MOST = 40, FILES = 5, FILE_ROOM = 8192, PATH_ROOM = 512, PAIRS = 2, DEEPEST = 2, MOST_CYCLES = 2000 };
 
 /* --- faults */
 
@@ -198,12 +198,38 @@ static void mutate(File *file) {
     }
 }
 
+static uint64_t hash_of(const File *chosen, size_t count, const char *names) {
+    uint64_t hash = HASH_OF_NOTHING;
+    for (size_t i = 0; i < count; i++)
+        if (names == NULL || strstr(names, chosen[i].name) != NULL)
+            hash = hash_bytes(hash, chosen[i].content, chosen[i].size);
+    return hash;
+}
+
+/* settings.csv, the first file where there is one, says in a row what hash the files of a part have. */
+static void enter_hash(File *settings, const char *row, uint64_t hash) {
+    char text[HASH_TEXT_SIZE];
+    const size_t length = strlen(row), digits = HASH_TEXT_SIZE - 1;
+    hash_text(text, hash);
+    for (size_t at_byte = 0; at_byte + length + digits <= settings->size; at_byte++)
+        if (memcmp(settings->content + at_byte, row, length) == 0)
+            memcpy(settings->content + at_byte + length, text, digits);
+}
+
+/* Of all files; where there are settings, of these, which hold those of the others. */
+static uint64_t seal(File *chosen, size_t count) {
+    if (count == 0 || strcmp(chosen[0].name, "settings.csv") != 0)
+        return hash_of(chosen, count, NULL);
+    enter_hash(&chosen[0], "hash.plant,", hash_of(chosen, count, "axes.csv modes.csv poses.bin"));
+    enter_hash(&chosen[0], "hash.motion,", hash_of(chosen, count, "setpoints.csv"));
+    return hash_of(chosen, 1, NULL);
+}
+
 /* Chooses the files of this input: those of the folder, without the last one, or some of them changed. */
 static void choose_resources(void) {
     static File changed[FILES];
     const unsigned variant = byte() % 8;
     size_t count = file_count;
-    uint64_t hash = HASH_OF_NOTHING;
     char own[HASH_TEXT_SIZE], theirs[HASH_TEXT_SIZE];
     if (variant == 1 && count > 1)
         count--;
@@ -212,8 +238,7 @@ static void choose_resources(void) {
     if (variant > 3 && count > 0)
         for (unsigned k = 1 + byte() % 2; k > 0; k--)
             mutate(&changed[byte() % count]);
-    for (size_t i = 0; i < count; i++)
-        hash = hash_bytes(hash, changed[i].content, changed[i].size);
+    const uint64_t hash = seal(changed, count);
     for (size_t i = 0; i < file_count && variant >= 1; i++) {
         char path[PATH_ROOM + 32];
         snprintf(path, sizeof path, "%s/%s", scratch, files[i].name);
@@ -237,7 +262,7 @@ static void clear_scratch(void) {
 
 int LLVMFuzzerInitialize(int *count, char ***words) {
     (void)count, (void)words;
-    static const char *const names[] = {"axes.csv", "modes.csv", "setpoints.csv", "poses.bin"};
+    static const char *const names[] = {"settings.csv", "axes.csv", "modes.csv", "setpoints.csv", "poses.bin"};
     for (size_t i = 0; i < FILES; i++)
         read_base(names[i]);
     snprintf(other_modes, sizeof other_modes, "%s/other_modes.csv", RESOURCES);

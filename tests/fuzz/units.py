@@ -28,7 +28,7 @@ from feedsim_packager.errors import CompilerError
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
-UNITS = ("plant", "controller", "friction", "setpoint")
+UNITS = ("plant", "controller", "friction", "setpoint", "machine")
 CORPUS = HERE / "corpus"
 
 FLAGS = ("-std=c99", "-ffp-contract=off", "-D_DEFAULT_SOURCE", "-O1", "-g", "-fno-omit-frame-pointer")

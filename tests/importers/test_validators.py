@@ -1,4 +1,4 @@
-"""What validators of other people say of the four archives: nothing."""
+"""What validators of other people say of the archives: nothing."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 from fmpy.validation import validate_fmu
 
-UNITS = ("plant", "controller", "friction", "setpoint")
+UNITS = ("plant", "controller", "friction", "setpoint", "machine")
 # VDMCheck2 has its rules twice, written independently: what it calls with which class.
 RULES = ("VDMCheckPlus", "VDMCheck")
 

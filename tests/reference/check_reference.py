@@ -1,4 +1,5 @@
-"""Run every archive over its reference cases and both scenarios against theirs, and compare (`make check-reference`).
+"""Run every archive over its reference cases, and both scenarios, wired and as one unit, over theirs; and compare
+(`make check-reference`).
 
 The verdict is that of `feedsim compare`, with the tolerances that stand, each with its reason, beside the references.
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,8 +19,9 @@ import system
 from reference_files import HELD, HERE, Case, Table, all_cases, read_case
 from run_case import Unusable, simulate
 
-from feedsim import cosim, scenario
+from feedsim import cosim, nc, scenario
 from feedsim.compare import Comparison, bounds_of, compare_series, tolerances_of, unusable
+from feedsim.cosim.one_unit import pack_whole
 from feedsim.errors import FeedsimError
 from feedsim.report.compare import write as write_comparison
 from feedsim.trace import Series
@@ -67,13 +70,30 @@ def check_system(archives: Path, wanted: system.Scenario, root: Path = HERE, *ov
     return _compared(name, result, reference, path)
 
 
+def check_one_unit(archives: Path, wanted: system.Scenario, root: Path = HERE) -> Comparison:
+    """One scenario packed as one unit with its motion inside, run by an importer at the reference's own interval."""
+    name, path = f"machine/{wanted.name}", system.path_of(wanted, root)
+    try:
+        loaded = scenario.load(system.SCENARIOS / f"{wanted.name}.yaml")
+        reference = system.read(wanted, root)
+        case = Case("machine", wanted.name, float(reference["time"][-1]), wanted.every, 0.0, {}, reference=reference)
+        with tempfile.TemporaryDirectory() as folder:
+            packed = Path(folder) / "machine.fmu"
+            base = archives / "machine.fmu"
+            pack_whole(base, packed, loaded.machine, coupling=loaded.coupling, program=nc.plan(loaded), trial=False)
+            return _compared(name, simulate(packed, case), reference, path)
+    except (FeedsimError, Unusable) as error:
+        return unusable(name, str(path), str(error))
+
+
 def check(archives: Path = ARCHIVES, root: Path = HERE) -> Iterator[Comparison]:
-    """All units over all their cases, then the scenarios, as far as `root` has references of them."""
+    """All units over all their cases, then the scenarios, wired and as one unit, as far as `root` has references."""
     for unit, name, held in all_cases(root):
         yield check_case(archives / f"{unit}.fmu", read_case(unit, name, root, held=held), root)
     for wanted in system.SYSTEMS:
         if system.path_of(wanted, root).is_file():
             yield check_system(archives, wanted, root)
+            yield check_one_unit(archives, wanted, root)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -40,6 +40,13 @@ def test_scenario(wanted: system.Scenario, fmus: Path) -> None:
     assert len(found.variables) == len(wanted.variables)
 
 
+@pytest.mark.parametrize("wanted", system.SYSTEMS, ids=lambda wanted: wanted.name)
+def test_scenario_as_one_unit(wanted: system.Scenario, fmus: Path) -> None:
+    found = check_reference.check_one_unit(fmus, wanted)
+    assert found.heading == "same", found.line
+    assert len(found.variables) == len(wanted.variables)
+
+
 @pytest.mark.parametrize(("unit", "name", "held"), CASES)
 def test_what_is_off_between_the_rows_of_a_reference_is_found(unit: str, name: str, held: bool) -> None:
     """Half a unit more, or a tenth of the range, in every row that the reference has not: by its lines and bounds."""

@@ -1,10 +1,11 @@
-"""Scenarios, studies, machines and structures that come along, and copies of them for the user to change.
+"""Scenarios, studies, machines, structures and notebooks that come along, and copies of them for the user to change.
 
 May use: files, installation, errors. Start reading at copy().
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -23,6 +24,7 @@ _KINDS = {
     "study": "studies/*.yaml",
     "machine": "machines/*/machine.yaml",
     "structure": "structures/*/structure.yaml",
+    "notebook": "notebooks/*.ipynb",
 }
 
 
@@ -32,7 +34,7 @@ class Example:
 
     Attributes:
         name: by which it is asked for.
-        kind: "scenario", "study", "machine" or "structure".
+        kind: "scenario", "study", "machine", "structure" or "notebook".
         file: what stands for it.
         about: its first sentence.
     """
@@ -51,7 +53,7 @@ def examples() -> list[Example]:
     """
     root = shipped("scenarios")
     found = [
-        Example(file.stem if kind in ("scenario", "study") else file.parent.name, kind, file, _about(file))
+        Example(file.parent.name if kind in ("machine", "structure") else file.stem, kind, file, _about(file))
         for kind, pattern in _KINDS.items()
         for file in sorted(root.glob(pattern))
     ]
@@ -102,7 +104,7 @@ def _asked(names: Iterable[str]) -> list[Example]:
     known = examples()
     found: list[Example] = []
     for name in names:
-        if not (meant := [each for each in known if each.name == name.removesuffix(".yaml")]):
+        if not (meant := [each for each in known if each.name == name.removesuffix(".yaml").removesuffix(".ipynb")]):
             others = sorted({each.name for each in known})
             near = "".join(f", did you mean {other}?" for other in get_close_matches(name, others, 1))
             raise InputError(f"{name}: no such example{near} (there are: {', '.join(others)})")
@@ -138,13 +140,20 @@ def _named(file: Path) -> Iterator[Path]:
 
 
 def _about(file: Path) -> str:
-    """The first sentence of the comment that a file begins with."""
+    """The first sentence of the comment that a file begins with, or of a notebook's text below its heading."""
+    if file.suffix == ".ipynb":
+        _, _, text = "".join(json.loads(file.read_text(encoding="utf-8"))["cells"][0]["source"]).partition("\n\n")
+        return _sentence(text)
     comment: list[str] = []
     for line in file.read_text(encoding="utf-8").splitlines():
         if not line.startswith("# "):
             break
         comment.append(line[2:])
-    return re.split(r"(?<=[.?])\s(?=[A-Z])", " ".join(comment), maxsplit=1)[0]
+    return _sentence(" ".join(comment))
+
+
+def _sentence(text: str) -> str:
+    return re.split(r"(?<=[.?])\s(?=[A-Z])", text, maxsplit=1)[0]
 
 
 def _exists(path: Path) -> bool:

@@ -86,6 +86,11 @@ def test_loads_are_never_inside(tmp_path: Path, capsys: Capture) -> None:
     scenario, out = tmp_path / "loaded.yaml", tmp_path / "machine.fmu"
     load = "loads:\n  - {kind: tool, direction: Z, table: {time: [0 s, 1 s], values: [0 N, 5 N]}}\n"
     scenario.write_text(text.replace("machines/", f"{SCENARIOS}/machines/") + load, encoding="utf-8")
-    assert run(scenario, "--out", out) == 2
-    assert "loads over time are inputs of the unit" in capsys.readouterr().err
+    for inputs in ([], ["--inputs"]):
+        assert run(scenario, "--out", out, *inputs) == 2
+        said = capsys.readouterr().err
+        assert "loads.0: the load on the tool in Z does not go into the unit" in said
+        assert "--set loads=[] packs it without, and its importer drives tool.F_Z" in said
     assert not out.exists()
+    assert run(scenario, "--out", out, "--set", "loads=[]") == 0
+    assert out.exists()

@@ -38,10 +38,14 @@ def pack(options: Namespace) -> None:
     fmus = options.fmus or cosim.fmus_directory()
     base = options.base or fmus / f"{UNIT}.fmu"
     program = nc.plan(plan) if plan is not None and not options.inputs else None
-    if plan is not None and plan.loads and program is not None:
-        raise InputError(
-            f"{plan.file}: loads over time are inputs of the unit (Z.F_a, tool.F_X), never inside; leave the key "
-            "'loads' out, or pack with --inputs"
+    if plan is not None and plan.loads:
+        raise InputError.of(
+            f"{plan.file}: the unit holds no loads over time",
+            [
+                f"{plan.at('loads', i)}: the load {load.words} does not go into the unit, which holds none over time: "
+                f"--set loads=[] packs it without, and its importer drives {load.input}"
+                for i, load in enumerate(plan.loads)
+            ],
         )
     if plan is not None and program is not None:
         warn(cosim.check(plan, program, fmus=fmus))  # what a run would refuse should not be packed

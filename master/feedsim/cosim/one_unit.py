@@ -90,7 +90,7 @@ def parameters(machine: Machine, coupling: Coupling, *, built_in: bool) -> Mappi
             "the machine cannot be one unit",
             [
                 f"axis {axis}: its {unit.role.name} is {unit.fmu.name}, another maker's unit; one unit holds the "
-                "shipped ones alone; wire the units instead: feedsim ssp"
+                "shipped ones alone: coupling.units: separate runs it, feedsim ssp without --one wires it"
                 for axis, unit in machine.foreign_units
             ],
         )

@@ -182,6 +182,7 @@ def test_numpy_comes_after_the_harness() -> None:
         "eigen",
         "floor",
         "growth",
+        "one_unit",
         "peers",
         "setpoints",
         "stability",

@@ -58,7 +58,7 @@ def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Process,
     words = ["--friction", "Z=friction_z.yaml", "--delay", "X=3.9417 ms", "--no-table"]
     # what is needed is recorded whatever the scenario leaves out
     words += ["--set", 'recording.variables=["X.x_a"]']
-    return feedsim("compensate", CIRCLE, "--out", "out", *words, fmus=fmus, cwd=folder), folder
+    return feedsim("compensate", CIRCLE, "--out", "out", "--figures", "png", *words, fmus=fmus, cwd=folder), folder
 
 
 def summary_of(folder: Path) -> dict[str, Any]:

@@ -63,7 +63,7 @@ def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[subproce
         "machine.axes.Z.drive.K_v=50 1/s",
     ]
     overlay = ["--overlay", "bench.csv:Z.n_a/Z.M_a"]
-    return feedsim("frf", SCENARIO, "--out", "out", *words, *overlay, fmus=fmus, cwd=folder), folder
+    return feedsim("frf", SCENARIO, "--out", "out", "--figures", "png", *words, *overlay, fmus=fmus, cwd=folder), folder
 
 
 def summary_of(folder: Path) -> dict[str, Any]:

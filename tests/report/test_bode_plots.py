@@ -141,15 +141,20 @@ def words(figure: Any) -> str:
 def test_first_and_last_crossing_are_marked_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
     figures = looked_at(monkeypatch, bode_plots)
     curve = closed(1 / (1 + 1j * F / 20))
-    speed_reference_pictures({"Z": [curve]}, {"Z": Bandwidth(21.0, 427.0)}, None)
-    speed_reference_pictures({"Z": [curve]}, {"Z": Bandwidth(21.0, 21.0)}, None)
-    speed_reference_pictures({"Z": [curve]}, {"Z": Bandwidth(math.nan, math.nan)}, None)
+    told = []
+    for found in (Bandwidth(21.0, 427.0), Bandwidth(21.0, 21.0), Bandwidth(math.nan, math.nan)):
+        (picture,) = speed_reference_pictures({"Z": [curve]}, {"Z": found}, None)
+        assert picture.png
+        assert picture.chart is not None
+        told.append(picture.chart.panels[0])
     assert "first 21 Hz" in words(figures[0])
     assert "last 427 Hz" in words(figures[0])
     dots = [line.get_xydata()[0].tolist() for line in figures[0].axes[0].lines if line.get_marker() == "o"]
     assert dots == [[21.0, -3.0], [427.0, -3.0]]
     assert words(figures[1]) == "−3 dB at 21 Hz"
     assert words(figures[2]) == "stays above −3 dB"
+    assert [(mark.x, mark.y, mark.hollow) for mark in told[0].marks] == [(21.0, -3.0, False), (427.0, -3.0, True)]
+    assert [panel.note for panel in told[1:]] == ["−3 dB at 21 Hz", "stays above −3 dB"]
 
 
 def test_margins_are_drawn_from_the_curve_to_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,7 +164,8 @@ def test_margins_are_drawn_from_the_curve_to_the_limit(monkeypatch: pytest.Monke
     margin = 90 - 360 * 10 * T
     margins = Margins((GainCrossing(125.0, 12.5),), (PhaseCrossing(10.0, margin),))
     figures = looked_at(monkeypatch, bode_plots)
-    loop_pictures({"Z": [closed(gain)]}, {"Z": margins}, "speed", None)
+    (picture,) = loop_pictures({"Z": [closed(gain)]}, {"Z": margins}, "speed", None)
+    assert picture.png
     magnitude, phase = figures[0].axes
     assert f"phase margin {margin:.0f}° at 10 Hz" in words(figures[0])
     assert "gain margin 21.9 dB at 125 Hz" in words(figures[0])
@@ -195,6 +201,7 @@ def test_all_pictures_of_a_report(monkeypatch: pytest.MonkeyPatch) -> None:
         "speed-controlled-system", "inertia-view", "speed-reference", "speed-loop", "position-reference",
         "position-loop", "scale-response", "tool-compliance",
     ]  # fmt: skip
+    assert all(picture.png for picture in pictures)
     for figure, picture in zip(figures, pictures, strict=True):
         assert picture.caption
         for axes in figure.axes:
@@ -278,6 +285,7 @@ def test_pictures_of_full_and_reduced_models(monkeypatch: pytest.MonkeyPatch) ->
     tables = {"full": modes, "reduced": reduced(modes, 600.0), "with static correction": modes}
     pictures = truncation_pictures(tables, ("X", "Y", "Z"), np.geomspace(1, 900, 300), 600.0)
     assert [p.stem for p in pictures] == ["truncation-n_M", "truncation-x_M", "truncation-tool"]
+    assert all(picture.png for picture in pictures)
     for figure in figures:
         above, below = figure.axes[0], figure.axes[3]
         assert [line.get_label() for line in above.lines][:3] == ["full", "reduced", "with static correction"]

@@ -42,7 +42,7 @@ FIGURES = {"stribeck", "plateaus", "loops-speed", "loops-position", "residuals",
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("identified") / "out"
-    write(identified(), folder)
+    write(identified(), folder, drawn=("png",))
     return folder
 
 
@@ -126,7 +126,7 @@ def test_page(written: Path) -> None:
     for words in ("Friction of axis Z", "error of the curve", "Synthetic machine", "N/µm", "kg·m²", "2 µm at 20 Hz",
                   "sigma_1 is known to 6.7 % only", "constant_load", "Were the delay known"):  # fmt: skip
         assert words in words_of_page, words
-    assert all(f'<figure id="{stem}">' in text for stem in FIGURES)
+    assert all(f'<figure id="{stem}" class="chart" ' in text for stem in FIGURES)
     assert not re.search(r"\bnan\b", re.sub(r"<svg.*?</svg>|data:[^\"]*", "", text, flags=re.S))
     assert str(Path.cwd()) not in text
     # sigma_0 at the slide, beside the motor side's
@@ -161,7 +161,7 @@ def test_position_in_open_loop(tmp_path: Path) -> None:
     for words in ("Applied", f"{before:.4g}", f"{1e3 * before * I_P:.4g}", "+2 %", "−4 %", "+0.01 N·m", "1.667"):
         assert words in text, words
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert '<figure id="open-loop">' in report
+    assert '<figure id="open-loop" class="chart" ' in report
     assert "open_loop.csv" in report
     with (tmp_path / "open_loop.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
@@ -181,7 +181,7 @@ def test_open_loop_that_was_tried_and_refused(tmp_path: Path) -> None:
     assert "Not applied: F_C would change by +23 %." in text
     assert "Tried" in text
     assert told(tmp_path)["open_loop"]["applied"] is False
-    assert (tmp_path / "figures" / "open-loop.png").exists()
+    assert '<figure id="open-loop" class="chart" ' in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_open_loop_is_not_spoken_of_where_it_is_none(tmp_path: Path) -> None:
@@ -232,7 +232,7 @@ def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
 def test_a_stage_may_be_absent(tmp_path: Path, absent: str) -> None:
     changes: dict[str, Any] = {absent: None} if absent != "both warnings" else {"warnings": (), "advice": ()}
     whole = identified(found=identification(**changes), subject=None)
-    names = {path.name for path in write(whole, tmp_path)}
+    names = {path.name for path in write(whole, tmp_path, drawn=("png",))}
     assert ("plateaus.csv" in names) == (absent != "stationary")
     assert ("residuals.csv" in names) == (absent != "dynamic")
     assert {"friction.yaml", "report.html", "correlation.png"} <= names

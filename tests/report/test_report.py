@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import math
 import re
 import stat
+import subprocess
+import sys
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -20,9 +25,11 @@ from feedsim.errors import OutputError
 from feedsim.findings import Note, Wrong
 from feedsim.motions import Arc, Dwell, Move
 from feedsim.report import run as report
+from feedsim.report.chart import Axis, Chart, Curve, Panel
+from feedsim.report.chart.embedded import embedded
 from feedsim.report.content import Tile
 from feedsim.report.formatting import duration
-from feedsim.report.page import html
+from feedsim.report.page import html, script
 from feedsim.report.provenance import archives, input_files
 from feedsim.report.run.report import HEADER, real_time_factor, report_of, summary, tile
 from feedsim.report.style import PALETTE
@@ -39,14 +46,39 @@ def test_files_of_a_positioning_run(tmp_path: Path) -> None:
     figures = evaluate(run)
     written = report.write(run, figures, tmp_path / "new" / "folder")
     directory = tmp_path / "new" / "folder"
-    names = {"figures/positioning-Z.png", "result.csv", "report.html", "summary.json"}
+    names = {"result.csv", "report.html", "summary.json"}
     assert set(contents(directory)) == names
     assert {path.relative_to(directory).as_posix() for path in written} == names
-    assert (directory / "figures/positioning-Z.png").read_bytes().startswith(b"\x89PNG")
     back = read_csv(directory / "result.csv")
     assert np.array_equal(back["Z.x_a"], run.trace["Z.x_a"])
     for file in written:
         assert stat.S_IMODE(file.stat().st_mode) & 0o444 == 0o444, f"{file} is not readable for others"
+
+
+def test_figures_are_drawn_where_they_are_asked_for(tmp_path: Path) -> None:
+    run = positioning_run()
+    report.write(run, evaluate(run), tmp_path, drawn=("png", "svg"))
+    drawn = {f"figures/{stem}.{kind}" for stem in ("positioning-Z", "overview") for kind in ("png", "svg")}
+    assert set(contents(tmp_path)) == drawn | {"result.csv", "report.html", "summary.json"}
+    assert (tmp_path / "figures/positioning-Z.png").read_bytes().startswith(b"\x89PNG")
+    svg = (tmp_path / "figures/positioning-Z.svg").read_text(encoding="utf-8")
+    assert ElementTree.fromstring(svg.replace("xlink:href", "href")).tag.endswith("svg")
+    assert "var(--" not in svg, "a file of its own has no style sheet beside it"
+    report.write(run, evaluate(run), tmp_path)
+    assert set(contents(tmp_path)) == {"result.csv", "report.html", "summary.json"}
+
+
+def test_nothing_is_drawn_where_no_figures_are_asked_for(tmp_path: Path) -> None:
+    """matplotlib, which takes longer to load than a run, is not even imported."""
+    script = (
+        "import sys; from pathlib import Path; sys.path.insert(0, 'tests'); from report_helpers import circle_run;"
+        "from feedsim.analysis import evaluate; from feedsim.report import run as report;"
+        "run = circle_run(); report.write(run, evaluate(run), Path(sys.argv[1])); print('matplotlib' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path)], cwd=Path(__file__).parents[2], capture_output=True, text=True
+    )
+    assert done.stdout == "False\n", done.stderr
 
 
 def test_summary_holds_every_figure_and_where_it_comes_from(tmp_path: Path) -> None:
@@ -74,7 +106,14 @@ def test_page_is_self_contained_and_well_formed(tmp_path: Path, make: Any) -> No
     report.write(run, evaluate(run), tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     page = Page(text)
-    assert "script" not in page.tags
+    own = re.findall(r"<script[^>]*>(.*?)</script>", text, re.DOTALL)
+    assert page.tags.count("script") == len(own) == 2
+    assert set(json.loads(own[0])) == {"charts", "palette", "arrays"}
+    assert own[1] == script()
+    digest = base64.b64encode(hashlib.sha256(own[1].encode()).digest()).decode()
+    policy = f"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
+    assert f'content="{policy}"' in unescape(text)
+    text = text.replace(own[1], "")  # it draws into the name space of SVG
     assert "link" not in page.tags
     assert all(r.startswith(("#", "data:image/png;base64,")) for r in page.references)
     assert not re.search(r"url\((?!#)|@import", text)
@@ -106,7 +145,12 @@ def test_names_from_files_cannot_break_the_page(tmp_path: Path) -> None:
     run = positioning_run(name='<script>"&', note="a < b & c")
     report.write(run, evaluate(run), tmp_path)
     page = Page((tmp_path / "report.html").read_text(encoding="utf-8"))
-    assert "script" not in page.tags
+    assert page.tags.count("script") == 2
+    curves = [Curve("<b>", np.arange(2.0), np.ones(2))]
+    foreign = Chart([Panel("</script><script>alert(1)", Axis("&"), Axis("y"), curves)])
+    data = embedded({"a": foreign})
+    assert not set("<>&") & set(data)
+    assert json.loads(data)["charts"]["a"]["panels"][0]["title"] == "</script><script>alert(1)"
     assert "a < b & c" in page.words
 
 
@@ -293,7 +337,7 @@ def test_earlier_results_are_put_back_when_moving_fails(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stuck: str
 ) -> None:
     run = small_run()
-    report.write(run, {}, tmp_path)
+    report.write(run, {}, tmp_path, drawn=("png",))
     (tmp_path / "notes.txt").write_text("mine")
     before = contents(tmp_path)
     replace = Path.replace
@@ -306,7 +350,7 @@ def test_earlier_results_are_put_back_when_moving_fails(
     other = FakeRun(run.scenario, run.program, run.trace, wall_time=1.0)
     monkeypatch.setattr(Path, "replace", failing)
     with pytest.raises(OutputError, match="No space left on device"):
-        report.write(other, {}, tmp_path)
+        report.write(other, {}, tmp_path, drawn=("png",))
     assert contents(tmp_path) == before
     monkeypatch.undo()
     report.write(other, {}, tmp_path)
@@ -328,11 +372,12 @@ def test_folders_made_for_results_go_when_moving_fails(tmp_path: Path, monkeypat
 
 def test_figures_of_an_earlier_run_go_and_other_files_stay(tmp_path: Path) -> None:
     circle, stop = circle_run(), positioning_run()
-    report.write(circle, evaluate(circle), tmp_path)
+    report.write(circle, evaluate(circle), tmp_path, drawn=("png",))
     (tmp_path / "figures" / "mine.png").write_bytes(b"x")
-    report.write(stop, evaluate(stop), tmp_path)
+    report.write(stop, evaluate(stop), tmp_path, drawn=("png",))
     assert set(contents(tmp_path)) == {
-        "figures/positioning-Z.png", "figures/mine.png", "result.csv", "report.html", "summary.json",
+        *(f"figures/{stem}.png" for stem in ("positioning-Z", "overview", "mine")),
+        *("result.csv", "report.html", "summary.json"),
     }  # fmt: skip
 
 

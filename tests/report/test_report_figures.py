@@ -28,7 +28,7 @@ def test_display_sign_turns_torques_over_and_says_so() -> None:
     other = positioning_run(machine=machine.model_copy(update={"axes": {**machine.axes, "Z": turned}}))
     figures = evaluate(run)
     assert figures == evaluate(other)  # a display sign is no result
-    (plain,), (reversed_,) = draw(run, figures), draw(other, figures)
+    (plain, _), (reversed_, _) = draw(run, figures), draw(other, figures)
     assert "reversed" not in plain.caption
     assert "drawn with reversed sign" in reversed_.caption
     assert plain.png != reversed_.png
@@ -111,7 +111,8 @@ def test_legends_stand_above_the_axes(make: Any, monkeypatch: pytest.MonkeyPatch
     for module in (axis_plots, circle_plots):
         monkeypatch.setattr(module, "finish", looked_at)
     run = make()
-    draw(run, evaluate(run))
+    for picture in draw(run, evaluate(run)):
+        assert picture.png
     assert seen >= 2
 
 
@@ -145,7 +146,7 @@ def test_contour_says_what_its_labels_are() -> None:
     assert "median (scales)" in svg
 
 
-def test_axes_that_no_evaluation_shows_get_an_overview() -> None:
+def test_all_axes_are_shown_over_the_whole_run() -> None:
     run = run_of(
         scenario(Move(by={"X": 0.01, "Z": 0.02}, feed=0.1), Dwell(duration=0.5), evaluate=(Positioning(axis="Z"),))
     )
@@ -158,10 +159,10 @@ def test_figures_do_with_what_is_recorded() -> None:
     """Positions alone: no torque, no tool point, no setpoint."""
     run = positioning_run()
     few = FakeRun(run.scenario, run.program, run.trace.select(["Z.x_a"]))
-    assert [picture.stem for picture in draw(few, evaluate(few))] == ["positioning-Z"]
+    assert [picture.stem for picture in draw(few, evaluate(few))] == ["positioning-Z", "overview"]
     run = circle_run()
     few = FakeRun(run.scenario, run.program, run.trace.select(["*.x_a"]))
-    assert [picture.stem for picture in draw(few, evaluate(few))] == ["contour-XZ"]
+    assert [picture.stem for picture in draw(few, evaluate(few))] == ["contour-XZ", "overview"]
 
 
 def test_rings_are_10_um_where_that_is_readable() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import QUIET, Command, Option, halves, names, out, quantity
+from feedsim.cli.options import FIGURES, QUIET, Command, Option, halves, names, out, quantity
 from feedsim.cli.terminal import finish, results_in
 from feedsim.errors import InputError
 
@@ -46,7 +46,7 @@ def circle(options: Namespace) -> None:
             pitch=pitch,
         )
         diagnosis = diagnose(recorded.circle, [turn.path for turn in recorded.turns], centred=recorded.centred)
-        report.write(recorded, diagnosis, options.records, directory)
+        report.write(recorded, diagnosis, options.records, directory, drawn=options.figures)
     finish(options.quiet, (), *report.lines(diagnosis, recorded), f"-> {directory / 'report.html'}")
 
 
@@ -80,6 +80,7 @@ COMMAND = Command(
         Option("--centre", "AXIS=POSITION", "programmed centre (default: fitted)", many=True),
         Option("--pitch", "AXIS=LENGTH", "look for an error that repeats with it", many=True),
         out("circle_<name of the first file>"),
+        FIGURES,
         QUIET,
     ),
     description=DESCRIPTION,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FMUS, QUIET, Command, Option, halves, out, quantity, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, halves, out, quantity, settings
 from feedsim.cli.terminal import announce, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def compensate(options: Namespace) -> None:
             plan, program, frictions=frictions, delays=delays, table=options.table, fmus=options.fmus,
             progress=progress,
         )  # fmt: skip
-        report.write(result, files, directory)
+        report.write(result, files, directory, drawn=options.figures)
     head = f"{plan.name}: friction compensation -> {directory / 'report.html'}"
     finish(options.quiet, result.warnings, head, f"  {report.summary_line(result)}")
 
@@ -103,7 +103,7 @@ COMMAND = Command(
     compensate,
     (
         Option("scenario", "SCENARIO.yaml", "scenario with a circle", type=Path),
-        out("compensate_<name of the file>"),
+        out("compensate_<name of the file>"), FIGURES,
         Option("--friction", "AXIS=FILE.yaml",
                "friction parameters that the compensation of an axis uses (default: the machine's own, which the "
                "machine keeps in any case); may be given several times", many=True, dest="frictions"),

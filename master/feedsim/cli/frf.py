@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FMUS, QUIET, Command, Group, Option, names, out, quantity, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Group, Option, names, out, quantity, settings
 from feedsim.cli.terminal import Progress, announce, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def frf(options: Namespace) -> None:
             figures=figures,
             warnings=tuple(warnings),
         )
-        report.write(subject, found, directory)
+        report.write(subject, found, directory, drawn=options.figures)
     head = f"{subject.name}: frequency responses -> {directory / 'report.html'}"
     finish(options.quiet, warnings, head, report.summary_line(found))
 
@@ -190,7 +190,7 @@ COMMAND = Command(
     frf,
     (
         Option("subject", "SCENARIO-or-MACHINE", "scenario file, machine file or machine folder", type=Path),
-        out("frf_<name of the file>"),
+        out("frf_<name of the file>"), FIGURES,
         Option("--axes", "X,Z", "axes to look at (default: all)", type=_names),
         settings("machine.axes.Z.drive.K_p='4 N.m.s/rad'"),
         FMUS,

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FMUS, Command, Group, Option, names, out, quantity
+from feedsim.cli.options import FIGURES, FMUS, Command, Group, Option, names, out, quantity
 from feedsim.cli.terminal import announce_archive, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def identify(options: Namespace) -> None:
                 found = identified_from(records, law, known, progress)
             found = replace(found, seconds=reading | dict(found.seconds))
             identified = Identified(found, records, sources, subject, _settings(options), date.today().isoformat())
-            report.write(identified, directory)
+            report.write(identified, directory, drawn=options.figures)
     # Without the table, all warnings: it holds the reasons that some only repeat.
     warnings = identified.warnings if options.quiet else report.terminal_warnings(identified)
     finish(options.quiet, warnings, *report.terminal_lines(identified, directory))
@@ -138,7 +138,7 @@ COMMAND = Command(
                "gives pitch, torque constant and inertia of the axis, and values for what the traces do not tell",
                type=Path),
         Option("--columns", "MAPPING.yaml", "which columns of the traces are what (docs/traces.md)", type=Path),
-        out("identify_<axis>, in small letters"),
+        out("identify_<axis>, in small letters"), FIGURES,
         Group(
             "what is known",
             Group(

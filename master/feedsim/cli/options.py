@@ -96,6 +96,22 @@ def out(default: str) -> Option:
     return Option("--out", "DIR", f"where the results go (default: results/{default})", type=folder)
 
 
+def _kinds(text: str) -> tuple[str, ...]:
+    """Kinds of files of figures."""
+    from feedsim.report.style import KINDS
+
+    asked = names(text)
+    if not asked or any(kind not in KINDS for kind in asked):
+        raise ArgumentTypeError(f"{text!r}: of {', '.join(KINDS)}, one or several, with commas between them")
+    return tuple(dict.fromkeys(asked))
+
+
+FIGURES = Option(
+    "--figures", "png,svg", "draw the figures for print, too, into the folder figures: png, svg or both", type=_kinds,
+    default=(),
+)  # fmt: skip
+
+
 def typed(text: str) -> str:
     """What was typed, also under a locale of few characters, such as C: it is taken for UTF-8 there."""
     try:

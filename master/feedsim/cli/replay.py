@@ -8,7 +8,7 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FMUS, QUIET, Command, Option, names, out, quantity, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, names, out, quantity, settings
 from feedsim.cli.terminal import announce, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def replay(options: Namespace) -> None:
             comparisons, subject, sources, marks, dict(text.split("=", 1) for text in _given(options)),
             list(told),
         )  # fmt: skip
-        report.write(done, directory)
+        report.write(done, directory, drawn=options.figures)
     finish(options.quiet, done.warnings, *report.summary_lines(done, directory))
 
 
@@ -140,7 +140,7 @@ def identify_drive(options: Namespace) -> None:
             found, sources, subject, name, dict(text.split("=", 1) for text in _given(options)),
             marks,
         )  # fmt: skip
-        report.write(done, directory)
+        report.write(done, directory, drawn=options.figures)
     finish(options.quiet, done.warnings, *report.summary_lines(done, directory))
 
 
@@ -161,7 +161,7 @@ REPLAY = Command(
     (
         _RECORD,
         Option("--machine", "MACHINE-or-SCENARIO", "the machine that follows the record", type=Path, required=True),
-        _AXES, _COLUMNS, _WINDOW, out("replay_<name of the record>"),
+        _AXES, _COLUMNS, _WINDOW, out("replay_<name of the record>"), FIGURES,
         settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,
     ),
     REPLAY_DESCRIPTION,
@@ -180,7 +180,7 @@ IDENTIFY_DRIVE = Command(
                "cycle of the position loop of rigid axes, e.g. '2 ms' (default: the control cycle, as where the "
                "drive closes that loop itself)"),
         Option("--name", "NAME", "of the machine that is written (default: name of the record)"),
-        out("drive_<name of the record>"),
+        out("drive_<name of the record>"), FIGURES,
         settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,
     ),
     DRIVE_DESCRIPTION,

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FMUS, QUIET, Command, Option, out, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, out, settings
 from feedsim.cli.terminal import announce, finish, progress_bar, results_in, warn
 from feedsim.errors import InputError, OutputError
 
@@ -55,7 +55,7 @@ def run(options: Namespace) -> None:
             result = replace(result, warnings=worded(result.warnings))
             figures = analysis.evaluate(result)
             causes = analysis.diagnoses(result)
-            report.write(result, figures, directory, recorded, causes)
+            report.write(result, figures, directory, recorded, causes, drawn=options.figures)
     warnings = (*result.warnings, *analysis.doubts(figures, causes))
     finish(
         options.quiet,
@@ -165,7 +165,7 @@ RUN = Command(
     "run",
     "run a scenario or an SSP; write result.csv, summary.json, report.html and figures",
     run,
-    (*SUBJECT, out("<name of the scenario file>"), QUIET),
+    (*SUBJECT, out("<name of the scenario file>"), FIGURES, QUIET),
     epilog=TRUST,
 )
 VALIDATE = Command(

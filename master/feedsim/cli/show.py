@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import QUIET, Command, Option, out
+from feedsim.cli.options import FIGURES, QUIET, Command, Option, out
 from feedsim.cli.terminal import finish, results_in
 
 DESCRIPTION = """Lay results of feedsim run and recorded CSV files over each other: contours of circles, following
@@ -28,7 +28,7 @@ def show(options: Namespace) -> None:
     directory: Path = options.out or Path("results") / "show"
     sources = read_sources(options.results)
     with results_in(directory, report.check_writable, files_of(sources)):
-        report.write(sources, directory)
+        report.write(sources, directory, drawn=options.figures)
     finish(options.quiet, (), *report.lines(sources), f"-> {directory / 'report.html'}")
 
 
@@ -39,6 +39,7 @@ COMMAND = Command(
     (
         Option("results", "RESULT", "folder of feedsim run, or CSV file with a column of time", type=Path, nargs="+"),
         out("show"),
+        FIGURES,
         QUIET,
     ),
     description=DESCRIPTION,

@@ -9,7 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FMUS, QUIET, Command, Option, out, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, out, settings
 from feedsim.cli.terminal import announce, finish, progress_bar, results_in, warn
 from feedsim.findings import WRONG, Wrong
 
@@ -79,13 +79,15 @@ def sweep(options: Namespace) -> int:
                     discard=lambda: report.discard(directory),
                 )
         except AllFailed as error:
-            report.write(error.table, study, planned, directory)  # which groups failures by what they have in common
+            report.write(
+                error.table, study, planned, directory, drawn=options.figures
+            )  # which groups failures by what they have in common
             raise
         except KeyboardInterrupt:
             done = f"{last[0].done} of {last[0].total} runs are done and kept in" if last else "what is done is kept in"
             print(f"feedsim: interrupted; {done} {directory}; the same command continues", file=sys.stderr)
             return 130
-        report.write(table, study, planned, directory)
+        report.write(table, study, planned, directory, drawn=options.figures)
     wrong = [str(text) for text in table["warnings"] if str(text).startswith(WRONG)]
     first = wrong[0].removeprefix(WRONG).split(" | ")[0] if wrong else ""
     told = [Wrong(f"{len(wrong)} of {len(table)} runs, the first: {first}")] if wrong else []
@@ -173,7 +175,7 @@ COMMAND = Command(
     sweep,
     (
         Option("study", "STUDY.yaml", "study file (docs/sweeps.md)", type=Path),
-        out("<name of the study file>"),
+        out("<name of the study file>"), FIGURES,
         Option("--workers", "N", "processes (default: the cores; 0: this one alone)", type=int),
         Option("--scheduler", "ADDRESS",
                "make the runs on the Dask cluster with this scheduler, tcp://host:8786"),

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal, Self
 
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.linear.drive import LinearDrive, OperatingPoint
+from feedsim.linear.kept import Kept
 from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, Hold, ModalPlant
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
@@ -74,13 +75,23 @@ class LinearSystem:
         if key not in self._closings:
             other = replace(self, closed=loops)
             # what does not depend on the loops is worked out once
-            other.__dict__.update(plant=self.plant, drives=self.drives, _closings=self._closings)
+            other.__dict__.update(plant=self.plant, drives=self.drives, _closings=self._closings,
+                                  _responses=self._responses, _structure=self._structure)  # fmt: skip
             self._closings[key] = other
         return self._closings[key]
 
     @cached_property
     def _closings(self) -> dict[tuple[Closed, ...], Self]:
         return {}
+
+    # Many responses are asked for at the same few grids.
+    @cached_property
+    def _responses(self) -> Kept:
+        return Kept(8)
+
+    @cached_property
+    def _structure(self) -> Kept:
+        return Kept(5)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
@@ -157,6 +168,9 @@ class LinearSystem:
 
     def at(self, s: Complexes) -> Complexes:
         """(F, outputs, inputs) response matrix at s (F,) [rad/s], rows and columns as in `outputs`, `inputs`."""
+        return self._responses(("at", *self.loops.values()), s, self._at)
+
+    def _at(self, s: Complexes) -> Complexes:
         axes = len(self.axes)
         fast = self.speed_level(s, self.tool_force)
         result = np.zeros((len(s), len(self.outputs), len(self.inputs)), dtype=np.complex128)
@@ -221,6 +235,9 @@ class LinearSystem:
 
         The sum over all components that one answer of a controller has within the ticks of its cycle.
         """
+        return self._responses(("position level", *self.loops.values()), s, self._position_level)
+
+    def _position_level(self, s: Complexes) -> Complexes:
         axes, ticks = len(self.axes), self.drives[0].ticks
         components = (s[:, None] + 2j * np.pi * np.arange(ticks) / self.machine.cycles.T_pos).ravel()
         x_a = self.speed_level(components)[:, axes : 2 * axes, :axes]
@@ -229,6 +246,9 @@ class LinearSystem:
 
     def ports(self, s: Complexes, tool_force: Hold = "linear") -> Complexes:
         """(F, 2 A + 3, A + 3): port matrix of the structure with every input running as it does."""
+        return self._structure(tool_force, s, partial(self._ports, tool_force=tool_force))
+
+    def _ports(self, s: Complexes, tool_force: Hold) -> Complexes:
         axes, T_c = len(self.axes), self.machine.cycles.T_c
         ports = self.plant.ports(s, T_c, "linear")
         if self._ideal.any():

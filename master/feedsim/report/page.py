@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import base64
+import hashlib
+from functools import cache
+from importlib import resources
 
+from feedsim.report.chart.embedded import embedded
+from feedsim.report.chart.still import still
 from feedsim.report.content import Report
 from feedsim.report.style import PALETTE
+
+# What draws the charts and what a reader does with them, in their order.
+SCRIPTS = ("chart_draw.js", "chart_use.js")
 
 
 def html(report: Report) -> str:
@@ -22,4 +30,27 @@ def html(report: Report) -> str:
     )
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
     environment.filters["kind"] = lambda part: type(part).__name__
-    return environment.get_template("report.html.j2").render(report=report, palette=PALETTE)
+    environment.filters["still"] = lambda picture: still(picture.chart, picture.stem, picture.title)
+    charts = {picture.stem: picture.chart for picture in report.pictures if picture.chart is not None}
+    return environment.get_template("report.html.j2").render(
+        report=report, palette=PALETTE, data=embedded(charts) if charts else "", script=script() if charts else "",
+        policy=policy(script() if charts else ""),
+    )  # fmt: skip
+
+
+@cache
+def script() -> str:
+    """The only script of a page."""
+    folder = resources.files("feedsim.report") / "template"
+    return (
+        '"use strict";\n(() => {\n'
+        + "".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
+        + "})();\n"
+    )
+
+
+def policy(text: str) -> str:
+    """What a browser lets a page do: run this script and no other, ask nobody for anything."""
+    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+    allowed = f"'sha256-{digest}'" if text else "'none'"
+    return f"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}"

@@ -76,12 +76,13 @@ def write_results(
     pictures: Sequence[Picture],
     fill: Callable[[Path, Sequence[str]], None],
     grown: Mapping[str, Path] | None = None,
+    drawn: Sequence[str] = ("png",),
 ) -> tuple[Path, ...]:
     """Write the figures and whatever ``fill`` writes; returns the paths.
 
     fill: called with an empty directory, in which it makes ``files``, and with the names of all files and figures.
     grown: those of ``files`` that are there already, complete behind ``fill``, and where, on the same disk; they are
-    moved from there, and back if moving fails.
+    moved from there, and back if moving fails. drawn: kinds of files that every picture is drawn as.
     Everything is made in a temporary directory in the target and moved when complete; files of an earlier result, of
     whatever kind, are replaced, those that this one has not are removed, and both are put back if moving fails. Only
     friction.yaml of an identification stays: scenarios and machine files may name it. Raises OutputError, also where
@@ -93,9 +94,10 @@ def write_results(
         with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=directory) as scratch:
             fresh = Path(scratch) / "fresh"
             (fresh / FIGURES).mkdir(parents=True)
-            for picture in pictures:
-                (fresh / FIGURES / f"{picture.stem}.png").write_bytes(picture.png)
-            names = [*(f"{FIGURES}/{picture.stem}.png" for picture in pictures), *files]
+            figures = {f"{FIGURES}/{picture.stem}.{kind}": (picture, kind) for picture in pictures for kind in drawn}
+            for name, (picture, kind) in figures.items():
+                (fresh / name).write_bytes(picture.content(kind))
+            names = [*figures, *files]
             fill(fresh, names)
             sources = {name: fresh / name for name in names} | dict(grown or {})
             _move(sources, directory, _stale(directory, names), Path(scratch))
@@ -112,11 +114,13 @@ def write_report(
     report: Report,
     summary: Callable[[Sequence[str]], Mapping[str, Any]],
     files: Mapping[str, Content],
+    drawn: Sequence[str] = (),
 ) -> tuple[Path, ...]:
-    """Write a report of any kind: its pictures as figures/*.png, ``files``, report.html and summary.json.
+    """Write a report of any kind: report.html, summary.json, ``files``, and its pictures as figures/*.
 
-    summary: content of summary.json, a function of the names of all files. Whole or not at all, as
-    :func:`write_results` does it. Returns the paths. Raises OutputError.
+    summary: content of summary.json, a function of the names of all files. drawn: kinds of files that the pictures are
+    drawn as; the page holds what they show in any case. Whole or not at all, as :func:`write_results` does it. Returns
+    the paths. Raises OutputError.
     """
     grown: dict[str, Path] = {}
 
@@ -131,7 +135,7 @@ def write_report(
         write_text(fresh / REPORT, html(report))
         write_text(fresh / SUMMARY, to_json({**summary(names), **_found(report)}))
 
-    return write_results(directory, (*files, REPORT, SUMMARY), report.pictures, fill, grown)
+    return write_results(directory, (*files, REPORT, SUMMARY), report.pictures, fill, grown, drawn)
 
 
 def _found(report: Report) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""How figures look: colours, fonts, and drawing a figure as PNG and as inline SVG.
+"""How figures look: colours, fonts, and drawing a figure as PNG and as inline SVG, where that is asked for.
 
 Colours are Okabe and Ito's, which stay apart for the colour-blind and in grey print. In the SVG every colour of the
 palette becomes a CSS variable, so that one drawing serves light, dark and paper; the PNG is drawn on white.
@@ -10,10 +10,11 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from html import escape
 from itertools import pairwise
 from pathlib import Path
@@ -28,6 +29,8 @@ from feedsim.errors import InputError, OutputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
     from matplotlib.text import Text
+
+    from feedsim.report.chart import Chart
 
 Array = NDArray[np.float64]
 
@@ -49,6 +52,14 @@ PALETTE = (
     ("sky", SKY, "#8fd0f5"),
 )
 
+
+def named(colour: str) -> str:
+    """The name of a colour of the palette."""
+    return _NAMES[colour]
+
+
+_NAMES = {on_light: name for name, on_light, _ in PALETTE}
+
 PNG_DPI = 160
 # The best compression of a PNG takes half as long again, for a file that is a ninth smaller.
 PNG_EFFORT = {"compress_level": 3}
@@ -58,17 +69,17 @@ LARGEST_SVG = 400_000
 MOST_POINTS = 6000
 
 
+# Files that a drawing is written as.
+KINDS = ("png", "svg")
+
 # What stands in small print in every figure that is finished inside remarked().
 _REMARK: ContextVar[str] = ContextVar("remark", default="")
 
 
-@dataclass(frozen=True, repr=False)
-class Picture:
-    """A finished figure: file stem, caption (plain text), PNG bytes, SVG text with ids prefixed by the stem."""
+@dataclass(frozen=True)
+class Drawn:
+    """A drawn figure: PNG bytes, SVG text with ids prefixed by the stem."""
 
-    stem: str
-    title: str
-    caption: str
     png: bytes
     svg: str
 
@@ -77,17 +88,52 @@ class Picture:
         """Whether a page holds the SVG; one above LARGEST_SVG it holds as PNG."""
         return len(self.svg.encode()) <= LARGEST_SVG
 
+
+@dataclass(frozen=True, repr=False)
+class Picture:
+    """A figure: file stem, title, caption (plain text), and what draws it, once it is asked for.
+
+    chart: the same as data, which a page draws by itself; without one the page holds the drawing.
+    """
+
+    stem: str
+    title: str
+    caption: str
+    draw: Callable[[], Drawn]
+    chart: Chart | None = None
+    remark: str = field(default_factory=lambda: _REMARK.get())
+
+    @cached_property
+    def drawn(self) -> Drawn:
+        """The figure as matplotlib draws it."""
+        with _said(self.remark):
+            return self.draw()
+
+    @property
+    def png(self) -> bytes:
+        """The drawing as PNG."""
+        return self.drawn.png
+
+    @property
+    def svg(self) -> str:
+        """The drawing as text of an SVG."""
+        return self.drawn.svg
+
     def save(self, path: str | Path) -> Path:
         """Write it as .png or .svg, which the name tells; returns the path. Raises InputError, OutputError."""
         path = Path(path)
-        kinds = {".png": self.png, ".svg": self.svg.encode()}
-        if path.suffix.lower() not in kinds:
-            raise InputError(f"{path}: a picture is saved as {' or '.join(kinds)}")
+        kind = path.suffix.lower().removeprefix(".")
+        if kind not in KINDS:
+            raise InputError(f"{path}: a picture is saved as {' or '.join(f'.{each}' for each in KINDS)}")
         try:
-            path.write_bytes(kinds[path.suffix.lower()])
+            path.write_bytes(self.content(kind))
         except OSError as error:
             raise OutputError(f"{path} cannot be written: {error.strerror}") from None
         return path
+
+    def content(self, kind: str) -> bytes:
+        """What a file of one of KINDS holds."""
+        return self.png if kind == "png" else _standalone(self.svg).encode()
 
     def __repr__(self) -> str:
         return f"Picture {self.stem!r}: {self.title}"
@@ -148,18 +194,24 @@ def drawing(width: float, height: float) -> Iterator[Drawing]:
 
 @contextmanager
 def remarked(text: str, width: int = 150, lines: int = 2) -> Iterator[None]:
-    """Figures finished inside say `text` in their upper right corner: a picture travels without its page.
+    """Figures made inside say `text` in their upper right corner: a picture travels without its page.
 
     width, lines: characters of a line and lines that fit the narrowest figure; what is longer ends there.
     """
-    token = _REMARK.set("\n".join(textwrap.wrap(text, width)[:lines]))
+    with _said("\n".join(textwrap.wrap(text, width)[:lines])):
+        yield
+
+
+@contextmanager
+def _said(remark: str) -> Iterator[None]:
+    token = _REMARK.set(remark)
     try:
         yield
     finally:
         _REMARK.reset(token)
 
 
-def finish(figure: Drawing, stem: str, title: str, caption: str, *, worded: bool = False) -> Picture:
+def finish(figure: Drawing, stem: str, title: str, caption: str = "", *, worded: bool = False) -> Drawn:
     """Render ``figure``; call inside its ``drawing``. The result depends on nothing but what was drawn.
 
     worded: title and caption stand above the PNG, which travels alone; the page has them beside the SVG.
@@ -187,7 +239,7 @@ def finish(figure: Drawing, stem: str, title: str, caption: str, *, worded: bool
         below = Bbox.from_extents(0, 0, figure.get_figwidth(), figure.get_figheight() - head) if head else None
         nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
         figure.savefig(svg, format="svg", metadata=nothing, bbox_inches=below)
-    return Picture(stem, title, caption, png.getvalue(), _inline(svg.getvalue(), stem, title))
+    return Drawn(png.getvalue(), _inline(svg.getvalue(), stem, title))
 
 
 def _head(figure: Drawing, title: str, caption: str) -> tuple[float, list[Text]]:
@@ -232,6 +284,17 @@ def thinned(x: Array, *ys: Array) -> tuple[Array, ...]:
             keep |= {first + int(np.argmin(y[first:last])), first + int(np.argmax(y[first:last]))}
     rows = np.array(sorted(keep))
     return (x[rows], *(y[rows] for y in ys))
+
+
+def _standalone(svg: str) -> str:
+    """An SVG as a file of its own: colours as numbers, a size, a light ground."""
+    for name, colour, _ in PALETTE:
+        svg = svg.replace(f"var(--{name})", colour)
+    if match := re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg):
+        svg = svg.replace("<svg", f'<svg width="{match[1]}pt" height="{match[2]}pt"', 1)
+    end = svg.index(">") + 1
+    ground = f'<rect width="100%" height="100%" fill="{PAPER}"/>'
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{svg[:end]}{ground}{svg[end:]}\n'
 
 
 def _inline(svg: str, stem: str, title: str) -> str:

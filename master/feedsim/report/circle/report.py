@@ -21,10 +21,12 @@ from feedsim.report.formatting import typeset
 from feedsim.report.provenance import figures_part, hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.run import circle_plots
+from feedsim.report.run.charts import circle_chart, turned
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
-from feedsim.report.style import BLUE, MUTED, VERMILLION, Array, Picture, drawing, finish
+from feedsim.report.style import BLUE, MUTED, VERMILLION, Array, Drawn, Picture, drawing, finish
 
 FORMAT = 1
+SENSES = {1: ("counterclockwise", BLUE), -1: ("clockwise", VERMILLION)}
 TILES = {"G": "circular deviation G", "G_b": "bidirectional deviation G(b)", "H": "circular hysteresis H"}
 
 
@@ -43,12 +45,17 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
 
 def write(
-    recorded: RecordedCircle, diagnosis: Diagnosis, files: Sequence[Path], directory: Path | str
+    recorded: RecordedCircle,
+    diagnosis: Diagnosis,
+    files: Sequence[Path],
+    directory: Path | str,
+    *,
+    drawn: Sequence[str] = (),
 ) -> tuple[Path, ...]:
     """Write summary.json, report.html and figures; returns the paths. Raises OutputError."""
     figures = figures_of(recorded, diagnosis)
     report = report_of(recorded, diagnosis, figures, files)
-    return write_report(directory, report, partial(summary, recorded, diagnosis, figures, files), {})
+    return write_report(directory, report, partial(summary, recorded, diagnosis, figures, files), {}, drawn)
 
 
 def lines(diagnosis: Diagnosis, recorded: RecordedCircle) -> list[str]:
@@ -114,32 +121,42 @@ def report_of(
 def picture(circle: CircleUnderTest, recorded: RecordedCircle, diagnosis: Diagnosis) -> Picture:
     """All turns over each other, magnified, and what the model says of them."""
     turns = _centred([turn.path for turn in recorded.turns], circle, diagnosis, recorded.centred)
-    largest = max(float(np.abs(turn.deviation).max()) for turn in turns) * 1e6
-    ring = circle_plots.ring_step(largest)
-    rings = 1 if largest < 1.1 * ring else 2
-    with drawing(10.0, 6.0) as figure:
-        polar, unrolled = figure.subplots(1, 2, width_ratios=[1.35, 1])
-        circle_plots.polar_ground(polar, circle, ring, rings)
-        seen: set[int] = set()
-        for turn in turns:
-            colour, words = (BLUE, "counterclockwise") if turn.sense > 0 else (VERMILLION, "clockwise")
-            look = {"color": colour, "linewidth": 1.3, "label": "" if turn.sense in seen else words}
-            seen.add(turn.sense)
-            circle_plots.polar_curve(polar, turn, ring, rings, **look)
-            circle_plots.unrolled_curve(unrolled, turn, **look)
-        fitted = [TurnedPath(a, e, s) for (a, e), s in zip(diagnosis.rest, diagnosis.senses, strict=True)]
-        for i, turn in enumerate(_centred(fitted, circle, diagnosis, recorded.centred)):
-            label = "" if i else "model without peaks"
-            circle_plots.unrolled_curve(unrolled, turn, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
-        circle_plots.unrolled_ground(unrolled, circle)
-        plane = f"{circle.axes[0]}-{circle.axes[1]}"
-        gap = circle_plots.RING_GAPS[rings]
-        caption = (
-            f"Radius {circle.radius * 1e3:.6g} mm. Radius deviation magnified "
-            f"{gap / ring * 1e6 / (circle_plots.NOMINAL / circle.radius):,.0f} times; rings at ±{ring:g} µm about the "
-            f"circle{', about its fitted centre' if recorded.centred else ''}. Dashed: the fitted model without peaks."
-        )
-        return finish(figure, f"circle-{plane}", f"Recorded circle in the plane {plane}", caption)
+    on = circle_plots.circle(circle, max(float(np.abs(turn.deviation).max()) for turn in turns))
+    ring, rings = on.ring, on.rings
+    fitted = _centred(
+        [TurnedPath(a, e, s) for (a, e), s in zip(diagnosis.rest, diagnosis.senses, strict=True)],
+        circle, diagnosis, recorded.centred,
+    )  # fmt: skip
+    plane = f"{circle.axes[0]}-{circle.axes[1]}"
+
+    def draw() -> Drawn:
+        with drawing(10.0, 6.0) as figure:
+            polar, unrolled = figure.subplots(1, 2, width_ratios=[1.35, 1])
+            circle_plots.polar_ground(polar, circle, ring, rings)
+            seen: set[int] = set()
+            for turn in turns:
+                words, colour = SENSES[turn.sense]
+                look = {"color": colour, "linewidth": 1.3, "label": "" if turn.sense in seen else words}
+                seen.add(turn.sense)
+                circle_plots.polar_curve(polar, turn, ring, rings, **look)
+                circle_plots.unrolled_curve(unrolled, turn, **look)
+            for i, turn in enumerate(fitted):
+                label = "" if i else "model without peaks"
+                circle_plots.unrolled_curve(
+                    unrolled, turn, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label=label
+                )
+            circle_plots.unrolled_ground(unrolled, circle)
+            return finish(figure, f"circle-{plane}", f"Recorded circle in the plane {plane}", caption)
+
+    caption = (
+        f"Radius {circle.radius * 1e3:.6g} mm. Radius deviation magnified "
+        f"{circle_plots.magnification(on):,.0f} times; rings at ±{ring:g} µm about the "
+        f"circle{', about its fitted centre' if recorded.centred else ''}. Dashed: the fitted model without peaks."
+    )
+    curves = [turned(*SENSES[turn.sense], turn.angle, turn.deviation) for turn in turns]
+    curves += [turned("model without peaks", MUTED, each.angle, each.deviation, "dashed", 0.9) for each in fitted]
+    chart = circle_chart(on, curves)
+    return Picture(f"circle-{plane}", f"Recorded circle in the plane {plane}", caption, draw, chart)
 
 
 def _centred(

@@ -35,7 +35,9 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, REPORT, SUMMARY), inputs)
 
 
-def write(compensation: Compensation, files: Mapping[str, Path], directory: Path | str) -> tuple[Path, ...]:
+def write(
+    compensation: Compensation, files: Mapping[str, Path], directory: Path | str, *, drawn: Sequence[str] = ()
+) -> tuple[Path, ...]:
     """Write the runs with (result.csv) and without compensation, feedforward.csv, compensation.csv (where there is a
     table), summary.json, report.html and figures; returns the paths.
 
@@ -53,7 +55,7 @@ def write(compensation: Compensation, files: Mapping[str, Path], directory: Path
     with remarked(f"{machine.name}. {machine.note}"):
         pictures = pictures_of(compensation)
     report = report_of(compensation, files, pictures)
-    return write_report(directory, report, partial(summary, compensation, files), curves)
+    return write_report(directory, report, partial(summary, compensation, files), curves, drawn)
 
 
 def report_of(compensation: Compensation, files: Mapping[str, Path], pictures: Sequence[Picture]) -> Report:

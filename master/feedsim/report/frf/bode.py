@@ -27,6 +27,7 @@ HIGH_COHERENCE = 0.99
 COLOURS = {"closed form": BLUE, "measured": VERMILLION, "overlaid": GREEN}
 OTHERS = (GREEN, PURPLE, ORANGE)  # of several overlaid curves
 LOWEST_DB = -400.0  # what is exactly zero
+ALIKE = 1.01  # crossings closer than this ratio are one
 EDGE = 1e-9  # of a frequency: quotients of times carry rounding
 # Ticks of the phase [deg]: the finest that leaves this many.
 PHASE_STEPS, MOST_PHASE_TICKS = (15, 30, 45, 90, 180, 360, 720, 1440), 9
@@ -125,15 +126,15 @@ def bode(
     rooms = figure.subplots(
         len(rows), len(columns), sharex="col", sharey="row", squeeze=False, height_ratios=[HEIGHTS[row] for row in rows]
     )
-    span = span or _span(columns)
-    columns = [_within(column, *span) for column in columns]
+    span = span or span_of(columns)
+    columns = [within(column, *span) for column in columns]
     result = []
     for j, column in enumerate(columns):
         own = dict(zip(rows, rooms[:, j], strict=True))
         panels = Panels(own["magnitude"], own.get("phase"), own.get("coherence"))
         heading(panels.magnitude, column.title)
         for curve, style in _styled(column.curves):
-            _draw(panels, curve, style, ordinate, _reference(column.curves, curve), floor)
+            _draw(panels, curve, style, ordinate, reference_of(column.curves, curve), floor)
         own[rows[-1]].set_xlabel("frequency [Hz]")
         panels.magnitude.set_xscale("log")
         panels.magnitude.set_xlim(*span)
@@ -201,7 +202,8 @@ def _from_principal(phase: Array) -> Array:
     return phase - 360 * turns
 
 
-def _reference(curves: Sequence[Curve], curve: Curve) -> Curve | None:
+def reference_of(curves: Sequence[Curve], curve: Curve) -> Curve | None:
+    """The closed form that the phase of another curve follows."""
     closed = next((each for each in curves if each.kind == "closed form"), None)
     if closed is None or curve.kind == "closed form":
         return None
@@ -234,7 +236,7 @@ def _draw(
     floor: float | None,
 ) -> None:
     f, magnitude = curve.frequency, ordinate.of(curve.value)
-    phase = _visible(phases(curve, reference), magnitude, floor)
+    phase = visible(phases(curve, reference), magnitude, floor)
     for which, look in ((curve.sure, style), (~curve.sure, style | {"alpha": 0.35})):
         if not which.any():
             continue
@@ -246,7 +248,7 @@ def _draw(
         panels.coherence.plot(f, curve.coherence, **style | {"markersize": 3.0})
 
 
-def _visible(phase: Array, magnitude: Array, floor: float | None) -> Array:
+def visible(phase: Array, magnitude: Array, floor: float | None) -> Array:
     """Phases, up to where the magnitude falls below what is shown for good: from there on they say nothing."""
     if floor is None or not (above := np.flatnonzero(magnitude >= floor)).size:
         return phase
@@ -264,7 +266,7 @@ def _finish_rows(panels: Sequence[Panels], columns: Sequence[Column], ordinate: 
         _magnitude_axis(first.magnitude, low, high, ordinate.decibel)
     first.magnitude.set_ylabel(ordinate.label)
     turns = [
-        _visible(phases(curve, _reference(column.curves, curve)), ordinate.of(curve.value), floor)[curve.sure]
+        visible(phases(curve, reference_of(column.curves, curve)), ordinate.of(curve.value), floor)[curve.sure]
         for column in columns
         for curve in column.curves
     ]
@@ -322,7 +324,7 @@ def frequency_axis(axes: Axes) -> None:
         each.grid(visible=True, axis="x", which="minor", linewidth=0.35)
 
 
-def _within(column: Column, low: float, high: float) -> Column:
+def within(column: Column, low: float, high: float) -> Column:
     """The parts of the curves between two frequencies; curves that have none are left out."""
     curves = []
     for curve in column.curves:
@@ -337,6 +339,12 @@ def _any_coherence(columns: Sequence[Column]) -> bool:
     return any(curve.coherence is not None for column in columns for curve in column.curves)
 
 
-def _span(columns: Sequence[Column]) -> tuple[float, float]:
+def span_of(columns: Sequence[Column]) -> tuple[float, float]:
+    """Lowest and highest frequency of all curves."""
     ends = [(curve.frequency[0], curve.frequency[-1]) for column in columns for curve in column.curves]
     return float(min(low for low, _ in ends)), float(max(high for _, high in ends))
+
+
+def hertz(frequency: float) -> str:
+    """A frequency in three digits."""
+    return f"{frequency:.3g} Hz" if frequency < 100 else f"{frequency:.0f} Hz"

@@ -18,9 +18,25 @@ from feedsim.analysis.responses import Responses
 from feedsim.linear.loops import COMPLIANCE, QUANTITIES
 from feedsim.linear.margins import Bandwidth, Margins, Pair
 from feedsim.linear.plant import TOOL_DIRECTIONS
-from feedsim.report.frf.bode import Column, Curve, Ordinate, Panels, at, bode, dot, level, note, phases, size, stretch
+from feedsim.report.frf.bode import (
+    ALIKE,
+    Column,
+    Curve,
+    Ordinate,
+    Panels,
+    at,
+    bode,
+    dot,
+    hertz,
+    level,
+    note,
+    phases,
+    size,
+    stretch,
+)
+from feedsim.report.frf.charts import Told, bode_chart, told_of_bandwidth, told_of_margins, told_of_pairs
 from feedsim.report.labels import keep_inside
-from feedsim.report.style import INK, Picture, drawing, finish
+from feedsim.report.style import INK, Drawn, Picture, drawing, finish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +48,6 @@ MOST_COLUMNS = 3
 LABEL_ROOM, LABEL_INCHES = 0.4, 0.9  # above the curves, in shares of their height; of the drawing
 LOWEST_GAIN_DB = -40.0  # of a loop: what is below says nothing about it
 LOWEST_CLOSED_DB = -45.0  # of a closed loop
-ALIKE = 1.01  # crossings closer than this ratio are one
 
 KINDS = (
     "Lines: closed form. Points: measured on the units, faded where the coherence is below 0.99. Dashed: laid over. "
@@ -72,6 +87,7 @@ def inertia_pictures(
         "moves as one rigid mass, more where the motor feels less inertia. Annotated: the most marked pairs of "
         "anti-resonance (hollow) and resonance (full), in Hz. ",
         mark=mark, phase=False, labelled_above=True,
+        told=lambda axis, curve: told_of_pairs(curve, pairs.get(axis, ())),
     )  # fmt: skip
 
 
@@ -109,6 +125,7 @@ def loop_pictures(
         f"Loop gain {cut}. Marked: the gain margin (vertical line from the curve to 0 dB) and the phase margin (from "
         "the curve to ±180°, where a loop of gain 1 would be at its limit). ",
         mark=mark, floor=LOWEST_GAIN_DB,
+        told=lambda axis, curve: told_of_margins(curve, margins[axis]) if axis in margins else Told(),
     )  # fmt: skip
 
 
@@ -144,7 +161,8 @@ def _closed_loops(
         f"{about}Dashed line: −3 dB. A curve with an anti-resonance can fall through it, return and fall again: full "
         "marker, first crossing; hollow marker, last crossing. "
     )
-    return _pictures(columns, stem, Ordinate(ordinate), span, title, caption, mark=mark, floor=LOWEST_CLOSED_DB)
+    return _pictures(columns, stem, Ordinate(ordinate), span, title, caption, mark=mark, floor=LOWEST_CLOSED_DB,
+                     told=lambda axis, _: told_of_bandwidth(bandwidths.get(axis)))  # fmt: skip
 
 
 def _pictures(
@@ -156,6 +174,7 @@ def _pictures(
     caption: str,
     *,
     mark: Callable[[str, Panels, Curve], None] | None = None,
+    told: Callable[[str, Curve], Told] | None = None,
     phase: bool = True,
     floor: float | None = None,
     labelled_above: bool = False,
@@ -163,23 +182,31 @@ def _pictures(
 ) -> list[Picture]:
     """A picture per group of columns.
 
-    title: {} in it are the names of the columns. mark: called for each column with its name, its panels and its first
-    curve. labelled_above: with room above the curves. of: what the columns are.
+    title: {} in it are the names of the columns. mark, told: called for each column with its name, (its panels) and its
+    first curve: what draws the marks, and the marks as data. labelled_above: with room above the curves. of: what the
+    columns are.
     """
-    pictures = []
-    for part, name in _parts(columns, stem):
+
+    def picture(part: Columns, name: str) -> Picture:
         shown = [Column(f"{of} {each}", curves) for each, curves in part.items()]
-        width, height = size(shown, phase=phase)
-        with drawing(width, height + (LABEL_INCHES if labelled_above else 0.0)) as figure:
-            drawn = bode(figure, shown, ordinate, phase=phase, span=span, floor=floor)
-            if labelled_above:
-                low, high = drawn[0].magnitude.get_ylim()  # shared by all columns
-                drawn[0].magnitude.set_ylim(low, high + LABEL_ROOM * (high - low))
-            if mark is not None:
-                for each, panels, column in zip(part, drawn, shown, strict=True):
-                    mark(each, panels, column.curves[0])
-            pictures.append(finish(figure, name, title.format(_axes(part)), caption + _kinds(part)))
-    return pictures
+
+        def draw() -> Drawn:
+            width, height = size(shown, phase=phase)
+            with drawing(width, height + (LABEL_INCHES if labelled_above else 0.0)) as figure:
+                drawn = bode(figure, shown, ordinate, phase=phase, span=span, floor=floor)
+                if labelled_above:
+                    low, high = drawn[0].magnitude.get_ylim()  # shared by all columns
+                    drawn[0].magnitude.set_ylim(low, high + LABEL_ROOM * (high - low))
+                if mark is not None:
+                    for each, panels, column in zip(part, drawn, shown, strict=True):
+                        mark(each, panels, column.curves[0])
+                return finish(figure, name, title.format(_axes(part)))
+
+        marks = {c.title: told(each, c.curves[0]) for each, c in zip(part, shown, strict=True)} if told else {}
+        chart = bode_chart(shown, ordinate, marks, phase=phase, span=span, floor=floor)
+        return Picture(name, title.format(_axes(part)), caption + _kinds(part), draw, chart)
+
+    return [picture(part, name) for part, name in _parts(columns, stem)]
 
 
 def _bandwidth(axes: Axes, bandwidth: Bandwidth) -> None:
@@ -187,9 +214,9 @@ def _bandwidth(axes: Axes, bandwidth: Bandwidth) -> None:
         return note(axes, "stays above −3 dB")
     dot(axes, bandwidth.first, -3.0)
     if bandwidth.last < bandwidth.first * ALIKE:
-        return note(axes, f"−3 dB at {_hertz(bandwidth.first)}")
+        return note(axes, f"−3 dB at {hertz(bandwidth.first)}")
     dot(axes, bandwidth.last, -3.0, hollow=True)
-    return note(axes, f"−3 dB, first {_hertz(bandwidth.first)}\n−3 dB, last {_hertz(bandwidth.last)}")
+    return note(axes, f"−3 dB, first {hertz(bandwidth.first)}\n−3 dB, last {hertz(bandwidth.last)}")
 
 
 def _margins(panels: Panels, curve: Curve, margins: Margins) -> None:
@@ -199,7 +226,7 @@ def _margins(panels: Panels, curve: Curve, margins: Margins) -> None:
     low, high = curve.frequency[0], curve.frequency[-1]
     crossing, gain = margins.phase_margin, margins.gain_margin
     if math.isfinite(crossing.frequency):
-        lines.append(f"phase margin {crossing.margin:.0f}° at {_hertz(crossing.frequency)}".replace("-", "−"))
+        lines.append(f"phase margin {crossing.margin:.0f}° at {hertz(crossing.frequency)}".replace("-", "−"))
         dot(panels.magnitude, crossing.frequency, 0.0)
         if phase is not None:
             turned = float(np.interp(np.log(crossing.frequency), np.log(curve.frequency), phases(curve, None)))
@@ -208,7 +235,7 @@ def _margins(panels: Panels, curve: Curve, margins: Margins) -> None:
             level(phase, turned - crossing.margin)
     if math.isfinite(gain.frequency) and low <= gain.frequency <= high:
         decibel = 20 * math.log10(gain.factor)
-        lines.append(f"gain margin {decibel:.1f} dB at {_hertz(gain.frequency)}")
+        lines.append(f"gain margin {decibel:.1f} dB at {hertz(gain.frequency)}")
         stretch(panels.magnitude, gain.frequency, -decibel, 0.0)
         dot(panels.magnitude, gain.frequency, -decibel)
     if lines:
@@ -248,10 +275,6 @@ def _kinds(part: Columns) -> str:
     """What the styles mean, where there is more than one."""
     there = {curve.kind for curves in part.values() for curve in curves}
     return KINDS if len(there) > 1 else ""
-
-
-def _hertz(frequency: float) -> str:
-    return f"{frequency:.3g} Hz" if frequency < 100 else f"{frequency:.0f} Hz"
 
 
 def pictures_of(responses: Responses) -> list[Picture]:

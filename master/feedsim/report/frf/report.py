@@ -46,7 +46,9 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (CURVES, MEASURED, REPORT, SUMMARY), inputs)
 
 
-def write(subject: Subject, responses: Responses, directory: Path | str) -> tuple[Path, ...]:
+def write(
+    subject: Subject, responses: Responses, directory: Path | str, *, drawn: Sequence[str] = ()
+) -> tuple[Path, ...]:
     """Write frf.csv (closed form), frf_measured.csv where there is a measurement, summary.json, report.html, figures.
 
     Returns the paths. Files of an earlier run are replaced. Raises OutputError.
@@ -55,7 +57,7 @@ def write(subject: Subject, responses: Responses, directory: Path | str) -> tupl
     if responses.campaign is not None:
         files[MEASURED] = partial(write_response, response=responses.campaign.response)
     report = report_of(subject, responses, draw(responses))
-    return write_report(directory, report, partial(summary, subject, responses), files)
+    return write_report(directory, report, partial(summary, subject, responses), files, drawn)
 
 
 def draw(responses: Responses) -> list[Picture]:

@@ -10,8 +10,9 @@ import numpy as np
 from feedsim.analysis.truncation import FULL, deviation, structure_responses
 from feedsim.linear.plant import TOOL_DIRECTIONS
 from feedsim.report.frf.bode import Ordinate, frequency_axis
+from feedsim.report.frf.charts import truncation_chart
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILLION, Array, Picture, drawing, finish
+from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILLION, Array, Drawn, Picture, drawing, finish
 from feedsim.structure import Modes
 from feedsim.trace.response import FrequencyResponse
 
@@ -80,30 +81,41 @@ def _picture(
 ) -> Picture:
     full = responses[FULL]
     others = [(name, response) for name, response in responses.items() if name != FULL]
-    with drawing(max(4.0 * len(columns), 9.0), 6.0) as figure:
-        rooms = figure.subplots(2, len(columns), sharex="all", sharey="row", squeeze=False, height_ratios=[1.5, 1])
-        for j, (title, name) in enumerate(columns.items()):
-            above, below = rooms[0, j], rooms[1, j]
-            heading(above, f"{'Direction' if name.startswith('tool') else 'Axis'} {title}")
-            above.plot(full.frequency, ordinate.of(full[name]), color=MUTED, linewidth=2.6, alpha=0.6, label=FULL)
-            for style, (model, response) in zip(STYLES, others, strict=False):
-                above.plot(response.frequency, ordinate.of(response[name]), label=model, **style)
-                size = np.maximum(np.abs(deviation(response, full, name)), FINEST)
-                below.plot(response.frequency, size, **style)
-            for room in (above, below):
-                room.axvline(cutoff, color=MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
-            below.axhline(AGREED, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
-            below.set_xlabel("frequency [Hz]")
-            legend_above(above)
-        _axes(rooms[0, 0], rooms[1, 0], full, ordinate)
-        for room in rooms[0]:
-            frequency_axis(room)
-        caption = (
-            "The structure alone, motors giving torque whatever the speed. Below: deviation of the magnitude from the "
-            f"full model; dashed 0.1 dB, dotted the cut-off at {cutoff:g} Hz, above which modes were dropped. "
-            "Dropped modes still yield statically: that is what the static correction returns."
-        )
-        return finish(figure, stem, f"Reduced models against the full finite-element model: {what}", caption)
+
+    off = {
+        (title, model): np.maximum(np.abs(deviation(response, full, name)), FINEST)
+        for title, name in columns.items()
+        for model, response in others
+    }
+
+    def draw() -> Drawn:
+        with drawing(max(4.0 * len(columns), 9.0), 6.0) as figure:
+            rooms = figure.subplots(2, len(columns), sharex="all", sharey="row", squeeze=False, height_ratios=[1.5, 1])
+            for j, (title, name) in enumerate(columns.items()):
+                above, below = rooms[0, j], rooms[1, j]
+                heading(above, f"{'Direction' if name.startswith('tool') else 'Axis'} {title}")
+                above.plot(full.frequency, ordinate.of(full[name]), color=MUTED, linewidth=2.6, alpha=0.6, label=FULL)
+                for style, (model, response) in zip(STYLES, others, strict=False):
+                    above.plot(response.frequency, ordinate.of(response[name]), label=model, **style)
+                    size = off[title, model]
+                    below.plot(response.frequency, size, **style)
+                for room in (above, below):
+                    room.axvline(cutoff, color=MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
+                below.axhline(AGREED, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
+                below.set_xlabel("frequency [Hz]")
+                legend_above(above)
+            _axes(rooms[0, 0], rooms[1, 0], full, ordinate)
+            for room in rooms[0]:
+                frequency_axis(room)
+            return finish(figure, stem, f"Reduced models against the full finite-element model: {what}", caption)
+
+    caption = (
+        "The structure alone, motors giving torque whatever the speed. Below: deviation of the magnitude from the "
+        f"full model; dashed 0.1 dB, dotted the cut-off at {cutoff:g} Hz, above which modes were dropped. "
+        "Dropped modes still yield statically: that is what the static correction returns."
+    )
+    chart = truncation_chart(full, others, columns, off, ordinate, cutoff, AGREED, (FINEST, COARSEST))
+    return Picture(stem, f"Reduced models against the full finite-element model: {what}", caption, draw, chart)
 
 
 def _axes(above: Axes, below: Axes, full: FrequencyResponse, ordinate: Ordinate) -> None:

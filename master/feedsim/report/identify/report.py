@@ -43,7 +43,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs)
 
 
-def write(identified: Identified, directory: Path | str) -> tuple[Path, ...]:
+def write(identified: Identified, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
     """Write friction.yaml, plateaus.csv, residuals.csv and open_loop.csv (where there are any), summary.json,
     report.html, figures.
 
@@ -59,7 +59,7 @@ def write(identified: Identified, directory: Path | str) -> tuple[Path, ...]:
         files[OPEN_LOOP] = open_loop_csv(found.balance)
     with remarked(quantities.remark(identified), REMARK_WIDTH, REMARK_LINES):
         pictures = pictures_of(identified)
-    return write_report(directory, report_of(identified, pictures), partial(summary, identified), files)
+    return write_report(directory, report_of(identified, pictures), partial(summary, identified), files, drawn)
 
 
 def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:

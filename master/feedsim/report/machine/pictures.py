@@ -12,7 +12,7 @@ from feedsim.report.formatting import minus
 from feedsim.report.machine import projection
 from feedsim.report.machine.model import Model, Motion, extent, motion, rotor_disc, solids
 from feedsim.report.machine.projection import Faces, View
-from feedsim.report.style import INK, MUTED, PAPER, PNG_DPI, VERMILLION, Picture, drawing, finish
+from feedsim.report.style import INK, MUTED, PAPER, PNG_DPI, VERMILLION, Drawn, Picture, drawing, finish
 from feedsim.structure.build import Built
 from feedsim.structure.geometry.outline import deflection, node_motion
 from feedsim.structure.info import MachineInfo
@@ -41,44 +41,52 @@ WORTH_AN_ARROW = 0.08  # of the kinetic energy
 
 def structure_picture(info: MachineInfo, of: Model) -> Picture:
     """The machine at rest, from three sides, with what holds and drives it."""
-    with drawing(11.6, 7.0) as figure:
-        panels = figure.subplot_mosaic(
-            [["oblique", "front"], ["oblique", "side"]], width_ratios=[2.1, 1], height_ratios=[1, 1]
-        )
-        points = extent(of)
-        for key, where in (("oblique", projection.OBLIQUE), ("front", projection.FRONT), ("side", projection.SIDE)):
-            axes = panels[key]
-            projection.frame_limits(axes, where, points, 0.03, below=0.2 if where.name else 0.0)
-            _draw(axes, where, of, None, 1.0)
-            _marks(axes, where, of)
-            triad(axes, where)
-            if where.name:
-                axes.set_title(where.name, fontsize=9, fontweight="normal", color=MUTED)
-        _legend(figure, of, panels["oblique"].get_legend_handles_labels()[0])
-        figure.set_dpi(PNG_DPI)
-        remark(figure, info)
-        figure.suptitle(info.title, x=0.015, ha="left", fontsize=12, fontweight="bold")
-        mass = f", {info.total_mass:.0f} kg" if np.isfinite(info.total_mass) else ""
-        caption = (
-            f"{of.assembly.mass.shape[0]} degrees of freedom{mass}. "
-            + ("Beams are drawn with their cross-sections. " if of.looks else "Lines between the nodes. ")
-            + "Y is up."
-        )
-        return finish(figure, "structure", "Structure", caption)
+
+    def draw() -> Drawn:
+        with drawing(11.6, 7.0) as figure:
+            panels = figure.subplot_mosaic(
+                [["oblique", "front"], ["oblique", "side"]], width_ratios=[2.1, 1], height_ratios=[1, 1]
+            )
+            points = extent(of)
+            for key, where in (("oblique", projection.OBLIQUE), ("front", projection.FRONT), ("side", projection.SIDE)):
+                axes = panels[key]
+                projection.frame_limits(axes, where, points, 0.03, below=0.2 if where.name else 0.0)
+                _draw(axes, where, of, None, 1.0)
+                _marks(axes, where, of)
+                triad(axes, where)
+                if where.name:
+                    axes.set_title(where.name, fontsize=9, fontweight="normal", color=MUTED)
+            _legend(figure, of, panels["oblique"].get_legend_handles_labels()[0])
+            figure.set_dpi(PNG_DPI)
+            remark(figure, info)
+            figure.suptitle(info.title, x=0.015, ha="left", fontsize=12, fontweight="bold")
+            return finish(figure, "structure", "Structure", caption)
+
+    mass = f", {info.total_mass:.0f} kg" if np.isfinite(info.total_mass) else ""
+    caption = (
+        f"{of.assembly.mass.shape[0]} degrees of freedom{mass}. "
+        + ("Beams are drawn with their cross-sections. " if of.looks else "Lines between the nodes. ")
+        + "Y is up."
+    )
+    return Picture("structure", "Structure", caption, draw)
 
 
 def mode_picture(info: MachineInfo, built: Built, of: Model, k: int, scale: float = 1.0) -> Picture:
     """A mode shape, exaggerated, over the structure at rest; beside it the view from the side where most is seen."""
     moved = motion(built, of, k, scale)
     shares = built.solution.moving[k].shares
-    with drawing(11.6, 5.8) as figure:
-        for axes, where in mode_panels(figure, of, moved):
-            draw_mode(axes, where, of, moved, 1.0)
-            arrows(axes, where, of, moved, [share.body for share in shares if share.energy >= WORTH_AN_ARROW])
-        mode_heading(figure, info, of, k)
-        figure.set_dpi(PNG_DPI)
-        remark(figure, info)
-        return finish(figure, f"mode_{k}", mode_title(info, k), mode_caption(info, k))
+
+    def draw() -> Drawn:
+        with drawing(11.6, 5.8) as figure:
+            for axes, where in mode_panels(figure, of, moved):
+                draw_mode(axes, where, of, moved, 1.0)
+                arrows(axes, where, of, moved, [share.body for share in shares if share.energy >= WORTH_AN_ARROW])
+            mode_heading(figure, info, of, k)
+            figure.set_dpi(PNG_DPI)
+            remark(figure, info)
+            return finish(figure, f"mode_{k}", mode_title(info, k), mode_caption(info, k))
+
+    return Picture(f"mode_{k}", mode_title(info, k), mode_caption(info, k), draw)
 
 
 def sheet_picture(info: MachineInfo, built: Built, of: Model, scale: float = 1.0) -> Picture | None:
@@ -88,25 +96,33 @@ def sheet_picture(info: MachineInfo, built: Built, of: Model, scale: float = 1.0
         return None
     columns = min(4, len(modes))
     rows = -(-len(modes) // columns)
-    with drawing(11.6, 0.7 + 2.9 * rows) as figure:
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for axes in panels[len(modes) :]:
-            axes.set_axis_off()
-        motions = [motion(built, of, k, scale) for k in modes]
-        points = np.concatenate([extent(of, moved) for moved in motions])
-        for axes, k, moved in zip(panels, modes, motions, strict=False):
-            projection.frame_limits(axes, projection.OBLIQUE, points, 0.01)
-            draw_mode(axes, projection.OBLIQUE, of, moved, 1.0)
-            axes.set_title(f"{k}: {frequency(info, k)}", fontsize=10, pad=16)
-            axes.text(0, 1.0, _short(info.moving[k]), transform=axes.transAxes, fontsize=7.5, color=MUTED, va="bottom")
-        figure.set_dpi(PNG_DPI)
-        remark(figure, info, below=True)
-        figure.suptitle(f"{info.title}: the first elastic modes", x=0.015, ha="left", fontsize=12, fontweight="bold")
-        caption = (
-            "Deflections exaggerated, over the structure at rest in grey; below the frequency the body that has the "
-            "largest share of the kinetic energy."
-        )
-        return finish(figure, "modes", "The first elastic modes", caption)
+
+    def draw() -> Drawn:
+        with drawing(11.6, 0.7 + 2.9 * rows) as figure:
+            panels = figure.subplots(rows, columns, squeeze=False).ravel()
+            for axes in panels[len(modes) :]:
+                axes.set_axis_off()
+            motions = [motion(built, of, k, scale) for k in modes]
+            points = np.concatenate([extent(of, moved) for moved in motions])
+            for axes, k, moved in zip(panels, modes, motions, strict=False):
+                projection.frame_limits(axes, projection.OBLIQUE, points, 0.01)
+                draw_mode(axes, projection.OBLIQUE, of, moved, 1.0)
+                axes.set_title(f"{k}: {frequency(info, k)}", fontsize=10, pad=16)
+                axes.text(
+                    0, 1.0, _short(info.moving[k]), transform=axes.transAxes, fontsize=7.5, color=MUTED, va="bottom"
+                )
+            figure.set_dpi(PNG_DPI)
+            remark(figure, info, below=True)
+            figure.suptitle(
+                f"{info.title}: the first elastic modes", x=0.015, ha="left", fontsize=12, fontweight="bold"
+            )
+            return finish(figure, "modes", "The first elastic modes", caption)
+
+    caption = (
+        "Deflections exaggerated, over the structure at rest in grey; below the frequency the body that has the "
+        "largest share of the kinetic energy."
+    )
+    return Picture("modes", "The first elastic modes", caption, draw)
 
 
 def mode_panels(figure: Drawing, of: Model, moved: Motion) -> Iterator[tuple[Axes, View]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from feedsim.report.machine.record import MEANINGS, USUAL_EXCHANGE, exchange, mo
 from feedsim.report.provenance import hashed
 from feedsim.report.results import FIGURES, REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.sections import provenance_section
-from feedsim.report.style import PALETTE, PAPER, Picture
+from feedsim.report.style import KINDS, Picture
 from feedsim.scenario.structure import Structure
 from feedsim.structure.info import MachineInfo
 
@@ -57,27 +56,14 @@ def write(
     elif (sheet := sheet_picture(info, built, of, scale)) is not None:
         pictures.append(sheet)
     gifs = {k: mode_gif(info, built, of, k, scale) for k in modes if animate}
-    drawings: dict[str, Content] = {f"{FIGURES}/{picture.stem}.svg": standalone(picture) for picture in pictures}
-    drawings |= {f"{FIGURES}/mode_{k}.gif": gif for k, gif in gifs.items()}
+    animated: dict[str, Content] = {f"{FIGURES}/mode_{k}.gif": gif for k, gif in gifs.items()}
 
     def summary(names: Sequence[str]) -> dict[str, Any]:
         return record(info, files) | {"files": list(names)}
 
     caption = "One period, slowed down and exaggerated."
     moving = [Animation(mode_title(info, k), caption, gif) for k, gif in gifs.items()]
-    return write_report(directory, report_of(info, files, [*pictures, *moving]), summary, drawings)
-
-
-def standalone(picture: Picture) -> str:
-    """The picture's SVG as a file of its own: colours as numbers, a size, a light ground."""
-    svg = picture.svg
-    for name, colour, _ in PALETTE:
-        svg = svg.replace(f"var(--{name})", colour)
-    if match := re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg):
-        svg = svg.replace("<svg", f'<svg width="{match[1]}pt" height="{match[2]}pt"', 1)
-    end = svg.index(">") + 1
-    ground = f'<rect width="100%" height="100%" fill="{PAPER}"/>'
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{svg[:end]}{ground}{svg[end:]}\n'
+    return write_report(directory, report_of(info, files, [*pictures, *moving]), summary, animated, KINDS)
 
 
 def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Sequence[Picture | Animation]) -> Report:

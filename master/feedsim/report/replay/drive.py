@@ -103,9 +103,9 @@ def note(record: Path) -> str:
     return f"Identified from {record.name}. Axes are rigid; what the record does not show is assumed (see the files)."
 
 
-def write(report: DriveReport, directory: Path | str) -> tuple[Path, ...]:
+def write(report: DriveReport, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
     """Write the files that were made, summary.json, report.html and figures; returns the paths. Raises OutputError."""
-    return write_report(directory, report_of(report), lambda names: summary(report, names), report.found.files)
+    return write_report(directory, report_of(report), lambda names: summary(report, names), report.found.files, drawn)
 
 
 def report_of(report: DriveReport) -> Report:

@@ -52,10 +52,10 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (REPLAY, REPORT, SUMMARY), inputs)
 
 
-def write(replayed: Replayed, directory: Path | str) -> tuple[Path, ...]:
+def write(replayed: Replayed, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
     """Write replay.csv, summary.json, report.html and figures; returns the paths. Raises OutputError."""
     files: dict[str, Content] = {REPLAY: partial(write_csv, trace=trace_of(replayed.comparisons))}
-    return write_report(directory, report_of(replayed), partial(summary, replayed), files)
+    return write_report(directory, report_of(replayed), partial(summary, replayed), files, drawn)
 
 
 def trace_of(comparisons: Sequence[Comparison]) -> Trace:

@@ -1,4 +1,4 @@
-"""Figures of axes over time: a positioning move with a zoom on its target, and an overview of all that move."""
+"""Figures of axes over time: a positioning move with a zoom on its target, and an overview of all."""
 
 from __future__ import annotations
 
@@ -9,15 +9,23 @@ from typing import TYPE_CHECKING, Any
 from feedsim.analysis import Approach, Figures, deviation
 from feedsim.analysis.positioning import PLATEAU
 from feedsim.report import style
-from feedsim.report.labels import beside, heading, keep_inside, legend_above, mark_instant, place_beside_level
-from feedsim.report.style import Picture, drawing, finish, thinned
+from feedsim.report.labels import (
+    beside,
+    heading,
+    keep_inside,
+    legend_above,
+    mark_instant,
+    place_beside_level,
+    reversed_note,
+)
+from feedsim.report.run.charts import ZOOM_AFTER, ZOOM_BEFORE, positioning_chart, whole_run_chart
+from feedsim.report.style import Drawn, Picture, drawing, finish, thinned
 from feedsim.trace import Trace, release
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 END = "end of NC motion"
-ZOOM_BEFORE, ZOOM_AFTER = 0.030, 0.400  # s about the end of the NC motion
 
 
 def positioning_picture(
@@ -29,72 +37,85 @@ def positioning_picture(
     """
     axis = approach.axis
     has_torque = f"{axis}.M_a" in trace.columns
-    with drawing(10.0, 7.2 if has_torque else 4.0) as figure:
-        rooms = figure.subplot_mosaic(
-            [["overview", "zoom"], ["torque", "torque"]] if has_torque else [["overview", "zoom"]],
-            width_ratios=[1, 1.25],
-        )
-        _overview(rooms["overview"], trace, approach)
-        _zoom(rooms["zoom"], trace, approach, figures, band)
-        if has_torque:
-            _torque(rooms["torque"], trace, approach, figures, torque_sign)
-        title = f"Positioning of axis {axis}: position, overshoot and driving torque"
-        caption = (
-            f"Axis {axis} from {approach.origin * 1e3:.6g} to {approach.target * 1e3:.6g} mm. "
-            "Top left: position over time. "
-            "Top right: distance beyond the target around the end of the NC motion; the shaded band is "
-            f"±{band * 1e6:g} µm, the marker shows the last instant outside it. "
-        )
-        if has_torque:
-            caption += "Bottom: motor torque and friction torque over time" + (
-                ", both drawn with reversed sign." if torque_sign < 0 else "."
+
+    def draw() -> Drawn:
+        with drawing(10.0, 7.2 if has_torque else 4.0) as figure:
+            rooms = figure.subplot_mosaic(
+                [["overview", "zoom"], ["torque", "torque"]] if has_torque else [["overview", "zoom"]],
+                width_ratios=[1, 1.25],
             )
-        return finish(figure, stem, title, caption)
+            _overview(rooms["overview"], trace, approach)
+            _zoom(rooms["zoom"], trace, approach, figures, band)
+            if has_torque:
+                _torque(rooms["torque"], trace, approach, figures, torque_sign)
+            return finish(figure, stem, title, caption)
+
+    title = f"Positioning of axis {axis}: position, overshoot and driving torque"
+    caption = (
+        f"Axis {axis} from {approach.origin * 1e3:.6g} to {approach.target * 1e3:.6g} mm. "
+        "Position over time; distance beyond the target around the end of the NC motion, where the shaded band is "
+        f"±{band * 1e6:g} µm and the marker shows the last instant outside it"
+    )
+    caption += "; motor torque and friction torque over time" if has_torque else ""
+    caption += ", both drawn with reversed sign." if has_torque and torque_sign < 0 else "."
+    return Picture(stem, title, caption, draw, positioning_chart(trace, approach, figures, band, torque_sign))
 
 
 def overview_picture(trace: Trace, axes: Iterable[str], signs: Mapping[str, int], stem: str) -> Picture | None:
-    """Position, following error and torque over the whole run, one row per axis; None where nothing is recorded.
+    """All axes over the whole run; the drawing has a row per axis. None where nothing is recorded.
 
     signs: axis -> +-1, display sign of its torques.
     """
     shown = [axis for axis in axes if any(f"{axis}.{name}" in trace.columns for name in ("x_a", "x_s", "M_a"))]
     if not shown:
         return None
-    with drawing(10.0, 0.5 + 2.7 * len(shown)) as figure:
-        rooms = figure.subplots(len(shown), 3, squeeze=False, sharex=True)
-        for (position, error, torque), axis in zip(rooms, shown, strict=True):
-            for name, scale, look, label in (
-                ("x_s", 1e3, {"color": style.SETPOINT, "linestyle": (0, (4, 2))}, "setpoint $x_s$"),
-                ("x_a", 1e3, {"color": style.BLUE}, "linear scale $x_a$"),
-            ):
-                _curve(position, trace, f"{axis}.{name}", scale, label, look)
-            _curve(error, trace, f"{axis}.x_e", 1e6, "", {"color": style.BLUE})
-            sign = signs.get(axis, 1)
-            _curve(torque, trace, f"{axis}.M_a", sign, "motor $M_a$", {"color": style.BLUE})
-            _curve(
-                torque, trace, f"{axis}.M_fr", sign, r"friction $M_{fr}$", {"color": style.VERMILLION, "linewidth": 1.1}
-            )
-            note = " (sign reversed)" if sign < 0 else ""
-            heading(position, f"Axis {axis}: position")
-            heading(error, "Following error")
-            heading(torque, f"Torque{note}")
-            position.set_ylabel("position [mm]")
-            error.set_ylabel("following error [µm]")
-            torque.set_ylabel("torque [N·m]")
-            for room in (position, error, torque):
-                room.margins(x=0.01)
-                if not room.lines:
-                    room.set_visible(False)
-            for room in (error, torque):
-                room.axhline(0.0, color=style.MUTED, linewidth=0.8)
-            for room in (position, torque):
-                if room.get_visible():
-                    legend_above(room)
-        for room in rooms[-1]:
-            room.set_xlabel("time [s]")
-        title = "Overview of the axes that move"
-        caption = "Position, following error (delayed setpoint less measured position) and torque over the whole run."
-        return finish(figure, stem, title, caption)
+
+    def draw() -> Drawn:
+        with drawing(10.0, 0.5 + 2.7 * len(shown)) as figure:
+            rooms = figure.subplots(len(shown), 3, squeeze=False, sharex=True)
+            for (position, error, torque), axis in zip(rooms, shown, strict=True):
+                for name, scale, look, label in (
+                    ("x_s", 1e3, {"color": style.SETPOINT, "linestyle": (0, (4, 2))}, "setpoint $x_s$"),
+                    ("x_a", 1e3, {"color": style.BLUE}, "linear scale $x_a$"),
+                ):
+                    _curve(position, trace, f"{axis}.{name}", scale, label, look)
+                _curve(error, trace, f"{axis}.x_e", 1e6, "", {"color": style.BLUE})
+                sign = signs.get(axis, 1)
+                _curve(torque, trace, f"{axis}.M_a", sign, "motor $M_a$", {"color": style.BLUE})
+                _curve(
+                    torque,
+                    trace,
+                    f"{axis}.M_fr",
+                    sign,
+                    r"friction $M_{fr}$",
+                    {"color": style.VERMILLION, "linewidth": 1.1},
+                )
+                note = " (sign reversed)" if sign < 0 else ""
+                heading(position, f"Axis {axis}: position")
+                heading(error, "Following error")
+                heading(torque, f"Torque{note}")
+                position.set_ylabel("position [mm]")
+                error.set_ylabel("following error [µm]")
+                torque.set_ylabel("torque [N·m]")
+                for room in (position, error, torque):
+                    room.margins(x=0.01)
+                    if not room.lines:
+                        room.set_visible(False)
+                for room in (error, torque):
+                    room.axhline(0.0, color=style.MUTED, linewidth=0.8)
+                for room in (position, torque):
+                    if room.get_visible():
+                        legend_above(room)
+            for room in rooms[-1]:
+                room.set_xlabel("time [s]")
+            return finish(figure, stem, title, caption)
+
+    title = "All axes over the whole run"
+    caption = (
+        "Position, following error (delayed setpoint less measured position), speed, torque and current. Longer curves "
+        "are thinned to the extremes of every stretch; result.csv has all rows." + reversed_note(shown, signs)
+    )
+    return Picture(stem, title, caption, draw, whole_run_chart(trace, shown, signs))
 
 
 def _overview(axes: Axes, trace: Trace, approach: Approach) -> None:

@@ -10,9 +10,11 @@ import numpy as np
 
 from feedsim.analysis import Contour, Figures, Glitch, Turn, contour
 from feedsim.report import style
+from feedsim.report.chart import Polar
 from feedsim.report.formatting import minus
 from feedsim.report.labels import heading, legend_above, plain_box, reversed_note, torque_label
-from feedsim.report.style import Array, Picture, drawing, finish, thinned
+from feedsim.report.run.charts import contour_chart, torque_chart
+from feedsim.report.style import Array, Drawn, Picture, drawing, finish, thinned
 from feedsim.trace import Trace
 
 if TYPE_CHECKING:
@@ -50,27 +52,28 @@ def contour_picture(trace: Trace, turn: Turn, figures: Figures, stem: str) -> Pi
     by_scale = contour(trace, turn)
     tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
     by_tool = contour(trace, turn, tool) if all(name in trace.columns for name in tool) else None
-    largest = float(np.abs(by_scale.deviation).max()) * 1e6
-    ring = ring_step(largest)
-    rings = 1 if largest < 1.1 * ring else 2
-    gap = RING_GAPS[rings]
-    with drawing(10.0, 7.0) as figure:
-        rooms = figure.subplot_mosaic(
-            [["polar", "angle"], ["polar", "table"]], width_ratios=[1.85, 1], height_ratios=[1, 0.8]
-        )
-        _polar(rooms["polar"], turn, by_scale, by_tool, ring, rings)
-        _unrolled(rooms["angle"], turn, by_scale, by_tool)
-        _table(rooms["table"], turn, figures)
-        magnification = gap / ring * 1e6 / (NOMINAL / turn.radius)
-        title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
-        caption = (
-            f"Radius {turn.radius * 1e3:.6g} mm, {'counterclockwise' if turn.sense > 0 else 'clockwise'} from "
-            f"{turn.axes[0]} to {turn.axes[1]}, turn from {turn.begin:.4f} to {turn.end:.4f} s. "
-            f"Radius deviation magnified {magnification:,.0f} times; rings at ±{ring:g} µm about the programmed "
-            "circle. The markers show the quadrant glitches: the largest deviation within ±45° of an axis crossing, "
-            "less the median of the turn."
-        )
-        return finish(figure, stem, title, caption)
+    on = circle(turn, float(np.abs(by_scale.deviation).max()))
+    ring, rings = on.ring, on.rings
+
+    def draw() -> Drawn:
+        with drawing(10.0, 7.0) as figure:
+            rooms = figure.subplot_mosaic(
+                [["polar", "angle"], ["polar", "table"]], width_ratios=[1.85, 1], height_ratios=[1, 0.8]
+            )
+            _polar(rooms["polar"], turn, by_scale, by_tool, ring, rings)
+            _unrolled(rooms["angle"], turn, by_scale, by_tool)
+            _table(rooms["table"], turn, figures)
+            return finish(figure, stem, title, caption)
+
+    title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
+    caption = (
+        f"Radius {turn.radius * 1e3:.6g} mm, {'counterclockwise' if turn.sense > 0 else 'clockwise'} from "
+        f"{turn.axes[0]} to {turn.axes[1]}, turn from {turn.begin:.4f} to {turn.end:.4f} s. "
+        f"Radius deviation magnified {magnification(on):,.0f} times; rings at ±{ring:g} µm about the programmed "
+        "circle. The markers show the quadrant glitches: the largest deviation within ±45° of an axis crossing, "
+        "less the median of the turn."
+    )
+    return Picture(stem, title, caption, draw, contour_chart(by_scale, by_tool, on, turn.sense))
 
 
 def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str) -> Picture | None:
@@ -82,17 +85,33 @@ def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str
     if not axes:
         return None
     part = trace.between(turn.begin, turn.end)
-    with drawing(10.0, 3.8 * len(axes)) as figure:
-        rooms = figure.subplots(len(axes), 3, squeeze=False, width_ratios=[1.25, 1, 1])
-        for row, axis in zip(rooms, axes, strict=True):
-            _torque_row(row, part, axis, signs.get(axis, 1))
-        title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: driving torque and friction torque"
-        caption = (
-            f"Turn from {turn.begin:.4f} to {turn.end:.4f} s. Left: over time. Middle: over the motor speed. Right: "
-            "friction torque around the reversal of the motion, where its slope is that of the engaging transmission."
-            + reversed_note(axes, signs)
-        )
-        return finish(figure, stem, title, caption)
+
+    def draw() -> Drawn:
+        with drawing(10.0, 3.8 * len(axes)) as figure:
+            rooms = figure.subplots(len(axes), 3, squeeze=False, width_ratios=[1.25, 1, 1])
+            for row, axis in zip(rooms, axes, strict=True):
+                _torque_row(row, part, axis, signs.get(axis, 1))
+            return finish(figure, stem, title, caption)
+
+    title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: driving torque and friction torque"
+    caption = (
+        f"Turn from {turn.begin:.4f} to {turn.end:.4f} s: over time, over the motor speed, and the friction torque "
+        "around the reversal of the motion, where its slope is that of the engaging transmission."
+        + reversed_note(axes, signs)
+    )
+    return Picture(stem, title, caption, draw, torque_chart(part, axes, signs))
+
+
+def circle(on: OnCircle, largest: float) -> Polar:
+    """The programmed circle with rings that suit a deviation of up to ``largest`` [m]; no curves."""
+    ring = ring_step(largest * 1e6)
+    title = f"Contour error, {on.axes[0]}-{on.axes[1]}, R {on.radius * 1e3:g} mm"
+    return Polar(title, on.axes, on.radius * 1e3, ring, 1 if largest * 1e6 < 1.1 * ring else 2, ())
+
+
+def magnification(on: Polar) -> float:
+    """How many times larger than the circle its deviations are drawn."""
+    return RING_GAPS[on.rings] / on.ring * 1e3 * on.radius / NOMINAL
 
 
 def ring_step(largest: float) -> float:

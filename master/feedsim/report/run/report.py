@@ -93,13 +93,15 @@ def write(
     directory: Path | str,
     recorded: Partial | None = None,
     causes: Mapping[str, Diagnosis] | None = None,
+    *,
+    drawn: Sequence[str] = (),
 ) -> tuple[Path, ...]:
-    """Write result.csv, summary.json, report.html, figures/*.png and log.csv, if there is one; returns their paths.
+    """Write result.csv, summary.json, report.html, log.csv, if there is one, and figures; returns their paths.
 
     figures: as from ``analysis.evaluate``. recorded: the run's rows where they have been written already, in the same
     directory; the file becomes result.csv, or stays as it is where the results cannot be written. Files of an earlier
-    run are replaced. causes: as from ``analysis.diagnoses``, which is asked where they are not given. Raises
-    OutputError.
+    run are replaced. causes: as from ``analysis.diagnoses``, which is asked where they are not given. drawn: kinds of
+    files that figures/* are drawn as. Raises OutputError.
     """
 
     def result(path: Path) -> Path | None:
@@ -114,7 +116,7 @@ def write(
         files[LOG] = partial(write_csv, trace=run.log)
     causes = diagnoses(run) if causes is None else causes
     report = report_of(run, figures, draw(run, figures), causes)
-    return write_report(directory, report, partial(summary, run, figures, causes=causes), files)
+    return write_report(directory, report, partial(summary, run, figures, causes=causes), files, drawn)
 
 
 def report_of(
@@ -175,10 +177,9 @@ def tile(name: str, figure: Figure) -> Tile:
 
 
 def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
-    """The figures of a report: those of every evaluation, and an overview of the axes that none of them shows."""
+    """The figures of a report: those of every evaluation, and an overview of all axes."""
     signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
     pictures: list[Picture] = []
-    covered: set[str] = set()
     for task in tasks(run.scenario, run.program):
         stem = task.prefix.replace("#", "-")
         own = {
@@ -193,15 +194,11 @@ def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
                     run.trace, task.approach, own, f"positioning-{stem}", band=task.band, torque_sign=signs[axis]
                 )
             )
-            covered.add(axis)
         elif isinstance(task, CircleTask):
             pictures.append(contour_picture(run.trace, task.turn, own, f"contour-{stem}"))
             torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
             pictures += [torques] if torques is not None else []
-            covered |= set(task.turn.axes)
-    reached = {axis: run.program.reached(axis) for axis in run.program.x_s if axis not in covered}
-    moving = [axis for axis, (low, high) in reached.items() if low < high]
-    overview = overview_picture(run.trace, moving, signs, "overview")
+    overview = overview_picture(run.trace, list(run.scenario.machine.axes), signs, "overview")
     return [*pictures, overview] if overview is not None else pictures
 
 

@@ -38,9 +38,9 @@ def files_of(sources: Sequence[Source]) -> list[Path]:
     return found
 
 
-def write(sources: Sequence[Source], directory: Path | str) -> tuple[Path, ...]:
+def write(sources: Sequence[Source], directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
     """Write summary.json, report.html and figures; returns the paths. Raises OutputError."""
-    return write_report(directory, report_of(sources), partial(summary, sources), {})
+    return write_report(directory, report_of(sources), partial(summary, sources), {}, drawn)
 
 
 def lines(sources: Sequence[Source]) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from feedsim.report import style
 from feedsim.report.formatting import number, plain
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import Array, Picture, drawing, finish, thinned
+from feedsim.report.style import Array, Drawn, Picture, drawing, finish, thinned
 from feedsim.report.sweep.account import QUANTILES, RANK, TOTAL, Account, Input, Measure, Output
 
 if TYPE_CHECKING:
@@ -40,17 +40,22 @@ def distribution_picture(
         return None
     telling = measure.telling()[:MOST_BARS]
     bars = len(telling)
-    with drawing(10.0 if bars else 6.5, max(3.3, 1.5 + 0.27 * bars)) as figure:
-        rooms = figure.subplots(1, 2 if bars else 1, squeeze=False, width_ratios=[1.15, 1][: 2 if bars else 1])[0]
-        _histogram(rooms[0], output, exceedance)
-        caption = "Left the runs' values with 5 %, 50 % and 95 % quantile" if bars else "The runs' values with "
-        caption += "" if bars else "5 %, 50 % and 95 % quantile"
-        caption += ", and the share of the runs that lie above a value (vermillion)" if exceedance else ""
-        caption += "; " if bars else "."
-        if bars:
-            _bars(rooms[1], inputs, measure, telling)
-            caption += _right(measure, len(inputs) - bars)
-        return finish(figure, f"distribution-{stem}", f"Distribution of {output.name}", caption, worded=True)
+
+    def draw() -> Drawn:
+        with drawing(10.0 if bars else 6.5, max(3.3, 1.5 + 0.27 * bars)) as figure:
+            rooms = figure.subplots(1, 2 if bars else 1, squeeze=False, width_ratios=[1.15, 1][: 2 if bars else 1])[0]
+            _histogram(rooms[0], output, exceedance)
+            if bars:
+                _bars(rooms[1], inputs, measure, telling)
+            return finish(figure, f"distribution-{stem}", f"Distribution of {output.name}", caption, worded=True)
+
+    caption = "Left the runs' values with 5 %, 50 % and 95 % quantile" if bars else "The runs' values with "
+    caption += "" if bars else "5 %, 50 % and 95 % quantile"
+    caption += ", and the share of the runs that lie above a value (vermillion)" if exceedance else ""
+    caption += "; " if bars else "."
+    if bars:
+        caption += _right(measure, len(inputs) - bars)
+    return Picture(f"distribution-{stem}", f"Distribution of {output.name}", caption, draw)
 
 
 def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, stem: str) -> Picture | None:
@@ -62,20 +67,24 @@ def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, s
     missing = len(output.known) < len(output.sample)
     across = min(PANELS, len(shown))
     down = -(-len(shown) // across)
-    with drawing(max(5.0, 2.6 * across), 0.3 + 2.5 * down) as figure:
-        rooms = figure.subplots(down, across, squeeze=False, sharey=True).ravel()
-        for axes, each in zip(rooms, shown, strict=False):
-            _panel(axes, output, each)
-        for axes in rooms[len(shown) :]:
-            axes.remove()
-        for axes in rooms[::across]:
-            axes.set_ylabel(plain(output.label))
-        left_out = len(inputs) - len(shown)
-        caption = "A point per run, a cross on the axis one without a value" if missing else "A point per run"
-        caption += "; the line is the running median"
-        caption += ", the bars the medians of each value" if any(len(each.levels) for each in shown) else ""
-        caption += f". {left_out} of {len(inputs)} parameters, which move it less, are not drawn." if left_out else "."
-        return finish(figure, f"scatter-{stem}", f"{output.name} over the parameters", caption, worded=True)
+
+    def draw() -> Drawn:
+        with drawing(max(5.0, 2.6 * across), 0.3 + 2.5 * down) as figure:
+            rooms = figure.subplots(down, across, squeeze=False, sharey=True).ravel()
+            for axes, each in zip(rooms, shown, strict=False):
+                _panel(axes, output, each)
+            for axes in rooms[len(shown) :]:
+                axes.remove()
+            for axes in rooms[::across]:
+                axes.set_ylabel(plain(output.label))
+            return finish(figure, f"scatter-{stem}", f"{output.name} over the parameters", caption, worded=True)
+
+    left_out = len(inputs) - len(shown)
+    caption = "A point per run, a cross on the axis one without a value" if missing else "A point per run"
+    caption += "; the line is the running median"
+    caption += ", the bars the medians of each value" if any(len(each.levels) for each in shown) else ""
+    caption += f". {left_out} of {len(inputs)} parameters, which move it less, are not drawn." if left_out else "."
+    return Picture(f"scatter-{stem}", f"{output.name} over the parameters", caption, draw)
 
 
 def running_median(x: Array, y: Array) -> tuple[Array, Array]:
@@ -240,29 +249,45 @@ def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
         return None
     title = f"{output.name} over {' and '.join(each.name for each in inputs)}"
     if len(inputs) == 1:
-        with drawing(6.5, 3.6) as figure:
-            axes = figure.subplots()
-            _line(axes, inputs[0], output.values, inputs[0].values, style.BLUE, None)
-            _finish_line(axes, inputs[0], output)
-            return finish(figure, f"grid-{stem}", title, "A point per run.", worded=True)
+
+        def draw() -> Drawn:
+            with drawing(6.5, 3.6) as figure:
+                axes = figure.subplots()
+                _line(axes, inputs[0], output.values, inputs[0].values, style.BLUE, None)
+                _finish_line(axes, inputs[0], output)
+                return finish(figure, f"grid-{stem}", title, "A point per run.", worded=True)
+
+        return Picture(f"grid-{stem}", title, "A point per run.", draw)
     first, second = inputs
     few = [each for each in inputs if each.words and len(np.unique(each.values)) <= len(LINES)]
     if few:  # words have no order that a map could show: a line each
         lines = few[-1]
         along = second if lines is first else first
-        with drawing(7.5, 3.8) as figure:
-            axes = figure.subplots()
-            for colour, level in zip(LINES, np.unique(lines.values), strict=False):
-                rows = lines.values == level
-                _line(axes, along, output.values[rows], along.values[rows], colour, plain(lines.text(level)))
-            legend_above(axes)
-            _finish_line(axes, along, output)
-            return finish(figure, f"grid-{stem}", title, f"A line for each {lines.name}.", worded=True)
-    with drawing(7.5, 4.6) as figure:
-        _map(figure, figure.subplots(), first, second, output)
-        return finish(
-            figure, f"grid-{stem}", title, "Empty: the run failed, or the figure could not be determined.", worded=True
-        )
+
+        def draw() -> Drawn:
+            with drawing(7.5, 3.8) as figure:
+                axes = figure.subplots()
+                for colour, level in zip(LINES, np.unique(lines.values), strict=False):
+                    rows = lines.values == level
+                    _line(axes, along, output.values[rows], along.values[rows], colour, plain(lines.text(level)))
+                legend_above(axes)
+                _finish_line(axes, along, output)
+                return finish(figure, f"grid-{stem}", title, f"A line for each {lines.name}.", worded=True)
+
+        return Picture(f"grid-{stem}", title, f"A line for each {lines.name}.", draw)
+
+    def draw_map() -> Drawn:
+        with drawing(7.5, 4.6) as figure:
+            _map(figure, figure.subplots(), first, second, output)
+            return finish(
+                figure,
+                f"grid-{stem}",
+                title,
+                "Empty: the run failed, or the figure could not be determined.",
+                worded=True,
+            )
+
+    return Picture(f"grid-{stem}", title, "Empty: the run failed, or the figure could not be determined.", draw_map)
 
 
 def _line(axes: Axes, along: Input, values: Array, x: Array, colour: str, label: str | None) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from feedsim.report.formatting import plain
 from feedsim.report.run.report import HEADER, is_leading
-from feedsim.report.style import BLUE, GRID, VERMILLION, Picture, drawing, finish
+from feedsim.report.style import BLUE, GRID, VERMILLION, Drawn, Picture, drawing, finish
 from feedsim.report.sweep.account import NOTHING, Account, Measure, Output, measures
 from feedsim.report.sweep.figure_plots import grid_picture, of_account
 from feedsim.sweep.sensitivity import is_constant
@@ -67,13 +67,17 @@ def overview_picture(account: Account) -> Picture | None:
     ranks = sorted(range(len(account.inputs)), key=lambda k: -max(each.size(k) for each in found))
     columns = sorted(ranks[:MOST_COLUMNS])
     width = max(6.0, 2.2 + 0.62 * len(columns))
-    with drawing(width, max(2.4, 1.5 + 0.32 * len(found))) as figure:
-        _matrix(figure.subplots(), account, found, columns)
-        left_out = len(account.inputs) - len(columns)
-        more = f" {left_out} parameters that move no figure more are left out." if left_out else ""
-        return finish(
-            figure, "sensitivities", "Which parameter moves which figure", found[0].caption + more, worded=True
-        )
+
+    def draw() -> Drawn:
+        with drawing(width, max(2.4, 1.5 + 0.32 * len(found))) as figure:
+            _matrix(figure.subplots(), account, found, columns)
+            return finish(
+                figure, "sensitivities", "Which parameter moves which figure", found[0].caption + more, worded=True
+            )
+
+    left_out = len(account.inputs) - len(columns)
+    more = f" {left_out} parameters that move no figure more are left out." if left_out else ""
+    return Picture("sensitivities", "Which parameter moves which figure", found[0].caption + more, draw)
 
 
 def _matrix(axes: Axes, account: Account, found: Sequence[Measure], columns: Sequence[int]) -> None:

@@ -68,7 +68,9 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (REPORT, SUMMARY), inputs)
 
 
-def write(table: Runs, study: Study, design: Design, directory: Path | str) -> tuple[Path, ...]:
+def write(
+    table: Runs, study: Study, design: Design, directory: Path | str, *, drawn: Sequence[str] = ()
+) -> tuple[Path, ...]:
     """Write report.html, summary.json and figures/*.png beside the table; returns their paths.
 
     The table may be that of an unfinished study. The table's own files are left as they are. Raises OutputError.
@@ -77,7 +79,7 @@ def write(table: Runs, study: Study, design: Design, directory: Path | str) -> t
     machine = study.base.scenario.machine
     with remarked(f"{study.name}. {machine.name}. {machine.note}".strip(), REMARK_WIDTH, REMARK_LINES):
         whole, single = pictures_of(account)
-    return write_report(directory, report_of(account, whole, single), partial(summary, account), {})
+    return write_report(directory, report_of(account, whole, single), partial(summary, account), {}, drawn)
 
 
 def _record(directory: Path) -> dict[str, Any]:

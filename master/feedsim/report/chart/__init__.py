@@ -1,0 +1,22 @@
+"""Charts as data: what a page draws by itself, to be zoomed into and read with a cursor, and what it shows without.
+
+May use the report's palette. Start with model.py, which says what a chart is; embedded.py is how a page holds its
+curves, still.py draws it once for readers without script. The script that draws it in the page: template/*.js.
+"""
+
+from feedsim.report.chart.model import (
+    Axis,
+    Band,
+    Chart,
+    Curve,
+    Dash,
+    Grid,
+    Level,
+    Mark,
+    Panel,
+    Polar,
+    column_of,
+    spans,
+)
+
+__all__ = ["Axis", "Band", "Chart", "Curve", "Dash", "Grid", "Level", "Mark", "Panel", "Polar", "column_of", "spans"]

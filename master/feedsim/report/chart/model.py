@@ -1,0 +1,232 @@
+"""What a chart is: panels with curves over axes with units, polar panels of a circle, grids of cells.
+
+Values are in the units that are shown; nothing here draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.report.style import BLUE, MUTED, Array
+
+Dash = Literal["", "dashed", "dotted"]
+
+# Rows that a curve has in a page at most: each bin of 2 rows less keeps its least and its largest value.
+MOST_ROWS = 4000
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What is shown along one side of a panel.
+
+    Attributes:
+        label: quantity; unit: as it is printed, "" for a plain number.
+        log: logarithmic. span: shown at first; None: all of the curves.
+        names: of the values 0, 1, 2, ..., where they are no numbers.
+    """
+
+    label: str
+    unit: str = ""
+    log: bool = False
+    span: tuple[float, float] | None = None
+    names: Sequence[str] = ()
+
+    @property
+    def title(self) -> str:
+        """Quantity and unit."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A curve: (N,) abscissae and ordinates; where they are not ascending, a loop.
+
+    Attributes:
+        name: in the legend; curves of one name in a chart are shown and hidden together.
+        colour: of the palette. dots: points in place of a line; faint: paler than the others.
+        filled: the area down to zero, steps of a histogram.
+        most: rows that the page has at most.
+    """
+
+    name: str
+    x: Array
+    y: Array
+    colour: str = BLUE
+    dash: Dash = ""
+    width: float = 1.4
+    dots: bool = False
+    faint: bool = False
+    filled: bool = False
+    most: int = MOST_ROWS
+
+    @property
+    def ascending(self) -> bool:
+        """Whether it is a function of its abscissa."""
+        return bool(np.all(np.diff(self.x) >= 0))
+
+    def thinned(self) -> Curve:
+        """The same curve in at most ``most`` rows (and its ends), keeping the extremes of every bin."""
+        if len(self.x) <= self.most:
+            return self
+        rows = extremes(self.y, self.most) if self.ascending else _along(self.x, self.y, self.most)
+        return replace(self, x=self.x[rows], y=self.y[rows])
+
+
+@dataclass(frozen=True)
+class Level:
+    """A line across a panel, at an ordinate, or (upright) at an abscissa. ends: where it does not go all the way."""
+
+    at: float
+    text: str = ""
+    upright: bool = False
+    colour: str = MUTED
+    dash: Dash = "dashed"
+    ends: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Ground between two curves, or between two ordinates all the way (x is None)."""
+
+    name: str
+    low: Array | float
+    high: Array | float
+    x: Array | None = None
+    colour: str = BLUE
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A point with what it is; hollow: its inside is empty."""
+
+    x: float
+    y: float
+    text: str = ""
+    colour: str = BLUE
+    hollow: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Curves over one pair of axes.
+
+    Attributes:
+        linked: panels of one chart with the same word are zoomed together along their abscissae.
+        note: said in a corner. height: against the usual one.
+    """
+
+    title: str
+    x: Axis
+    y: Axis
+    curves: Sequence[Curve] = ()
+    levels: Sequence[Level] = ()
+    bands: Sequence[Band] = ()
+    marks: Sequence[Mark] = ()
+    linked: str = ""
+    note: str = ""
+    height: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Polar:
+    """Deviations of a radius [um] over the angle [rad], magnified about the programmed circle.
+
+    Attributes:
+        axes: of the plane. radius: [mm]. ring: distance of the rings at first [um]; rings: to either side.
+        curves: x angle, y deviation. marks: the same. sense: +-1 the way it is driven, 0 for both.
+    """
+
+    title: str
+    axes: tuple[str, str]
+    radius: float
+    ring: float
+    rings: int
+    curves: Sequence[Curve]
+    marks: Sequence[Mark] = ()
+    sense: int = 0
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Numbers in cells, coloured by their size; a number that is not finite leaves its cell empty.
+
+    span: the values of the palest and the deepest colour; about zero, signs have colours of their own.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[str]
+    values: Array
+    span: tuple[float, float]
+    digits: int = 2
+    heading: str = ""
+
+
+Part = Panel | Polar | Grid
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Panels side by side, row by row. widths: of the columns against one another; one column where it is empty."""
+
+    panels: Sequence[Part]
+    widths: Sequence[float] = (1.0,)
+
+    @property
+    def legend(self) -> dict[str, Curve]:
+        """A curve of each name, in their order."""
+        found: dict[str, Curve] = {}
+        for panel in self.panels:
+            if not isinstance(panel, Grid):
+                for curve in panel.curves:
+                    found.setdefault(curve.name, curve)
+        return {name: curve for name, curve in found.items() if name}
+
+    def rows(self) -> Iterator[Sequence[Part]]:
+        """The panels of each row."""
+        for k in range(0, len(self.panels), len(self.widths)):
+            yield self.panels[k : k + len(self.widths)]
+
+
+def column_of(panels: Sequence[Panel | None]) -> Chart | None:
+    """Panels below one another; None where there is none."""
+    there = [panel for panel in panels if panel is not None]
+    return Chart(there) if there else None
+
+
+def extremes(y: Array, most: int) -> NDArray[np.intp]:
+    """Rows that keep the least and the largest value of every bin, and both ends: most + 2 at most, ascending.
+
+    What is not finite counts as the least.
+    """
+    bins = max(1, most // 2)
+    width = -(-len(y) // bins)
+    whole = len(y) // width * width
+    finite = np.where(np.isfinite(y), y, -np.inf)
+    folded = finite[:whole].reshape(-1, width)
+    first = np.arange(len(folded)) * width
+    keep = [first + folded.argmin(axis=1), first + folded.argmax(axis=1), np.array([0, len(y) - 1])]
+    if whole < len(y):
+        rest = finite[whole:]
+        keep.append(whole + np.array([rest.argmin(), rest.argmax()]))
+    return np.unique(np.concatenate(keep))
+
+
+def _along(x: Array, y: Array, most: int) -> NDArray[np.intp]:
+    """Rows of a loop: the extremes of both coordinates in every bin, in their order."""
+    return np.unique(np.concatenate([extremes(x, most // 2), extremes(y, most // 2)]))
+
+
+def spans(values: Sequence[Array]) -> tuple[float, float] | None:
+    """Least and largest finite value; None without any."""
+    finite = [each[np.isfinite(each)] for each in values]
+    finite = [each for each in finite if len(each)]
+    if not finite:
+        return None
+    return float(min(each.min() for each in finite)), float(max(each.max() for each in finite))

@@ -1,0 +1,322 @@
+// Draws charts (feedsim.report.chart) as SVG: panels, polar panels, grids. Colours are the page's CSS variables, so that
+// one drawing serves light, dark and paper. chart_use.js has what a reader does with them.
+const SPACE = "http://www.w3.org/2000/svg";
+const EDGE = { left: 62, right: 14, top: 28, bottom: 44 };
+const HEIGHT = 235, NARROW = 640, GAP = 18, ROUND = 520;
+const DASHES = { dashed: "6 3", dotted: "2 3" };
+const FONT = 'system-ui, "Segoe UI", Arial, sans-serif';
+const RING_GAPS = { 1: 0.36, 2: 0.24 };
+
+function make(name, attributes = {}, parent = null, text = null) {
+  const found = document.createElementNS(SPACE, name);
+  for (const key in attributes) found.setAttribute(key, attributes[key]);
+  if (text !== null) found.textContent = text;
+  if (parent) parent.append(found);
+  return found;
+}
+
+const colour = name => `var(--${name})`;
+const number = (value, digits = 6) => Number.isFinite(value) ? written(Number(value.toPrecision(digits))) : "–";
+
+function written(value) {
+  const size = Math.abs(value);
+  return String(size && (size < 1e-4 || size >= 1e7) ? value.toExponential() : value).replaceAll("-", "−");
+}
+
+const unit_of = axis => axis.unit ? ` ${axis.unit}` : "";
+// Words over curves.
+const HALO = { "fill": "var(--ink)", "font-size": 11, "paint-order": "stroke", stroke: "var(--ground)", "stroke-width": 3, "stroke-linejoin": "round" };
+const label_of = axis => axis.unit ? `${axis.label} [${axis.unit}]` : axis.label;
+
+// A scale from values to pixels and back.
+function scale(low, high, first, last, log) {
+  const by = log ? Math.log10 : value => value;
+  const from = by(low), per = (last - first) / (by(high) - from || 1);
+  const to = value => first + (by(value) - from) * per;
+  to.back = pixel => log ? 10 ** (from + (pixel - first) / per) : from + (pixel - first) / per;
+  return to;
+}
+
+function step_of(rough) {
+  const decade = 10 ** Math.floor(Math.log10(rough));
+  return decade * [1, 2, 5, 10].find(each => each * decade >= rough * 0.999);
+}
+
+function ticks(axis, low, high, most) {
+  if (axis.names.length) {
+    const every = Math.ceil(axis.names.length / Math.max(1, most));
+    return axis.names.map((name, k) => ({ at: k, text: name })).filter((each, k) => k % every === 0 && k >= low && k <= high);
+  }
+  if (axis.log && high / low > 8) {
+    const found = [], decades = Math.log10(high / low), few = decades < 2.2, every = Math.ceil(decades / most);
+    for (let k = Math.floor(Math.log10(low)); k <= Math.log10(high); k++)
+      for (const part of [1, 2, 3, 4, 5, 6, 7, 8, 9]) {
+        const at = part * 10 ** k;
+        if (at >= low * 0.9999 && at <= high * 1.0001)
+          found.push({ at, text: (part === 1 && k % every === 0) || (few && (part === 2 || part === 5)) ? number(at) : "" });
+      }
+    return found;
+  }
+  const turns = axis.unit === "°" && high - low > 60;
+  const step = turns ? [15, 30, 45, 90, 180, 360, 720, 1440].find(each => (high - low) / each <= most) || 3600
+    : step_of((high - low) / most);
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push({ at: k * step, text: number(k * step) });
+  return found;
+}
+
+// First row whose abscissa is not below; x ascending.
+function row_at(x, value) {
+  let low = 0, high = x.length;
+  while (low < high) { const middle = (low + high) >> 1; if (x[middle] < value) low = middle + 1; else high = middle; }
+  return low;
+}
+
+function nearest(x, value) {
+  const k = row_at(x, value);
+  return k > 0 && (k === x.length || value - x[k - 1] <= x[k] - value) ? k - 1 : k;
+}
+
+// A curve as a path: of each column of pixels its extremes, where there are more rows than can be told apart.
+function path_of(x, y, across, up, range, columns) {
+  const parts = [];
+  let pen = "M";
+  const point = k => {
+    const a = across(x[k]), b = up(y[k]);
+    if (Number.isFinite(a) && Number.isFinite(b)) { parts.push(pen, a.toFixed(1), " ", b.toFixed(1)); pen = "L"; } else pen = "M";
+  };
+  if (!range) { for (let k = 0; k < x.length; k++) point(k); return parts.join(""); }
+  const begin = Math.max(0, row_at(x, range[0]) - 1), end = Math.min(x.length, row_at(x, range[1]) + 2);
+  if (end - begin < 4 * columns) { for (let k = begin; k < end; k++) point(k); return parts.join(""); }
+  for (let k = begin; k < end;) {
+    const column = Math.floor(across(x[k]));
+    let least = k, most = k, last = k;
+    for (; last < end && Math.floor(across(x[last])) === column; last++) {
+      if (y[last] < y[least]) least = last;
+      if (y[last] > y[most]) most = last;
+    }
+    for (const each of [...new Set([k, Math.min(least, most), Math.max(least, most), last - 1])]) point(each);
+    k = last;
+  }
+  return parts.join("");
+}
+
+const styled = curve => ({
+  fill: "none", stroke: colour(curve.colour), "stroke-width": curve.width, "stroke-linejoin": "round",
+  ...(curve.dash ? { "stroke-dasharray": DASHES[curve.dash] } : {}), ...(curve.faint ? { "stroke-opacity": 0.4 } : {}),
+});
+
+// Least and largest ordinate of the curves that are seen, with room about them.
+function range_of(panel, curves, values, span) {
+  let low = Infinity, high = -Infinity;
+  const seen = value => {
+    if (Number.isFinite(value) && (!panel.y.log || value > 0)) { low = Math.min(low, value); high = Math.max(high, value); }
+  };
+  for (const curve of curves) {
+    const x = values(curve.x), y = values(curve.y);
+    if (curve.filled) seen(0);
+    for (let k = 0; k < x.length; k++) if (x[k] >= span[0] && x[k] <= span[1]) seen(y[k]);
+  }
+  for (const mark of panel.marks) if (mark.x >= span[0] && mark.x <= span[1]) seen(mark.y);
+  if (low > high) return panel.y.span || (panel.y.log ? [0.1, 10] : [-1, 1]);
+  if (panel.y.log) return [low / 1.3, high * 1.3];
+  const room = 0.07 * (high - low) || 0.05 * Math.abs(high) || 1;
+  return [low - (low === 0 && curves.some(each => each.filled) ? 0 : room), high + room];
+}
+
+function whole_span(panel, values) {
+  if (panel.x.span) return panel.x.span;
+  let low = Infinity, high = -Infinity;
+  for (const curve of panel.curves) for (const each of values(curve.x))
+    if (Number.isFinite(each) && (!panel.x.log || each > 0)) { low = Math.min(low, each); high = Math.max(high, each); }
+  if (low > high) return [0, 1];
+  return high > low ? [low, high] : [low - 0.5, low + 0.5];
+}
+
+// One panel into box = {x, y, width, height}; returns its scales and ranges.
+function draw_panel(panel, box, parent, values, hidden, zoom, id) {
+  const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent);
+  const names_width = panel.y.names.reduce((most, each) => Math.max(most, 6.6 * each.length + 26), 0);
+  const left = Math.min(Math.max(EDGE.left, names_width), box.width * 0.45);
+  const inner = { x: left, y: EDGE.top, width: box.width - left - EDGE.right, height: box.height - EDGE.top - EDGE.bottom };
+  const shown = panel.curves.filter(each => !hidden.has(each.name));
+  const span = zoom.x || whole_span(panel, values);
+  const height = zoom.y || (!zoom.x && panel.y.span) || range_of(panel, shown, values, span);
+  const across = scale(span[0], span[1], inner.x, inner.x + inner.width, panel.x.log);
+  const up = scale(height[0], height[1], inner.y + inner.height, inner.y, panel.y.log);
+  const bottom = inner.y + inner.height, right = inner.x + inner.width;
+  make("text", { x: panel.y.names.length ? 0 : inner.x, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
+  const widest = panel.x.names.reduce((most, each) => Math.max(most, 7 * each.length + 14), 74);
+  for (const tick of ticks(panel.x, span[0], span[1], Math.max(2, Math.floor(inner.width / widest)))) {
+    const at = across(tick.at).toFixed(1);
+    make("line", { x1: at, x2: at, y1: inner.y, y2: bottom, stroke: colour("grid"), "stroke-width": tick.text ? 0.8 : 0.35 }, part);
+    if (tick.text) make("text", { x: at, y: bottom + 16, "text-anchor": "middle", fill: colour("ink") }, part, tick.text);
+  }
+  for (const tick of ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(inner.height / 34)))) {
+    const at = up(tick.at).toFixed(1);
+    make("line", { x1: inner.x, x2: right, y1: at, y2: at, stroke: colour("grid"), "stroke-width": tick.text ? 0.8 : 0.35 }, part);
+    if (tick.text) make("text", { x: inner.x - 6, y: +at + 4, "text-anchor": "end", fill: colour("ink") }, part, tick.text);
+  }
+  make("text", { x: inner.x + inner.width / 2, y: bottom + 34, "text-anchor": "middle", fill: colour("ink") }, part, label_of(panel.x));
+  if (!panel.y.names.length)
+    make("text", { transform: `translate(13 ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, label_of(panel.y));
+  const clip = make("clipPath", { id }, part);
+  make("rect", { x: inner.x, y: inner.y, width: inner.width, height: inner.height }, clip);
+  const field = make("g", { "clip-path": `url(#${id})` }, part);
+  const top = make("g", { "clip-path": `url(#${id})` });
+  for (const band of panel.bands) {
+    if (band.name && hidden.has(band.name)) continue;
+    const x = band.x === null ? span : values(band.x);
+    const edge = which => typeof band[which] === "number" ? Array(x.length).fill(band[which]) : values(band[which].array);
+    const low = edge("low"), high = edge("high"), points = [];
+    const inside = value => Math.min(Math.max(Number.isFinite(value) ? up(value) : bottom, -1e4), 1e4).toFixed(1);
+    for (let k = 0; k < x.length; k++) points.push(`${across(x[k]).toFixed(1)} ${inside(high[k])}`);
+    for (let k = x.length - 1; k >= 0; k--) points.push(`${across(x[k]).toFixed(1)} ${inside(low[k])}`);
+    make("path", { d: `M${points.join("L")}Z`, fill: colour(band.colour), "fill-opacity": 0.18 }, field);
+  }
+  for (const level of panel.levels) {
+    const look = { stroke: colour(level.colour), "stroke-width": 1, ...(level.dash ? { "stroke-dasharray": DASHES[level.dash] } : {}) };
+    const at = (level.upright ? across : up)(level.at);
+    if (!Number.isFinite(at)) continue;
+    const ends = level.ends ? level.ends.map(level.upright ? up : across) : level.upright ? [inner.y, bottom] : [inner.x, right];
+    make("line", level.upright ? { x1: at, x2: at, y1: ends[0], y2: ends[1], ...look } : { x1: ends[0], x2: ends[1], y1: at, y2: at, ...look }, field);
+    if (level.text) {
+      const far = at > right - 7 * level.text.length;
+      make("text", level.upright ? { x: at + (far ? -4 : 4), y: inner.y + 12, "text-anchor": far ? "end" : "start", ...HALO, fill: colour("muted") }
+        : { x: right - 4, y: at - 4, "text-anchor": "end", ...HALO, fill: colour("muted") }, top, level.text);
+    }
+  }
+  make("rect", { x: inner.x, y: inner.y, width: inner.width, height: inner.height, fill: "none", stroke: colour("muted"), "stroke-width": 0.8 }, part);
+  for (const curve of shown) {
+    const x = values(curve.x), y = values(curve.y);
+    let d = path_of(x, y, across, up, curve.ascending && !curve.filled && !curve.dots ? span : null, inner.width);
+    if (!d) continue;
+    if (curve.dots) make("path", { ...styled(curve), d: d.replace(/[LM]/g, "h0M").slice(2) + "h0", "stroke-width": 2 * curve.width, "stroke-linecap": "round" }, field);
+    else if (curve.filled) {
+      const zero = Math.min(bottom, up(panel.y.log ? height[0] : 0)).toFixed(1);
+      make("path", { d: `${d}V${zero}H${across(x[0]).toFixed(1)}Z`, fill: colour(curve.colour), "fill-opacity": 0.5 }, field);
+    } else make("path", { ...styled(curve), d }, field);
+  }
+  part.append(top);
+  const placed = []; // boxes of labels: one that would cover another moves up, or down where there is no room
+  for (const mark of panel.marks) {
+    const x = across(mark.x), y = up(mark.y);
+    if (!(x >= inner.x - 1 && x <= right + 1)) continue;
+    make("circle", { cx: x, cy: y, r: 3.6, fill: mark.hollow ? "none" : colour(mark.colour), stroke: colour(mark.colour), "stroke-width": 1.4 }, field);
+    if (mark.text) {
+      const wide = 6.3 * mark.text.length + 6, far = x > right - wide - 4, from = far ? x - 7 - wide : x + 7;
+      const covered = at => placed.some(([left, low]) => left < from + wide && from < left + placed.wide && Math.abs(low - at) < 13);
+      placed.wide = Math.max(placed.wide || 0, wide);
+      let at = Math.min(Math.max(y - 6, inner.y + 12), bottom - 4);
+      const places = [...Array(8)].flatMap((_, k) => [at - 13 * k, at + 13 * k]).filter(each => each >= inner.y + 11 && each <= bottom - 3);
+      at = places.find(each => !covered(each)) ?? at;
+      placed.push([from, at]);
+      make("text", { x: x + (far ? -7 : 7), y: at, "text-anchor": far ? "end" : "start", ...HALO }, field, mark.text);
+    }
+  }
+  panel.note.split("\n").reverse().forEach((line, k) => {
+    if (line) make("text", { x: inner.x + 8, y: bottom - 8 - 15 * k, ...HALO }, part, line);
+  });
+  return { panel, box, inner, across, up, span, height, shown, part };
+}
+
+// Deviations about the programmed circle. reach: deviation [um] of the outermost ring.
+function draw_polar(panel, box, parent, values, hidden, reach, id) {
+  const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent);
+  const gap = RING_GAPS[panel.rings] * panel.rings, outer = 1 + 1.16 * gap;
+  const half = Math.min(box.width, box.height - 24) / 2 - 20, centre = [box.width / 2, 24 + (box.height - 24) / 2];
+  const one = half / outer;
+  const radius = deviation => one * Math.max(0, Math.min(2 * outer, 1 + deviation / reach * gap));
+  const place = (angle, deviation) => [centre[0] + radius(deviation) * Math.cos(angle), centre[1] - radius(deviation) * Math.sin(angle)];
+  make("text", { x: 4, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
+  const step = step_of(reach / 2.4);
+  const ring = (deviation, look) => make("circle", { cx: centre[0], cy: centre[1], r: radius(deviation).toFixed(1), fill: "none", ...look }, part);
+  const count = Math.floor(reach / step + 1e-9);
+  for (let k = -count; k <= count; k++) if (k) ring(k * step, { stroke: colour("grid"), "stroke-width": 0.9 });
+  panel.axes.forEach((axis, k) => {
+    for (const sign of [1, -1]) {
+      const x = k ? 0 : sign, y = k ? -sign : 0;
+      make("line", { x1: centre[0], y1: centre[1], x2: centre[0] + half * x, y2: centre[1] + half * y, stroke: colour("grid"), "stroke-width": 0.9 }, part);
+      make("text", { x: centre[0] + (half + 11) * x, y: centre[1] + (half + 11) * y + 4, "text-anchor": "middle", "font-weight": 600, fill: colour("ink") }, part, axis + (sign > 0 ? "+" : "−"));
+    }
+  });
+  ring(0, { stroke: colour("muted"), "stroke-width": 1.1, "stroke-dasharray": "7 4" });
+  const words = make("g", { ...HALO, fill: colour("muted"), "font-size": 10.5 });
+  for (let k = -count; k <= count; k++) {
+    const at = radius(k * step) * Math.SQRT1_2;
+    make("text", { x: centre[0] + at, y: centre[1] - at + 4, "text-anchor": "middle" }, words, (k > 0 ? "+" : "") + number(k * step) + (k ? " µm" : ""));
+  }
+  const clip = make("clipPath", { id }, part);
+  make("circle", { cx: centre[0], cy: centre[1], r: half + 8 }, clip);
+  const field = make("g", { "clip-path": `url(#${id})` }, part);
+  part.append(words);
+  const shown = panel.curves.filter(each => !hidden.has(each.name));
+  for (const curve of shown) {
+    const angle = values(curve.x), deviation = values(curve.y), n = angle.length;
+    const points = Array.from(angle, (each, k) => place(each, deviation[k]).map(value => value.toFixed(1)).join(" "));
+    const ends = n ? Math.abs(deviation[n - 1] - deviation[0]) < 0.02 * reach : false;
+    make("path", { ...styled(curve), d: n ? `M${points.join("L")}${ends ? "Z" : ""}` : "" }, field);
+  }
+  for (const mark of panel.marks) {
+    const [x, y] = place(mark.x, mark.y), inside = one * (1 - 1.16 * RING_GAPS[panel.rings]);
+    const to = [centre[0] + inside * Math.cos(mark.x), centre[1] - inside * Math.sin(mark.x)];
+    make("circle", { cx: x, cy: y, r: 4, fill: colour(mark.colour) }, part);
+    if (!mark.text) continue;
+    make("line", { x1: x, y1: y, x2: to[0], y2: to[1], stroke: colour(mark.colour), "stroke-width": 0.9 }, part);
+    const side = Math.round(Math.cos(mark.x)), lower = Math.round(Math.sin(mark.x));
+    make("text", { x: to[0] - 3 * side, y: to[1] + 4 + 9 * lower, "text-anchor": ["start", "middle", "end"][side + 1], ...HALO }, part, mark.text);
+  }
+  panel.note.split("\n").forEach((line, k) => make("text", { x: centre[0], y: centre[1] - 0.3 * one + 14 * k, "text-anchor": "middle", fill: colour("muted"), "font-size": 11 }, part, line));
+  if (panel.sense) {
+    const arc = [50, 130].map(each => each * Math.PI / 180).sort((a, b) => panel.sense * (a - b)), r = 0.16 * one, low = centre[1] + 0.36 * one;
+    const [from, to] = arc.map(each => [centre[0] + r * Math.cos(each), low - r * Math.sin(each)]);
+    make("path", { d: `M${from.join(" ")}A${r} ${r} 0 0 ${panel.sense > 0 ? 0 : 1} ${to.join(" ")}`, fill: "none", stroke: colour("muted"), "stroke-width": 1.3 }, part);
+    const back = panel.sense;
+    make("path", { d: `M${to[0]} ${to[1]}l${7 * back} -1l${-2.5 * back} -5.5Z`, fill: colour("muted") }, part);
+  }
+  return { panel, box, centre, radius, place, reach, shown, part, half };
+}
+
+function draw_grid(panel, box, parent, values) {
+  const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent), cells = values(panel.values);
+  make("text", { x: 4, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
+  const left = grid_left(panel), top = grid_top(panel), columns = panel.columns.length;
+  const width = Math.min(64, (box.width - left - 8) / columns), height = 24, numbers = width >= 30;
+  const [low, high] = panel.span, about_zero = low < 0 && high > 0;
+  panel.columns.forEach((name, j) => make("text", { transform: `translate(${left + (j + 0.5) * width} ${top - 6}) rotate(-40)`, fill: colour("ink"), "font-size": 11 }, part, name));
+  panel.rows.forEach((name, i) => make("text", { x: left - 8, y: top + (i + 0.5) * height + 4, "text-anchor": "end", fill: colour("ink"), "font-size": 11 }, part, name));
+  panel.rows.forEach((row, i) => panel.columns.forEach((column, j) => {
+    const value = cells[i * columns + j], box = { x: left + j * width, y: top + i * height, width, height };
+    make("rect", { ...box, fill: "none", stroke: colour("grid"), "stroke-width": 0.6 }, part);
+    if (!Number.isFinite(value)) return;
+    const share = about_zero ? Math.abs(value) / Math.max(-low, high) : (value - low) / (high - low || 1);
+    const cell = make("rect", { ...box, fill: colour(about_zero && value < 0 ? "vermillion" : "blue"), "fill-opacity": (0.75 * Math.min(1, Math.max(0, share))).toFixed(3) }, part);
+    make("title", {}, cell, `${row}, ${column}: ${number(value)}`);
+    if (numbers) make("text", { x: box.x + width / 2, y: box.y + height / 2 + 4, "text-anchor": "middle", fill: colour("ink"), "font-size": 11 }, part, about_zero ? number(value, panel.digits) : number(value, panel.digits + 1));
+  }));
+  return { panel, part };
+}
+const grid_left = panel => Math.min(260, 16 + 6.4 * panel.rows.reduce((most, each) => Math.max(most, each.length), 0));
+const grid_top = panel => 36 + 4.3 * panel.columns.reduce((most, each) => Math.max(most, each.length), 0);
+
+// Where every panel goes: boxes, and the height of all.
+function placed(chart, width) {
+  const columns = width < NARROW ? [1] : chart.widths, total = columns.reduce((a, b) => a + b, 0), boxes = [];
+  let y = 4;
+  for (let k = 0; k < chart.panels.length; k += columns.length) {
+    const row = chart.panels.slice(k, k + columns.length);
+    const widths = columns.map(each => (width - GAP * (columns.length - 1)) * each / total);
+    const natural = row.map((panel, j) => panel.kind === "polar" ? Math.min(widths[j], ROUND) + 24
+      : panel.kind === "grid" ? grid_top(panel) + 24 * panel.rows.length + 12
+      : panel.y.names.length ? EDGE.top + EDGE.bottom + 26 * panel.y.names.length : HEIGHT * panel.height + EDGE.bottom);
+    const height = Math.max(...natural);
+    let x = 0;
+    row.forEach((panel, j) => {
+      const own = row.some(each => each.kind === "polar") && panel.kind === "xy" ? Math.min(height, 360) : height;
+      boxes.push({ x, y, width: widths[j], height: panel.y && panel.y.names.length ? natural[j] : own });
+      x += widths[j] + GAP;
+    });
+    y += height + 10;
+  }
+  return { boxes, height: y };
+}

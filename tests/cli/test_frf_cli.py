@@ -25,7 +25,7 @@ from feedsim.report.frf import report as report_module
 from feedsim.report.frf.bode_plots import curves_of, speed_controlled_pictures
 from feedsim.report.frf.report import report_of
 from feedsim.report.page import html
-from feedsim.report.style import Picture
+from feedsim.report.picture import Picture
 from feedsim.scenario import load_machine, load_subject
 from feedsim.structure import checked_modes
 from feedsim.trace.response import FrequencyResponse

@@ -64,7 +64,7 @@ def pages(browser: Any, runs: dict[str, tuple[FakeRun, Path]]) -> Iterator[dict[
         page.goto(file.as_uri())
         metrics = {each["name"]: each["value"] for each in session.send("Performance.getMetrics")["metrics"]}
         page.taken = metrics["TaskDuration"]
-        page.wait_for_function("!document.querySelector('.still')")
+        page.wait_for_selector(".still", state="detached")
         found[name] = page
     yield found
     for page in found.values():

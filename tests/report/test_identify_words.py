@@ -92,7 +92,7 @@ def test_whose_curve_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     found = identification()
     other = {**found.estimates, "F_C": replace(found.estimates["F_C"], value=1.5)}
     stage = stage_of(found)
-    stribeck_picture(found, stage)
+    assert stribeck_picture(found, stage).png
     assert not drawn
     assert "stage 1 alone" not in stribeck_title(found, stage) + tiles(found)
     apart = replace(found, prior=False, estimates=other)
@@ -101,7 +101,13 @@ def test_whose_curve_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "of stage 1 alone" in picture.caption
     assert "stage 1 alone, known to" in stribeck_title(apart, stage)
     assert "error of the curve (95 %), stage 1 alone" in tiles(apart)
+    assert picture.png
     assert [label for *_, label in drawn] == ["identified set, +", "identified set, −"]
+    assert picture.chart is not None
+    own = [curve for curve in picture.chart.panels[0].curves if curve.name.startswith("identified set")]
+    assert [curve.name for curve in own] == [label for *_, label in drawn]
+    for curve_of_page, (_, torque, _) in zip(own, drawn, strict=True):
+        np.testing.assert_array_equal(curve_of_page.y, torque)
     lean, viscous = TRUE["asymmetry"][0], TRUE["sigma_2"][0]
     for (speed, torque, _), sign in zip(drawn, (1, -1), strict=True):
         # a smaller F_C counts in full where F_S - F_C has decayed, and not at rest

@@ -98,7 +98,7 @@ def out(default: str) -> Option:
 
 def _kinds(text: str) -> tuple[str, ...]:
     """Kinds of files of figures."""
-    from feedsim.report.style import KINDS
+    from feedsim.report.picture import KINDS
 
     asked = names(text)
     if not asked or any(kind not in KINDS for kind in asked):

@@ -14,9 +14,9 @@ from feedsim.analysis import Figure
 from feedsim.cosim import Run
 from feedsim.findings import ranked, severity
 from feedsim.report import run as report
+from feedsim.report.picture import Picture
 from feedsim.report.run.report import HEADER, draw, is_leading
 from feedsim.report.run.signals import signals_picture
-from feedsim.report.style import Picture
 from feedsim.trace import Array
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 from feedsim.findings import ranked, severity
 from feedsim.report.formatting import minus, shown
-from feedsim.report.style import Picture
+from feedsim.report.picture import Picture
 
 if TYPE_CHECKING:
     from feedsim.analysis import Figure

@@ -16,8 +16,8 @@ from feedsim.errors import OutputError
 from feedsim.owned import claimed
 from feedsim.report.content import Report
 from feedsim.report.page import html
+from feedsim.report.picture import Picture
 from feedsim.report.provenance import sha256, to_json
-from feedsim.report.style import Picture
 
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
 SCRATCH = ".feedsim-"  # how the folder begins in which files are made

@@ -10,27 +10,21 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError, OutputError
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
     from matplotlib.text import Text
-
-    from feedsim.report.chart import Chart
 
 Array = NDArray[np.float64]
 
@@ -69,11 +63,8 @@ LARGEST_SVG = 400_000
 MOST_POINTS = 6000
 
 
-# Files that a drawing is written as.
-KINDS = ("png", "svg")
-
 # What stands in small print in every figure that is finished inside remarked().
-_REMARK: ContextVar[str] = ContextVar("remark", default="")
+REMARK: ContextVar[str] = ContextVar("remark", default="")
 
 
 @dataclass(frozen=True)
@@ -87,59 +78,6 @@ class Drawn:
     def is_light(self) -> bool:
         """Whether a page holds the SVG; one above LARGEST_SVG it holds as PNG."""
         return len(self.svg.encode()) <= LARGEST_SVG
-
-
-@dataclass(frozen=True, repr=False)
-class Picture:
-    """A figure: file stem, title, caption (plain text), and what draws it, once it is asked for.
-
-    chart: the same as data, which a page draws by itself; without one the page holds the drawing.
-    """
-
-    stem: str
-    title: str
-    caption: str
-    draw: Callable[[], Drawn]
-    chart: Chart | None = None
-    remark: str = field(default_factory=lambda: _REMARK.get())
-
-    @cached_property
-    def drawn(self) -> Drawn:
-        """The figure as matplotlib draws it."""
-        with _said(self.remark):
-            return self.draw()
-
-    @property
-    def png(self) -> bytes:
-        """The drawing as PNG."""
-        return self.drawn.png
-
-    @property
-    def svg(self) -> str:
-        """The drawing as text of an SVG."""
-        return self.drawn.svg
-
-    def save(self, path: str | Path) -> Path:
-        """Write it as .png or .svg, which the name tells; returns the path. Raises InputError, OutputError."""
-        path = Path(path)
-        kind = path.suffix.lower().removeprefix(".")
-        if kind not in KINDS:
-            raise InputError(f"{path}: a picture is saved as {' or '.join(f'.{each}' for each in KINDS)}")
-        try:
-            path.write_bytes(self.content(kind))
-        except OSError as error:
-            raise OutputError(f"{path} cannot be written: {error.strerror}") from None
-        return path
-
-    def content(self, kind: str) -> bytes:
-        """What a file of one of KINDS holds."""
-        return self.png if kind == "png" else _standalone(self.svg).encode()
-
-    def __repr__(self) -> str:
-        return f"Picture {self.stem!r}: {self.title}"
-
-    def _repr_png_(self) -> bytes:
-        return self.png
 
 
 @contextmanager
@@ -198,17 +136,18 @@ def remarked(text: str, width: int = 150, lines: int = 2) -> Iterator[None]:
 
     width, lines: characters of a line and lines that fit the narrowest figure; what is longer ends there.
     """
-    with _said("\n".join(textwrap.wrap(text, width)[:lines])):
+    with said("\n".join(textwrap.wrap(text, width)[:lines])):
         yield
 
 
 @contextmanager
-def _said(remark: str) -> Iterator[None]:
-    token = _REMARK.set(remark)
+def said(remark: str) -> Iterator[None]:
+    """Figures finished inside have this in small print."""
+    token = REMARK.set(remark)
     try:
         yield
     finally:
-        _REMARK.reset(token)
+        REMARK.reset(token)
 
 
 def finish(figure: Drawing, stem: str, title: str, caption: str = "", *, worded: bool = False) -> Drawn:
@@ -217,7 +156,7 @@ def finish(figure: Drawing, stem: str, title: str, caption: str = "", *, worded:
     worded: title and caption stand above the PNG, which travels alone; the page has them beside the SVG.
     """
     head, words_above = _head(figure, title, caption) if worded else (0.0, [])
-    if remark := _REMARK.get():
+    if remark := REMARK.get():
         words = figure.text(0.995, 0.995, remark, fontsize=6.5, color=MUTED, ha="right", va="top")
         words.set_in_layout(False)
         words.set_y(0.995 - head / figure.get_figheight())
@@ -284,17 +223,6 @@ def thinned(x: Array, *ys: Array) -> tuple[Array, ...]:
             keep |= {first + int(np.argmin(y[first:last])), first + int(np.argmax(y[first:last]))}
     rows = np.array(sorted(keep))
     return (x[rows], *(y[rows] for y in ys))
-
-
-def _standalone(svg: str) -> str:
-    """An SVG as a file of its own: colours as numbers, a size, a light ground."""
-    for name, colour, _ in PALETTE:
-        svg = svg.replace(f"var(--{name})", colour)
-    if match := re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg):
-        svg = svg.replace("<svg", f'<svg width="{match[1]}pt" height="{match[2]}pt"', 1)
-    end = svg.index(">") + 1
-    ground = f'<rect width="100%" height="100%" fill="{PAPER}"/>'
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{svg[:end]}{ground}{svg[end:]}\n'
 
 
 def _inline(svg: str, stem: str, title: str) -> str:

@@ -1,7 +1,8 @@
 """Charts as data: what a page draws by itself, to be zoomed into and read with a cursor, and what it shows without.
 
-May use the report's palette. Start with model.py, which says what a chart is; embedded.py is how a page holds its
-curves, still.py draws it once for readers without script. The script that draws it in the page: template/*.js.
+May use the report's palette. The script that draws charts in a page: template/*.js.
+Start with model.py, which says what a chart is; embedded.py is how a page holds its curves, still.py draws it once for
+readers without script.
 """
 
 from feedsim.report.chart.model import (

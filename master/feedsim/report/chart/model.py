@@ -17,7 +17,7 @@ from feedsim.report.style import BLUE, MUTED, Array
 Dash = Literal["", "dashed", "dotted"]
 
 # Rows that a curve has in a page at most: each bin of 2 rows less keeps its least and its largest value.
-MOST_ROWS = 4000
+MOST_ROWS = 3000
 
 
 @dataclass(frozen=True)

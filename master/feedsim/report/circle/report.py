@@ -18,12 +18,13 @@ from feedsim.analysis.circularity import axis_letters
 from feedsim.report import sections
 from feedsim.report.content import Bullets, Report, Section, Tile, tile_value
 from feedsim.report.formatting import typeset
+from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.run import circle_plots
 from feedsim.report.run.charts import circle_chart, turned
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
-from feedsim.report.style import BLUE, MUTED, VERMILLION, Array, Drawn, Picture, drawing, finish
+from feedsim.report.style import BLUE, MUTED, VERMILLION, Array, Drawn, drawing, finish
 
 FORMAT = 1
 SENSES = {1: ("counterclockwise", BLUE), -1: ("clockwise", VERMILLION)}

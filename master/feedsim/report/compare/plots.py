@@ -10,7 +10,8 @@ from feedsim.compare import Comparison, Curves, Variable, along, seconds
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Mark, Panel
 from feedsim.report.formatting import display_unit, minus, powers
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import BLUE, GREEN, MUTED, VERMILLION, Array, Drawn, Picture, drawing, finish, thinned
+from feedsim.report.picture import Picture
+from feedsim.report.style import BLUE, GREEN, MUTED, VERMILLION, Array, Drawn, drawing, finish, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,7 +22,7 @@ from feedsim.report.compare.plots import picture_of, reach_text
 from feedsim.report.content import Paragraph, Part, Report, Section, Span, Table, Text, Tile, code
 from feedsim.report.formatting import counted, display_unit, minus, powers
 from feedsim.report.page import html as as_html
-from feedsim.report.style import Picture
+from feedsim.report.picture import Picture
 from feedsim.trace.files import is_stream, written_whole
 
 MOST_PICTURES = 12

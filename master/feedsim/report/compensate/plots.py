@@ -14,9 +14,10 @@ from feedsim.analysis.compensation import Compensation, Variation
 from feedsim.report.chart import Axis, Chart, Curve, Level, Panel
 from feedsim.report.formatting import minus
 from feedsim.report.labels import heading, legend_above, reversed_note, torque_label
+from feedsim.report.picture import Picture
 from feedsim.report.run import circle_plots
 from feedsim.report.run.charts import circle_chart, turned
-from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, VERMILLION, Array, Drawn, Picture, drawing, finish, thinned
+from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, VERMILLION, Array, Drawn, drawing, finish, thinned
 
 BEFORE: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.3, "label": "without"}
 AFTER: dict[str, Any] = {"color": BLUE, "linewidth": 1.6, "label": "with compensation"}

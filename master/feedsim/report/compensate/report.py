@@ -14,12 +14,13 @@ from feedsim.analysis.compensation import Compensation, Quality
 from feedsim.report.compensate.plots import pictures_of
 from feedsim.report.content import Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import display_unit, minus, powers, typeset
+from feedsim.report.picture import Picture
 from feedsim.report.provenance import InputFile, axis_parameters, hashed, inputs_part, quantity
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.run.report import motions_section, provenance
 from feedsim.report.run.report import summary as summary_of_run
 from feedsim.report.sections import figures_footer, figures_section, files_table
-from feedsim.report.style import Picture, remarked
+from feedsim.report.style import remarked
 from feedsim.trace import write_csv
 
 RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE = "result.csv", "uncompensated.csv", "feedforward.csv", "compensation.csv"

@@ -36,7 +36,8 @@ from feedsim.report.frf.bode import (
 )
 from feedsim.report.frf.charts import Told, bode_chart, told_of_bandwidth, told_of_margins, told_of_pairs
 from feedsim.report.labels import keep_inside
-from feedsim.report.style import INK, Drawn, Picture, drawing, finish
+from feedsim.report.picture import Picture
+from feedsim.report.style import INK, Drawn, drawing, finish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

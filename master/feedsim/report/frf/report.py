@@ -17,9 +17,10 @@ from feedsim.report.content import Report, Section, Table, Text, Tile, code, til
 from feedsim.report.formatting import display_unit, minus, number, typeset
 from feedsim.report.frf.bode_plots import pictures_of
 from feedsim.report.frf.truncation_plots import truncation_pictures
+from feedsim.report.picture import Picture
 from feedsim.report.provenance import InputFile, figures_part, hashed, inputs_part, machine_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
-from feedsim.report.style import Picture, remarked
+from feedsim.report.style import remarked
 from feedsim.scenario import Subject
 from feedsim.trace.response_files import write_response
 

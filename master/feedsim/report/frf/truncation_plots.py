@@ -12,7 +12,8 @@ from feedsim.linear.plant import TOOL_DIRECTIONS
 from feedsim.report.frf.bode import Ordinate, frequency_axis
 from feedsim.report.frf.charts import truncation_chart
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILLION, Array, Drawn, Picture, drawing, finish
+from feedsim.report.picture import Picture
+from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILLION, Array, Drawn, drawing, finish
 from feedsim.structure import Modes
 from feedsim.trace.response import FrequencyResponse
 

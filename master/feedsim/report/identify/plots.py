@@ -17,7 +17,8 @@ from feedsim.report.identify.charts import SPEED, correlation_chart, loops_chart
 from feedsim.report.identify.quantities import symbol
 from feedsim.report.identify.stribeck_plots import plateaus_picture, stribeck_picture
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import Array, Drawn, Picture, drawing, finish, thinned
+from feedsim.report.picture import Picture
+from feedsim.report.style import Array, Drawn, drawing, finish, thinned
 
 MOST_LOOPS = 6
 COLUMNS = 3

@@ -14,10 +14,11 @@ from feedsim.report.formatting import counted, minus, powers, typeset
 from feedsim.report.identify import quantities
 from feedsim.report.identify.plots import describe, pictures_of
 from feedsim.report.identify.summary import open_loop_csv, plateaus_csv, residuals_csv, summary
+from feedsim.report.picture import Picture
 from feedsim.report.provenance import software
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.sections import provenance_section
-from feedsim.report.style import Picture, remarked
+from feedsim.report.style import remarked
 
 PLATEAUS, RESIDUALS, OPEN_LOOP = "plateaus.csv", "residuals.csv", "open_loop.csv"
 REMARK_WIDTH, REMARK_LINES = 100, 3  # fits the narrowest figure

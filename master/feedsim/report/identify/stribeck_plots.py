@@ -16,7 +16,8 @@ from feedsim.report.formatting import counted
 from feedsim.report.identify.charts import plateaus_chart, stribeck_chart
 from feedsim.report.identify.quantities import MM_PER_MIN, curve_error, is_curve, speeds_of
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import Array, Drawn, Picture, drawing, finish, thinned
+from feedsim.report.picture import Picture
+from feedsim.report.style import Array, Drawn, drawing, finish, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

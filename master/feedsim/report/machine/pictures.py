@@ -12,7 +12,8 @@ from feedsim.report.formatting import minus
 from feedsim.report.machine import projection
 from feedsim.report.machine.model import Model, Motion, extent, motion, rotor_disc, solids
 from feedsim.report.machine.projection import Faces, View
-from feedsim.report.style import INK, MUTED, PAPER, PNG_DPI, VERMILLION, Drawn, Picture, drawing, finish
+from feedsim.report.picture import Picture
+from feedsim.report.style import INK, MUTED, PAPER, PNG_DPI, VERMILLION, Drawn, drawing, finish
 from feedsim.structure.build import Built
 from feedsim.structure.geometry.outline import deflection, node_motion
 from feedsim.structure.info import MachineInfo

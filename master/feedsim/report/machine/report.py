@@ -13,10 +13,10 @@ from feedsim.report.machine.animation import mode_gif
 from feedsim.report.machine.model import model
 from feedsim.report.machine.pictures import mode_picture, mode_title, sheet_picture, structure_picture
 from feedsim.report.machine.record import MEANINGS, USUAL_EXCHANGE, exchange, moves, record
+from feedsim.report.picture import KINDS, Picture
 from feedsim.report.provenance import hashed
 from feedsim.report.results import FIGURES, REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.sections import provenance_section
-from feedsim.report.style import KINDS, Picture
 from feedsim.scenario.structure import Structure
 from feedsim.structure.info import MachineInfo
 

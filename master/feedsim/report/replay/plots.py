@@ -8,7 +8,8 @@ from dataclasses import replace
 from feedsim.replay.compare import TO_RPM, Channel, Comparison
 from feedsim.report.chart import Axis, Chart, Curve, Level, Panel
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import BLUE, MUTED, ORANGE, VERMILLION, Array, Drawn, Picture, drawing, finish, thinned
+from feedsim.report.picture import Picture
+from feedsim.report.style import BLUE, MUTED, ORANGE, VERMILLION, Array, Drawn, drawing, finish, thinned
 from feedsim.trace import Mark
 
 SHOWN = {"m": (1e6, "µm"), "rad/s": (TO_RPM, "rpm"), "N.m": (1.0, "N·m")}

@@ -18,8 +18,9 @@ from feedsim.report.labels import (
     place_beside_level,
     reversed_note,
 )
+from feedsim.report.picture import Picture
 from feedsim.report.run.charts import ZOOM_AFTER, ZOOM_BEFORE, positioning_chart, whole_run_chart
-from feedsim.report.style import Drawn, Picture, drawing, finish, thinned
+from feedsim.report.style import Drawn, drawing, finish, thinned
 from feedsim.trace import Trace, release
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ ZOOM_BEFORE, ZOOM_AFTER = 0.030, 0.400  # s about the end of the NC motion
 OF_AXES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 # What the whole run is shown by: signal, title, quantity, unit, factor from SI, whether a display sign turns it over.
 SIGNALS = (
-    ("x_a", "Position at the linear scale, from where the run begins", "position", "mm", 1e3, False),
+    ("x_a", "Position, from where the run begins", "position", "mm", 1e3, False),
     ("x_e", "Following error", "following error", "µm", 1e6, False),
     ("n_a", "Motor speed", "speed", "rad/s", 1.0, False),
     ("M_a", "Motor torque", "torque", "N·m", 1.0, True),

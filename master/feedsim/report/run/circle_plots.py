@@ -13,8 +13,9 @@ from feedsim.report import style
 from feedsim.report.chart import Polar
 from feedsim.report.formatting import minus
 from feedsim.report.labels import heading, legend_above, plain_box, reversed_note, torque_label
+from feedsim.report.picture import Picture
 from feedsim.report.run.charts import contour_chart, torque_chart
-from feedsim.report.style import Array, Drawn, Picture, drawing, finish, thinned
+from feedsim.report.style import Array, Drawn, drawing, finish, thinned
 from feedsim.trace import Trace
 
 if TYPE_CHECKING:

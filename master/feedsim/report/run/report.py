@@ -24,6 +24,7 @@ from feedsim.report import sections
 from feedsim.report.content import Report, Section, Table, Tile, tile_value
 from feedsim.report.formatting import duration, number, typeset
 from feedsim.report.partial import PARTIAL, Partial
+from feedsim.report.picture import Picture
 from feedsim.report.provenance import (
     figures_part,
     friction_origins,
@@ -39,7 +40,6 @@ from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
 from feedsim.report.run.pose import pose_part, pose_section
-from feedsim.report.style import Picture
 from feedsim.scenario import Level, Logging
 from feedsim.trace import Trace, write_csv
 from feedsim.units import show

@@ -5,8 +5,9 @@ from __future__ import annotations
 from feedsim.errors import InputError
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.formatting import display_unit
+from feedsim.report.picture import Picture
 from feedsim.report.run.charts import OF_AXES as COLOURS
-from feedsim.report.style import Drawn, Picture, drawing, finish, thinned
+from feedsim.report.style import Drawn, drawing, finish, thinned
 from feedsim.trace import Trace
 
 MOST = 12  # signals in a picture

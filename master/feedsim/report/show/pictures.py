@@ -13,6 +13,7 @@ from feedsim.errors import InputError
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
 from feedsim.report.formatting import plain
 from feedsim.report.labels import heading
+from feedsim.report.picture import Picture
 from feedsim.report.run import circle_plots
 from feedsim.report.run.charts import circle_chart, turned
 from feedsim.report.style import (
@@ -25,7 +26,6 @@ from feedsim.report.style import (
     VERMILLION,
     Array,
     Drawn,
-    Picture,
     drawing,
     finish,
     thinned,

@@ -10,7 +10,8 @@ import numpy as np
 from feedsim.report import style
 from feedsim.report.formatting import number, plain
 from feedsim.report.labels import heading, legend_above
-from feedsim.report.style import Array, Drawn, Picture, drawing, finish, thinned
+from feedsim.report.picture import Picture
+from feedsim.report.style import Array, Drawn, drawing, finish, thinned
 from feedsim.report.sweep.account import QUANTILES, RANK, TOTAL, Account, Input, Measure, Output
 
 if TYPE_CHECKING:

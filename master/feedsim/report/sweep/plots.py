@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from feedsim.report.formatting import plain
+from feedsim.report.picture import Picture
 from feedsim.report.run.report import HEADER, is_leading
-from feedsim.report.style import BLUE, GRID, VERMILLION, Drawn, Picture, drawing, finish
+from feedsim.report.style import BLUE, GRID, VERMILLION, Drawn, drawing, finish
 from feedsim.report.sweep.account import NOTHING, Account, Measure, Output, measures
 from feedsim.report.sweep.figure_plots import grid_picture, of_account
 from feedsim.sweep.sensitivity import is_constant

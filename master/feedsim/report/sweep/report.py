@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from feedsim.report.content import Paragraph, Part, Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import counted, minus, number
+from feedsim.report.picture import Picture
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.sections import parameters_section, provenance_section
-from feedsim.report.style import Array, Picture, remarked
+from feedsim.report.style import Array, remarked
 from feedsim.report.sweep.account import QUANTILES, Account, Input
 from feedsim.report.sweep.plots import drawn, pictures_of, varying
 from feedsim.report.sweep.summary import study_files, summary

@@ -266,7 +266,7 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
     const side = Math.round(Math.cos(mark.x)), lower = Math.round(Math.sin(mark.x));
     make("text", { x: to[0] - 3 * side, y: to[1] + 4 + 9 * lower, "text-anchor": ["start", "middle", "end"][side + 1], ...HALO }, part, mark.text);
   }
-  panel.note.split("\n").forEach((line, k) => make("text", { x: centre[0], y: centre[1] - 0.3 * one + 14 * k, "text-anchor": "middle", fill: colour("muted"), "font-size": 11 }, part, line));
+  if (half > 150) panel.note.split("\n").forEach((line, k) => make("text", { x: centre[0], y: centre[1] - 0.3 * one + 14 * k, "text-anchor": "middle", fill: colour("muted"), "font-size": 11 }, part, line));
   if (panel.sense) {
     const arc = [50, 130].map(each => each * Math.PI / 180).sort((a, b) => panel.sense * (a - b)), r = 0.16 * one, low = centre[1] + 0.36 * one;
     const [from, to] = arc.map(each => [centre[0] + r * Math.cos(each), low - r * Math.sin(each)]);

@@ -85,7 +85,7 @@ class Live {
   }
 
   draw(width = this.width || this.room.clientWidth || 960) {
-    this.width = width;
+    this.width = width = Math.max(width, 200);
     const { boxes, height } = placed(this.chart, width), title = this.figure.dataset.title;
     const svg = make("svg", { class: "chart", viewBox: `0 0 ${width} ${Math.ceil(height)}`, role: "group", "aria-roledescription": "chart", tabindex: "0",
       "aria-label": `${title}. ${[...this.names.keys()].join(", ")}. ${KEYS}`, "font-family": FONT, "font-size": 12 });
@@ -349,7 +349,7 @@ later(go_on);
 let frame = 0;
 addEventListener("resize", () => {
   cancelAnimationFrame(frame);
-  frame = requestAnimationFrame(() => { for (const live of lives) if (live.room.clientWidth !== live.width) live.draw(live.room.clientWidth); });
+  frame = requestAnimationFrame(() => { for (const live of lives) if (live.room.clientWidth !== live.width) live.draw(live.room.clientWidth || live.width); });
 });
 addEventListener("beforeprint", () => { while (waiting.length) begin(waiting.shift()); for (const live of lives) live.draw(720); });
 addEventListener("afterprint", () => { for (const live of lives) live.draw(live.room.clientWidth); });

@@ -1,0 +1,80 @@
+"""A figure of a report: what it shows as data, for pages, and what draws it, for print."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from feedsim.errors import InputError, OutputError
+from feedsim.report.chart import Chart
+from feedsim.report.style import PALETTE, PAPER, REMARK, Drawn, said
+
+# Files that a drawing is written as.
+KINDS = ("png", "svg")
+
+
+@dataclass(frozen=True, repr=False)
+class Picture:
+    """A figure: file stem, title, caption (plain text), and what draws it, once it is asked for.
+
+    chart: the same as data, which a page draws by itself; without one the page holds the drawing.
+    """
+
+    stem: str
+    title: str
+    caption: str
+    draw: Callable[[], Drawn]
+    chart: Chart | None = None
+    remark: str = field(default_factory=lambda: REMARK.get())
+
+    @cached_property
+    def drawn(self) -> Drawn:
+        """The figure as matplotlib draws it."""
+        with said(self.remark):
+            return self.draw()
+
+    @property
+    def png(self) -> bytes:
+        """The drawing as PNG."""
+        return self.drawn.png
+
+    @property
+    def svg(self) -> str:
+        """The drawing as text of an SVG."""
+        return self.drawn.svg
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as .png or .svg, which the name tells; returns the path. Raises InputError, OutputError."""
+        path = Path(path)
+        kind = path.suffix.lower().removeprefix(".")
+        if kind not in KINDS:
+            raise InputError(f"{path}: a picture is saved as {' or '.join(f'.{each}' for each in KINDS)}")
+        try:
+            path.write_bytes(self.content(kind))
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror}") from None
+        return path
+
+    def content(self, kind: str) -> bytes:
+        """What a file of one of KINDS holds."""
+        return self.png if kind == "png" else _standalone(self.svg).encode()
+
+    def __repr__(self) -> str:
+        return f"Picture {self.stem!r}: {self.title}"
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+
+def _standalone(svg: str) -> str:
+    """An SVG as a file of its own: colours as numbers, a size, a light ground."""
+    for name, colour, _ in PALETTE:
+        svg = svg.replace(f"var(--{name})", colour)
+    if match := re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg):
+        svg = svg.replace("<svg", f'<svg width="{match[1]}pt" height="{match[2]}pt"', 1)
+    end = svg.index(">") + 1
+    ground = f'<rect width="100%" height="100%" fill="{PAPER}"/>'
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{svg[:end]}{ground}{svg[end:]}\n'

@@ -84,14 +84,13 @@ ZIG_FLAGS = ("-fno-slp-vectorize",)
 
 
 def together(names: Sequence[str]) -> tuple[str, list[str]]:
-    """The C files `names` as one: its text, and those that stay by themselves, as they are several in one already.
+    """The C files `names` as one: its text, and those that stay by themselves: what is several in one already, and
+    files.c, as no names but its own go with Windows' headers, which it brings.
 
     A compiler then sees across files on every platform. Every operation is rounded as before.
     """
-    apart = sorted(name for name in names if name.endswith("_part.c"))
-    # files.c ahead: it brings Windows' own headers, which do not bear our macros.
-    ordered = sorted(set(names) - set(apart), key=lambda name: (name != "files.c", name))
-    return "".join(f'#include "{name}"\n' for name in ordered), apart
+    apart = sorted(name for name in names if name == "files.c" or name.endswith("_part.c"))
+    return "".join(f'#include "{name}"\n' for name in sorted(set(names) - set(apart))), apart
 
 
 def run(command: Sequence[str], directory: Path) -> str:

@@ -223,12 +223,7 @@ static bool step(Unit *unit, double t, double h) {
     const double end = t + h;
     double t_k = start_time + (double)x->instant * p->T_c;
     if (end - t_k > INSTANTS_MOST * p->T_c) {
-        char text[3][NUMBER_TEXT_SIZE];
-        return unit_fail(unit,
-                         "the step would hold %s sample instants, T_c = %s s apart; allowed are at most %.0e, which is "
-                         "a step of %s s",
-                         number_text(text[0], ceil((end - t_k) / p->T_c)), number_text(text[1], p->T_c), INSTANTS_MOST,
-                         number_text(text[2], INSTANTS_MOST * p->T_c));
+        return instants_too_many(unit, (end - t_k) / p->T_c, p->T_c);
     }
     const double last = end - instants_margin(t, h, p->T_c);
     while (t_k < last) {

@@ -4,7 +4,11 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
+
+#include "numbers.h"
+#include "unit.h"
 
 /* An importer's sum of steps runs off the grid: adding 125 us ten million times ends 1.6e-3 cycles late. An instant
  * that lies so little ahead of the end of a step belongs to the next one, as it was meant; reading the inputs a
@@ -31,6 +35,16 @@ static inline double instants_margin(double t, double h, double T_c) {
     const double part = INSTANTS_DRIFT * (T_c < h ? T_c : h), grain = INSTANTS_GRAIN * (fabs(t) + h);
     const double drift = part > grain ? part : grain;
     return drift < 0.5 * h ? drift : 0.5 * h; /* steps of a few grains */
+}
+
+/* Refuses a step that would hold `count` instants, T_c apart; false, with the reason logged. */
+static inline bool instants_too_many(Unit *unit, double count, double T_c) {
+    char text[3][NUMBER_TEXT_SIZE];
+    return unit_fail(unit,
+                     "the step would hold %s sample instants, T_c = %s s apart; allowed are at most %.0e, which is a "
+                     "step of %s s",
+                     number_text(text[0], ceil(count)), number_text(text[1], T_c), INSTANTS_MOST,
+                     number_text(text[2], INSTANTS_MOST * T_c));
 }
 
 /* Share [1] of the cycle, the last one begun, that lies behind where its end, t_k, is `ahead` [s] of the step's. */

@@ -178,20 +178,23 @@ static bool step_plant(const Exchange *x) {
 
 /* What friction learns of the speed at its contact. */
 static void tell_speed(const Exchange *x) {
-    for (size_t i = 0; i < x->machine->axes; i++) {
-        const double n_end = unit_axis(x->unit, i)->plant_n_fr;
-        const double slope = (n_end - x->n_start[i]) / x->h;
-        x->n[i] = x->scheme->speed == SPEED_AT_END ? n_end : x->n_start[i];
-        x->n_slope[i] = x->scheme->speed == SPEED_WITHIN         ? slope
-                        : x->scheme->speed == SPEED_EXTRAPOLATED ? x->axes[i].n_slope
-                                                                 : 0;
-        x->axes[i].n_slope = slope;
+    const size_t axes = x->machine->axes;
+    const Speed speed = x->scheme->speed;
+    for (size_t i = 0; i < axes; i++) {
+        const double n_end = unit_axis(x->unit, i)->plant_n_fr, n_start = x->n_start[i];
+        const double slope = (n_end - n_start) / x->h;
+        double *last = &x->axes[i].n_slope;
+        x->n[i] = speed == SPEED_AT_END ? n_end : n_start;
+        x->n_slope[i] = speed == SPEED_WITHIN ? slope : speed == SPEED_EXTRAPOLATED ? *last : 0;
+        *last = slope;
     }
 }
 
 static bool step_friction(const Exchange *x) {
-    for (size_t i = 0; unit_scalars(x->unit)->coupling_friction && i < x->machine->axes; i++) {
-        Part *contact = &x->machine->contacts[i];
+    const size_t axes = unit_scalars(x->unit)->coupling_friction ? x->machine->axes : 0;
+    const bool ramp = x->scheme->friction_ramp;
+    Part *contact = x->machine->contacts;
+    for (size_t i = 0; i < axes; i++, contact++) {
         AxisBlock *axis = unit_axis(x->unit, i);
         axis->friction_n_fr = x->n[i];
         contact->slopes[AXIS_VR_friction_n_fr - FRICTION_FIRST] = x->n_slope[i];
@@ -199,7 +202,7 @@ static bool step_friction(const Exchange *x) {
             return false;
         }
         x->axes[i].M_fr = axis->friction_M_fr;
-        if (x->scheme->friction_ramp) {
+        if (ramp) {
             x->axes[i].M_fr_slope = friction_part.output_derivative(contact, AXIS_VR_friction_M_fr - FRICTION_FIRST);
         }
     }

@@ -151,16 +151,6 @@ static void machine_show_late(Unit *unit) {
 /* --- steps ---------------------------------------------------------------------------------------------------------
  */
 
-static bool too_long(Unit *unit, const Machine *machine, double cycles) {
-    char text[3][NUMBER_TEXT_SIZE];
-    return unit_fail(
-        unit,
-        "the step would hold %s control cycles, T_c = %s s each; allowed are at most %.0e, which is a step "
-        "of %s s",
-        number_text(text[0], ceil(cycles)), number_text(text[1], machine->T_c), INSTANTS_MOST,
-        number_text(text[2], INSTANTS_MOST * machine->T_c));
-}
-
 /* Steps longer than the position cycle, and nobody told how the setpoints go on: the drives see stairs. */
 static void warn_of_held(Unit *unit, Machine *machine, double h) {
     const double T_pos = unit_axis(unit, 0)->drive_T_pos;
@@ -225,7 +215,7 @@ static bool machine_step(Unit *unit, double t, double h) {
     const double last = end - instants_margin(t, h, T_c);
     double t_k = start_time + (double)head->cycle * T_c;
     if (end - t_k > INSTANTS_MOST * T_c) {
-        return too_long(unit, machine, (end - t_k) / T_c);
+        return instants_too_many(unit, (end - t_k) / T_c, T_c);
     }
     machine_bind(unit, true);
     unit_leave_late(unit); /* ahead: where a cycle fails they are of the state that it has left, shown before or not */

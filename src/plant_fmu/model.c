@@ -191,14 +191,15 @@ static bool plant_step(Unit *unit, double t, double h) {
     double *q_end = end + ports, *v_end = q_end + size;
     plant_gather(unit, h, plant->u, plant->du);
     size_t active = plant->axes; /* mostly, no force is on tool and slides: nothing to add then */
+    const double *u = plant->u, *du = plant->du;
     for (size_t i = 0; i < ports; i++) {
-        end[i] = plant->u[i] + plant->du[i];
-        if (i >= active && (plant->u[i] < 0 || plant->u[i] > 0 || plant->du[i] < 0 || plant->du[i] > 0)) {
-            active = i + 1;
-        }
+        end[i] = u[i] + du[i];
+    }
+    for (size_t i = active; i < ports; i++) {
+        active = u[i] != 0 || du[i] != 0 ? i + 1 : active;
     }
     modal_prepare(modal, h);
-    modal_advance(modal, active, plant->u, plant->du, state + ports, state + ports + size, q_end, v_end);
+    modal_advance(modal, active, u, du, state + ports, state + ports + size, q_end, v_end);
     if (!plant_measure(plant, modal, q_end, v_end, plant->y) ||
         (plant->cells > 1 && !plant_follow(unit, plant, q_end, v_end))) {
         return unit_fail(unit, "an output would be no finite number at the end of the step");

@@ -10,6 +10,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
     calloc,
@@ -350,6 +351,15 @@ def test_held_setpoints_at_long_steps_are_told(z_move: Packed, tmp_path: Path) -
     assert "steps of 0.01" in said[0]
     assert "position cycle, 0.001 s" in said[0]
     unit.close()
+
+
+def test_a_step_of_more_cycles_than_anybody_means_is_refused(z_move: Packed, tmp_path: Path) -> None:
+    said: list[str] = []
+    unit = Unit(z_move, tmp_path, said)
+    with pytest.raises(FMICallException):
+        unit.step_to(2e5)
+    unit.slave.freeInstance()
+    assert "1600000000 sample instants, T_c = 0.000125 s apart; allowed are at most 1e+09" in said[0]
 
 
 def test_what_cannot_be_packed_leaves_no_file(tmp_path: Path, fmus: Path, z_move: Packed) -> None:

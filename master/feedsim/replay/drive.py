@@ -31,7 +31,7 @@ from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_de
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
-from feedsim.replay.tuning import Problem, Rows, together
+from feedsim.replay.tuning import BOUNDS, Problem, Rows, together
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
 from feedsim.trace.trace import Array
@@ -121,9 +121,12 @@ def identify_drive(
     values = start_of(machine, each.axis) | dict(start)
     if speed is not None and speed.K_v > 0:
         values["K_v"] = speed.K_v
+    if (weight := feedforward_of(records)) is not None:
+        values["k_ffw"] = weight
     total = taps.delay if taps is not None and exact_delay else None
-    if total is not None:
-        values["T_sym"] = min(values["T_sym"], total)
+    if taps is not None:
+        values["T_sym"] = min(values["T_sym"], taps.delay)
+        values["T_dyn"] = taps.delay - values["T_sym"]
     problem = Problem(
         machine, each, Replay(machine, {each.axis: each}, fmus=fmus), values, total, J,
         {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0},
@@ -183,6 +186,25 @@ def _told(of: Callable[[Sequence[Record]], Told], records: Sequence[Record]) -> 
         return of(records)
     except InputError:
         return None
+
+
+def feedforward_of(records: Sequence[Record]) -> float | None:
+    """Weight of the speed feedforward to begin with: n_s = K_v x_e + k_ffw n_ffw + n_0 by least squares, where the
+    record has all of these. Samples of the setpoint in place of x_e would be a feedforward of their own."""
+    whole = [
+        (each.speed_setpoint, each.deviation, each.feedforward)
+        for each in records
+        if each.speed_setpoint is not None and each.deviation is not None and each.feedforward is not None
+    ]
+    if not whole:
+        return None
+    n_s, x_e, n_ffw = (np.concatenate(signals) for signals in zip(*whole, strict=True))
+    columns = np.column_stack([x_e, n_ffw, np.ones_like(n_s)])
+    scale = np.linalg.norm(columns, axis=0) + 1e-300
+    found, _, rank, _ = np.linalg.lstsq(columns / scale, n_s, rcond=1e-9)
+    weight = float(found[1] / scale[1])
+    low, high = BOUNDS["k_ffw"]
+    return min(max(weight, low), high) if rank == columns.shape[1] else None
 
 
 def start_of(machine: Machine, axis: str) -> dict[str, float]:

@@ -94,7 +94,16 @@ COMMANDS = {
     "help": ("`feedsim --help`", [*FEEDSIM, "--help"]),
     "validate": ("`feedsim validate scenarios/xz_circle.yaml`", [*FEEDSIM, "validate", str(CIRCLE)]),
     "run": ("`feedsim run scenarios/xz_circle.yaml`", [*FEEDSIM, "run", str(CIRCLE), "--quiet", "--out"]),
+    "drawn": (
+        "the same with `--figures png,svg`",
+        [*FEEDSIM, "run", str(CIRCLE), "--quiet", "--figures", "png,svg", "--out"],
+    ),
+    "frf": (
+        "`feedsim frf scenarios/xz_circle.yaml --no-measure`",
+        [*FEEDSIM, "frf", str(CIRCLE), "--no-measure", "--quiet", "--out"],
+    ),
 }
+WRITING = ("run", "drawn", "frf")  # which take a folder for what they write
 FILES = {"circle": "X-Z circle", "short": "move of 1 mm"}  # whose parts are told
 
 
@@ -106,7 +115,7 @@ def main(words: Sequence[str] | None = None) -> int:
         short = Path(folder) / "short.yaml"
         short.write_text(SHORT, encoding="utf-8")
         contestants = [
-            Contestant(name, waited([sys.executable, *words, *([f"{folder}/out"] if each == "run" else [])]))
+            Contestant(name, waited([sys.executable, *words, *([f"{folder}/{each}"] if each in WRITING else [])]))
             for each, (name, words) in COMMANDS.items()
             if each in bench.only
         ]

@@ -202,7 +202,22 @@ def _errors_picture(compensation: Compensation) -> Picture:
         "Dotted: without the error. Without compensation G is "
         f"{compensation.figures['before.G'].value:.3g} µm."
     )
-    return Picture("compensation-errors", title, caption, draw)
+    error, G = _by_change(by_delay, compensation.figures["after.G"].value)
+    without = Level(compensation.figures["after.G"].value, upright=True, dash="dotted")
+    rows = {name: float(i) for i, name in enumerate(reversed(names))}
+    curves = []
+    for offset, low, colour in ((0.19, True, VERMILLION), (-0.19, False, BLUE)):
+        chosen = [each for each in others if (each.change < 0) == low]
+        x = np.array([value for each in chosen for value in (0.0, each.quality.G * 1e6, math.nan)])
+        y = np.array([value for each in chosen for value in (*(2 * [rows[each.what] + offset]), math.nan)])
+        share = next((each.change for each in chosen), 0.0)
+        curves.append(Curve(minus(f"{share:+.3g} %"), x, y, colour, width=8.0))
+    axis = Axis("", names=list(rows), span=(-0.6, len(rows) - 0.4))
+    G_axis = Axis("circular deviation G", "µm")
+    panels = [Panel("Delay", Axis("error of the delay", "ms"), G_axis, [Curve("", np.array(error), np.array(G), BLUE)])]
+    if others:
+        panels.append(Panel("Parameters", G_axis, axis, curves, [without]))
+    return Picture("compensation-errors", title, caption, draw, Chart(panels, (1.0,) * len(panels)))
 
 
 def _by_change(variations: Sequence[Variation], without_error: float) -> tuple[list[float], list[float]]:

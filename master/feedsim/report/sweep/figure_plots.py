@@ -13,6 +13,7 @@ from feedsim.report.labels import heading, legend_above
 from feedsim.report.picture import Picture
 from feedsim.report.style import Array, Drawn, drawing, finish, thinned
 from feedsim.report.sweep.account import QUANTILES, RANK, TOTAL, Account, Input, Measure, Output
+from feedsim.report.sweep.charts import distribution_chart, lines_chart, map_chart, scatter_chart, scatter_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +57,8 @@ def distribution_picture(
     caption += "; " if bars else "."
     if bars:
         caption += _right(measure, len(inputs) - bars)
-    return Picture(f"distribution-{stem}", f"Distribution of {output.name}", caption, draw)
+    chart = distribution_chart(output, _edges(output.known), inputs, measure, telling, exceedance)
+    return Picture(f"distribution-{stem}", f"Distribution of {output.name}", caption, draw, chart)
 
 
 def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, stem: str) -> Picture | None:
@@ -85,7 +87,17 @@ def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, s
     caption += "; the line is the running median"
     caption += ", the bars the medians of each value" if any(len(each.levels) for each in shown) else ""
     caption += f". {left_out} of {len(inputs)} parameters, which move it less, are not drawn." if left_out else "."
-    return Picture(f"scatter-{stem}", f"{output.name} over the parameters", caption, draw)
+    known = np.isfinite(output.sample)
+    panels = [
+        scatter_panel(output, each, running_median(each.sample[known], output.sample[known]), _beside(int(known.sum())))
+        for each in shown
+    ]
+    return Picture(f"scatter-{stem}", f"{output.name} over the parameters", caption, draw, scatter_chart(panels))
+
+
+def _beside(count: int) -> Array:
+    """How far points stand beside their level, spread evenly."""
+    return np.asarray(0.5 * ((np.arange(count) * GOLDEN) % 1 - 0.5))
 
 
 def running_median(x: Array, y: Array) -> tuple[Array, Array]:
@@ -206,7 +218,7 @@ def _panel(axes: Axes, output: Output, each: Input) -> None:
     x, y = each.sample[known], output.sample[known]
     without = each.sample[~known]  # failed, or not determined
     if len(each.levels):
-        without = np.searchsorted(each.levels, without) + 0.5 * ((np.arange(len(without)) * GOLDEN) % 1 - 0.5)
+        without = np.searchsorted(each.levels, without) + _beside(len(without))
     axes.plot(
         without, np.full(len(without), 0.02), "x", markersize=4, markeredgewidth=0.9, color=style.VERMILLION,
         transform=axes.get_xaxis_transform(), rasterized=len(without) > VECTORS,
@@ -216,7 +228,7 @@ def _panel(axes: Axes, output: Output, each: Input) -> None:
     look: dict[str, Any] = {"s": size, "alpha": alpha, "color": style.BLUE, "linewidths": 0, "rasterized": many}
     if len(each.levels):
         at = np.searchsorted(each.levels, x)
-        beside = 0.5 * ((np.arange(len(x)) * GOLDEN) % 1 - 0.5)
+        beside = _beside(len(x))
         axes.scatter(at + beside, y, **look)
         for k in range(len(each.levels)):
             if np.any(at == k):
@@ -258,7 +270,8 @@ def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
                 _finish_line(axes, inputs[0], output)
                 return finish(figure, f"grid-{stem}", title, "A point per run.", worded=True)
 
-        return Picture(f"grid-{stem}", title, "A point per run.", draw)
+        chart = lines_chart(output, inputs[0], [("", inputs[0].values, output.values, style.BLUE)])
+        return Picture(f"grid-{stem}", title, "A point per run.", draw, chart)
     first, second = inputs
     few = [each for each in inputs if each.words and len(np.unique(each.values)) <= len(LINES)]
     if few:  # words have no order that a map could show: a line each
@@ -275,7 +288,12 @@ def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
                 _finish_line(axes, along, output)
                 return finish(figure, f"grid-{stem}", title, f"A line for each {lines.name}.", worded=True)
 
-        return Picture(f"grid-{stem}", title, f"A line for each {lines.name}.", draw)
+        own = [
+            (lines.text(level), along.values[lines.values == level], output.values[lines.values == level], colour)
+            for colour, level in zip(LINES, np.unique(lines.values), strict=False)
+        ]
+        chart = lines_chart(output, along, own)
+        return Picture(f"grid-{stem}", title, f"A line for each {lines.name}.", draw, chart)
 
     def draw_map() -> Drawn:
         with drawing(7.5, 4.6) as figure:
@@ -288,7 +306,8 @@ def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
                 worded=True,
             )
 
-    return Picture(f"grid-{stem}", title, "Empty: the run failed, or the figure could not be determined.", draw_map)
+    empty = "Empty: the run failed, or the figure could not be determined."
+    return Picture(f"grid-{stem}", title, empty, draw_map, map_chart(output, first, second))
 
 
 def _line(axes: Axes, along: Input, values: Array, x: Array, colour: str, label: str | None) -> None:

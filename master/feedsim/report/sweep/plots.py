@@ -12,6 +12,7 @@ from feedsim.report.picture import Picture
 from feedsim.report.run.report import HEADER, is_leading
 from feedsim.report.style import BLUE, GRID, VERMILLION, Drawn, drawing, finish
 from feedsim.report.sweep.account import NOTHING, Account, Measure, Output, measures
+from feedsim.report.sweep.charts import matrix_chart
 from feedsim.report.sweep.figure_plots import grid_picture, of_account
 from feedsim.sweep.sensitivity import is_constant
 
@@ -78,7 +79,8 @@ def overview_picture(account: Account) -> Picture | None:
 
     left_out = len(account.inputs) - len(columns)
     more = f" {left_out} parameters that move no figure more are left out." if left_out else ""
-    return Picture("sensitivities", "Which parameter moves which figure", found[0].caption + more, draw)
+    chart = matrix_chart([each.name for each in account.inputs], found, columns)
+    return Picture("sensitivities", "Which parameter moves which figure", found[0].caption + more, draw, chart)
 
 
 def _matrix(axes: Axes, account: Account, found: Sequence[Measure], columns: Sequence[int]) -> None:

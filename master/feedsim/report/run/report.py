@@ -63,6 +63,7 @@ TILES = {
     "E": "systematic deviation E",
     "M": "range of the mean deviations M",
 }
+OF_REVERSALS = {"peak": "reversal peak", "glitch": "quadrant glitch"}  # of an axis: peak_X
 MOST_MOTIONS = 200
 LINE = ("overshoot", "settling_time", "peak_torque", "G", "A", "R", "B")
 HEADER = (*LINE, "duration", "ringing_frequency", "plateau_torque", "rest_torque", "F_max", "F_min", "mean", "E", "M")
@@ -170,9 +171,8 @@ def answers(causes: Mapping[str, Diagnosis]) -> list[str]:
 def tile(name: str, figure: Figure) -> Tile:
     """A figure with its name in words."""
     prefix, _, key = name.partition(".")
-    label = f"reversal peak, {key[5:]} reverses" if key.startswith("peak_") else TILES.get(key, key)
-    if key.startswith("glitch_"):
-        label = f"quadrant glitch, {key[7:]} reverses"
+    what, _, axis = key.partition("_")
+    label = TILES.get(key, f"{OF_REVERSALS[what]}, {axis} reverses" if what in OF_REVERSALS and axis else key)
     return Tile(tile_value(figure), f"{prefix.replace('#', ' no. ')}: {label}", typeset(figure.meaning))
 
 

@@ -14,6 +14,7 @@ from feedsim.cosim.loads import _random
 from feedsim.errors import InputError
 from feedsim.motions.positioning_cycle import Visits
 from feedsim.nc import plan
+from feedsim.report.run.report import draw, report_of
 from feedsim.scenario import Scenario, load
 from feedsim.scenario.loads import TorqueNoise
 
@@ -149,3 +150,22 @@ def test_a_load_at_random_has_its_size_and_its_corner() -> None:
     assert correlation == pytest.approx(np.exp(-2 * np.pi * 5 * 0.03), abs=0.03)
     other = _random(noise.model_copy(update={"seed": 3}), 3600.0)[1]
     assert abs(np.corrcoef(values, other)[0, 1]) < 0.02
+
+
+def test_the_report_has_the_sheet(tmp_path: Path, fmus: Path) -> None:
+    """Every target has its row, the picture every reading, within what is shown at first."""
+    found = run(scenario(tmp_path), fmus=fmus)
+    figures = evaluate(found)
+    report = report_of(found, figures, draw(found, figures))
+    (sheet_of_scale, sheet_of_tool) = (
+        part for part in report.main if getattr(part, "anchor", "").startswith("accuracy-Z")
+    )
+    for section in (sheet_of_scale, sheet_of_tool):
+        (table,) = section.parts  # type: ignore[union-attr]
+        assert [row[0] for row in table.rows] == ["99", "101"]  # type: ignore[union-attr]
+    picture = next(part for part in report.main if getattr(part, "stem", "") == "accuracy-Z")
+    (panel,) = picture.chart.panels  # type: ignore[union-attr]
+    readings = [curve for curve in panel.curves if curve.dots]
+    assert [len(curve.x) for curve in readings] == [6, 6]
+    low, high = panel.y.span
+    assert all(low <= value <= high for curve in readings for value in curve.y)

@@ -35,7 +35,7 @@ from feedsim.report.provenance import (
     software,
 )
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
-from feedsim.report.run.accuracy import accuracy_section
+from feedsim.report.run.accuracy import accuracy_picture, accuracy_section
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
@@ -198,6 +198,8 @@ def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
             pictures.append(contour_picture(run.trace, task.turn, own, f"contour-{stem}"))
             torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
             pictures += [torques] if torques is not None else []
+        else:
+            pictures.append(accuracy_picture(task.prefix, task.found(run.trace)[""], f"accuracy-{stem}"))
     overview = overview_picture(run.trace, list(run.scenario.machine.axes), signs, "overview")
     return [*pictures, overview] if overview is not None else pictures
 

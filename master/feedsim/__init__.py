@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from feedsim.cosim import Run
     from feedsim.errors import FeedsimError, InputError, OutputError, SimulationError
     from feedsim.examples import copy as example
-    from feedsim.front import Result, compare, frf, identify, load, run, sweep
+    from feedsim.front import Overlay, Result, compare, frf, identify, load, run, show, sweep
     from feedsim.scenario import Machine, Scenario, load_machine
     from feedsim.scenario.load import load as load_scenario
     from feedsim.trace import Trace
@@ -35,6 +35,7 @@ _HOMES = {
     "InputError": "errors",
     "Machine": "scenario",
     "OutputError": "errors",
+    "Overlay": "front",
     "Result": "front",
     "Run": "cosim",
     "Scenario": "scenario",
@@ -50,13 +51,14 @@ _HOMES = {
     "load_scenario": "scenario:load",
     "read_trace": "trace:read_csv",
     "run": "front",
+    "show": "front",
     "sweep": "front",
 }
 
 __all__ = [
-    "FeedsimError", "Figure", "InputError", "Machine", "OutputError", "Result", "Run", "Scenario", "SimulationError",
-    "Trace", "compare", "evaluate", "example", "frf", "identify", "load", "load_machine", "load_scenario",
-    "read_trace", "run", "sweep",
+    "FeedsimError", "Figure", "InputError", "Machine", "OutputError", "Overlay", "Result", "Run", "Scenario",
+    "SimulationError", "Trace", "compare", "evaluate", "example", "frf", "identify", "load", "load_machine",
+    "load_scenario", "read_trace", "run", "show", "sweep",
 ]  # fmt: skip
 
 

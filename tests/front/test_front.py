@@ -43,7 +43,15 @@ def circle(folder: Path) -> fs.Result:
 
 
 @pytest.mark.parametrize(
-    "module", ["feedsim", "feedsim.front.calls", "feedsim.front.result", "feedsim.examples", "feedsim.extras"]
+    "module",
+    [
+        "feedsim",
+        "feedsim.front.calls",
+        "feedsim.front.result",
+        "feedsim.front.overlay",
+        "feedsim.examples",
+        "feedsim.extras",
+    ],
 )
 def test_examples_of_docstrings(module: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
@@ -52,8 +60,31 @@ def test_examples_of_docstrings(module: str, folder: Path, monkeypatch: pytest.M
     assert not found.failed
 
 
+def test_results_over_each_other(folder: Path, circle: fs.Result, tmp_path: Path) -> None:
+    """Of a prompt and of a folder: figures and parameters side by side, a page in a notebook, the same as a report."""
+    stiff = fs.run(folder / "xz_circle.yaml", set={"machine.axes.Z.drive.K_v": "5 (m/min)/mm"})
+    stiff.save(tmp_path / "stiff")
+    over = fs.show(circle, stiff=tmp_path / "stiff")
+    assert over.names == (circle.scenario.name, "stiff")
+    first, second = over.figures["XZ.G"]
+    assert first is not None
+    assert second is not None
+    assert (first.value, second.value) == (circle.figures["XZ.G"].value, stiff.figures["XZ.G"].value)
+    assert list(over.parameters) == ["machine.axes.Z.drive.K_v"]
+    assert over.pictures
+    assert repr(over).startswith(f"Overlay of {circle.scenario.name}, stiff\ndiffers: machine.axes.Z.drive.K_v")
+    html = over._repr_html_()
+    assert html.startswith("<iframe")
+    assert "&lt;html" in html
+    assert {path.name for path in over.save(tmp_path / "over")} >= {"report.html", "summary.json"}
+    with pytest.raises(InputError, match="two results are called 'stiff'"):
+        fs.show(tmp_path / "stiff", stiff=stiff)
+    with pytest.raises(InputError, match="no result is given"):
+        fs.show()
+
+
 def test_every_public_function_has_an_example() -> None:
-    for name in ("run", "load", "compare", "identify", "sweep", "frf"):
+    for name in ("run", "load", "compare", "identify", "sweep", "frf", "show"):
         described = inspect.getdoc(getattr(import_module("feedsim.front"), name)) or ""
         assert ">>> " in described, name
 

@@ -5,6 +5,7 @@ Start with calls.py; result.py is what a run returns.
 """
 
 from feedsim.front.calls import compare, frf, identify, load, run, sweep
+from feedsim.front.overlay import Overlay, show
 from feedsim.front.result import Result
 
-__all__ = ["Result", "compare", "frf", "identify", "load", "run", "sweep"]
+__all__ = ["Overlay", "Result", "compare", "frf", "identify", "load", "run", "show", "sweep"]

@@ -119,7 +119,7 @@ def test_restart_leaves_nothing_of_what_was_there(
     """Interrupted after --restart: no report of the other study beside the new table; what is not ours stays."""
     out = tmp_path / "out"
     arguments = ["--out", str(out), "--workers", "0", "--fmus", str(fmus), "--quiet"]
-    assert main(["sweep", str(study()), *arguments]) == 0
+    assert main(["sweep", str(study()), *arguments, "--figures", "png"]) == 0
     drawn = [*(out / "figures").iterdir()]
     assert drawn
     (out / "notes.txt").write_text("mine")

@@ -210,8 +210,8 @@ def test_a_load_that_drifts(general: Record, law: FrictionLaw) -> None:
 
 
 def test_the_interval_of_a_drift_holds_it(general: Record, law: FrictionLaw) -> None:
-    """Noise of the torque, and a viscous friction that is 5 % off. Of 30 such logs 29 hold the truth within 95 %; the
-    axis that sticks at another reversal than the true one is the rest."""
+    """Noise of the torque, and a viscous friction that is 5 % off: of six intervals of 95 % one may miss. The axis that
+    sticks at another reversal than the true one lies far off."""
     change, held = 0.05 * TRUE["F_C"], 0
     for seed in range(6):
         record = drifting(general, change, 0.12, seed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 
 from feedsim.cli import main
 from feedsim.cosim import run
-from feedsim.scenario import load
+from feedsim.replay.closed_loop import Replay, read_axes, windowed
+from feedsim.scenario import load, load_machine
 from feedsim.trace import Trace, read_csv, write_csv
+from feedsim.trace.trace import Array
 
 ROOT = Path(__file__).resolve().parents[2]
 MACHINE = ROOT / "scenarios" / "machines" / "test_centre"
@@ -101,6 +104,21 @@ def test_a_load_that_was_recorded_acts(
         > 0.5
     )
     assert "'pulse' may be a known load" in capsys.readouterr().err
+
+
+def test_a_load_goes_with_the_scale_of_the_torques(log: Path) -> None:
+    """An inertia that is being identified is a scale of all torques: half of each, and of the load, moves the same."""
+    machine = load_machine(MACHINE)
+    each = windowed("Z", read_axes(log, ["Z"], machine)["Z"], (0.1, 0.2))
+    pulse = 4.0 * np.exp(-(((each.record.time - 0.15) / 0.01) ** 2))
+
+    def moved(load: float, scale: float) -> Array:
+        record = replace(each.record, load=load * pulse)
+        replayed = Replay(machine, {"Z": replace(each, record=record)})
+        return replayed.follow(machine, ("x_a",), scale=scale)["Z"]["x_a"]
+
+    assert np.array_equal(moved(1.0, 2.0), moved(0.5, 1.0))
+    assert np.max(np.abs(moved(1.0, 2.0) - moved(1.0, 1.0))) > 1e-6
 
 
 def test_a_torque_logged_late_is_told(log: Path, tmp_path: Path) -> None:

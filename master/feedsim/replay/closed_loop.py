@@ -9,7 +9,7 @@ of it, so that the state of drive and friction there is what the motion before h
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isinf
 from pathlib import Path
 
@@ -217,18 +217,22 @@ class Replay:
             x_s[axis], n_ffw[axis] = x, v / machine.axes[axis].I_P
         return Program(time, x_s, n_ffw)
 
-    def follow(self, machine: Machine, signals: Sequence[str], per_row: int = 1) -> dict[str, dict[str, Array]]:
+    def follow(
+        self, machine: Machine, signals: Sequence[str], per_row: int = 1, scale: float = 1.0
+    ) -> dict[str, dict[str, Array]]:
         """Axis -> signal -> (N,) at the rows of the record, of the units with the parameters of `machine`.
 
-        per_row: samples from one row to the next; ((N - 1) per_row + 1,) then.
+        per_row: samples from one row to the next; ((N - 1) per_row + 1,) then. scale: by which the torques of `machine`
+        are less than they are meant; so are the loads.
 
         Raises SimulationError: a unit failed, as with a drive that is unstable.
         """
         machine = machine.model_copy(update={"pose": machine.pose | self.pose})
         columns = [f"{axis}.{signal}" for axis in self.records for signal in signals]
+        loads = [replace(load, values=load.values / scale) for load in self._loads]
         trace = follow(
             machine, self.program(machine), columns, self.interval / per_row,
-            loads=self._loads, coupling=self._coupling, fmus=self._fmus,
+            loads=loads, coupling=self._coupling, fmus=self._fmus,
         )  # fmt: skip
         first = round(self.lead / self.interval) * per_row
         rows = slice(first, first + (len(self.time) - 1) * per_row + 1)

@@ -99,7 +99,7 @@ class Problem:
         machine, scale = self.tuned(values)
         self.runs += 1
         try:
-            found = self.replay.follow(machine, ("x_a", "M_a"), self.per_row)[self.each.axis]
+            found = self.replay.follow(machine, ("x_a", "M_a"), self.per_row, scale)[self.each.axis]
         except FeedsimError as error:  # a drive that is unstable runs away until its numbers do
             raise InputError(str(error)) from None
         delay = (self.start | dict(values))["delay"]

@@ -114,7 +114,7 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 def test_csv_round_trip_is_exact(
     tmp_path_factory: pytest.TempPathFactory, time: list[float], heads: list[tuple[str, str]], data: st.DataObject
 ) -> None:
-    heads = heads or [("a", "m")]
+    heads = [*heads, ("in round brackets (mm)", ""), ("r0078 (1)", ""), ("Speed(A)", "")]
     columns = {name: data.draw(st.lists(finite, min_size=len(time), max_size=len(time))) for name, _ in heads}
     written = Trace(np.array(time), {name: np.array(column) for name, column in columns.items()}, dict(heads))
     path = tmp_path_factory.mktemp("round") / "t.csv"
@@ -148,6 +148,8 @@ PLAIN = "time [s],x [mm]\n0,0.5\n0.001,0.25\n0.003,-1e3\n"
         "x [mm],time [s]\n0.5,0\n0.25,0.001\n-1e3,0.003\n",
         "x [mm],T [s]\n0.5,0\n0.25,0.001\n-1e3,0.003\n",
         "time [ms],x [mm]\n0,0.5\n1,0.25\n3,-1e3\n",
+        "time (s),x (mm)\n0,0.5\n0.001,0.25\n0.003,-1e3\n",
+        "Time(ms);x (mm)\n0;0.5\n1;0.25\n3;-1e3\n",
         "clock [us],x [mm]\n0,0.5\n1000,0.25\n3000,-1e3\n",
         PLAIN.replace("time [s]", "time"),
         PLAIN.replace(",", ";").encode("utf-16"),

@@ -25,12 +25,14 @@ from feedsim.files.regular import content
 from feedsim.trace.trace import Array, check_name, check_unit, suggest
 
 _HEADER = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?")
+_ROUND = re.compile(r"(.*?[^\s])(\s*)\(([^()]*[^()0-9\s][^()]*)\)")
 _SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
 _PLAIN = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _PLAIN_COLUMN = re.compile(r"[0-9eE+\-.\n]*")
 # Could mark thousands just as well as a decimal: 1,234 or 12,345, but not 0,125 or 1,25 or 1234,567.
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
+TIME_NAMES = ("time", "t")  # in any case
 MOST_REMARKS = 65536  # characters within which a header is looked for
 _SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # .xlsx and .ods; .xls
 _WINDOWS = "cp1252"  # of programs that know no UTF-8; it has no byte for five values, and digits are the same
@@ -232,6 +234,8 @@ def _header(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[st
     for i, cell in enumerate(cells):
         match = _HEADER.fullmatch(cell.strip())
         name, unit = (match[1], (match[2] or "").strip()) if match else ("", "")
+        if match and match[2] is None:  # no square brackets; "x (mm) []" says that there is no unit
+            name, unit = round_unit(name) or (name, "")
         if not match or not name:
             raise InputError(f"{where}: column {i + 1} is headed {cell!r}; expected is name [unit]")
         if name in names:
@@ -247,6 +251,21 @@ def _header(cells: Sequence[str], where: str) -> tuple[tuple[str, ...], tuple[st
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
     return tuple(names), tuple(found)
+
+
+def round_unit(cell: str) -> tuple[str, str] | None:
+    """Name and unit of a head such as "angle (deg)"; None where what stands in round brackets is no unit.
+
+    In "Speed(A)" they may belong to the name: without a blank before them, only a time has its unit there.
+    """
+    match = _ROUND.fullmatch(cell)
+    if not match or not (match[2] or match[1].lower() in TIME_NAMES):
+        return None
+    try:
+        units.unit(match[3])
+    except InputError:
+        return None
+    return match[1], match[3].strip()
 
 
 def fits(unit: str, wanted: str) -> bool:

@@ -14,12 +14,11 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError, OutputError
-from feedsim.trace.cells import read_table
+from feedsim.trace.cells import TIME_NAMES, read_table, round_unit
 from feedsim.trace.files import written_whole
 from feedsim.trace.table import stretches
 from feedsim.trace.trace import Array, Trace, first_not_finite
 
-TIME_NAMES = ("time", "t")
 ROWS = 1 << 12  # that are written at a time
 
 
@@ -119,7 +118,7 @@ def write_csv(path: str | Path, trace: Trace) -> None:
 def heading(trace: Trace) -> bytes:
     """The first line of a trace's file."""
     units = [(name, trace.unit(name)) for name in trace.columns]
-    heads = ["time [s]", *(f"{name} [{unit}]" if unit else name for name, unit in units)]
+    heads = ["time [s]", *(f"{name} [{unit}]" if unit or round_unit(name) else name for name, unit in units)]
     return f"{','.join(quoted(cell) for cell in heads)}\n".encode()
 
 

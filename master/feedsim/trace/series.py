@@ -15,14 +15,12 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.trace.cells import Decimal, Table, decimal_mark, fits, read_table
-from feedsim.trace.csv import TIME_NAMES
+from feedsim.trace.cells import TIME_NAMES, Decimal, Table, decimal_mark, fits, read_table, round_unit
 from feedsim.trace.trace import Array, TimeColumns, Trace
 
 # "x [m]", "Z.x_a[REAL]"; an index as in "x[3]" or "A[1,2]" belongs to the name.
 _UNIT_BEHIND = re.compile(r"(.*?[^\s])\s*\[([^\[\]]*)\]")
 _INDEX = re.compile(r"\s*[0-9]+(?:\s*,\s*[0-9]+)*\s*")
-_ROUND = re.compile(r"(.*?[^\s])(\s*)\(([^()]*)\)")
 # What tools write where a unit could stand: "[REAL]" (ecos).
 _TYPE = re.compile(r"[0-9]*\s*(?:real|float|double|int|integer|bool|boolean|string|enum)[0-9]*\b.*", re.IGNORECASE)
 # Values in words; what is missing is NaN.
@@ -138,13 +136,7 @@ def _head(cell: str) -> tuple[str, str]:
         inner, apart = match[2].strip(), cell[len(match[1])].isspace()
         if not _INDEX.fullmatch(inner) or (inner == "1" and apart):  # "x [1]" is a plain number, "x[1]" an element
             return match[1], "" if _TYPE.fullmatch(inner) else inner
-    if (match := _ROUND.fullmatch(cell)) and (match[2] or match[1].lower() in ("time", "t")):
-        try:
-            units.unit(match[3])
-        except InputError:
-            return cell, ""
-        return match[1], match[3].strip()
-    return cell, ""
+    return round_unit(cell) or (cell, "")
 
 
 def _values(cells: Sequence[str], mark: Decimal) -> Array | None:

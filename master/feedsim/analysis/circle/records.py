@@ -78,7 +78,7 @@ def read_circle(
             found, mean = _of_positions(recording, x, y, centre, radius)
         else:
             found, mean = _of_angles(recording, *polar, radius)
-        notes += [f"{file}: {each}" for each in recording.notes]
+        notes += recording.notes
         notes.append(f"{file}: {', '.join(turn.name for turn in found)}")
         turns += found
         radii.append(mean)

@@ -277,18 +277,25 @@ def _covariance(matrix: Array, residual: Array, weights: Array, slopes: Array, b
 
 
 def _calm(found: Fit) -> bool:
-    """Whether the peaks have died away where their windows end, as far as noise lets one see."""
+    """Whether the peaks have died away where their windows end, as far as noise and what else is left let one see."""
+    width = math.radians(NEXT)
+    around = []
+    for angle, residual, which in zip(found.angle, found.residual, found.reversal, strict=True):
+        _, block = np.unique(np.floor(angle[which < 0] / width), return_inverse=True)
+        around.append(np.bincount(block, residual[which < 0]) / np.bincount(block))
+    # What repeats all the way round, a pitch error or form, is no tail of a peak, however much a window leaves out.
+    usual = float(np.median(np.abs(np.concatenate(around)))) / 0.6745
     for angle, residual, which, since in zip(found.angle, found.residual, found.reversal, found.since, strict=True):
         for k in range(4):
             own = which == k
             if not own.any():
                 continue
             last = angle[own][np.argmax(since[own])]
-            next_ = np.abs((angle - last + math.pi) % (2 * math.pi) - math.pi) < math.radians(NEXT)
+            next_ = np.abs((angle - last + math.pi) % (2 * math.pi) - math.pi) < width
             next_ &= which < 0
             if not next_.any():
                 continue
             left = abs(float(residual[next_].mean()))
-            if left > max(CALM * float(np.abs(residual[own]).max()), 4 * found.noise / math.sqrt(next_.sum())):
+            if left > max(CALM * float(np.abs(residual[own]).max()), 4 * usual):
                 return False
     return True

@@ -110,7 +110,7 @@ def _trust(diagnosis: Diagnosis) -> str:
     if diagnosis.noise > NOISY * diagnosis.G:
         return f" Noise of {_um(diagnosis.noise)} hides much: measure again, or more slowly."
     rest = _rest(diagnosis)
-    if abs(rest.share) > 0.5:
+    if max(abs(rest.share), rest.size / diagnosis.G) > 0.5:
         return " The model explains less than half of G: look at the picture before acting on it."
     return ""
 

@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all release lint format reference check-reference bench worst-case pose-study identification-study identification-accuracy lock ansys clean
+.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all release lint format schemas reference check-reference bench worst-case pose-study identification-study identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -181,6 +181,10 @@ test-platforms: $(ALL_FMUS) $(VARIABLES) $(VENV)/.dev ## the FMUs of all platfor
 test-importers: fmus $(VENV)/.importers ## the units in other simulators, three validators (Java, Maven: CONTRIBUTING)
 	$(PY) tests/importers/install.py $(BUILD)/importers
 	FEEDSIM_IMPORTERS=$(BUILD)/importers $(PY) -m pytest tests/importers
+
+schemas: $(VENV)/.run $(VARIABLES) ## write the JSON Schemas of scenarios/schemas anew, for editors
+	@set -e; for file in scenarios/schemas/*.schema.json; do \
+	    kind=$${file##*/}; $(VENV)/bin/feedsim schema $${kind%%.*} > $(BUILD)/schema.json; mv $(BUILD)/schema.json $$file; done
 
 reference: $(VENV)/.dev $(VARIABLES) ## make the pinned reference CSVs anew, from scipy and the monolithic implementation
 	$(PY) tests/reference/make_reference.py

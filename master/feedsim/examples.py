@@ -26,6 +26,7 @@ _KINDS = {
     "structure": "structures/*/structure.yaml",
     "notebook": "notebooks/*.ipynb",
 }
+_FOR_EDITORS = re.compile(r"# yaml-language-server: \$schema=(\S+)\n")  # a first line
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def copy(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     len(copy("xz_circle", folder))
-    4
+    7
 
     Raises:
         InputError: there is no such example.
@@ -124,6 +125,7 @@ def _needed(asked: Iterable[Example], root: Path) -> list[Path]:
         if file.name in ("machine.yaml", "structure.yaml"):
             waiting += [other for other in file.parent.iterdir() if other.is_file()]
         if file.suffix == ".yaml":
+            waiting += _schema(file)
             for named in _named(file):
                 inside = [named] if named.is_file() else [other for other in named.rglob("*") if other.is_file()]
                 waiting += [other for other in inside if other.is_relative_to(root)]
@@ -139,13 +141,20 @@ def _named(file: Path) -> Iterator[Path]:
             yield (file.parent / text).resolve()
 
 
+def _schema(file: Path) -> list[Path]:
+    """The schema that a YAML file names to editors in its first line."""
+    with file.open(encoding="utf-8") as opened:
+        said = _FOR_EDITORS.match(opened.readline())
+    return [(file.parent / said[1]).resolve()] if said else []
+
+
 def _about(file: Path) -> str:
     """The first sentence of the comment that a file begins with, or of a notebook's text below its heading."""
     if file.suffix == ".ipynb":
         _, _, text = "".join(json.loads(file.read_text(encoding="utf-8"))["cells"][0]["source"]).partition("\n\n")
         return _sentence(text)
     comment: list[str] = []
-    for line in file.read_text(encoding="utf-8").splitlines():
+    for line in _FOR_EDITORS.sub("", file.read_text(encoding="utf-8")).splitlines():
         if not line.startswith("# "):
             break
         comment.append(line[2:])

@@ -137,6 +137,12 @@ def test_an_ssp_file_runs(folder: Path) -> None:
     assert np.abs(result["Z.x_a"] - fs.run(scenario)["Z.x_a"]).max() < 1e-9
 
 
+def test_frequency_responses_cover_the_band_that_is_asked_for(folder: Path) -> None:
+    response = fs.frf(folder / "machines" / "test_centre", ["Z"], band=(2.0, 300.0), tool=False)
+    assert response.frequency[[0, -1]] == pytest.approx([2.0, 300.0], rel=1e-12)
+    assert repr(response).startswith("FrequencyResponse: 2 to 300 Hz; ")
+
+
 def test_representations_are_short(circle: fs.Result, folder: Path) -> None:
     response = fs.frf(folder / "machines" / "test_centre", ["Z"], tool=False)
     shown = [circle, circle.trace, circle.scenario, circle.scenario.machine, circle.plot(), response]

@@ -1,5 +1,6 @@
 """JSON Schema for editors: accepts what load() accepts, refuses the usual mistakes."""
 
+import json
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -7,6 +8,8 @@ from typing import Any, Literal
 import pytest
 import yaml
 
+from feedsim.cli import main
+from feedsim.cli.files import KINDS
 from feedsim.scenario.schema import json_schema
 
 jsonschema = pytest.importorskip("jsonschema")
@@ -29,9 +32,30 @@ def errors(kind: Literal["scenario", "machine"], data: Any) -> list[str]:
     return [".".join(map(str, error.absolute_path)) for error in validator(kind).iter_errors(data)]
 
 
-@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.name)
-def test_shipped_scenarios_are_valid(path: Path) -> None:
-    assert errors("scenario", content(path)) == []
+@pytest.mark.parametrize("kind", KINDS)
+def test_files_are_what_the_command_prints(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema", kind]) == 0
+    pinned = (SCENARIOS / "schemas" / f"{kind}.schema.json").read_text(encoding="utf-8")
+    assert pinned == capsys.readouterr().out, "`make schemas` writes the files anew"
+
+
+def test_there_is_a_file_for_every_kind_and_no_other() -> None:
+    assert {path.name for path in (SCENARIOS / "schemas").iterdir()} == {f"{kind}.schema.json" for kind in KINDS}
+
+
+# Fragments that other files name have no schema of their own.
+@pytest.mark.parametrize(
+    "path",
+    [path for path in sorted(SCENARIOS.rglob("*.yaml")) if not path.name.startswith(("drive_", "friction_"))],
+    ids=lambda path: path.relative_to(SCENARIOS).as_posix(),
+)
+def test_shipped_files_name_the_schema_that_they_satisfy(path: Path) -> None:
+    """By the first line of each, which editors read; relative to the file, as the YAML language server takes it."""
+    first, _, _ = path.read_text(encoding="utf-8").partition("\n")
+    words, _, named = first.partition("$schema=")
+    assert words == "# yaml-language-server: "
+    schema = json.loads((path.parent / named).read_text(encoding="utf-8"))
+    assert [error.message for error in jsonschema.Draft202012Validator(schema).iter_errors(content(path))] == []
 
 
 def test_shipped_machine_is_valid_alone_and_inside_a_scenario() -> None:

@@ -25,7 +25,7 @@ from feedsim.trace.response_files import read_overlay
 
 # Measured responses are held against the closed form where they are known.
 COHERENT, COMPARED = 0.99, (5.0, 500.0)
-# The closed form is drawn up to this multiple of the band: gain margins lie above it.
+# The closed form of a report is drawn up to this multiple of the band: gain margins lie above it.
 BEYOND = 2.0
 BELOW_MIRROR = 0.999  # of half the sampling rate
 
@@ -68,15 +68,15 @@ class Responses:
     warnings: tuple[str, ...] = ()
 
 
-def frequencies(machine: Machine, modes: Modes, band: tuple[float, float]) -> Floats:
-    """Frequencies of the closed form [Hz]: fine enough for every resonance, up to BEYOND times the band."""
+def frequencies(machine: Machine, modes: Modes, band: tuple[float, float], beyond: float = 1.0) -> Floats:
+    """Frequencies of the closed form [Hz]: fine enough for every resonance, up to `beyond` times the band's end."""
     highest = 0.5 / machine.cycles.T_c * BELOW_MIRROR
     if not 0 < band[0] < band[1] <= highest:
         raise InputError(
             f"band {band[0]:.6g} to {band[1]:.6g} Hz: above 0, the first below the second, and up to {highest:.6g} Hz "
             "(half the sampling rate of the control cycle)"
         )
-    return linear.grid(modes, band[0], min(BEYOND * band[1], highest))
+    return linear.grid(modes, band[0], min(beyond * band[1], highest))
 
 
 def closed_form(system: linear.LinearSystem, wanted: Sequence[str], frequency: Floats) -> FrequencyResponse:

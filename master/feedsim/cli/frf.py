@@ -53,7 +53,7 @@ def frf(options: Namespace) -> None:
     named = options.subject.stem if options.subject.is_file() else options.subject.resolve().name
     directory: Path = options.out or Path("results") / f"frf_{named}"
     modes, doubts = plant_modes(machine)
-    frequency = responses.frequencies(machine, modes, plan.band)
+    frequency = responses.frequencies(machine, modes, plan.band, responses.BEYOND)
     wanted = linear.names(axes, tool=options.tool)
     overlays, warnings = _overlays(options.overlays, wanted)
     warnings += doubts

@@ -1,4 +1,4 @@
-"""What a wheel holds besides Python: the four archives, the native cycle loop, scenarios and machines."""
+"""What a wheel holds besides Python: the archives, the native cycle loop, scenarios and machines."""
 
 import platform
 import sys
@@ -52,7 +52,7 @@ def for_platform(name: str, compiler: Sequence[str], archives: Path | None = Non
 
 
 def taken(folder: Path) -> dict[str, bytes]:
-    """The four archives of a folder by their file names. Raises InputError where one is missing."""
+    """The archives of a folder by their file names. Raises InputError where one is missing."""
     names = [f"{path.name.removesuffix('_fmu')}.fmu" for path in checkout.unit_folders()]
     if missing := [name for name in names if not (folder / name).is_file()]:
         raise InputError(f"{folder}: has no {', '.join(missing)}; make fmus-all builds them")

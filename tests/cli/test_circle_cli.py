@@ -57,6 +57,18 @@ def lengths_in_two_files(folder: Path) -> list[str]:
     return [*files, "--radius", "100 mm"]
 
 
+def columns_of_any_name(folder: Path) -> list[str]:
+    """One file of deviations, one of radii: nothing but the units tells which column is what."""
+    files = []
+    for angle, deviation, sense in turns():
+        file = folder / ("there.csv" if sense > 0 else "back.csv")
+        value = deviation * 1e3 if sense > 0 else (RADIUS + deviation) * 1e3
+        table = np.column_stack([np.degrees(angle), value])
+        np.savetxt(file, table, "%.7f", "\t", header="Polar position (deg)\tBar (mm)", comments="")
+        files.append(str(file))
+    return [*files, "--radius", "100 mm", "--feed", "3000 mm/min"]
+
+
 def scales_over_time(folder: Path) -> list[str]:
     """Linear scales in mm: at rest, a turn and a half one way, at rest, as much back; the centre is anywhere."""
     step = 2 * np.pi * RADIUS / SPEED / SAMPLES
@@ -73,7 +85,8 @@ def scales_over_time(folder: Path) -> list[str]:
     return [str(folder / "scales.csv"), "--radius", "100 mm"]
 
 
-FORMATS = {each.__name__: each for each in (ballbar_in_one_file, lengths_in_two_files, scales_over_time)}
+FORMS = (ballbar_in_one_file, lengths_in_two_files, columns_of_any_name, scales_over_time)
+FORMATS = {each.__name__: each for each in FORMS}
 
 
 def run(folder: Path, words: list[str]) -> tuple[int, dict[str, Any]]:

@@ -23,8 +23,11 @@ from feedsim.errors import InputError
 from feedsim.trace import Recording, read_recording
 
 ANGLES = ("angle", "phi", "theta", "winkel", "angular position")
-DEVIATIONS = ("deviation", "radial deviation", "radius deviation", "error", "e", "dr", "delta r", "abweichung")
+DEVIATIONS = (
+    "deviation", "radial deviation", "radius deviation", "error", "radial error", "e", "dr", "delta r", "abweichung",
+)  # fmt: skip
 RADII = ("radius", "r", "length", "ballbar length", "radius length")
+LEAST_RADIUS = 1e-3  # [m]; where a name does not tell, what is never less is a radius and no deviation
 TIMES = ("time", "t", "zeit")
 # The angle has turned round where it goes back by this [rad]: less is noise at rest.
 TURNED_ROUND = math.radians(10)
@@ -116,6 +119,12 @@ def _column(recording: Recording, names: Sequence[str], unit: str) -> str | None
     return None
 
 
+def _only(recording: Recording, unit: str) -> str | None:
+    """The one column that has a unit of this kind, whatever its name is; None where there is none or a choice."""
+    found = [name for name in recording.names if _is(recording, name, unit)]
+    return found[0] if len(found) == 1 else None
+
+
 def _is(recording: Recording, name: str, unit: str) -> bool:
     try:
         units.factor(recording.units[name] or "1", unit)
@@ -138,10 +147,12 @@ def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool]
     """Columns of angle and of deviation (or radius: True); None where the file has positions of both axes instead."""
     if all(_position(recording, axis) for axis in axes):
         return None
-    angle, deviation = _column(recording, ANGLES, "rad"), _column(recording, DEVIATIONS, "m")
-    length = _column(recording, RADII, "m")
-    if angle is not None and (deviation or length) is not None:
-        return (angle, deviation, False) if deviation is not None else (angle, str(length), True)
+    angle = _column(recording, ANGLES, "rad") or _only(recording, "rad")
+    deviation, radius = _column(recording, DEVIATIONS, "m"), _column(recording, RADII, "m")
+    if angle is not None and (length := deviation or radius or _only(recording, "m")) is not None:
+        if deviation is None and radius is None:
+            return angle, length, float(np.abs(_values(recording, length, "m")).min()) > LEAST_RADIUS
+        return angle, length, deviation is None
     has = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in recording.units.items())
     raise InputError(
         f"{recording.header}: holds {has}; needed are positions of both axes ({axes[0]} [mm], {axes[1]} [mm]; --axes "

@@ -12,6 +12,7 @@ from scipy.io import savemat
 
 from feedsim.errors import InputError, OutputError
 from feedsim.trace import Trace, convert, read_csv, read_signals, write_csv, written_whole
+from feedsim.trace.csv import shortest
 
 
 def trace(rows: int = 5) -> Trace:
@@ -229,6 +230,19 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
 
 
 # --- whole or not at all --------------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.floats(), max_size=20))
+def test_the_shortest_form_is_that_of_repr(values: list[float]) -> None:
+    assert shortest(np.array(values)) == [repr(value).removesuffix(".0") for value in values]
+
+
+def test_the_shortest_form_where_it_changes() -> None:
+    powers = [10.0**k for k in range(-30, 31)] + [2.0**k for k in range(-80, 81)]
+    around = [float(np.nextafter(power, towards)) for power in powers for towards in (0.0, np.inf)]
+    values = np.array([0.0, *powers, *around, 123456789012345680.0, 5e-324, np.finfo(float).max])
+    values = np.concatenate([values, -values])
+    assert shortest(values) == [repr(value).removesuffix(".0") for value in values.tolist()]
 
 
 def test_a_value_that_is_not_finite_is_not_written(tmp_path: Path) -> None:

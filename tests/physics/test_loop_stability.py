@@ -10,6 +10,7 @@ import pytest
 
 from feedsim import cosim, nc, scenario
 from feedsim.analysis.linear import LinearSystem, unstable_poles
+from feedsim.errors import InputError
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.scenario import Friction, Scenario, load_subject
 from feedsim.structure import Modes, checked_modes
@@ -126,6 +127,23 @@ def test_advice_has_the_usual_margins(tmp_path: Path) -> None:
     assert not loop.unstable
     assert not loop.thin
     assert GAIN_MARGIN <= loop.gain_margin < 1.02 * GAIN_MARGIN or loop.phase_margin < PHASE_MARGIN + 1
+
+
+@pytest.mark.parametrize("gain", [0.0, 1e-300, 1e4, 1e9, 1e20, 1e300])
+def test_gains_far_from_any_other(gain: float, tmp_path: Path) -> None:
+    """A speed loop with a unit left out is told as unstable, and not the position loop over it."""
+    plan = planned(tmp_path, "Z", "moving", f"machine.axes.Z.drive.K_p={gain} N.m.s/rad")
+    modes = checked_modes(plan.machine)
+    if gain > 1e200:
+        with pytest.raises(InputError, match=r"beyond all numbers.*axis Z: 1e\+300"):
+            judge(plan.machine, modes)
+        return
+    loops = judge(plan.machine, modes)
+    assert {loop.kind for loop in loops if loop.unstable} == ({"speed"} if gain > 1 else set())
+    if gain == 1e4:
+        usual = planned(tmp_path, "Z", "moving", "machine.axes.Z.drive.K_p=100 N.m.s/rad")
+        near = loop_of(judge(usual.machine, modes), "Z", "speed", "moving")
+        assert loop_of(loops, "Z", "speed", "moving").limit == pytest.approx(near.limit, rel=1e-3)
 
 
 SAID = {

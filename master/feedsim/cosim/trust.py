@@ -81,18 +81,18 @@ def _control(machine: Machine, program: Program, loops: Sequence[Loop]) -> list[
         advised = [loop.advised for loop in unstable or thin]
         nearest = None if None in advised else _gain(kind, min(filter(None, advised)))
         usual = f"the usual {_decibels(GAIN_MARGIN):.0f} dB and {PHASE_MARGIN:g} deg"
-        better = f"; with {nearest} it has {usual}" if nearest else f"; with no {GAIN[kind][0]} it has {usual}"
+        better = f"; with {nearest} it has" if nearest else f"; no {GAIN[kind][0]} was found with which it has"
         if not unstable:
             margins = "; ".join(
                 f"gain {_decibels(loop.gain_margin):.1f} dB, phase {loop.phase_margin:.0f} deg {STATE[loop.state]}"
                 for loop in thin
             )
-            found.append(f"axis {axis}: the {kind} loop has thin margins with {now}: {margins}{better}")
+            found.append(f"axis {axis}: the {kind} loop has thin margins with {now}: {margins}{better} {usual}")
             continue
         where = "; ".join(map(_where, states))
         text = (
-            f"axis {axis}: the {kind} loop is unstable with {now}: {where}{better}. A run shows this instability, "
-            "whatever coupling.substeps are"
+            f"axis {axis}: the {kind} loop is unstable with {now}: {where}{better} {usual}. A run shows this "
+            "instability, whatever coupling.substeps are"
         )
         met = any(loop.growing and (loop.state == "at rest" or _moves(program, axis)) for loop in unstable)
         found.append(Wrong(text) if met else text)

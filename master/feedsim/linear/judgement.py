@@ -21,6 +21,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.errors import InputError
 from feedsim.linear.drive import LinearDrive
 from feedsim.linear.plant import CHUNK, Complexes, Floats, Hold, ModalPlant, modal_sums
 from feedsim.linear.stability import GROWTH, TURN
@@ -39,7 +40,11 @@ STEP = 0.05  # relative step of the frequencies between resonances; drives and d
 # Points about a resonance, in its half widths: a circle is a polygon of these.
 ABOUT = np.array([-5.0, -2.4, -1.3, -0.7, -0.3, 0.0, 0.3, 0.7, 1.3, 2.4, 5.0])
 SHOWS = 0.03  # of an open-loop gain: a resonance that adds less at its peak is not looked at closely
-GAINS = np.geomspace(1e-2, 1e2, 801)  # factors on a gain that are tried; a step is 1.2 %
+# Factors on a gain that are looked at: of a stable loop, and of one that is not, since a unit left out may be 1000. A
+# step is 1.2 %.
+WITHIN = 1e-2, 1e2
+GAINS = np.geomspace(1e-6, 1e6, 2401)
+LEAST = np.finfo(np.float64).tiny  # a loop without gain is no reason to take the logarithm of 0
 # Components either side of 0 Hz that a position loop is the sum of. Further ones are (f/(2/T_pos - f))^3 times smaller:
 # 1 % of the gain at 0.35/T_pos, where a position loop has none left.
 IMAGES = 1
@@ -119,12 +124,14 @@ def _judged_axes(
     return _Sampled(axes, drives, held, ModalPlant.of(modes, axes)).judged()
 
 
-def _judged(axis: str, kind: Kind, state: State, gain: float, L: Complexes, growing: int, closed: int) -> Loop:
+def _judged(
+    axis: str, kind: Kind, state: State, gain: float, L: Complexes, growing: int, closed: int, inner: int
+) -> Loop:
     """What the open-loop gain L (F,) along half the contour tells of a loop.
 
-    growing: solutions that grow with it closed; closed: with all loops closed.
+    growing: solutions that grow with it closed; closed: with all loops closed; inner: in the loops below it alone.
     """
-    limits = _limits(L)
+    limits = _limits(L, WITHIN if not growing else (GAINS[0], GAINS[-1]))
     gain_margin, phase_margin = _gain_margin(limits, 1.0), _phase_margin(L, 1.0)
     if not growing and gain_margin >= GAIN_MARGIN and phase_margin >= PHASE_MARGIN:
         limit = gain * float(min(limits, key=_far)) if limits.size else None
@@ -133,8 +140,9 @@ def _judged(axis: str, kind: Kind, state: State, gain: float, L: Complexes, grow
     ends = np.concatenate([[GAINS[0]], limits, [GAINS[-1]]])
     winds = _windings(1 + L)
     counts = np.array([growing + winds - _windings(1 + k * L) for k in np.sqrt(ends[1:] * ends[:-1])])
-    fewest = counts == counts.min()
-    unstable = bool(growing > counts.min())
+    least = min(counts.min(), growing + winds)  # the latter without any gain
+    fewest = counts == least
+    unstable = bool(growing > least) and not inner
     if growing and not unstable:  # another loop is the cause, and margins say nothing
         return Loop(axis, kind, state, gain, closed, False, None, math.inf, 180.0, None)
     good = [k for k in sorted(GAINS, key=_far) if fewest[np.searchsorted(limits, k)]]
@@ -155,14 +163,14 @@ def _edges(ends: Floats, inside: NDArray[np.bool_]) -> list[float]:
     return [float(ends[k]) for k in range(1, len(ends) - 1) if inside[k - 1] != inside[k]]
 
 
-def _limits(L: Complexes) -> Floats:
-    """Factors on an open-loop gain (F,), ascending, that take it through -1, within those of GAINS."""
-    angle, size = np.angle(-L), np.log(np.abs(L))
+def _limits(L: Complexes, within: tuple[float, float]) -> Floats:
+    """Factors on an open-loop gain (F,), ascending, that take it through -1, between two."""
+    angle, size = np.angle(-L), np.log(np.maximum(np.abs(L), LEAST))
     turn = np.diff(angle)
     through = np.flatnonzero((np.signbit(angle[1:]) != np.signbit(angle[:-1])) & (np.abs(turn) < np.pi))
     share = -angle[through] / turn[through]
     factors = np.exp(-(size[through] + share * np.diff(size)[through]))
-    return np.sort(factors[(factors > GAINS[0]) & (factors < GAINS[-1])])
+    return np.sort(factors[(factors > within[0]) & (factors < within[1])])
 
 
 def _gain_margin(limits: Floats, factor: float) -> float:
@@ -170,7 +178,7 @@ def _gain_margin(limits: Floats, factor: float) -> float:
 
 
 def _phase_margin(L: Complexes, factor: float) -> float:
-    angle, size = np.angle(-L), np.log(np.abs(L) * factor)
+    angle, size = np.angle(-L), np.log(np.maximum(np.abs(L) * factor, LEAST))
     through = np.flatnonzero((size[1:] < 0) != (size[:-1] < 0))
     if not through.size:
         return 180.0
@@ -204,18 +212,23 @@ class _Sampled:
             of_speed = -_windings(speed[k, 0])
             closed = of_speed - _windings(position[k, 0])
             for i, (axis, drive) in enumerate(zip(self.axes, self.drives, strict=True)):
-                for kind, level, gain, growing in (
-                    ("speed", speed[k], drive.drive.K_p, of_speed),
-                    ("position", position[k], drive.drive.K_v, closed),
+                for kind, level, gain, growing, inner in (
+                    ("speed", speed[k], drive.drive.K_p, of_speed, 0),
+                    ("position", position[k], drive.drive.K_v, closed, of_speed),
                 ):
                     if gain > 0:
                         L = level[0] / level[1 + i] - 1
-                        found.append(_judged(axis, kind, state, gain, L, growing, closed))
+                        found.append(_judged(axis, kind, state, gain, L, growing, closed, inner))
         return tuple(found)
 
     def _along(self, level: Callable[[Complexes], Complexes], frequency: Floats) -> Complexes:
         """A level's determinants (2, 1 + A, F) along half its contour, close enough together that none jumps."""
-        values = level(_s(frequency))
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = level(_s(frequency))
+        if not np.isfinite(values).all():
+            pairs = zip(self.axes, self.drives, strict=True)
+            gains = ", ".join(f"axis {axis}: {drive.drive.K_p:.3g}" for axis, drive in pairs)
+            raise InputError(f"the loops are beyond all numbers that a computer has; K_p [N.m.s/rad], {gains}")
         for _ in range(ROUNDS):
             turns = np.abs(np.angle(values[..., 1:] / values[..., :-1])).max(axis=(0, 1))
             L = values[:, :1] / values[:, 1:] - 1

@@ -19,7 +19,7 @@ from feedsim.trace import Recording, read_recording
 
 RESULT, SUMMARY = "result.csv", "summary.json"
 # Columns that are laid over each other, of every axis: name -> SI unit.
-SIGNALS = {"x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
+SIGNALS = {"x_s": "m", "x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
 TIMES = ("time", "t")
 
 
@@ -28,8 +28,9 @@ class Source:
     """A result's folder, or a file of curves.
 
     Attributes:
-        name: short, and of no other one. recording: its curves. time: (N,) [s], from its first row on.
+        name: short, and of no other one. recording: its curves. time: (N,) [s], as recorded.
         figures: name -> value and unit. parameters: dotted name -> value as text. circles: prefix -> turns.
+        shift: of its first row on the first source's time [s], None where none fits. aligned: how that was found.
     """
 
     name: str
@@ -40,6 +41,13 @@ class Source:
     parameters: Mapping[str, str] = field(default_factory=dict)
     circles: Mapping[str, tuple[Turn, ...]] = field(default_factory=dict)
     answer: tuple[str, ...] = ()
+    shift: float | None = 0.0
+    aligned: str = ""
+
+    @property
+    def t(self) -> Array:
+        """(N,) [s] from the first row of the first source on; from its own first row on where no shift fits."""
+        return np.asarray(self.time - self.time[0] + (self.shift or 0.0))
 
     def curve(self, name: str, unit: str) -> Array | None:
         """A column in an SI unit; None where there is none of that name and kind."""
@@ -52,16 +60,20 @@ class Source:
         return np.asarray(self.recording.read([name])[name], dtype=np.float64) * factor
 
     @property
+    def signals(self) -> list[str]:
+        """Columns that can be laid over those of others."""
+        return [name for name in self.recording.names if "." in name and name.partition(".")[2] in SIGNALS]
+
+    @property
     def axes(self) -> list[str]:
         """Axes of which there is a signal."""
-        found = [name.partition(".") for name in self.recording.names]
-        return list(dict.fromkeys(axis for axis, dot, signal in found if dot and signal in SIGNALS))
+        return list(dict.fromkeys(name.partition(".")[0] for name in self.signals))
 
 
 def read_sources(paths: Sequence[Path]) -> list[Source]:
     """Folders of `feedsim run`, or CSV files with a column of time. InputError lists all that is no such."""
     found, problems = [], []
-    for path, name in zip(paths, _names(paths), strict=True):
+    for path, name in zip(paths, named_apart(paths), strict=True):
         try:
             found.append(_read(path, name))
         except InputError as error:
@@ -71,10 +83,10 @@ def read_sources(paths: Sequence[Path]) -> list[Source]:
     return found
 
 
-def _names(paths: Sequence[Path]) -> list[str]:
+def named_apart(paths: Sequence[Path]) -> list[str]:
     """The shortest ends of the paths that differ."""
     parts = [path.absolute().parts for path in paths]
-    for count in range(1, max(map(len, parts)) + 1):
+    for count in range(1, max(map(len, parts), default=0) + 1):
         names = ["/".join(each[-count:]) for each in parts]
         if len(set(names)) == len(names):
             return names
@@ -84,7 +96,10 @@ def _names(paths: Sequence[Path]) -> list[str]:
 def _read(path: Path, name: str) -> Source:
     curves = path / RESULT if path.is_dir() else path
     if path.is_dir() and not curves.is_file():
-        raise InputError(f"{path}: has no {RESULT}; a folder of `feedsim run`, or a CSV file, is needed")
+        raise InputError(
+            f"{path}: has no {RESULT}; a folder of `feedsim run`, a CSV file, or a run of a study "
+            "(FOLDER:17, FOLDER:max=FIGURE) is needed"
+        )
     recording = read_recording(curves)
     column = next((each for each in recording.names if each.lower() in TIMES), None)
     if column is None:

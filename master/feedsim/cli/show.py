@@ -8,28 +8,29 @@ from pathlib import Path
 from feedsim.cli.options import FIGURES, QUIET, Command, Option, out
 from feedsim.cli.terminal import finish, results_in
 
-DESCRIPTION = """Lay results of feedsim run and recorded CSV files over each other: contours of circles, following
-error, torque, speed and position, a table of their figures with differences, and the parameters in which they
-differ."""
+DESCRIPTION = """Lay results of feedsim run, recorded CSV files and runs of studies over each other: contours of
+circles, stops, following error, torque, speed, position and spectra, a table of their figures with differences, and
+the parameters in which they differ. Sources are aligned by their setpoints, circles by the angle; the page says how.
+A run of a study is FOLDER:17, FOLDER:min=FIGURE or FOLDER:max=FIGURE; it is made once more."""
 EPILOG = """examples:
   feedsim run scenarios/xz_circle.yaml --out results/as_is
   feedsim run scenarios/xz_circle.yaml --set machine.axes.Z.drive.K_v="5 (m/min)/mm" --out results/faster
   feedsim show results/as_is results/faster
   feedsim show results/as_is/result.csv record.csv --out results/against_record
+  feedsim show results/z_stop:min=Z.overshoot results/z_stop:max=Z.overshoot results/z_stop:17
 """
 
 
 def show(options: Namespace) -> None:
-    """Read, compare, write."""
-    from feedsim.analysis.side_by_side import read_sources
+    """Read, lay over each other, write."""
+    from feedsim.front import overlay
     from feedsim.report import show as report
-    from feedsim.report.show.report import files_of
 
     directory: Path = options.out or Path("results") / "show"
-    sources = read_sources(options.results)
-    with results_in(directory, report.check_writable, files_of(sources)):
-        report.write(sources, directory, drawn=options.figures)
-    finish(options.quiet, (), *report.lines(sources), f"-> {directory / 'report.html'}")
+    with results_in(directory, report.check_writable, ()):
+        over = overlay.show(*options.results)
+        over.save(directory, drawn=options.figures)
+    finish(options.quiet, (), *over.lines, f"-> {directory / 'report.html'}")
 
 
 COMMAND = Command(
@@ -37,7 +38,9 @@ COMMAND = Command(
     "lay results and records over each other: pictures, figures with differences, parameters that differ",
     show,
     (
-        Option("results", "RESULT", "folder of feedsim run, or CSV file with a column of time", type=Path, nargs="+"),
+        Option(
+            "results", "RESULT", "folder of feedsim run, CSV file with a column of time, or run of a study", nargs="+"
+        ),
         out("show"),
         FIGURES,
         QUIET,

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from feedsim import cosim
 from feedsim.analysis import linear, responses
@@ -22,10 +22,6 @@ from feedsim.errors import InputError
 from feedsim.files.columns import load_columns
 from feedsim.files.source import is_ssp
 from feedsim.front.result import Result
-from feedsim.identify.options import Asked
-from feedsim.identify.read import named_apart, read_traces
-from feedsim.identify.result import Identification
-from feedsim.identify.stages import identify as identified_from
 from feedsim.scenario import Machine, Scenario, load_subject
 from feedsim.scenario import load as load_scenario
 from feedsim.scenario.study import load_study
@@ -33,6 +29,9 @@ from feedsim.sweep.study import run as run_study
 from feedsim.sweep.table import Table
 from feedsim.trace import Trace, read_csv
 from feedsim.trace.response import FrequencyResponse
+
+if TYPE_CHECKING:
+    from feedsim.identify.result import Identification
 
 File = str | Path
 Changes = Mapping[str, Any] | Sequence[str] | None
@@ -121,6 +120,11 @@ def identify(
     >>> 1.0 < found.estimates["F_C"].value < 3.0
     True
     """
+    # Most of a second, which those who lay results over each other need not wait for.
+    from feedsim.identify.options import Asked
+    from feedsim.identify.read import named_apart, read_traces
+    from feedsim.identify.stages import identify as identified_from
+
     described = machine if isinstance(machine, Machine) or machine is None else load_subject(machine).machine
     mapping = load_columns(columns) if columns is not None else None
     files = [Path(each) for each in ([traces] if isinstance(traces, str | Path) else traces)]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from html import escape
 from pathlib import Path
 
+from feedsim import cosim
 from feedsim.analysis import Figure
-from feedsim.analysis.side_by_side import Source, differing, read_sources
+from feedsim.analysis.alignment import aligned
+from feedsim.analysis.side_by_side import Source, differing, named_apart, read_sources
 from feedsim.errors import InputError
 from feedsim.front.result import Result
 from feedsim.owned import TemporaryFolder
@@ -18,6 +20,7 @@ from feedsim.report import show as report
 from feedsim.report.picture import Picture
 from feedsim.report.show.pictures import pictures_of
 from feedsim.report.show.report import files_of, report_of
+from feedsim.sweep.case import case, scenario_of
 
 Shown = str | Path | Result
 HEIGHT = 900  # [px] of a report in a notebook; it scrolls
@@ -39,7 +42,7 @@ class Overlay:
         self._folder = TemporaryFolder()
         paths = [_at(each, self._folder.path / str(k)) for k, each in enumerate(results.values())]
         found = zip(self.names, read_sources(paths), strict=True)
-        self._sources = [replace(source, name=name) for name, source in found]
+        self._sources = aligned([replace(source, name=name) for name, source in found])
 
     @property
     def figures(self) -> dict[str, tuple[Figure | None, ...]]:
@@ -57,13 +60,18 @@ class Overlay:
         """Contours, following errors, torques, ..., over each other."""
         return tuple(pictures_of(self._sources))
 
-    def save(self, directory: str | Path) -> tuple[Path, ...]:
-        """Write what ``feedsim show`` leaves: report.html, summary.json. Returns the paths."""
+    @property
+    def lines(self) -> list[str]:
+        """What ``feedsim show`` says: parameters that differ, leading figures, how all was aligned."""
+        return report.lines(self._sources)
+
+    def save(self, directory: str | Path, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
+        """Write what ``feedsim show`` leaves; drawn: kinds of its figures, png and svg. Returns the paths."""
         report.check_writable(Path(directory), files_of(self._sources))
-        return report.write(self._sources, directory)
+        return report.write(self._sources, directory, drawn=drawn)
 
     def __repr__(self) -> str:
-        return "\n".join([f"Overlay of {', '.join(self.names)}", *report.lines(self._sources)])
+        return "\n".join([f"Overlay of {', '.join(self.names)}", *self.lines])
 
     def _repr_html_(self) -> str:
         inside = escape(page.html(report_of(self._sources)), quote=True)
@@ -73,7 +81,9 @@ class Overlay:
 def show(*results: Shown, **named: Shown) -> Overlay:
     """Lay results over each other: what :func:`run` returned, folders of ``feedsim run``, CSV files with a time.
 
-    named: results under names of your own; the others are called by their scenario or file.
+    A run of a study is named by its folder and its number or what is least or largest: "results/z_stop:17",
+    "results/z_stop:max=Z.overshoot". named: results under names of your own; the others are called by their scenario or
+    file.
 
     >>> import feedsim as fs
     >>> now = fs.run("z_positioning.yaml")
@@ -83,8 +93,10 @@ def show(*results: Shown, **named: Shown) -> Overlay:
     ('66.6666667 1/s', '83.3333333 1/s')
     """
     given: dict[str, Shown] = {}
+    files = list(dict.fromkeys(str(each) for each in results if not isinstance(each, Result)))
+    names = dict(zip(files, named_apart([Path(each) for each in files]), strict=True))
     for each in results:
-        plain = each.scenario.name if isinstance(each, Result) else _called(Path(each))
+        plain = each.scenario.name if isinstance(each, Result) else _called(str(each), names[str(each)])
         same = sum(re.fullmatch(rf"{re.escape(plain)}( \(\d+\))?", name) is not None for name in given)
         given[f"{plain} ({same + 1})" if same else plain] = each
     for name, each in named.items():
@@ -94,14 +106,19 @@ def show(*results: Shown, **named: Shown) -> Overlay:
     return Overlay(given)
 
 
-def _called(path: Path) -> str:
-    return path.name or str(path)
+def _called(text: str, name: str) -> str:
+    chosen = case(text)
+    return name if chosen is None else chosen.name
 
 
 def _at(each: Shown, folder: Path) -> Path:
-    """Where a result stands; one of the prompt is written there."""
+    """Where a result stands; one of the prompt, and a run of a study, is written there."""
     if not isinstance(each, Result):
-        return Path(each)
+        chosen = case(str(each))
+        if chosen is None:
+            return Path(each)
+        scenario, fmus = scenario_of(chosen)
+        each = Result.of(cosim.run(scenario, fmus=fmus))
     each.save(folder)
     return folder
 

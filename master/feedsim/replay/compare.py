@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from feedsim.analysis import Figure
+from feedsim.analysis.spectrum import amplitude_spectrum
 from feedsim.errors import InputError
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
@@ -112,11 +113,7 @@ class Comparison:
     def spectrum(self, name: str) -> tuple[Array, Array]:
         """Frequency [Hz] and amplitude spectrum of what is left of a channel over the window, Hann window."""
         rows = np.flatnonzero(self.each.rows)
-        error = self.channels[name].error[rows]
-        window = np.hanning(len(error))
-        amplitude = 2 * np.abs(np.fft.rfft((error - np.mean(error)) * window)) / np.sum(window)
-        frequency = np.fft.rfftfreq(len(error), self.each.record.interval)
-        return np.asarray(frequency, dtype=np.float64), np.asarray(amplitude, dtype=np.float64)
+        return amplitude_spectrum(self.channels[name].error[rows], self.each.record.interval)
 
     def over_position(self, name: str) -> tuple[Array, Array, Array]:
         """Centres of bins of the position [m] (B,), and the mean of what is left of a channel in either direction,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -109,7 +110,8 @@ def run(
                 **record, "format": format, "done": len(journal.done), "failed": journal.failed,
                 "partial": len(journal.done) < planned.runs, "resumed": journal.resumed, "began": begun,
                 "ended": ended, "sessions": [*sessions, own] if made or not ended or not sessions else sessions,
-                "nominal": nominal, "workers": where, "processes": processes, **provenance.circumstances(command),
+                "nominal": nominal, "place": _place(study, directory, fmus),
+                "workers": where, "processes": processes, **provenance.circumstances(command),
                 "warnings": [*study.warnings, *(made_by.warnings if made_by else ())], **more,
             })  # fmt: skip
 
@@ -184,6 +186,21 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(f"{path} cannot be removed: {error.strerror or error}") from error
+
+
+def _place(study: Study, directory: Path, fmus: Path | None) -> dict[str, Any]:
+    """Where a run can be made once more from: paths as from the study's folder."""
+
+    def seen(path: Path) -> str:
+        try:
+            return os.path.relpath(path, directory)
+        except ValueError:  # on another drive
+            return str(path.absolute())
+
+    return {
+        "file": seen(study.file), "overrides": [*study.overrides], "runs": study.sampling.runs,
+        "fmus": None if fmus is None else seen(fmus),
+    }  # fmt: skip
 
 
 def _write_record(path: Path, content: Mapping[str, Any]) -> None:

@@ -39,10 +39,12 @@ LEAST = 180
 
 @dataclass(frozen=True, eq=False)
 class RecordedTurn:
-    """A turn of a file: what it is called, the path, and how long it took [s], None where the file has no time."""
+    """A turn of a file: what it is called, the path, when it began and how long it took [s], None where the file has no
+    time."""
 
     name: str
     path: TurnedPath
+    begin: float | None
     duration: float | None
 
 
@@ -211,7 +213,7 @@ def _named(recording: Recording, angle: Array, deviation: Array, time: Array | N
     found = []
     for rows, sense in _turns(np.unwrap(angle), str(recording.path)):
         path = TurnedPath((angle[rows] + math.pi) % (2 * math.pi) - math.pi, deviation[rows], sense)
-        duration = None
+        begin = duration = None
         if time is not None:
             turned = np.abs(np.unwrap(angle[rows]) - angle[rows][0])
             passed = np.interp(np.linspace(0, turned[-1], PARTS + 1), turned, time[rows])
@@ -221,9 +223,10 @@ def _named(recording: Recording, angle: Array, deviation: Array, time: Array | N
                     f"{recording.path}: a turn from {time[rows][0]:.6g} s on is not driven at constant speed: parts of "
                     f"it take {100 * uneven:.2g} % more or less time than the mean; allowed: {100 * EVEN:g} %"
                 )
-            duration = float(time[rows][-1] - time[rows][0]) * 2 * math.pi / float(turned[-1])
+            begin = float(time[rows][0])
+            duration = float(time[rows][-1] - begin) * 2 * math.pi / float(turned[-1])
         way = "counterclockwise" if sense > 0 else "clockwise"
-        found.append(RecordedTurn(f"a turn {way}, {rows.stop - rows.start} samples", path, duration))
+        found.append(RecordedTurn(f"a turn {way}, {rows.stop - rows.start} samples", path, begin, duration))
     return found
 
 

@@ -1,21 +1,24 @@
-"""Pictures of several results over each other: contours of circles, and signals of the axes over time."""
+"""Pictures of several results over each other: contours of circles, stops, signals over time and by frequency."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from feedsim.analysis import Approach, deviation
+from feedsim.analysis.alignment import stops
 from feedsim.analysis.circularity import Turn, contour
-from feedsim.analysis.side_by_side import Source
+from feedsim.analysis.side_by_side import SIGNALS, Source
+from feedsim.analysis.spectrum import amplitude_spectrum
 from feedsim.errors import InputError
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
 from feedsim.report.formatting import plain
 from feedsim.report.labels import heading
 from feedsim.report.picture import Picture
 from feedsim.report.run import circle_plots
-from feedsim.report.run.charts import circle_chart, turned
+from feedsim.report.run.charts import ZOOM_AFTER, ZOOM_BEFORE, circle_chart, turned
 from feedsim.report.style import (
     BLUE,
     GREEN,
@@ -34,7 +37,11 @@ from feedsim.trace import Trace
 
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 ABSCISSA = Axis("time from the first row", "s")
+AFTER = Axis("time after the end of the motion", "ms", span=(-1e3 * ZOOM_BEFORE, 1e3 * ZOOM_AFTER))
+FREQUENCY = Axis("frequency", "Hz", log=True)
 DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1.5, 1.5)))
+SHAKEN = 0.02
+LEFT_OUT = f"Axes with less than {100 * SHAKEN:g} % of the largest range are left out."
 # What a picture answers: stem, title, signal, factor from SI, ordinate.
 QUESTIONS = (
     ("following-error", "How far do the axes lag?", "x_e", 1e6, "following error [µm]"),
@@ -42,7 +49,11 @@ QUESTIONS = (
     ("speed", "How fast are the motors?", "n_a", 1.0, "motor speed [rad/s]"),
     ("position", "Where are the axes?", "x_a", 1e3, "position [mm]"),
 )
-SI = {"x_e": "m", "M_a": "N.m", "n_a": "rad/s", "x_a": "m"}
+# Stops of an axis that are drawn, and the distance beyond the target that is shown at least [um].
+MOST_STOPS, LEAST_REACH = 6, 2.2
+# Spectra: signal, title, factor from SI, ordinate; stretch [s], rows of it at least, and how far down they are drawn.
+SPECTRA = (("x_e", "following error", 1e6, "amplitude [µm]"), ("M_a", "motor torque", 1.0, "amplitude [N·m]"))
+STRETCH, LEAST_ROWS, DOWN = 1.0, 64, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +75,12 @@ def _dash(k: int) -> Dash:
 def pictures_of(sources: Sequence[Source]) -> list[Picture]:
     """A picture per question that at least one source answers."""
     found = [picture for prefix in _prefixes(sources) if (picture := contour_picture(sources, prefix)) is not None]
-    for question in QUESTIONS:
-        if (picture := _over_time(sources, *question)) is not None:
-            found.append(picture)
-    return found
+    more = [
+        stop_picture(sources, stops(sources)),
+        *(_over_time(sources, *question) for question in QUESTIONS),
+        spectrum_picture(sources),
+    ]
+    return found + [picture for picture in more if picture is not None]
 
 
 def _prefixes(sources: Sequence[Source]) -> list[str]:
@@ -122,50 +135,168 @@ def contour_picture(sources: Sequence[Source], prefix: str) -> Picture | None:
     return Picture(stem, title, caption, draw, circle_chart(on, shown))
 
 
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """A stop of a source: the motion that it ends, and the source's position over its own ``t``."""
+
+    approach: Approach
+    trace: Trace
+
+
+@dataclass(frozen=True, eq=False)
+class _Room:
+    """A room of a drawing and panel of its chart: a curve each for some of the sources, by their numbers."""
+
+    title: str
+    x: Axis
+    y: Axis
+    curves: Sequence[tuple[int, Array, Array]]
+    levels: Sequence[Level] = ()
+    linked: str = "t"
+
+
 def _over_time(
     sources: Sequence[Source], stem: str, title: str, signal: str, factor: float, ordinate: str
 ) -> Picture | None:
-    axes = list(dict.fromkeys(axis for source in sources for axis in source.axes))
-    curves: dict[str, list[tuple[int, Array]]] = {}
-    for axis in axes:
-        found = ((k, source.curve(f"{axis}.{signal}", SI[signal])) for k, source in enumerate(sources))
-        curves[axis] = [(k, y) for k, y in found if y is not None]
-    # An axis that nothing moves says nothing.
-    curves = {axis: ys for axis, ys in curves.items() if any(float(np.ptp(y)) > 0 for _, y in ys)}
-    if not curves:
+    found: dict[str, list[tuple[int, Array, Array]]] = {}
+    for axis in dict.fromkeys(axis for source in sources for axis in source.axes):
+        curves = ((k, source, source.curve(f"{axis}.{signal}", SIGNALS[signal])) for k, source in enumerate(sources))
+        found[axis] = [(k, source.t, factor * y) for k, source, y in curves if y is not None]
+    rooms = [
+        _Room(f"Axis {axis}", ABSCISSA, _axis(ordinate), found[axis], [Level(0.0, dash="")])
+        for axis in _moved({axis: max((float(np.ptp(y)) for *_, y in curves), default=0.0)
+                            for axis, curves in found.items()})
+    ]  # fmt: skip
+    caption = f"Over the time of the first source, from its first row on. {LEFT_OUT}"
+    return _rooms(sources, stem, title, caption, rooms)
+
+
+def stop_picture(sources: Sequence[Source], stops: Sequence[Sequence[Approach]]) -> Picture | None:
+    """Distance beyond the target about the ends of motions, a room for every stop of an axis."""
+    rooms = []
+    for axis, number in stops_of(stops):
+        curves, most, said = [], LEAST_REACH, []
+        for k, (source, found) in enumerate(zip(sources, stops, strict=True)):
+            if (seen := stop_seen(source, found, axis, number)) is None:
+                continue
+            approach = seen.approach
+            time, beyond = deviation(seen.trace, approach, f"{axis}.x_a")
+            after = 1e3 * (time - approach.end)
+            near = (after >= -1e3 * ZOOM_BEFORE) & (after <= 1e3 * ZOOM_AFTER)
+            curves.append((k, after[near], 1e6 * beyond[near]))
+            most = max(most, 1e6 * float(beyond.max()))
+            said.append(f"{approach.target * 1e3:.6g}")
+        title = f"Axis {axis}, stop {number + 1} at {' and '.join(dict.fromkeys(said))} mm"
+        ordinate = Axis("beyond the target", "µm", span=(-1.45 * most, 1.45 * most))
+        levels = [Level(0.0, dash=""), Level(0.0, upright=True, dash="dotted")]
+        if curves and number < MOST_STOPS:
+            rooms.append(_Room(title, AFTER, ordinate, curves, levels, "stop"))
+    caption = (
+        "Actual position less end position in the sense of the motion, positive past it, over the time after the "
+        "setpoint has come to rest."
+    )
+    if any(number >= MOST_STOPS for _, number in stops_of(stops)):
+        caption += f" The first {MOST_STOPS} stops of each axis are drawn; the table has all."
+    return _rooms(sources, "stop", "How do the axes come to rest?", caption, rooms)
+
+
+def stops_of(stops: Sequence[Sequence[Approach]]) -> list[tuple[str, int]]:
+    """Axis and number of every stop that any source has."""
+    names = dict.fromkeys(approach.axis for found in stops for approach in found)
+    most = {axis: max(sum(each.axis == axis for each in found) for found in stops) for axis in names}
+    return [(axis, number) for axis in names for number in range(most[axis])]
+
+
+def stop_seen(source: Source, found: Sequence[Approach], axis: str, number: int) -> Stop | None:
+    """A stop of a source; None where it has not recorded it whole."""
+    own = [each for each in found if each.axis == axis]
+    position = source.curve(f"{axis}.x_a", "m")
+    if number >= len(own) or position is None or not source.t[0] <= own[number].start < own[number].end < source.t[-1]:
+        return None
+    return Stop(own[number], Trace(source.t, {f"{axis}.x_a": position}))
+
+
+def spectrum_picture(sources: Sequence[Source]) -> Picture | None:
+    """Amplitude spectra of following error and torque of every axis, over the whole of each source."""
+    rooms = []
+    for signal, words, factor, ordinate in SPECTRA:
+        found: dict[str, list[tuple[int, Array, Array]]] = {}
+        for axis in dict.fromkeys(axis for source in sources for axis in source.axes):
+            curves = [(k, _spectrum(source, f"{axis}.{signal}", factor)) for k, source in enumerate(sources)]
+            found[axis] = [(k, *curve) for k, curve in curves if curve is not None]
+        tops = {axis: max((float(a.max()) for *_, a in curves), default=0.0) for axis, curves in found.items()}
+        for axis in _moved(tops):
+            y = Axis(*_labelled(ordinate), log=True, span=(DOWN * tops[axis], 2 * tops[axis]))
+            rooms.append(_Room(f"Axis {axis}: {words}", FREQUENCY, y, found[axis], (), "f"))
+    caption = (
+        f"Amplitude spectra over the whole of each source: Hann windows of {STRETCH:g} s, half over each other, "
+        "averaged by power. A steady vibration stands there with its amplitude; what only rings now and then stands "
+        f"lower. {LEFT_OUT}"
+    )
+    return _rooms(sources, "spectrum", "Which frequencies are in it?", caption, rooms, 2)
+
+
+def _spectrum(source: Source, name: str, factor: float) -> tuple[Array, Array] | None:
+    values = source.curve(name, SIGNALS[name.partition(".")[2]])
+    if values is None or len(values) < LEAST_ROWS or not np.ptp(values):
+        return None
+    interval = float(np.median(np.diff(source.time)))
+    even = np.arange(source.time[0], source.time[-1], interval)
+    rows = max(LEAST_ROWS, round(STRETCH / interval))
+    f, a = amplitude_spectrum(factor * np.interp(even, source.time, values), interval, rows)
+    return f[2:], a[2:]  # what is below holds the mean
+
+
+def _moved(sizes: Mapping[str, float]) -> list[str]:
+    """Axes that are worth a room, by how large what they do is."""
+    return [axis for axis, size in sizes.items() if size > SHAKEN * max(sizes.values())]
+
+
+def _rooms(
+    sources: Sequence[Source], stem: str, title: str, caption: str, rooms: Sequence[_Room], columns: int = 1
+) -> Picture | None:
+    """A picture of rooms below one another, in columns; None without any."""
+    if not rooms:
         return None
 
     def draw() -> Drawn:
-        with drawing(10.0, 0.6 + 2.3 * len(curves)) as figure:
-            rooms = figure.subplots(len(curves), 1, squeeze=False, sharex=True)[:, 0]
-            for room, (axis, ys) in zip(rooms, curves.items(), strict=True):
-                for k, y in ys:
-                    t = sources[k].time - sources[k].time[0]
-                    room.plot(*thinned(t, factor * y), **look(k), linewidth=1.1, label=plain(sources[k].name))
-                room.axhline(0.0, color=MUTED, linewidth=0.8)
-                room.margins(x=0.01)
-                heading(room, f"Axis {axis}")
-                room.set_ylabel(ordinate)
-            handles = [line for room in rooms for line in room.get_lines() if not line.get_label().startswith("_")]
-            once = {handle.get_label(): handle for handle in handles}
-            figure.legend(handles=list(once.values()), loc="outside upper right", ncols=min(len(once), 4))
-            rooms[-1].set_xlabel("time from the first row [s]")
+        lines = -(-len(rooms) // columns)
+        with drawing(10.0, 0.6 + 2.3 * lines) as figure:
+            places = figure.subplots(lines, columns, squeeze=False, sharex=True).ravel()
+            for place in places[len(rooms) :]:
+                place.set_visible(False)
+            for place, room in zip(places, rooms, strict=False):
+                for k, x, y in room.curves:
+                    place.plot(*thinned(x, y), **look(k), linewidth=1.1, label=plain(sources[k].name))
+                for level in room.levels:
+                    (place.axvline if level.upright else place.axhline)(level.at, color=MUTED, linewidth=0.8)
+                place.margins(x=0.01)
+                if room.x.log:
+                    place.set(xscale="log", yscale="log")
+                place.set(xlim=room.x.span, ylim=room.y.span, ylabel=room.y.title)
+                heading(place, room.title)
+            once = {line.get_label(): line for place in places for line in place.get_lines()}
+            handles = [line for label, line in once.items() if not str(label).startswith("_")]
+            figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 4))
+            for place in places[-columns:]:
+                place.set_xlabel(rooms[0].x.title)
             return finish(figure, stem, title, caption)
 
+    panels = [
+        Panel(
+            room.title, room.x, room.y,
+            [Curve(sources[k].name, x, y, COLOURS[k % len(COLOURS)], _dash(k), 1.2) for k, x, y in room.curves],
+            room.levels, linked=room.linked,
+        )
+        for room in rooms
+    ]  # fmt: skip
+    return Picture(stem, title, caption, draw, Chart(panels, (1.0,) * columns))
+
+
+def _axis(ordinate: str) -> Axis:
+    return Axis(*_labelled(ordinate))
+
+
+def _labelled(ordinate: str) -> tuple[str, str]:
     label, _, unit = ordinate.removesuffix("]").rpartition(" [")
-    panels = []
-    for axis, ys in curves.items():
-        own = [
-            Curve(
-                sources[k].name,
-                sources[k].time - sources[k].time[0],
-                factor * y,
-                COLOURS[k % len(COLOURS)],
-                _dash(k),
-                1.2,
-            )
-            for k, y in ys
-        ]
-        panels.append(Panel(f"Axis {axis}", ABSCISSA, Axis(label, unit), own, [Level(0.0, dash="")], linked="t"))
-    caption = "Each curve in its source's colour, from the first row of its file on."
-    return Picture(stem, title, caption, draw, Chart(panels))
+    return label, unit

@@ -8,7 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from feedsim.analysis import Figure
+from feedsim.analysis import Figure, positioning
+from feedsim.analysis.alignment import stops
 from feedsim.analysis.side_by_side import SUMMARY as OF_RESULT
 from feedsim.analysis.side_by_side import Source, differing
 from feedsim.report import sections
@@ -16,9 +17,10 @@ from feedsim.report.content import Bullets, Report, Section, Table, Text, code
 from feedsim.report.formatting import display_unit, minus, shown
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
-from feedsim.report.show.pictures import pictures_of
+from feedsim.report.show.pictures import Stop, pictures_of, stop_seen, stops_of
 
 FORMAT = 1
+BAND = 1e-6  # [m] about the target, within which an axis has settled
 # Figures whose change is told first, by what stands behind the last dot.
 FIRST = ("G", "G_b", "peak_", "servo_mismatch", "overshoot", "settling_time")
 
@@ -52,6 +54,9 @@ def lines(sources: Sequence[Source]) -> list[str]:
     for name in _leading(sources):
         values = [source.figures.get(name) for source in sources]
         said.append(f"{name}: {' | '.join('–' if v is None else str(Figure(*v, '')) for v in values)}")
+    said += [
+        f"{source.name} is aligned {source.aligned}" for source in sources if source.aligned and not source.figures
+    ]
     return said or ["the sources have neither figures nor parameters to compare; the pictures do"]
 
 
@@ -68,11 +73,13 @@ def report_of(sources: Sequence[Source]) -> Report:
     return Report(
         " against ".join(names) if len(names) <= 3 else f"{len(names)} results side by side",
         f"{len(sources)} source(s)",
-        answer=lines(sources)[:4],
+        answer=lines(sources)[:6],
         main=[
             *pictures_of(sources),
+            _stops(sources),
             _figures(sources),
             _parameters(sources),
+            _alignment(sources),
             Section("What each says of itself", [Bullets([f"{s.name}: {line}" for s in sources for line in s.answer])])
             if any(source.answer for source in sources)
             else None,
@@ -80,6 +87,36 @@ def report_of(sources: Sequence[Source]) -> Report:
         provenance=sections.provenance_section(rows, hashed([("source", file) for file in files_of(sources)])),
         footer="Differences are to the first source that has the figure. Values in full precision: summary.json.",
     )
+
+
+def _alignment(sources: Sequence[Source]) -> Section | None:
+    rows = [(source.name, source.aligned or "the others are laid onto it") for source in sources]
+    return Section("How they are laid over each other", [Table("lp", (), rows)]) if len(sources) > 1 else None
+
+
+def _stops(sources: Sequence[Source]) -> Section | None:
+    """Every stop of an axis: overshoot and settling time of every source."""
+    found = stops(sources)
+    rows = []
+    for axis, number in stops_of(found):
+        seen = [stop_seen(source, own, axis, number) for source, own in zip(sources, found, strict=True)]
+        cells = [cell for each in seen for cell in _stop(each)]
+        rows.append((f"{axis}, stop {number + 1}", *cells))
+    if not rows:
+        return None
+    heads = [f"{source.name}: {what}" for source in sources for what in ("overshoot [µm]", "settling [ms]")]
+    note = (
+        "Overshoot: largest distance beyond the end position. Settling: last instant outside "
+        f"±{BAND * 1e6:g} µm about it, counted from where the setpoint comes to rest."
+    )
+    return Section("Stops", [Table("l" + "r" * len(heads), ["Axis", *heads], rows, note)])
+
+
+def _stop(stop: Stop | None) -> tuple[str, str]:
+    if stop is None:
+        return "–", "–"
+    figures = positioning(stop.trace, stop.approach, band=BAND)
+    return shown(figures["overshoot"])[0], shown(figures["settling_time"])[0]
 
 
 def _figures(sources: Sequence[Source]) -> Section | None:
@@ -134,6 +171,8 @@ def summary(sources: Sequence[Source], names: Sequence[str]) -> dict[str, Any]:
             {
                 "name": source.name,
                 "rows": len(source.time),
+                "aligned": source.aligned,
+                "shift": quantity(math.nan if source.shift is None else source.shift, "s"),
                 "figures": {name: quantity(value, unit) for name, (value, unit) in source.figures.items()},
             }
             for source in sources

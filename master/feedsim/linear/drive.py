@@ -116,7 +116,8 @@ class LinearDrive:
         d = self.drive
         result = np.ones_like(s)
         for each in (d.filter_1, d.filter_2, d.filter_3, d.filter_4):
-            result = result * _filter(s, each, self.cycles.T_c)
+            if each.type != "off":
+                result = result * _filter(s, each, self.cycles.T_c)
         return result
 
     # --- current loop and motor --------------------------------------------------------------------------------------
@@ -213,9 +214,7 @@ def _bilinear(
 
 
 def _filter(s: Complexes, described: Filter, T_c: float) -> Complexes:
-    """A current setpoint filter, Tustin prewarped at its frequency."""
-    if described.type == "off":
-        return np.ones_like(s)
+    """A current setpoint filter that is on, Tustin prewarped at its frequency."""
     omega = 2 * math.pi * _given(described.f)
     denominator = (1.0, 2 * _given(described.D_den) * omega, omega**2)
     if described.type == "low_pass":

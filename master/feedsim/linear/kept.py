@@ -6,8 +6,8 @@ from collections.abc import Callable, Hashable
 
 from feedsim.linear.plant import Complexes
 
-# Points of a grid; the few at which a crossing is searched are asked for once.
-LEAST = 100
+# Points of a grid; the fewer at which crossings are searched are asked for once.
+LEAST = 500
 
 
 class Kept:

@@ -98,12 +98,12 @@ def speed_reference(system: LinearSystem, axis: str, frequency: Floats) -> Compl
 
 def position_reference(system: LinearSystem, axis: str, frequency: Floats, *, feedforward: bool = False) -> Complexes:
     """x_a/x_s [1] of the closed position loop; with feedforward, n_ffw is the setpoint's derivative over the lead."""
-    closed, x_a = system.closing({axis: "position"}), f"{axis}.x_a"
-    result = closed.transfer(frequency, x_a, f"{axis}.x_s")
-    if feedforward:
-        speed = 2j * np.pi * np.asarray(frequency) / system.machine.axes[axis].I_P
-        result = result + speed * closed.transfer(frequency, x_a, f"{axis}.n_ffw")
-    return result
+    closed = system.closing({axis: "position"})
+    to_x_s, to_n_ffw = closed.transfers(frequency, f"{axis}.x_a", (f"{axis}.x_s", f"{axis}.n_ffw"))
+    if not feedforward:
+        return to_x_s
+    speed = 2j * np.pi * np.asarray(frequency) / system.machine.axes[axis].I_P
+    return np.asarray(to_x_s + speed * to_n_ffw)
 
 
 def speed_gain(system: LinearSystem, axis: str, s: Complexes) -> Complexes:

@@ -16,8 +16,9 @@ which is the response of q' = p q + u (Franklin, Powell, Workman: Digital Contro
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
@@ -27,6 +28,9 @@ from feedsim.structure import Modes
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+# Modes at s (F,): their responses q and q' to their own forces, (F, N) each.
+Responses = Callable[[Complexes], tuple[Complexes, Complexes]]
 
 # How an input runs between its sample instants; "continuous": it is no sampled signal, but exp(s t).
 Hold = Literal["linear", "held", "continuous"]
@@ -78,29 +82,54 @@ class ModalPlant:
         of the axes [N.m], forces on the tool [N]. All inputs run by `hold` over cycles of T [s].
         """
         axes = self.rotor.shape[1]
-        into = np.hstack([self.rotor, self.tool])
-        columns = into.shape[1]
-        # (N, outputs * inputs): products of shapes, so that the modal sums are two matrix products
-        speeds = (self.rotor[:, :, None] * into[:, None, :]).reshape(len(into), -1)
-        places = (np.hstack([self.scale, self.tool])[:, :, None] * into[:, None, :]).reshape(len(into), -1)
-        result = np.empty((len(s), 2 * axes + len(TOOL_DIRECTIONS), columns), dtype=np.complex128)
+        columns = axes + len(TOOL_DIRECTIONS)
+        speeds, places = self._products
+        result = np.empty((len(s), axes + columns, columns), dtype=np.complex128)
         for start in range(0, len(s), CHUNK):
             part = slice(start, start + CHUNK)
             q, v = self.modal(s[part], T, hold)
             result[part, :axes] = modal_sums(v, speeds).reshape(-1, axes, columns)
-            result[part, axes:] = modal_sums(q, places).reshape(-1, axes + len(TOOL_DIRECTIONS), columns)
+            result[part, axes:] = modal_sums(q, places).reshape(-1, columns, columns)
         return result
+
+    @cached_property
+    def _products(self) -> tuple[Floats, Floats]:
+        """(N, outputs * inputs) of speeds and of displacements: products of shapes, so that the modal sums are two
+        matrix products."""
+        into = np.hstack([self.rotor, self.tool])
+        speeds = (self.rotor[:, :, None] * into[:, None, :]).reshape(len(into), -1)
+        places = (np.hstack([self.scale, self.tool])[:, :, None] * into[:, None, :]).reshape(len(into), -1)
+        return speeds, places
 
     def modal(self, s: Complexes, T: float, hold: Hold) -> tuple[Complexes, Complexes]:
         """Responses q and q' of every mode to its own force: (F, N) each."""
         q = np.empty((len(s), len(self.omega_0)), dtype=np.complex128)
         v = np.empty_like(q)
-        rigid = self.omega_0 == 0
-        double = ~rigid & (np.abs(self.damping - 1) < DOUBLE_POLE)
-        for which, response in ((rigid, _rigid), (double, _double_pole), (~rigid & ~double, _elastic)):
-            if which.any():
-                q[:, which], v[:, which] = response(s, self.omega_0[which], self.damping[which], T, hold)
+        for which, responses in self._kinds(T, hold):
+            q[:, which], v[:, which] = responses(s)
         return q, v
+
+    def _kinds(self, T: float, hold: Hold) -> list[tuple[slice | NDArray[np.int64], Responses]]:
+        """The modes of each kind with their responses: what does not depend on s is worked out once."""
+        if (T, hold) not in self._known:
+            rigid = self.omega_0 == 0
+            double = ~rigid & (np.abs(self.damping - 1) < DOUBLE_POLE)
+            self._known[T, hold] = [
+                (_places(which), kind(self.omega_0[which], self.damping[which], T, hold))
+                for which, kind in ((rigid, _rigid), (double, _double_pole), (~rigid & ~double, _elastic))
+                if which.any()
+            ]
+        return self._known[T, hold]
+
+    @cached_property
+    def _known(self) -> dict[tuple[float, Hold], list[tuple[slice | NDArray[np.int64], Responses]]]:
+        return {}
+
+
+def _places(which: NDArray[np.bool_]) -> slice | NDArray[np.int64]:
+    """Where a mask holds: a slice where it can be one, which numpy writes to several times as fast."""
+    at = np.flatnonzero(which)
+    return slice(int(at[0]), int(at[-1]) + 1) if at[-1] - at[0] == len(at) - 1 else at
 
 
 def modal_sums(responses: Complexes, shapes: Floats) -> Complexes:
@@ -111,56 +140,89 @@ def modal_sums(responses: Complexes, shapes: Floats) -> Complexes:
     return result
 
 
-def _rigid(s: Complexes, omega_0: Floats, damping: Floats, T: float, hold: Hold) -> tuple[Complexes, Complexes]:
+def _rigid(omega_0: Floats, damping: Floats, T: float, hold: Hold) -> Responses:
     """The double integrator."""
-    if hold == "continuous":
-        v = np.asarray(1 / s)
-        q = np.asarray(v * v)
-    else:
-        z = np.exp(s * T)
-        less = np.expm1(s * T)  # z - 1, which cancels at low frequencies
-        if hold == "linear":
-            v = np.asarray(T / 2 * (z + 1) / less)
-            q = np.asarray(T**2 / 6 * (z * z + 4 * z + 1) / less**2)
+
+    def responses(s: Complexes) -> tuple[Complexes, Complexes]:
+        if hold == "continuous":
+            v = np.asarray(1 / s)
+            q = np.asarray(v * v)
         else:
-            v = np.asarray(T / less)
-            q = np.asarray(T**2 / 2 * (z + 1) / less**2)
-    shape = (len(s), len(omega_0))
-    return np.broadcast_to(q[:, None], shape), np.broadcast_to(v[:, None], shape)
+            z = np.exp(s * T)
+            less = np.expm1(s * T)  # z - 1, which cancels at low frequencies
+            if hold == "linear":
+                v = np.asarray(T / 2 * (z + 1) / less)
+                q = np.asarray(T**2 / 6 * (z * z + 4 * z + 1) / less**2)
+            else:
+                v = np.asarray(T / less)
+                q = np.asarray(T**2 / 2 * (z + 1) / less**2)
+        shape = (len(s), len(omega_0))
+        return np.broadcast_to(q[:, None], shape), np.broadcast_to(v[:, None], shape)
+
+    return responses
 
 
-def _elastic(s: Complexes, omega_0: Floats, damping: Floats, T: float, hold: Hold) -> tuple[Complexes, Complexes]:
-    s = s[:, None]
-    if hold == "continuous":
+def _elastic(omega_0: Floats, damping: Floats, T: float, hold: Hold) -> Responses:
+    def continuous(s: Complexes) -> tuple[Complexes, Complexes]:
+        s = s[:, None]
         q = 1 / (s * s + 2 * damping * omega_0 * s + omega_0**2)
         return q, s * q
+
+    if hold == "continuous":
+        return continuous
     root = np.sqrt(np.asarray(damping**2 - 1, dtype=np.complex128))
     first = np.asarray(omega_0 * (-damping + root), dtype=np.complex128)
     second = np.asarray(omega_0 * (-damping - root), dtype=np.complex128)
-    z = np.exp(s * T)
-    h_1, h_2 = _first_order(z, first, T, hold), _first_order(z, second, T, hold)
-    apart = first - second
-    return (h_1 - h_2) / apart, (first * h_1 - second * h_2) / apart
+    h_1, h_2 = _first_order(first, T, hold), _first_order(second, T, hold)
+    # real or imaginary: to multiply by it is to divide by their distance
+    apart = 1 / (first - second)
+
+    def sampled(s: Complexes) -> tuple[Complexes, Complexes]:
+        z = np.exp(s[:, None] * T)
+        v, less = h_1(z), h_2(z)
+        q = v - less
+        np.multiply(first, v, out=v)
+        v -= np.multiply(second, less, out=less)
+        q *= apart
+        v *= apart
+        return q, v
+
+    return sampled
 
 
-def _double_pole(s: Complexes, omega_0: Floats, damping: Floats, T: float, hold: Hold) -> tuple[Complexes, Complexes]:
-    def mean(away: float) -> tuple[Complexes, Complexes]:
-        above = _elastic(s, omega_0, damping + away, T, hold)
-        below = _elastic(s, omega_0, damping - away, T, hold)
-        return (above[0] + below[0]) / 2, (above[1] + below[1]) / 2
+def _double_pole(omega_0: Floats, damping: Floats, T: float, hold: Hold) -> Responses:
+    near, far = (
+        [_elastic(omega_0, damping + away, T, hold) for away in (distance, -distance)]
+        for distance in (EPSILON, 2 * EPSILON)
+    )
 
-    near, far = mean(EPSILON), mean(2 * EPSILON)
-    return (4 * near[0] - far[0]) / 3, (4 * near[1] - far[1]) / 3
+    def responses(s: Complexes) -> tuple[Complexes, Complexes]:
+        (q_near, v_near), (q_far, v_far) = (
+            [(one + other) / 2 for one, other in zip(above(s), below(s), strict=True)] for above, below in (near, far)
+        )
+        return (4 * q_near - q_far) / 3, (4 * v_near - v_far) / 3
+
+    return responses
 
 
-def _first_order(z: Complexes, pole: Complexes, T: float, hold: Hold) -> Complexes:
-    """h(p) at z (F, 1) for poles (N,): (F, N)."""
+def _first_order(pole: Complexes, T: float, hold: Hold) -> Callable[[Complexes], Complexes]:
+    """h(p) for poles (N,), a function of z (F, 1): (F, N)."""
     x = pole * T
-    phi_1 = np.expm1(x) / x
+    exp_x, phi_1 = np.exp(x), np.expm1(x) / x
     if hold == "held":
-        return T * phi_1 / (z - np.exp(x))
+        return lambda z: T * phi_1 / (z - exp_x)
     phi_2 = _phi_2(x)
-    return T * (phi_1 - phi_2 + phi_2 * z) / (z - np.exp(x))
+    rest = phi_1 - phi_2
+
+    def h(z: Complexes) -> Complexes:
+        # rounded as T (phi_1 - phi_2 + phi_2 z)/(z - exp(x)), with no array in between that is thrown away
+        found = np.asarray(phi_2 * z)
+        found += rest
+        found *= T
+        found /= z - exp_x
+        return found
+
+    return h
 
 
 def _phi_2(x: Complexes) -> Complexes:

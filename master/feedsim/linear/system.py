@@ -75,8 +75,8 @@ class LinearSystem:
         if key not in self._closings:
             other = replace(self, closed=loops)
             # what does not depend on the loops is worked out once
-            other.__dict__.update(plant=self.plant, drives=self.drives, _closings=self._closings,
-                                  _responses=self._responses, _structure=self._structure)  # fmt: skip
+            shared = ("plant", "drives", "_closings", "_responses", "_structure", "_levels")
+            other.__dict__.update({name: getattr(self, name) for name in shared})
             self._closings[key] = other
         return self._closings[key]
 
@@ -84,14 +84,19 @@ class LinearSystem:
     def _closings(self) -> dict[tuple[Closed, ...], Self]:
         return {}
 
-    # Many responses are asked for at the same few grids.
+    # Many responses are asked for at the same few grids, axis after axis. Those of the structure and of the position
+    # level are the dear ones, and small.
     @cached_property
     def _responses(self) -> Kept:
         return Kept(8)
 
     @cached_property
     def _structure(self) -> Kept:
-        return Kept(5)
+        return Kept(12)
+
+    @cached_property
+    def _levels(self) -> Kept:
+        return Kept(12)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
@@ -154,8 +159,12 @@ class LinearSystem:
 
     def transfer(self, frequency: Floats, output: str, name: str) -> Complexes:
         """(F,) response of one output to one input alone, at frequencies in any order. Raises as :meth:`response`."""
-        matrix = self.at(self._s(frequency))
-        return np.asarray(matrix[:, self._index(output, self.outputs, "output"), self._input(name)])
+        return self.transfers(frequency, output, (name,))[0]
+
+    def transfers(self, frequency: Floats, output: str, names: Sequence[str]) -> list[Complexes]:
+        """The same to each of several inputs alone."""
+        rows = self.at(self._s(frequency))[:, self._index(output, self.outputs, "output")]
+        return [np.asarray(rows[:, self._input(name)]) for name in names]
 
     def ratio(self, frequency: Floats, numerator: str, denominator: str, excitation: str) -> Complexes:
         """(F,) response of an output over that of another, both to one excitation: what H1 finds.
@@ -188,61 +197,78 @@ class LinearSystem:
             if self.loops[self.axes[i]] == "position":
                 answers[:, i, column + axes] = drive.feedforward(s)
         solved = np.linalg.solve(np.eye(axes) + gains[:, None] * slow, answers)
-        ramps = np.stack([drive.ramp(s) for drive in self.drives], axis=1)
-        result += fast[:, :, :axes] @ (ramps[:, :, None] * solved)
+        result += fast[:, :, :axes] @ (self._ramps(s)[:, :, None] * solved)
         return result
 
     # --- the two eliminations ----------------------------------------------------------------------------------------
 
     def speed_level(self, s: Complexes, tool_force: Hold = "linear") -> Complexes:
         """(F, outputs, 3 A + 3): responses with every position loop open, to n_add, M_add, M_a and tool forces."""
+        key = ("speed level", tool_force, *self._controlled)
+        return self._responses(key, s, partial(self._speed_level, tool_force))
+
+    def _speed_level(self, tool_force: Hold, s: Complexes) -> Complexes:
         axes = len(self.axes)
         ports = self.ports(s, tool_force)
-        E = np.stack([drive.torque(s)[0] for drive in self.drives], axis=1) * self._controlled
-        loop = self.torque_loop(s, ports)
+        torques = self._torques(s, ports)
+        result = np.zeros((len(s), len(self.outputs), torques.shape[2]), dtype=np.complex128)
+        mechanical = ports.shape[1]
+        result[:, :mechanical] = ports[:, :, :axes] @ torques
+        result[:, :mechanical, 3 * axes :] += ports[:, :, axes:]
+        result[:, mechanical : mechanical + axes] = torques
+        each = np.arange(axes)
+        result[:, mechanical + axes + each, each] = 1.0
+        return result
+
+    def _torques(self, s: Complexes, ports: Complexes) -> Complexes:
+        """(F, A, 3 A + 3): motor torques with every position loop open, to what speed_level() answers to."""
+        axes, each = len(self.axes), np.arange(len(self.axes))
+        E, loop = self._loop(s, ports)
         S = np.stack([drive.from_setpoint(s) for drive in self.drives], axis=1)
         given = np.zeros((len(s), axes, 3 * axes + len(TOOL_DIRECTIONS)), dtype=np.complex128)
-        each = np.arange(axes)
         given[:, each, each] = E * S
         given[:, each, axes + each] = E
         given[:, each, 2 * axes + each] = ~self._controlled
-        forces = given.shape[2] - len(TOOL_DIRECTIONS)
-        given[:, :, forces:] = -loop[:, :, axes:]
-        torques = np.linalg.solve(np.eye(axes) + loop[:, :, :axes], given)
-        result = np.zeros((len(s), len(self.outputs), given.shape[2]), dtype=np.complex128)
-        mechanical = ports.shape[1]
-        result[:, :mechanical] = ports[:, :, :axes] @ torques
-        result[:, :mechanical, forces:] += ports[:, :, axes:]
-        result[:, mechanical : mechanical + axes] = torques
-        result[:, mechanical + axes + each, each] = 1.0
-        return result
+        given[:, :, 3 * axes :] = -loop[:, :, axes:]
+        return np.asarray(np.linalg.solve(np.eye(axes) + loop[:, :, :axes], given))
 
     def torque_loop(self, s: Complexes, ports: Complexes) -> Complexes:
         """(F, A, A + 3): what the speed loops take off the motor torques per motor torque [1] and per tool force [m],
         with the structure's `ports`: E C n + G_n n_a; 0 for axes without control."""
+        return self._loop(s, ports)[1]
+
+    def _loop(self, s: Complexes, ports: Complexes) -> tuple[Complexes, Complexes]:
+        """E of the drives (F, A), 0 for axes without control, and the torque loop."""
         axes = len(self.axes)
+        E = np.zeros((len(s), axes), dtype=np.complex128)
         loop = np.zeros((len(s), axes, ports.shape[2]), dtype=np.complex128)
         for i in np.flatnonzero(self._controlled):
             drive = self.drives[i]
-            E, G_n = drive.torque(s)
+            E[:, i], G_n = drive.torque(s)
             V, n_a = drive.speed_of_position(s), ports[:, i]
             n = n_a if V is None else V[:, None] * ports[:, axes + i]
-            loop[:, i] = (E * drive.from_speed(s))[:, None] * n + G_n[:, None] * n_a
-        return loop
+            loop[:, i] = (E[:, i] * drive.from_speed(s))[:, None] * n + G_n[:, None] * n_a
+        return E, loop
 
     def position_level(self, s: Complexes) -> Complexes:
         """(F, A, A): what the position controllers sample of x_a per setpoint that they give, position loops open.
 
         The sum over all components that one answer of a controller has within the ticks of its cycle.
         """
-        return self._responses(("position level", *self.loops.values()), s, self._position_level)
+        return self._levels(tuple(self._controlled), s, self._position_level)
 
     def _position_level(self, s: Complexes) -> Complexes:
         axes, ticks = len(self.axes), self.drives[0].ticks
         components = (s[:, None] + 2j * np.pi * np.arange(ticks) / self.machine.cycles.T_pos).ravel()
-        x_a = self.speed_level(components)[:, axes : 2 * axes, :axes]
-        ramps = np.stack([drive.ramp(components) for drive in self.drives], axis=1)
-        return np.asarray((x_a * ramps[:, None, :]).reshape(len(s), ticks, axes, axes).sum(axis=1))
+        ports = self._structure("components", s, lambda _: self._ports(components, "linear"))
+        x_a = (ports[:, axes : 2 * axes, :axes] @ self._torques(components, ports))[:, :, :axes]
+        return np.asarray((x_a * self._ramps(components)[:, None, :]).reshape(len(s), ticks, axes, axes).sum(axis=1))
+
+    def _ramps(self, s: Complexes) -> Complexes:
+        """(F, A): the ramps of the axes' setpoints, of which there are two kinds."""
+        kinds = {drive.drive.ramp_speed_setpoint: drive for drive in self.drives}
+        ramps = {kind: drive.ramp(s) for kind, drive in kinds.items()}
+        return np.stack([ramps[drive.drive.ramp_speed_setpoint] for drive in self.drives], axis=1)
 
     def ports(self, s: Complexes, tool_force: Hold = "linear") -> Complexes:
         """(F, 2 A + 3, A + 3): port matrix of the structure with every input running as it does."""

@@ -322,15 +322,25 @@ def test_an_estimated_shift_of_nothing_is_0(
     assert not re.search(r"e-[0-9]+ (s|ns)\b", out)
 
 
+def simulate(archive: Path, folder: Path) -> subprocess.CompletedProcess[str]:
+    words = [str(archive), f"references/{archive.stem}", f"results/{archive.stem}"]
+    command = [sys.executable, str(ROOT / "ci" / "simulate.py"), *words]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
 @pytest.mark.parametrize("unit", ["friction", "controller", "plant", "setpoint"])
 def test_the_script_for_integrators(unit: str, fmus: Path, tmp_path: Path) -> None:
-    """docs/comparing.md: the references in an archive through FMPy, with the tolerances that lie beside them."""
-    document = (ROOT / "docs" / "comparing.md").read_text(encoding="utf-8")
-    script = document.split("## In your own CI")[1].split("```python\n")[1].split("```")[0]
-    (tmp_path / "simulate.py").write_text(script, encoding="utf-8")
-    words = [str(fmus / f"{unit}.fmu"), f"references/{unit}", f"results/{unit}"]
-    subprocess.run([sys.executable, "simulate.py", *words], cwd=tmp_path, check=True, capture_output=True)
+    """The references in an archive through FMPy, with the tolerances that lie beside them."""
+    done = simulate(fmus / f"{unit}.fmu", tmp_path)
+    assert done.returncode == 0, done.stderr
     assert run(tmp_path / "results", tmp_path / "references") == 0
+
+
+def test_the_script_for_integrators_wants_references(fmus: Path, tmp_path: Path) -> None:
+    """The whole machine has none in its archive; a check of nothing is no success."""
+    done = simulate(fmus / "machine.fmu", tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.endswith("machine.fmu: holds no reference results\n")
 
 
 def test_names_do_not_command_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

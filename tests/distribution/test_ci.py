@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -41,6 +42,10 @@ def missing(job: Path) -> None:
     (job / "results" / "two.csv").unlink()
 
 
+def broken(job: Path) -> None:
+    (job / "results" / "two.csv").write_bytes(b"\x00\xff no table")
+
+
 def script(job: Path, **variables: str) -> subprocess.CompletedProcess[str]:
     return steps('sh "$CI_FOLDER/compare.sh" "$RESULTS" "$REFERENCES" $OPTIONS', job, variables, ("sh", "-euc"))
 
@@ -78,12 +83,13 @@ def steps(text: str, job: Path, variables: dict[str, str], shell: tuple[str, ...
 
 
 def told(job: Path) -> tuple[int, int]:
-    """Failures and errors of the JUnit file."""
-    cases = list(ET.parse(job / "feedsim.xml").iter("testcase"))
+    """Failures and errors of the JUnit file: as its cases are, and as its head counts them, which CIs show."""
+    root = ET.parse(job / "feedsim.xml").getroot()
+    cases = list(root.iter("testcase"))
     assert cases
-    return sum(case.find("failure") is not None for case in cases), sum(
-        case.find("error") is not None for case in cases
-    )
+    counted = tuple(sum(case.find(what) is not None for case in cases) for what in ("failure", "error"))
+    assert counted == (int(root.attrib["failures"]), int(root.attrib["errors"]))
+    return counted[0], counted[1]
 
 
 WAYS = [script, github, gitlab]
@@ -103,8 +109,14 @@ def test_a_planted_difference_is_a_failure_and_a_missing_result_an_error(way: An
     assert told(job) == (1, 0)
     missing(job)
     assert way(job, RESULTS="results", REFERENCES="references").returncode == 2
-    failures, errors = told(job)
-    assert (failures, errors) == (1, 1)
+    assert told(job) == (1, 1)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_result_that_cannot_be_read_is_an_error(way: Any, job: Path) -> None:
+    broken(job)
+    assert way(job, RESULTS="results", REFERENCES="references").returncode == 2
+    assert told(job) == (0, 1)
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -128,15 +140,64 @@ def test_what_cannot_be_installed_is_no_success(job: Path) -> None:
     assert done.returncode == 2
 
 
-def test_a_wheel_that_is_named_is_installed(fmus: Path, job: Path) -> None:
-    """The packages that it needs are borrowed: the job of a CI has an index, a test has none."""
-    (job / "dist").mkdir()
+# The packages that a wheel needs are borrowed: the job of a CI has an index, a test has none.
+BORROWED = {
+    "PIP_NO_INDEX": "1",
+    "PIP_NO_DEPS": "1",
+    "PYTHONPATH": os.pathsep.join(path for path in sys.path if path.endswith("site-packages")),
+}
+
+
+@pytest.fixture(scope="module")
+def wheel(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Without the native loop: no compiler for another platform is needed."""
+    folder = tmp_path_factory.mktemp("dist")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(shipped, "zig", lambda: tuple(backend.toolchain.find_compiler()))
-        name = backend.build_wheel(str(job / "dist"), {"platform": "any", "archives": str(fmus)})
-    borrowed = os.pathsep.join(path for path in sys.path if path.endswith("site-packages"))
-    done = script(
-        job, FEEDSIM=f"./dist/{name}", PIP_NO_INDEX="1", PIP_NO_DEPS="1", PYTHONPATH=borrowed, PYTHON=sys.executable
-    )
+        return folder / backend.build_wheel(str(folder), {"platform": "any", "archives": str(fmus)})
+
+
+def test_a_wheel_that_is_named_is_installed(wheel: Path, job: Path) -> None:
+    done = script(job, FEEDSIM=str(wheel), PYTHON=sys.executable, **BORROWED)
     assert done.returncode == 0, done.stderr
     assert told(job) == (0, 0)
+
+
+def test_a_container_runs_feedsim(wheel: Path, job: Path) -> None:
+    """Its instructions in their order, by hand: files copied, the shell's lines run, the entry point with arguments.
+
+    Below a folder in place of the container's root, in an environment in place of its image.
+    """
+    text = (CI / "Containerfile").read_text().replace("\\\n", "")
+    root, home = job / "root", job / "image"
+    subprocess.run([sys.executable, "-m", "venv", str(home)], check=True)
+    kept = {name: value for name, value in os.environ.items() if name != "CC"}
+    environment = kept | BORROWED | {"PATH": f"{home / 'bin'}{os.pathsep}/usr/bin{os.pathsep}/bin"}
+    given, folder, done = {"WHEEL": wheel.name}, root, []
+
+    def inside(text: str) -> str:
+        """Paths of the container, arguments filled in."""
+        filled = re.sub(r"\$\{(\w+)\}", lambda found: given[found[1]], text)
+        return re.sub(r"(?<![\w.\]])/(?=wheels|work)", f"{root}/", filled)
+
+    for line in text.splitlines():
+        instruction, _, rest = line.partition(" ")
+        done.append(instruction)
+        if instruction == "ARG":
+            assert rest in given
+        elif instruction == "COPY":
+            source, place = inside(rest).split()
+            Path(place).mkdir(parents=True)
+            shutil.copy(wheel.parent / source, place)
+        elif instruction == "RUN":
+            subprocess.run(["/bin/sh", "-c", inside(rest)], env=environment, check=True, cwd=folder)
+        elif instruction == "WORKDIR":
+            folder = Path(inside(rest))
+            folder.mkdir(parents=True, exist_ok=True)
+        elif instruction == "ENTRYPOINT":
+            command = [*json.loads(rest), "compare", str(job / "results"), str(job / "references")]
+            assert subprocess.run(command, env=environment, cwd=folder, check=False).returncode == 0
+        else:
+            assert instruction in ("FROM", "#")
+    assert [each for each in done if each != "#"] == ["FROM", "ARG", "COPY", "RUN", "WORKDIR", "ENTRYPOINT"]
+    assert not (root / "wheels").exists()

@@ -63,6 +63,8 @@ def test_units_come_with_references_icons_and_sums(made: Path, fmus: Path) -> No
         assert f"| `{unit}.fmu` |" in files["README.md"].decode()
         with zipfile.ZipFile(io.BytesIO(files[f"{unit}.fmu"])) as archive:
             assert "modelDescription.xml" in archive.namelist()
+    for path in (ROOT / "ci").iterdir():
+        assert files[f"ci/{path.name}"] == path.read_bytes()
     sums = sums_of(files["SHA256SUMS"].decode())
     assert set(sums) == set(files) - {"SHA256SUMS"}
     assert all(hashlib.sha256(files[name]).hexdigest() == digest for name, digest in sums.items())

@@ -16,7 +16,7 @@ from feedsim_packager import archive
 from feedsim_packager.errors import InputError, PackagerError
 
 from . import sbom, sdist, shipped, wheel
-from .project import PROJECT, table
+from .project import PROJECT, files, table
 
 SUMS = "SHA256SUMS"
 _ABOUT = """# The feed drive units of feedsim {version}
@@ -28,9 +28,16 @@ Their start values are those of a synthetic machine, which runs, but describes n
 | file | what it is |
 |---|---|
 {files}
-| `references/UNIT` | inputs, parameters and results to check an import with, as the archives hold them |
+| `references/UNIT` | to check an import with: inputs, parameters and results of each unit but the whole machine |
 | `icons/UNIT.png` | the unit's picture |
+| `ci/` | the same in your CI: a line each for a shell, GitHub Actions and GitLab, which is said in each file |
 | `{sums}` | SHA-256 of every file here: `sha256sum --check {sums}` |
+
+Through FMPy, with the wheel of this release, which compares; put your own importer in the place of `ci/simulate.py`:
+
+    pip install fmpy feedsim-{version}-*.whl
+    python ci/simulate.py friction.fmu checked/references/friction checked/results/friction
+    sh ci/compare.sh checked/results checked/references
 
 An FMU is a program: to run it is to run its library with your rights. Licence: MIT (LICENSE).
 """
@@ -50,9 +57,9 @@ def write(folder: Path, archives: Path) -> list[Path]:
     }
     for name, content in made.items():
         archive.write(folder / name, content)
-    files = sorted(folder / name for name in (*names, *made))
-    archive.write(folder / SUMS, _sums({path.name: path.read_bytes() for path in files}))
-    return [*files, folder / SUMS]
+    written = sorted(folder / name for name in (*names, *made))
+    archive.write(folder / SUMS, _sums({path.name: path.read_bytes() for path in written}))
+    return [*written, folder / SUMS]
 
 
 def _platforms() -> tuple[str, ...]:
@@ -63,6 +70,7 @@ def _units(archives: Path, version: str) -> bytes:
     """The archives, with what people want to see without opening one."""
     held = shipped.taken(archives)
     content: dict[str, bytes] = {"LICENSE": (PROJECT / "LICENSE").read_bytes()}
+    content |= {path.relative_to(PROJECT).as_posix(): path.read_bytes() for path in files("ci")}
     lines = []
     for name, data in held.items():
         content[name] = data

@@ -38,7 +38,7 @@ def show(out: Path, *sources: Path) -> int:
 def test_what_differs_is_told(results: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert show(tmp_path / "out", *results) == 0
     said = capsys.readouterr().out
-    assert "differs: machine.axes.X.drive.K_v: " in said
+    assert "differs: machine.axes.X.drive.K_v: 4 (m/min)/mm | 5 (m/min)/mm\n" in said
     assert said.count("differs: ") == 1
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert list(summary["differing"]) == ["machine.axes.X.drive.K_v"]

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from feedsim.analysis import Figure, positioning
 from feedsim.analysis.alignment import stops
@@ -14,7 +17,7 @@ from feedsim.analysis.side_by_side import SUMMARY as OF_RESULT
 from feedsim.analysis.side_by_side import Source, differing
 from feedsim.report import sections
 from feedsim.report.content import Bullets, Report, Section, Table, Text, code
-from feedsim.report.formatting import display_unit, minus, shown
+from feedsim.report.formatting import display_unit, minus, scale, shown
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.show.pictures import Stop, pictures_of, stop_seen, stops_of
@@ -48,7 +51,7 @@ def write(sources: Sequence[Source], directory: Path | str, *, drawn: Sequence[s
 def lines(sources: Sequence[Source]) -> list[str]:
     """What the command says: parameters that differ, and the leading figures of every source."""
     rows = differing(sources)
-    said = [f"differs: {name}: {' | '.join(value or '–' for value in values)}" for name, values in rows[:10]]
+    said = [f"differs: {name}: {' | '.join(map(_readable, values))}" for name, values in rows[:10]]
     if len(rows) > 10:
         said.append(f"and {len(rows) - 10} parameters more, in the report")
     for name in _leading(sources):
@@ -58,6 +61,16 @@ def lines(sources: Sequence[Source]) -> list[str]:
         f"{source.name} is aligned {source.aligned}" for source in sources if source.aligned and not source.figures
     ]
     return said or ["the sources have neither figures nor parameters to compare; the pictures do"]
+
+
+def _readable(value: str) -> str:
+    """A parameter as a person reads it, 4 (m/min)/mm for 66.6666667 1/s; a dash where a source has none."""
+    number, _, unit = value.partition(" ")
+    with suppress(ValueError):
+        amount = float(number)
+        best = scale(unit, np.array([amount]))
+        return value if best.factor == 1 else f"{best.factor * amount:.6g} {best.unit}"
+    return value or "–"
 
 
 def _leading(sources: Sequence[Source]) -> list[str]:
@@ -152,9 +165,7 @@ def _rounded(value: float) -> str:
 def _parameters(sources: Sequence[Source]) -> Section | None:
     if sum(bool(source.parameters) for source in sources) < 2:
         return None
-    rows: list[tuple[Text, ...]] = [
-        (code(name), *(value or "–" for value in values)) for name, values in differing(sources)
-    ]
+    rows: list[tuple[Text, ...]] = [(code(name), *map(_readable, values)) for name, values in differing(sources)]
     if not rows:
         return Section(
             "Parameters that differ", [Bullets(["None: machine, motion, coupling and recording are the same."])]

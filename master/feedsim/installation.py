@@ -28,4 +28,4 @@ def mend(what: str) -> str:
     """What to do where `what` (such as "the archives") is missing or does not fit."""
     if checkout():
         return f"`make fmus` builds {what}"
-    return f"installing feedsim anew brings {what} along"
+    return f"installing feedsim anew, from the wheel for this platform, brings {what} along"

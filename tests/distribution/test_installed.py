@@ -127,6 +127,38 @@ def test_every_way_of_use(installed: Installation) -> None:
     assert said == "native"
 
 
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [(None, f"{LOOP}: no such file beside the archives"), (b"\x7fELF, cut off", f"{LOOP}: cannot be used: ")],
+    ids=["absent, as in the wheel for every platform", "damaged"],
+)
+def test_without_the_native_loop_a_run_says_so_and_gives_the_same(
+    installed: Installation, content: bytes | None, reason: str
+) -> None:
+    (loop,) = installed.home.rglob(LOOP)
+    kept, name = loop.read_bytes(), "absent" if content is None else "damaged"
+    short = ("run", "z_positioning.yaml", "--set=motions=[{kind: dwell, duration: 20 ms}]", "--set=evaluate=[]")
+    installed.run("example", "z_positioning")
+    installed.run(*short, "--out", "native")
+    loop.unlink()
+    try:
+        if content is not None:
+            loop.write_bytes(content)
+        said = installed.run(*short, "--out", name)
+    finally:
+        loop.unlink(missing_ok=True)
+        loop.write_bytes(kept)
+        loop.chmod(0o755)
+    summary = json.loads((installed.folder / name / "summary.json").read_text())
+    notes = [each["text"] for each in summary["findings"]]
+    assert summary["performance"]["cycle_loop"] == "Python"
+    for told in (said, " ".join(notes)):
+        assert "the cycle loop ran in Python, some 30 times slower than the native one, same bits: " + reason in told
+        assert "installing feedsim anew, from the wheel for this platform, brings the native loop along" in told
+    results = [(installed.folder / each / "result.csv").read_bytes() for each in (name, "native")]
+    assert results[0] == results[1]
+
+
 def test_results_say_nothing_of_where_it_is_installed(installed: Installation) -> None:
     places = [str(path).encode() for path in (installed.home, ROOT)]
     results = [path for path in installed.folder.rglob("*") if path.is_file()]

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.linalg import solve_banded
 
 from feedsim.motions.kind import Array, Points
 
@@ -40,17 +40,37 @@ class RestSpline:
         before = np.full(max(0, -first), self._origin)
         after = np.full(max(0, last + 1 - count), points[count - 1 : count][0])
         # Knots are whole numbers, so that a long program loses no digits in the differences of instants.
-        at = np.arange(first, last + 1, dtype=np.float64)
+        self._knots = first, last
         # Deviations from the first point keep the digits of a small motion far from the origin.
-        deviation = np.concatenate([before, within, after]) - self._origin
-        self._spline = CubicSpline(at, deviation, bc_type="clamped", extrapolate=False)
+        self._pieces = _clamped(np.concatenate([before, within, after]) - self._origin)
 
     def __call__(self, time: Array) -> tuple[Array, Array]:
         """Position [unit of the points] and speed [per s] at ``time`` (N,) [s], at rest outside the points."""
         if self._constant:
             return np.full(len(time), self._origin), np.zeros(len(time))
-        knot = np.clip(time / self._step, self._spline.x[0], self._spline.x[-1])
-        return self._origin + self._spline(knot), self._spline(knot, 1) / self._step
+        first, last = self._knots
+        knot = np.clip(time / self._step, first, last)
+        below = np.minimum(np.floor(knot), last - 1)
+        s, (y, dy, half, sixth) = knot - below, self._pieces[:, below.astype(np.int64) - first]
+        deviation = y + dy * s + half * (s * s) + sixth * (s * s * s)
+        return self._origin + deviation, (dy + half * s * 2 + sixth * (s * s) * 3) / self._step
+
+
+def _clamped(y: Array) -> Array:
+    """(4, N - 1): powers 0 to 3 of the pieces of a C2 cubic spline through `y` (N,) at distances 1, clamped to slope 0.
+
+    The slopes at the knots have s_(i-1) + 4 s_i + s_(i+1) = 3 (y_(i+1) - y_(i-1)). scipy.interpolate has the same, with
+    the same bits, and takes longer to load than a short program to plan.
+    """
+    rise = np.diff(y)
+    bands = np.ones((3, len(y)))
+    bands[1, 1:-1] = 4.0
+    bands[0, 1] = bands[2, -2] = 0.0
+    right = np.zeros(len(y))
+    right[1:-1] = 3 * (rise[1:] + rise[:-1])
+    slope = solve_banded((1, 1), bands, right)
+    bend = slope[:-1] + slope[1:] - 2 * rise
+    return np.stack([y[:-1], slope[:-1], rise - slope[:-1] - bend, bend])
 
 
 class LongSpline:

@@ -271,6 +271,8 @@ class Loads:
 
     def ahead(self, begin: int, end: int) -> None:
         """Be ready for the cycles `begin` to `end` - 1; those before are done."""
+        if not self._accounts:
+            return
         self.count(begin)
         rows = np.arange(begin, end) % REPORTED_EVERY
         edges = np.arange(begin, end + 1, dtype=np.float64) * self._T_c
@@ -281,6 +283,8 @@ class Loads:
 
     def count(self, cycles: int) -> None:
         """Take in what was done in the first `cycles`."""
+        if not self._accounts:
+            return
         if not self._ended:  # before the first; displacements count from the start
             system = self._system
             self._ended = [system.measured.copy(), system.M_a_end.copy(), np.zeros(len(self._tool.real_names))]

@@ -9,8 +9,8 @@ so that the units, on the record's setpoints, give its position and its torque:
 
 s_x and s_M are what is left, so that both channels have their weight of themselves. Parts of the friction law that an
 axis may do without are added only where the record itself asks for them: fitted to three quarters of its motion, they
-must predict the fourth one better (cross-validation). Intervals are those of residuals that hang together over
-stretches of time, as errors of a model do.
+must predict the fourth one better, and so with kinds of motion (cross-validation). Intervals are those of residuals
+that hang together over stretches of time, as errors of a model do.
 """
 
 from __future__ import annotations
@@ -25,13 +25,12 @@ import numpy as np
 
 from feedsim import variables
 from feedsim.errors import InputError
-from feedsim.identify.fit import Fit
 from feedsim.identify.parameters import estimate
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
-from feedsim.replay.tuning import BOUNDS, Problem, Rows, together
+from feedsim.replay.tuning import BOUNDS, FINAL, ROUGH, Problem, Rows, Tuned, together
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
 from feedsim.trace.trace import Array
@@ -51,6 +50,7 @@ BLOCKS: Mapping[str, tuple[str, ...]] = {
 EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
 LEAST_ROWS = 50  # in which the axis moves
 MOST_TURNS = 8  # of fits and weights in turns; two or three do where the start is near
+SETTLED = 0.01  # change of a weight that moves no value by what its interval shows
 FOLDS = 4
 FAST = 0.1  # of the top speed: what is faster is another kind of motion
 BETTER = 2.0  # of the logarithm of the likelihood: what predicts hardly better is not worth having
@@ -67,7 +67,8 @@ class DriveFound:
         estimates: name -> value with interval: K_v, k_ffw, T_dyn, T_sym, K_p, T_n, J, M_0, friction, delay.
         taps, speed: the position loop by regression; None where the record does not hold it.
         machine: with these values. parts: what the friction has besides LuGre and viscous friction, and what
-            cross-validation says of every part: name -> gain of the logarithm of the likelihood.
+            cross-validation says of every part: name -> gain of the logarithm of the likelihood; where it predicts
+            times or kinds of motion worse, that loss.
         position, torque: rms of what is left [m], [N.m]; without a recorded torque nan.
         predicted: the same, of every quarter of the motion by a fit to the other three.
         other_cycles: cycle of the position loop [s] -> by how much the record is likelier with it than with the
@@ -127,15 +128,15 @@ def identify_drive(
     if taps is not None:
         values["T_sym"] = min(values["T_sym"], taps.delay)
         values["T_dyn"] = taps.delay - values["T_sym"]
-    problem = Problem(
-        machine, each, Replay(machine, {each.axis: each}, fmus=fmus), values, total, J,
-        {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0},
-    )  # fmt: skip
     rows = np.flatnonzero(each.moving)
     if len(rows) < LEAST_ROWS:
         raise InputError(
             f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least {LEAST_ROWS} are needed"
         )
+    problem = Problem(
+        machine, each, Replay(machine, {each.axis: each}, fmus=fmus), values, total, J,
+        {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0}, rows,
+    )  # fmt: skip
     driven = each.record.driven
     free = ["K_p", "K_i", "T_sym", "k_ffw"]
     # Without a torque friction and load are the machine's: what they do to the position, the speed controller may, too.
@@ -152,32 +153,28 @@ def identify_drive(
         own = {name for name, block in BLOCKS.items() if driven and _has(values, block)}
         chosen = tuple(name for name in BLOCKS if name in own)
         free += [name for part in chosen for name in BLOCKS[part]]
-        found = _first(problem, free, rows)
+        found = _first(problem, free)
     else:
-        chosen, parts, free, found = _parts(problem, free, rows, progress)
+        chosen, parts, found = _parts(problem, free, progress)
     progress("last fit", 1 + len(BLOCKS), 2 + len(BLOCKS))
-    result = None
     for _ in range(MOST_TURNS):
-        problem.weigh(found, rows)
-        result = problem.fitted(free, found, rows, limit=25)
-        moved = max(abs(problem.away(n, v) - problem.away(n, found.get(n, problem.start[n])))
-                    for n, v in result.mapping().items())  # fmt: skip
-        found = result.mapping()
-        if moved < 1e-3:
+        before = problem.weights
+        problem.weigh(found)
+        found = problem.fitted(found.names, found.values, found, FINAL)
+        if all(abs(problem.weights[channel] / weight - 1) < SETTLED for channel, weight in before.items()):
             break
-    assert result is not None
-    unseen = _left_out(problem, result, np.array_split(np.arange(len(rows)), FOLDS))
+    found = problem.exact(found, central=True)
+    unseen = _left_out(problem, found, np.array_split(np.arange(len(rows)), FOLDS))
     predicted = unseen[0] * problem.weights["position"], unseen[1] * problem.weights["torque"]
     if not each.record.driven:
         predicted = predicted[0], nan
     estimates = _estimates(
-        problem, result, rows, taps if exact_delay else None, speed if exact_gain else None, structure_known
+        problem, found, taps if exact_delay else None, speed if exact_gain else None, structure_known
     )
-    position, torque = problem.errors(found)
-    likelier = {} if other_cycle is None else {other_cycle: _likelier(problem, free, found, rows, other_cycle)}
+    likelier = {} if other_cycle is None else {other_cycle: _likelier(problem, found, other_cycle)}
     return DriveFound(
-        each.axis, estimates, taps, speed, problem.machine_of(found), parts, chosen,
-        rms(position[rows]), rms(torque[rows]) if each.record.driven else nan, predicted, likelier, problem.runs,
+        each.axis, estimates, taps, speed, problem.machine_of(found.values), parts, chosen,
+        rms(found.position), rms(found.torque) if each.record.driven else nan, predicted, likelier, problem.runs,
     )  # fmt: skip
 
 
@@ -227,18 +224,17 @@ def _has(values: Mapping[str, float], block: Sequence[str]) -> bool:
     return values[block[0]] != 0
 
 
-def _likelier(problem: Problem, free: Sequence[str], found: Mapping[str, float], rows: Rows, T_pos: float) -> float:
+def _likelier(problem: Problem, found: Tuned, T_pos: float) -> float:
     """By how much the whole motion is likelier (logarithm) with another cycle of the position loop."""
 
-    def likely(values: Mapping[str, float]) -> float:
-        position, torque = problem.errors(values)
-        return -_independent(problem, len(rows)) * (log(rms(position[rows])) + log(rms(torque[rows])))
+    def likely(found: Tuned) -> float:
+        return -_independent(problem, len(problem.rows)) * (log(rms(found.position)) + log(rms(found.torque)))
 
-    own, machine = likely(found), problem.machine
+    machine = problem.machine
     cycles = machine.cycles.model_copy(update={"position": T_pos})
     problem.machine = machine.model_copy(update={"cycles": cycles})
     try:
-        return likely(problem.fitted(free, found, rows, limit=10).mapping()) - own
+        return likely(problem.fitted(found.names, found.values, found)) - likely(found)
     finally:
         problem.machine = machine
 
@@ -248,44 +244,47 @@ def _independent(problem: Problem, count: int) -> float:
     return count * problem.each.record.interval / BLOCK
 
 
-def _first(problem: Problem, free: Sequence[str], rows: Rows) -> dict[str, float]:
+def _first(problem: Problem, free: Sequence[str]) -> Tuned:
     """A first fit, whose weights are those of what is left."""
-    found: dict[str, float] = {}
-    for limit in (8, 8):
-        found = problem.fitted(free, found, rows, limit=limit).mapping()
-        problem.weigh(found, rows)
+    found = problem.fitted(free, {}, promises=ROUGH)
+    problem.weigh(found)
+    found = problem.fitted(free, found.values, found)
+    problem.weigh(found)
     return found
 
 
 def _parts(
-    problem: Problem, free: Sequence[str], rows: Rows, progress: Progress
-) -> tuple[tuple[str, ...], dict[str, float], list[str], dict[str, float]]:
-    """Parts of the friction law that the record asks for: chosen, the gain of each, what is free then, and a fit."""
+    problem: Problem, free: Sequence[str], progress: Progress
+) -> tuple[tuple[str, ...], dict[str, float], Tuned]:
+    """Parts of the friction law that the record asks for: chosen, the gain of each, and a fit with them."""
     gains: dict[str, float] = {}
     chosen: list[str] = []
-    now, found = list(free), _first(problem, free, rows)
+    found = _first(problem, free)
     while len(chosen) < len(BLOCKS):
         progress("cross-validation", 1 + len(chosen), 2 + len(BLOCKS))
         # As near to its end as what it is compared with.
-        best = problem.fitted(now, found, rows, limit=8)
-        score, found = _predicted(problem, best, rows), best.mapping()
+        found = problem.exact(problem.fitted(found.names, found.values, found))
+        score = _predicted(problem, found)
         tried = {}
         for part, block in BLOCKS.items():
             if part in chosen:
                 continue
-            wider = [*now, *block]
-            begin = found | {name: _begin(problem, name) for name in block}
-            with_part = problem.fitted(wider, begin, rows, limit=6)
-            tried[part] = (_predicted(problem, with_part, rows) - max(score, -1e9), wider, with_part.mapping())
-            gains[part] = tried[part][0]
-        gain, part = max((gain, part) for part, (gain, _, _) in tried.items())
-        _, wider, begin = tried[part]
+            begin = {**found.values, **{name: _begin(problem, name) for name in block}}
+            tried[part] = problem.fitted([*found.names, *block], begin, found)
+            if _at_end(problem, tried[part], block):
+                gains[part] = -inf
+                continue
+            tried[part] = problem.exact(tried[part])
+            by = _predicted(problem, tried[part]) - score
+            # Both partitions ask for it: what one gains at the other's cost is no law.
+            gains[part] = float(np.sum(by) if np.all(by > 0) else np.min(by))
+        gain, part = max((gains[part], part) for part in tried)
         if not gain >= BETTER:
             break
         chosen.append(part)
-        now, found = wider, begin
-        problem.weigh(found, rows)
-    return tuple(chosen), gains, now, found
+        found = tried[part]
+        problem.weigh(found)
+    return tuple(chosen), gains, found
 
 
 def _begin(problem: Problem, name: str) -> float:
@@ -293,33 +292,35 @@ def _begin(problem: Problem, name: str) -> float:
     return {"F_log": 0.1 * F_C, "gamma": 0.5, "excess": 0.1, "asymmetry": 0.0}.get(name, problem.start[name])
 
 
-def _predicted(problem: Problem, found: Fit, rows: Rows) -> float:
-    """Logarithm of the likelihood of every part of the motion, predicted from the others; -inf where a part sits at a
-    bound, since what has no end there is not told.
+def _at_end(problem: Problem, found: Tuned, block: Sequence[str]) -> bool:
+    """Whether a part sits at a bound: what has no end there is not told."""
+    return any(problem.at_end(name, found.values[name]) for name in block)
+
+
+def _predicted(problem: Problem, found: Tuned) -> Array:
+    """(2,) logarithm of the likelihood of every part of the motion, predicted from the others.
 
     Parts are stretches of time, and then kinds of motion: either direction, slow and fast. What predicts only motion
     that it has seen elsewhere is no law. The fit to the others is a Gauss-Newton step away from the one to all.
     """
-    if any(problem.at_end(name, found[name]) for block in BLOCKS.values() for name in block if name in found.names):
-        return -inf
-    speed = problem.each.speed[rows]
+    speed = problem.each.speed[problem.rows]
     kinds = 2 * (speed > 0) + (np.abs(speed) > FAST * np.max(np.abs(speed)))
-    every = np.arange(len(rows))
+    every = np.arange(len(speed))
     partitions = np.array_split(every, FOLDS), [every[kinds == kind] for kind in np.unique(kinds)]
-    return sum(_likelihood(problem, found, folds) for folds in partitions if len(folds) > 1)
+    return np.array([_likelihood(problem, found, folds) for folds in partitions if len(folds) > 1])
 
 
-def _likelihood(problem: Problem, found: Fit, folds: Sequence[Rows]) -> float:
+def _likelihood(problem: Problem, found: Tuned, folds: Sequence[Rows]) -> float:
     """Of the folds, each predicted from the others."""
     count = sum(map(len, folds))
     position, torque = _left_out(problem, found, folds)
     return -_independent(problem, count) * (log(position) + log(torque))
 
 
-def _left_out(problem: Problem, found: Fit, folds: Sequence[Rows]) -> tuple[float, float]:
+def _left_out(problem: Problem, found: Tuned, folds: Sequence[Rows]) -> tuple[float, float]:
     """Rms of position and torque, in their weights, where each fold is predicted from the others."""
     count = sum(map(len, folds))
-    J, r = found.jacobian * problem.slopes(found), found.residuals
+    J, r = found.jacobian, found.residuals
     prior = np.arange(2 * count, len(r))
     left = np.empty(2 * count)
     for fold in folds:
@@ -331,11 +332,11 @@ def _left_out(problem: Problem, found: Fit, folds: Sequence[Rows]) -> tuple[floa
 
 
 def _estimates(
-    problem: Problem, found: Fit, rows: Rows, taps: Taps | None, speed: SpeedSetpoint | None, known: bool
+    problem: Problem, found: Tuned, taps: Taps | None, speed: SpeedSetpoint | None, known: bool
 ) -> dict[str, Estimate]:
     """In the parameters of drive and friction, with intervals."""
-    values = problem.start | found.mapping()
-    covariance = _covariance(problem, found, len(rows))
+    values = problem.start | dict(found.values)
+    covariance = _covariance(problem, found)
     spread = dict(zip(found.names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     told: dict[str, Estimate] = {}
 
@@ -392,10 +393,10 @@ def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:
     return found
 
 
-def _covariance(problem: Problem, found: Fit, count: int) -> Array:
+def _covariance(problem: Problem, found: Tuned) -> Array:
     """Covariance (P, P), where residuals hang together as long as they do: every channel counts as many times less."""
-    scale = problem.slopes(found)
-    J, r = found.jacobian * scale, found.residuals
+    scale = np.array([problem.spread(name, found.values) for name in found.names])
+    J, r, count = found.jacobian, found.residuals, len(problem.rows)
     channels = slice(0, count), slice(count, 2 * count)
     prior = J[2 * count :].T @ J[2 * count :]
     parts = [(J[rows].T @ J[rows], together(r[rows]), float(np.mean(r[rows] ** 2))) for rows in channels]

@@ -2,21 +2,24 @@
 
 The parameters are those of the drive and the friction, but for three: K_i = K_p/T_n, `excess` = F_S/F_C - 1, and
 `delay`, by how much the torque is logged later than the motion.
+
+A run of the units is what costs, and a Jacobian by differences is a run for every parameter. It is therefore taken
+over from one fit to the next (secant.py); what is left out of a fit, and intervals, are told from differences.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, inf, log, sqrt
+from math import exp, inf, log, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import FeedsimError, InputError
-from feedsim.identify.fit import Fit, Parameter, fit
 from feedsim.identify.position_loop import rms
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
+from feedsim.replay.secant import Least, Point
 from feedsim.scenario import Machine
 from feedsim.trace.trace import Array
 
@@ -39,6 +42,39 @@ DAMPED, BARELY = 0.7, 0.2
 SPAN = 4.0  # usual deviations that a logarithm may be off its start
 LEAST = {"position": 1e-9, "torque": 1e-3}  # [m], share of the torque: no channel is weighted as better than that
 
+# Of the cost: what a step has to promise. The cost counts rows, of which some twenty say the same. A fit that ends
+# COMPARED off its least is off by a few hundredths of the logarithm of the likelihood, or a fifth of a standard
+# deviation; FINAL is a tenth of that, and a third of the deviation. ROUGH is to begin with, where weights are guessed.
+ROUGH, COMPARED, FINAL = 1e-2, 1e-3, 1e-4
+DIFFERENCE = 1e-3  # of the logarithm, or of a tenth of the usual deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Tuned:
+    """A fit.
+
+    Attributes:
+        names, values: of what was free. point: in usual deviations from the start.
+        residuals: (2 N + M,) of position and torque in their weights, and of what is usual. jacobian: (2 N + M, P) of
+            them, over usual deviations.
+    """
+
+    names: tuple[str, ...]
+    values: Mapping[str, float]
+    point: Point
+    residuals: Array
+    jacobian: Array
+
+    @property
+    def position(self) -> Array:
+        """(N,) what is left [m]."""
+        return self.point.errors[: len(self.point.errors) // 2]
+
+    @property
+    def torque(self) -> Array:
+        """(N,) what is left [N.m]."""
+        return self.point.errors[len(self.point.errors) // 2 :]
+
 
 @dataclass(eq=False)
 class Problem:
@@ -51,6 +87,7 @@ class Problem:
     total: float | None  # T_dyn + T_sym where it is known
     J: float
     weights: dict[str, float]
+    rows: Rows  # that are fitted
     runs: int = 0
 
     def tuned(self, values: Mapping[str, float]) -> tuple[Machine, float]:
@@ -109,14 +146,6 @@ class Problem:
         off = torque - self.each.record.torque if self.each.record.driven else np.zeros(len(time))
         return found["x_a"][:: self.per_row] - self.each.position, off
 
-    def residuals(self, values: Mapping[str, float], rows: Rows) -> Array:
-        """Both channels over their weights; then how far every free parameter is off its start, in usual deviations."""
-        position, torque = self.errors(values)
-        usual = [*(self.away(name, value) for name, value in values.items()), self.rings(values)]
-        return np.concatenate(
-            [position[rows] / self.weights["position"], torque[rows] / self.weights["torque"], usual]
-        )  # fmt: skip
-
     def rings(self, values: Mapping[str, float]) -> float:
         """How far the speed loop is less damped than anybody leaves it: J s^2 + K_p s + K_i."""
         values = self.start | dict(values)
@@ -138,45 +167,83 @@ class Problem:
         """Deviation from the start that is usual, of the logarithm or of the value."""
         return USUAL[name] if name in USUAL else 2.0 * self.start["F_C"] if name == "F_log" else 5 * self.start["F_C"]
 
-    def slopes(self, found: Fit) -> Array:
-        """(P,) what the solver's unit step changes a parameter by: columns of the Jacobian become alike in size."""
-        return np.array(
-            [value if name in LOGARITHMIC else self.usual(name) * 0.1 for name, value in found.mapping().items()]
-        )
+    def at(self, name: str, away: float) -> float:
+        """The value that is so many usual deviations off the start."""
+        off = away * self.usual(name)
+        if name in LOGARITHMIC:
+            return self.start[name] * exp(off)
+        low, high = BOUNDS.get(name, (-inf, inf))  # the way there and back rounds
+        return min(max(self.start[name] + off, low), high)
+
+    def bounds(self, names: Sequence[str]) -> tuple[Array, Array]:
+        """(P,) and (P,), in usual deviations from the start."""
+        ends = [
+            (-SPAN, SPAN)
+            if name in LOGARITHMIC
+            else tuple(self.away(name, end) for end in BOUNDS.get(name, (-inf, inf)))
+            for name in names
+        ]
+        low, high = zip(*ends, strict=True)
+        return np.array(low), np.array(high)
 
     def spread(self, name: str, values: Mapping[str, float]) -> float:
         """The usual deviation of a parameter, in its own unit."""
         return self.usual(name) * (abs(values[name]) if name in LOGARITHMIC else 1.0)
 
-    def weigh(self, values: Mapping[str, float], rows: Rows) -> None:
-        """Take what is left with `values` as what a residual is worth.
+    def weigh(self, found: Tuned) -> None:
+        """Take what is left with what was found as what a residual is worth.
 
         What is left of the position is what is left of the torque, integrated twice: it hangs together for longer, and
         counts by as many rows as say something of their own.
         """
-        position, torque = (error[rows] for error in self.errors(values))
-        least = LEAST["torque"] * rms(self.each.record.torque[rows]) if self.each.record.driven else 1.0
+        position, torque = found.position, found.torque
+        least = LEAST["torque"] * rms(self.each.record.torque[self.rows]) if self.each.record.driven else 1.0
         self.weights = {
             "position": max(rms(position), LEAST["position"]) * sqrt(together(position)),
             "torque": max(rms(torque), least),
         }
 
-    def fitted(self, free: Sequence[str], begin: Mapping[str, float], rows: Rows, limit: int = 12) -> Fit:
-        """From `begin`, with the weights as they are."""
-        parameters = []
-        for name in free:
-            low, high = BOUNDS.get(name, (-inf, inf))
-            value = begin.get(name, self.start[name])
-            if name in LOGARITHMIC:
-                span = exp(SPAN * USUAL[name])
-                low, high = self.start[name] / span, self.start[name] * span
-                parameters.append(Parameter(name, min(max(value, low), high), low, high, log=True))
-            else:
-                scale = self.usual(name) * 0.1
-                parameters.append(Parameter(name, min(max(value, low), high), low, high, scale=scale))
-        return fit(
-            lambda values: self.residuals(values, rows), parameters, difference=1e-3, tolerance=1e-5, limit=limit
+    def fitted(
+        self, free: Sequence[str], begin: Mapping[str, float], near: Tuned | None = None, promises: float = COMPARED
+    ) -> Tuned:
+        """From `begin`, with the weights as they are, to where no step promises more than a share of the cost.
+
+        near: a fit nearby, whose Jacobian is taken over.
+        """
+        names = tuple(free)
+        least = self._least(names)
+        x = np.array([self.away(name, begin.get(name, self.start[name])) for name in names])
+        slopes = np.full((2 * len(self.rows), len(names)), nan)
+        for k, name in enumerate(names):
+            if near is not None and name in near.names:
+                slopes[:, k] = near.point.slopes[:, near.names.index(name)]
+        return self._told(names, least, least.found(np.clip(x, least.low, least.high), slopes, promises))
+
+    def exact(self, found: Tuned, central: bool = False) -> Tuned:
+        """The same with its Jacobian by differences, which what is left out and intervals are told from."""
+        least = self._least(found.names)
+        return self._told(found.names, least, least.exact(found.point, central))
+
+    def _least(self, names: tuple[str, ...]) -> Least:
+        """The sum of squares over both channels in their weights and over how far every parameter is off its start."""
+
+        def values(x: Array) -> dict[str, float]:
+            return {name: self.at(name, float(away)) for name, away in zip(names, x, strict=True)}
+
+        def errors(x: Array) -> Array:
+            position, torque = self.errors(values(x))
+            return np.concatenate([position[self.rows], torque[self.rows]])
+
+        count = len(self.rows)
+        weights = np.repeat([self.weights["position"], self.weights["torque"]], count)
+        steps = np.array([DIFFERENCE / self.usual(name) if name in LOGARITHMIC else 0.1 * DIFFERENCE for name in names])
+        return Least(
+            errors, lambda x: np.append(x, self.rings(values(x))), weights, *self.bounds(names), steps
         )  # fmt: skip
+
+    def _told(self, names: tuple[str, ...], least: Least, point: Point) -> Tuned:
+        values = {name: self.at(name, float(away)) for name, away in zip(names, point.x, strict=True)}
+        return Tuned(names, values, point, least.residuals(point), least.jacobian(point))
 
 
 def together(residuals: Array) -> float:

@@ -1,0 +1,106 @@
+"""Least squares with few calls, against scipy's, which takes differences at every step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from feedsim.errors import InputError
+from feedsim.replay.secant import Least
+from feedsim.trace.trace import Array
+
+TIME = np.linspace(0.0, 3.0, 200)
+TRUE = np.array([1.2, 0.7, 0.4, -0.3])
+STEPS = np.full(4, 1e-4)
+FREE = np.full(4, -np.inf), np.full(4, np.inf)
+
+
+def course(x: Array) -> Array:
+    """A decay beside an oscillation: curved in two of its parameters."""
+    return np.asarray(x[0] * np.exp(-x[1] * TIME) + x[2] * np.sin(4 * TIME + x[3]))
+
+
+class Counted:
+    """What is left of a course with noise, and how often that was asked."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+        self.measured = course(TRUE) + 0.02 * np.random.default_rng(1).standard_normal(len(TIME))
+
+    def __call__(self, x: Array) -> Array:
+        self.calls += 1
+        return course(x) - self.measured
+
+
+def least(errors: Counted, low: Array = FREE[0], high: Array = FREE[1]) -> Least:
+    """With the noise's own weight, and a weak prior at 0."""
+    return Least(errors, lambda x: 0.01 * x, np.full(len(TIME), 0.02), low, high, STEPS)
+
+
+def unknown(rows: int = len(TIME), columns: int = 4) -> Array:
+    return np.full((rows, columns), np.nan)
+
+
+def test_the_end_is_that_of_exact_jacobians() -> None:
+    """To a small share of a standard deviation, as the promise of a step that is left says; in less calls."""
+    begin = np.array([0.6, 0.2, 0.2, 0.2])
+    errors, exact = Counted(), Counted()
+    found = least(errors).found(begin, unknown(), 1e-6)
+    other = least_squares(lambda x: np.concatenate([exact(x) / 0.02, 0.01 * x]), begin, xtol=1e-12)
+    sigma = np.sqrt(np.diag(np.linalg.inv(other.jac.T @ other.jac)))
+    assert np.all(np.abs(found.x - other.x) < 0.05 * sigma)
+    assert errors.calls < 0.7 * exact.calls
+
+
+def test_slopes_from_nearby_save_calls() -> None:
+    """They are taken over, and what is not known is found by differences: three calls of four are saved."""
+    near = least(Counted()).exact(least(Counted()).found(TRUE, unknown(), 1e-4))
+    slopes = near.slopes.copy()
+    slopes[:, 3] = np.nan
+    begin = near.x + np.array([0.001, 0.0, 0.0, 0.002])
+    calls = []
+    for known in (slopes, unknown()):
+        errors = Counted()
+        found = least(errors).found(begin, known, 1e-4)
+        assert found.x == pytest.approx(near.x, abs=1e-3)
+        calls.append(errors.calls)
+    assert calls[1] - calls[0] == 3
+
+
+def test_bounds_hold() -> None:
+    """The end lies on a bound where the free one lies behind it, and is the least of those that are allowed."""
+    low, high = np.array([0.0, 0.0, 0.0, -0.1]), np.array([2.0, 2.0, 2.0, 1.0])
+    begin = np.array([1.0, 0.5, 0.5, 0.5])
+    found = least(Counted(), low, high).found(begin, unknown(), 1e-6)
+    errors = Counted()
+    other = least_squares(lambda x: np.concatenate([errors(x) / 0.02, 0.01 * x]), begin, bounds=(low, high), xtol=1e-12)
+    assert found.x[3] == -0.1
+    assert found.x == pytest.approx(other.x, abs=1e-3)
+
+
+def test_steps_into_nothing_are_shortened() -> None:
+    """A simulation of a drive that is unstable has no result: the search goes round it, and begins nowhere there."""
+    errors = Counted()
+
+    def guarded(x: Array) -> Array:
+        if x[1] > 0.75:
+            raise InputError("unstable")
+        return errors(x)
+
+    problem = Least(guarded, lambda x: 0.01 * x, np.full(len(TIME), 0.02), *FREE, STEPS)
+    found = problem.found(np.array([0.6, 0.2, 0.2, 0.2]), unknown(), 1e-5)
+    assert found.x == pytest.approx(TRUE, abs=0.03)
+    with pytest.raises(InputError, match="unstable"):
+        problem.found(np.array([0.6, 0.8, 0.2, 0.2]), unknown(), 1e-5)
+
+
+def test_slopes_in_the_end() -> None:
+    """Central differences are those of the closed form to the square of their step."""
+    problem = least(Counted())
+    point = problem.exact(problem.found(TRUE, unknown(), 1e-4), central=True)
+    x = point.x
+    decay, angle = np.exp(-x[1] * TIME), 4 * TIME + x[3]
+    form = np.column_stack([decay, -x[0] * TIME * decay, np.sin(angle), x[2] * np.cos(angle)])
+    assert point.exact
+    assert np.abs(point.slopes - form).max() < 1e-7

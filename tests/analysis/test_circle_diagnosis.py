@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from drawn_circles import Causes, driven
 
-from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, answer, diagnose, sentence
+from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, answer, diagnose, sentence, swinging
 
 BALLBAR = CircleUnderTest(("X", "Z"), radius=0.1, speed=0.05, pitch={"X": 0.01, "Z": 0.02})
 SAMPLES = 3000
@@ -97,7 +98,7 @@ def test_a_peak_has_its_height_width_and_decay() -> None:
 
 def test_a_vibration_has_its_frequency_and_amplitude() -> None:
     rng = np.random.default_rng(1)
-    path = driven(BALLBAR, Causes(noise=0.2e-6), 1, rng, SAMPLES)
+    path = replace(driven(BALLBAR, Causes(noise=0.2e-6), 1, rng, SAMPLES), phase=None)  # as a ballbar has it
     turn = 2 * math.pi * BALLBAR.radius / BALLBAR.speed
     time = np.arange(SAMPLES) * turn / SAMPLES
     swinging = type(path)(path.angle, path.deviation + 0.5e-6 * np.sin(2 * math.pi * 8.0 * time), 1)
@@ -106,7 +107,55 @@ def test_a_vibration_has_its_frequency_and_amplitude() -> None:
     assert found.frequency == pytest.approx(8.0, abs=1 / turn)
     # Seven lines of noise are counted in: 0.2 um sqrt(2 * 7 / 1000) = 0.02 um, squared and added to it
     assert found.amplitude == pytest.approx(0.5e-6, abs=0.03e-6)
+    assert found.axis == ""
     assert diagnose(BALLBAR, [path]).vibration is None
+
+
+SMALL = CircleUnderTest(("X", "Z"), radius=0.02, speed=0.05, pitch={"X": 0.01, "Z": 0.02})
+SUPERPOSED = Causes(scale=(30e-6, 0.0), squareness=50e-6, delay=(0.0, 2e-4), lost=(2e-6, 0.0), peak=(4e-6, 6e-6),
+                    pitch_error=(1e-6, 0.0))  # fmt: skip
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1e-6, 0.5e-6])
+@pytest.mark.parametrize("causes", [Causes(), SUPERPOSED], ids=["alone", "superposed"])
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("frequency", [9.0, 21.3, 150.0])
+def test_the_axis_that_vibrates_is_named(axis: int, frequency: float, causes: Causes, noise: float) -> None:
+    """Frequency within 2 %, amplitude within 10 %, and the other axis is left alone."""
+    swing = (1e-6, 0.0) if axis == 0 else (0.0, 1e-6)
+    found = both(SMALL, replace(causes, swing=swing, frequency=frequency, noise=noise), samples=8000)
+    assert [each.axis for each in found.vibrations] == [SMALL.axes[axis]]
+    assert found.vibration is not None
+    assert found.vibration.frequency == pytest.approx(frequency, rel=0.02)
+    assert found.vibration.amplitude == pytest.approx(1e-6, rel=0.10)
+    assert f"swings {SMALL.axes[axis]} " in swinging(found)
+
+
+@pytest.mark.parametrize("circle", [SMALL, BALLBAR], ids=["small", "ballbar"])
+@pytest.mark.parametrize("causes", [Causes(), SUPERPOSED], ids=["round", "superposed"])
+def test_no_vibration_is_invented(circle: CircleUnderTest, causes: Causes) -> None:
+    """Nor in noise, of which the strongest of some thousand lines always stands somewhere."""
+    for seed in range(20):
+        found = both(circle, replace(causes, noise=0.2e-6 * (seed > 0)), seed)
+        assert found.vibrations == ()
+        assert swinging(found) == ""
+
+
+def test_path_lag_is_told_from_the_radius_where_the_drives_are_known() -> None:
+    """First-order lag of K_v makes the circle smaller by R (1 - 1/sqrt(1 + (omega/K_v)^2)); a scale is no lag."""
+    K_v = 4000 / 60
+    omega = SMALL.speed / SMALL.radius
+    gain = 1 / math.sqrt(1 + (omega / K_v) ** 2)
+    known = replace(SMALL, gain=dict.fromkeys("XZ", 1 / (1 + 1j * omega / K_v)))
+    found = both(known, Causes(lag=(1 / K_v, 1 / K_v), scale=(2e-5, 2e-5), noise=0.1e-6))
+    shrink = SMALL.radius * (1 - gain)
+    assert shrink == pytest.approx(14e-6, rel=0.01)
+    assert found.lag == pytest.approx(-shrink, rel=1e-9)
+    assert found["radius"].value == pytest.approx(-shrink + 2e-5 * SMALL.radius, abs=found["radius"].half)
+    assert "path lag makes -14.0 um" in sentence(found, found["radius"])
+    unknown = both(SMALL, Causes(lag=(1 / K_v, 1 / K_v), noise=0.1e-6))
+    assert unknown.lag is None
+    assert "one feed cannot tell which" in sentence(unknown, unknown["radius"])
 
 
 DRAWS = 500

@@ -17,7 +17,7 @@ from feedsim.motions import Circle, Dwell, Move
 from feedsim.nc import plan
 from feedsim.scenario import CircleTest
 from feedsim.trace import Trace
-from scenario_helpers import scenario
+from scenario_helpers import default_machine, scenario
 
 RADIUS, OMEGA = 0.015, 0.05 / 0.015
 CENTRE = (0.785, 0.1)
@@ -266,3 +266,21 @@ def test_setpoints_of_a_planned_circle_are_round() -> None:
     found = values(task.figures(perfect))
     assert found["G"] == pytest.approx(0, abs=1e-6)
     assert found["mean"] == pytest.approx(0, abs=1e-6)
+
+
+def test_gain_of_the_loops_is_that_of_a_lag_of_first_order() -> None:
+    """Without speed feedforward, and with K_v so small that the loops within (5 ms) add less than 1 % to the lag."""
+    machine = default_machine()
+    slow = {
+        name: axis.model_copy(update={"drive": axis.drive.model_copy(update={"k_ffw": 0.0, "K_v": K_v})})
+        for (name, axis), K_v in zip(machine.axes.items(), (1.0, 1.0, 1.25), strict=True)
+    }
+    motion = Circle(plane=("X", "Z"), radius=0.02, feed=0.05, turns=3)
+    described = scenario(motion, evaluate=(CircleTest(),), machine=machine.model_copy(update={"axes": slow}))
+    (task,) = tasks(described, plan(described))
+    assert isinstance(task, CircleTask)
+    for axis, K_v in (("X", 1.0), ("Z", 1.25)):
+        assert abs(task.gain[axis]) == pytest.approx(1 / math.sqrt(1 + (2.5 / K_v) ** 2), rel=0.01)
+    (task,) = tasks(described := scenario(motion, evaluate=(CircleTest(),)), plan(described))
+    assert isinstance(task, CircleTask)
+    assert max(abs(1 - abs(gain)) for gain in task.gain.values()) < 1e-6  # with feedforward

@@ -91,3 +91,14 @@ def test_hysteresis_of_a_servo_mismatch_is_twice_its_ellipse(driven: Driven) -> 
     figures, _ = driven(*gains(4, 5))
     assert figures["XZ.H"].value == pytest.approx(150, rel=0.01)
     assert figures["XZ.G_b"].value == pytest.approx(150, rel=0.01)
+
+
+def test_path_lag_is_told_from_what_friction_makes_of_the_radius(driven: Driven) -> None:
+    """With feedforward there is none. Without it and with other gains the radius changes by what is told."""
+    with_it = driven()[0]
+    assert with_it["XZ.radius_lag"].value == pytest.approx(0, abs=0.01)
+    friction = with_it["XZ.radius_change"].value
+    for overrides in (NO_FEEDFORWARD, gains(3, 5)):
+        figures = driven(*overrides)[0]
+        assert figures["XZ.radius_lag"].value < -5
+        assert figures["XZ.radius_change"].value - friction == pytest.approx(figures["XZ.radius_lag"].value, abs=0.05)

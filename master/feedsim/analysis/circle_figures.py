@@ -26,17 +26,23 @@ ORDER = (
 ANGLES = 720  # at which two directions are compared: every half degree
 
 
-def diagnosed(trace: Trace, turns: Sequence[Turn], pitch: Mapping[str, float]) -> Diagnosis | None:
-    """Turns of one circle taken apart; None where they have too few samples for that. pitch: axis -> [m]."""
+def diagnosed(
+    trace: Trace, turns: Sequence[Turn], pitch: Mapping[str, float], gain: Mapping[str, complex] | None = None
+) -> Diagnosis | None:
+    """Turns of one circle taken apart; None where they have too few samples for that.
+
+    pitch: axis -> [m]. gain: axis -> x_a/x_s at the circle's frequency [1].
+    """
     turn = turns[0]
     paths = []
     for each in turns:
         measured = contour(trace, each)
         if len(measured.angle) < LEAST:
             return None
-        paths.append(TurnedPath(measured.angle, measured.deviation, each.sense))
+        phase = (measured.time - measured.time[0]) * (2 * math.pi / (each.end - each.begin))
+        paths.append(TurnedPath(measured.angle, measured.deviation, each.sense, phase))
     speed = 2 * math.pi * turn.radius / (turn.end - turn.begin)
-    return diagnose(CircleUnderTest(turn.axes, turn.radius, speed, pitch), paths)
+    return diagnose(CircleUnderTest(turn.axes, turn.radius, speed, pitch, gain or {}), paths)
 
 
 def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
@@ -59,10 +65,20 @@ def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
     for term in sorted(diagnosis.terms, key=lambda each: (ORDER.index(each.key), each.axis)):
         factor, unit = UNITS[term.unit]
         found[figure_name(term)] = Figure(factor * term.value, unit, meanings[term.key].format(axis=term.axis))
+    if diagnosis.lag is not None:
+        meaning = "part of the mean radius deviation that path lag makes, by the response of the position loops"
+        found["radius_lag"] = Figure(1e6 * diagnosis.lag, "um", meaning)
     vibration = diagnosis.vibration
     amplitude, frequency = (vibration.amplitude * 1e6, vibration.frequency) if vibration else (0.0, math.nan)
     found["vibration"] = Figure(amplitude, "um", "amplitude of the strongest vibration; 0 where none stands out")
     found["vibration_frequency"] = Figure(frequency, "Hz", "frequency of that vibration")
+    for each in diagnosis.vibrations:
+        if each.axis:
+            found[f"vibration_{each.axis}"] = Figure(
+                1e6 * each.amplitude, "um", f"amplitude of what {each.axis} swings"
+            )
+            meaning = f"frequency of what {each.axis} swings"
+            found[f"vibration_frequency_{each.axis}"] = Figure(each.frequency, "Hz", meaning)
     return found
 
 

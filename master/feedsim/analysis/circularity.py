@@ -54,8 +54,9 @@ class Glitch:
 
 @dataclass(frozen=True, eq=False)
 class Contour:
-    """Measured turn: angle (N,) [rad] in [-pi, pi), deviation of the radius (N,) [m], and its four glitches."""
+    """Measured turn: time (N,) [s], angle (N,) [rad] in [-pi, pi), deviation of the radius (N,) [m], four glitches."""
 
+    time: Array
     angle: Array
     deviation: Array
     median: float
@@ -83,7 +84,7 @@ def contour(trace: Trace, turn: Turn, columns: tuple[str, str] | None = None) ->
         )
     median = float(np.median(deviation))
     glitches = [_glitch(turn, k, angle, deviation, median) for k in range(4)]
-    return Contour(angle, deviation, median, (glitches[0], glitches[1], glitches[2], glitches[3]))
+    return Contour(trace.time[rows], angle, deviation, median, (glitches[0], glitches[1], glitches[2], glitches[3]))
 
 
 def circularity(trace: Trace, turn: Turn) -> dict[str, Figure]:

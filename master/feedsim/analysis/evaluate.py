@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -15,14 +16,17 @@ from feedsim.analysis.circularity import EVEN, Turn, axis_letters, circularity, 
 from feedsim.analysis.figures import Figure
 from feedsim.analysis.positioning import LEAST_REST, Approach, positioning
 from feedsim.analysis.positioning_accuracy import Accuracy, readings
+from feedsim.cosim.plant import plant_modes
 from feedsim.errors import InputError
 from feedsim.findings import Note
+from feedsim.linear.loops import position_reference
+from feedsim.linear.system import LinearSystem
 from feedsim.motions.circular import Circular
 from feedsim.motions.move import Straight
 from feedsim.motions.positioning_cycle import Visits
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment
-from feedsim.scenario import CircleTest, Positioning, PositioningAccuracy, Scenario
+from feedsim.scenario import CircleTest, Machine, Positioning, PositioningAccuracy, Scenario
 from feedsim.trace import Trace, matches
 
 # What acceleration leaves dies away in the run-in [s]: on the default machine it makes G 3 % too large after 0.2 s on
@@ -62,13 +66,12 @@ class PositioningTask:
 
 @dataclass(frozen=True)
 class CircleTask:
-    """A turn to evaluate; ``prefix`` of its figures; ``back``: the same circle in the other sense, where it is driven;
-    ``pitch`` of the plane's axes [m]."""
+    """A turn to evaluate; ``prefix`` of its figures; ``back``: the same circle in the other sense, if it is driven."""
 
     prefix: str
     turn: Turn
+    machine: Machine
     back: Turn | None = None
-    pitch: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def turns(self) -> tuple[Turn, ...]:
@@ -91,7 +94,25 @@ class CircleTask:
 
     def diagnosis(self, trace: Trace) -> Diagnosis | None:
         """Why the circle is not round; None where it has too few samples to tell."""
-        return diagnosed(trace, self.turns, self.pitch)
+        return diagnosed(trace, self.turns, self.pitch, self.gain)
+
+    @property
+    def pitch(self) -> dict[str, float]:
+        """Of the plane's axes [m]."""
+        return {axis: 2 * math.pi * self.machine.axes[axis].I_P for axis in self.turn.axes}
+
+    @cached_property
+    def gain(self) -> dict[str, complex]:
+        """x_a/x_s of the plane's axes at the circle's frequency [1]; empty where a drive is not the shipped one."""
+        frequency = np.array([1 / (self.turn.end - self.turn.begin)])
+        try:
+            system = LinearSystem(self.machine, plant_modes(self.machine)[0])
+            return {
+                axis: complex(position_reference(system, axis, frequency, feedforward=True)[0])
+                for axis in self.turn.axes
+            }
+        except InputError:
+            return {}
 
 
 @dataclass(frozen=True)
@@ -254,8 +275,7 @@ def _turn(item: CircleTest, scenario: Scenario, program: Program) -> CircleTask:
         for each in (circle, circle.back)
         if each is not None
     )
-    pitch = {axis: 2 * math.pi * scenario.machine.axes[axis].I_P for axis in circle.axes}
-    return CircleTask(axis_letters(circle.axes), turn, back[0] if back else None, pitch)
+    return CircleTask(axis_letters(circle.axes), turn, scenario.machine, back[0] if back else None)
 
 
 def _even_turn(circle: Circular, number: int | None, program: Program) -> tuple[float, float]:

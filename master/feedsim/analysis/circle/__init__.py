@@ -4,9 +4,10 @@ May use analysis.figures, analysis.circularity, trace and units. Simulated circl
 Start with model.py, the terms and their fit; diagnosis.py says what share of G each of them has.
 """
 
-from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, Vibration, diagnose
+from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, diagnose
 from feedsim.analysis.circle.model import CircleUnderTest, TurnedPath
-from feedsim.analysis.circle.words import answer, name, sentence
+from feedsim.analysis.circle.vibration import Vibration
+from feedsim.analysis.circle.words import answer, name, sentence, swinging
 
 __all__ = [
     "CircleUnderTest",
@@ -19,4 +20,5 @@ __all__ = [
     "diagnose",
     "name",
     "sentence",
+    "swinging",
 ]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circle.model import CircleUnderTest, Fit, TurnedPath, fit
+from feedsim.analysis.circle.vibration import Vibration, averaged, vibrations
 from feedsim.analysis.figures import Array
 
 # A peak is seen where its mean over this angle [deg] exceeds this multiple of what noise makes of such means and of the
@@ -20,9 +21,6 @@ SEEN, OVER = 5.0, 1.0
 # quarter of the peak's width, which would take from its height.
 BLUR = 0.015
 FLOOR = 1e-9  # a deviation of less [m] is not worth a word
-# Lines of the spectrum that belong to one vibration, and how far their mean stands out of what is around them.
-LINES, AROUND, STANDS_OUT = 7, 101, 5.0
-FIRST_ORDER = 13  # below it is form
 FORM = (3, 4, 5)
 
 
@@ -72,15 +70,6 @@ class Peak:
     decay: float
 
 
-@dataclass(frozen=True)
-class Vibration:
-    """Frequency at this path speed [Hz] and amplitude [m] of what swings, with half of its interval [m]."""
-
-    frequency: float
-    amplitude: float
-    half: float
-
-
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """A circle taken apart.
@@ -89,7 +78,8 @@ class Diagnosis:
         circle, senses: what was tested, and in which senses.
         G: largest less smallest radial deviation of all turns [m].
         terms: by their share of G, the largest first. peaks: of all reversals, in the order of the turns.
-        vibration: the strongest; None where none stands out.
+        vibrations: the strongest of each axis that stands out, of the radius where only that is known.
+        lag: the part of the mean radius that the loops' response makes [m]; None where the drives are not known.
         form: order -> amplitude of it in what remains [m].
         noise: standard deviation of what remains outside the windows behind the reversals [m].
         centre: fitted, from the programmed one [m].
@@ -102,7 +92,8 @@ class Diagnosis:
     G: float
     terms: tuple[Term, ...]
     peaks: tuple[Peak, ...]
-    vibration: Vibration | None
+    vibrations: tuple[Vibration, ...]
+    lag: float | None
     form: dict[int, float]
     noise: float
     left_out: tuple[str, ...]
@@ -117,6 +108,11 @@ class Diagnosis:
         raise KeyError(key)
 
     @property
+    def vibration(self) -> Vibration | None:
+        """The strongest; None where none stands out."""
+        return self.vibrations[0] if self.vibrations else None
+
+    @property
     def both(self) -> bool:
         """Whether both senses were driven."""
         return len(set(self.senses)) == 2
@@ -127,7 +123,7 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
 
     centred: the centre is that of the measurement's set-up and no error of the machine; G is then about the fitted one.
     """
-    paths = [path.thinned() for path in paths]
+    whole, paths = paths, [path.thinned() for path in paths]
     found = fit(circle, paths)
     curves = _curves(found, paths, circle)
     total = [path.deviation for path in paths]
@@ -156,7 +152,8 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         G=G,
         terms=tuple(sorted(terms, key=lambda term: (-term.share if term.told else 1.0, -term.size))),
         peaks=peaks,
-        vibration=_vibration(circle, found, [path.sense for path in paths]),
+        vibrations=vibrations(circle, found, whole),
+        lag=_lag(circle),
         form=_form(found),
         noise=found.noise,
         left_out=found.left_out,
@@ -165,6 +162,13 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
             (path.angle, path.deviation - residual) for path, residual in zip(paths, found.residual, strict=True)
         ),
     )
+
+
+def _lag(circle: CircleUnderTest) -> float | None:
+    """Of the mean response of both axes: what one makes more is scale; lagging more, it makes the ellipse slimmer."""
+    if any(axis not in circle.gain for axis in circle.axes):
+        return None
+    return circle.radius * (abs(sum(circle.gain[axis] for axis in circle.axes)) / 2 - 1)
 
 
 def _curves(found: Fit, paths: Sequence[TurnedPath], circle: CircleUnderTest) -> dict[str, list[Array]]:
@@ -233,7 +237,7 @@ def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak
             continue
         since, off = found.since[k][own], found.residual[k][own]
         wide = max(1, round(math.radians(OVER) / per_sample))
-        smooth = _averaged(off, wide)
+        smooth = averaged(off, wide)
         most = float(np.abs(smooth).max())
         level = max(SEEN * math.hypot(found.noise / math.sqrt(wide), rest_error), FLOOR)
         if most < level:
@@ -246,7 +250,7 @@ def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak
             max(1, math.ceil((found.noise / (BLUR * most)) ** 2)),
             max(1, int(broad[0]) // 2 if len(broad) else wide),
         )
-        curve = _averaged(off, enough)
+        curve = averaged(off, enough)
         at = int(np.abs(curve).argmax())
         height = float(curve[at])
         half = math.hypot(found.quantile * found.noise / math.sqrt(enough), found.quantile * rest_error)
@@ -270,56 +274,6 @@ def _falls(since: Array, relative: Array, at: int, level: float, way: int) -> fl
     out, before = side[below[0]], side[below[0] - 1]
     share = (relative[before] - level) / (relative[before] - relative[out])
     return float(since[before] + share * (since[out] - since[before]))
-
-
-def _averaged(values: Array, count: int) -> Array:
-    """Mean over ``count`` neighbours; fewer at the ends."""
-    ones = np.ones(min(count, len(values)))
-    return np.asarray(np.convolve(values, ones, "same") / np.convolve(np.ones(len(values)), ones, "same"))
-
-
-def _vibration(circle: CircleUnderTest, found: Fit, senses: Sequence[int]) -> Vibration | None:
-    """The strongest vibration in what remains outside the windows, over all paths."""
-    best: Vibration | None = None
-    for k, sense in enumerate(senses):
-        order = np.argsort(sense * found.angle[k] % (2 * math.pi))
-        angle, off = (sense * found.angle[k] % (2 * math.pi))[order], found.residual[k][order]
-        free = (found.reversal[k] < 0)[order]
-        even = np.arange(len(angle)) * (2 * math.pi / len(angle))
-        still = np.interp(even, angle, np.where(free, off, 0.0), period=2 * math.pi)
-        power = np.abs(np.fft.rfft(still)) ** 2
-        usable = power[FIRST_ORDER:]
-        if len(usable) < 2 * AROUND:
-            continue
-        mean = _averaged(usable, LINES)
-        around = _floor(usable)
-        stands = mean / np.maximum(around, 1e-300)
-        at = int(np.argmax(np.where(stands > STANDS_OUT, mean, 0.0)))
-        if stands[at] <= STANDS_OUT:
-            continue
-        lines = np.arange(max(at - LINES // 2, 0), min(at + LINES // 2 + 1, len(usable)))
-        centre = float(usable[lines] @ (lines + FIRST_ORDER) / usable[lines].sum())
-        amplitude = _swing(angle[free], off[free], round(centre))
-        if best is None or amplitude > best.amplitude:
-            frequency = centre * circle.speed / (2 * math.pi * circle.radius)
-            half = found.quantile * found.noise * math.sqrt(2 / max(int(free.sum()), 1))
-            best = Vibration(frequency, amplitude, half)
-    return best if best is not None and best.amplitude > FLOOR else None
-
-
-def _floor(power: Array) -> Array:
-    """Mean power of the lines around each, if they are noise: their median is ln 2 of it."""
-    edges = np.arange(0, len(power), AROUND // 2)
-    middle = [float(np.median(power[max(edge - AROUND // 2, 0) : edge + AROUND // 2 + 1])) for edge in edges]
-    return np.asarray(np.interp(np.arange(len(power)), edges, middle)) / math.log(2)
-
-
-def _swing(angle: Array, off: Array, order: int) -> float:
-    """Amplitude of the orders about one, which an axis' vibration makes on its way round: of the mean power."""
-    beside = range(max(order - LINES // 2, 1), order + LINES // 2 + 1)
-    matrix = np.column_stack([wave(n * angle) for n in beside for wave in (np.cos, np.sin)])
-    values = np.linalg.lstsq(matrix, off, rcond=None)[0]
-    return math.sqrt(2 * float(np.mean((matrix @ values) ** 2)))
 
 
 def _form(found: Fit) -> dict[int, float]:

@@ -43,28 +43,35 @@ SETTLED = 1e-13  # changes of a term below this [m] are rounding
 
 @dataclass(frozen=True)
 class CircleUnderTest:
-    """What is known of the circle: axes of its plane (first, second), radius [m], path speed [m/s], and the pitch of
-    an axis [m] where an error that repeats with it is looked for."""
+    """What is known of the circle: axes of its plane (first, second), radius [m], path speed [m/s]; the pitch of an
+    axis [m] where an error that repeats with it is looked for; the response of an axis, x_a over x_s, at the circle's
+    frequency [1], where its drive is known."""
 
     axes: tuple[str, str]
     radius: float
     speed: float
     pitch: Mapping[str, float] = field(default_factory=dict)
+    gain: Mapping[str, complex] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class TurnedPath:
     """A measured turn at constant speed: angle about the programmed centre (N,) [rad], deviation of the radius
-    (N,) [m], and its sense, +1 from the first axis towards the second, else -1. In the order of the motion."""
+    (N,) [m], and its sense, +1 from the first axis towards the second, else -1. In the order of the motion.
+
+    phase: where both axes' positions were measured over time, the angle by which the motion has turned (N,) [rad], from
+    0 on."""
 
     angle: Array
     deviation: Array
     sense: int
+    phase: Array | None = None
 
     def thinned(self) -> TurnedPath:
         """At most MOST samples, evenly chosen."""
         step = -(-len(self.angle) // MOST)
-        return TurnedPath(self.angle[::step], self.deviation[::step], self.sense)
+        phase = None if self.phase is None else self.phase[::step]
+        return TurnedPath(self.angle[::step], self.deviation[::step], self.sense, phase)
 
 
 @dataclass(frozen=True, eq=False)

@@ -187,7 +187,7 @@ def _of_positions(
     nominal = radius if radius is not None else mean
     u, w = x - about[0], y - about[1]
     angle, deviation = np.arctan2(w, u), np.hypot(u, w) - nominal
-    return _named(recording, angle, deviation, _time(recording)), mean
+    return _named(recording, angle, deviation, _time(recording), by_axes=True), mean
 
 
 def _of_angles(
@@ -209,11 +209,13 @@ def _of_angles(
     return _named(recording, phi, deviation, _time(recording)), mean
 
 
-def _named(recording: Recording, angle: Array, deviation: Array, time: Array | None) -> list[RecordedTurn]:
+def _named(
+    recording: Recording, angle: Array, deviation: Array, time: Array | None, *, by_axes: bool = False
+) -> list[RecordedTurn]:
+    """by_axes: both axes' positions were measured, not the radius alone."""
     found = []
     for rows, sense in _turns(np.unwrap(angle), str(recording.path)):
-        path = TurnedPath((angle[rows] + math.pi) % (2 * math.pi) - math.pi, deviation[rows], sense)
-        begin = duration = None
+        begin = duration = phase = None
         if time is not None:
             turned = np.abs(np.unwrap(angle[rows]) - angle[rows][0])
             passed = np.interp(np.linspace(0, turned[-1], PARTS + 1), turned, time[rows])
@@ -225,6 +227,8 @@ def _named(recording: Recording, angle: Array, deviation: Array, time: Array | N
                 )
             begin = float(time[rows][0])
             duration = float(time[rows][-1] - begin) * 2 * math.pi / float(turned[-1])
+            phase = (time[rows] - begin) * (2 * math.pi / duration) if by_axes else None
+        path = TurnedPath((angle[rows] + math.pi) % (2 * math.pi) - math.pi, deviation[rows], sense, phase)
         way = "counterclockwise" if sense > 0 else "clockwise"
         found.append(RecordedTurn(f"a turn {way}, {rows.stop - rows.start} samples", path, begin, duration))
     return found

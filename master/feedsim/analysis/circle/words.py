@@ -51,10 +51,7 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
         case "offset":
             return f"the centre lies {_um(amount)} off: set-up of the measurement, or drift since the centre was set"
         case "radius":
-            return (
-                f"the radius is {_um(amount)} too {'large' if value > 0 else 'small'}: path lag without "
-                "speed feedforward, symmetry filter T_sym, or a scale of both axes"
-            )
+            return f"the radius is {_um(amount)} too {'large' if value > 0 else 'small'}: {_lag(diagnosis, value)}"
         case "scale":
             more, less = (first, second) if value > 0 else (second, first)
             return (
@@ -94,6 +91,20 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
     return f"what no cause explains: {_um(term.size)} from peak to valley ({form})"
 
 
+def _lag(diagnosis: Diagnosis, change: float) -> str:
+    """What the mean radius is made of, as far as it can be told."""
+    if diagnosis.lag is None:
+        return (
+            "path lag without speed feedforward, symmetry filter T_sym, or a scale of both axes; one feed cannot tell "
+            "which: path lag grows with the square of the feed, a scale does not"
+        )
+    rest = change - diagnosis.lag
+    return (
+        f"path lag makes {_um(diagnosis.lag)} by the response of the position loops (K_v, speed feedforward, T_sym), "
+        f"friction or a scale {_um(rest)}"
+    )
+
+
 def _peaks(diagnosis: Diagnosis, term: Term) -> str:
     own = [peak for peak in diagnosis.peaks if peak.axis == term.axis]
     largest = max(own, key=lambda peak: abs(peak.height))
@@ -104,6 +115,18 @@ def _peaks(diagnosis: Diagnosis, term: Term) -> str:
     wide = f", {largest.width * 1e3:.3g} ms wide" if math.isfinite(largest.width) else ""
     remedy = "friction; friction compensation" if largest.height > 0 else "too much friction compensation"
     return f"{term.axis} {where} where it reverses, {_um(abs(largest.height))}{wide}: {remedy}"
+
+
+def swinging(diagnosis: Diagnosis) -> str:
+    """What vibrates between the reversals, in a sentence; "" where nothing stands out."""
+    if not diagnosis.vibrations:
+        return ""
+    told = [
+        f"{each.axis or 'the radius'} {_um(each.amplitude)} (amplitude) at {each.frequency:.3g} Hz"
+        for each in diagnosis.vibrations
+    ]
+    alone = "; a file of angle and radius does not tell the axis" if not diagnosis.vibrations[0].axis else ""
+    return f"Between the reversals swings {', '.join(told)}{alone}."
 
 
 def _trust(diagnosis: Diagnosis) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, name, sentence
+from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, name, sentence, swinging
 from feedsim.analysis.circle_figures import UNITS
 from feedsim.report.content import Section, Table
 from feedsim.report.formatting import minus, number, typeset
@@ -32,11 +32,8 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     if diagnosis.left_out:
         axes = " and ".join(diagnosis.left_out)
         note += f"\nThe circle is too small to tell errors that repeat with the pitch of {axes}."
-    if (vibration := diagnosis.vibration) is not None:
-        frequency = number(vibration.frequency, 3)
-        note += (
-            f"\nStrongest vibration between the reversals: {_um(vibration.amplitude)} µm (amplitude) at {frequency} Hz."
-        )
+    if words := swinging(diagnosis):
+        note += f"\n{typeset(words)}"
     heads = ("Cause", "Amount", "Alone [µm]", "Share of G [%]", "What it means, where to look")
     peaks = [(minus(peak.name), _direction(peak.sense), *_peak(peak)) for peak in diagnosis.peaks]
     peak_heads = ("Reversal at", "Direction", "Peak [µm]", "±", "Width at half the height [ms]", "Falls to 1/e in [ms]")
@@ -53,7 +50,6 @@ def _direction(sense: int) -> str:
 
 def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
     """The diagnosis in summary.json, in SI."""
-    vibration = diagnosis.vibration
     return {
         "answer": answer(diagnosis),
         "directions": [_direction(sense) for sense in diagnosis.senses],
@@ -81,9 +77,16 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for peak in diagnosis.peaks
         ],
-        "vibration": None
-        if vibration is None
-        else {"frequency": quantity(vibration.frequency, "Hz"), "amplitude": quantity(vibration.amplitude, "m")},
+        "vibrations": [
+            {
+                "axis": each.axis,
+                "frequency": quantity(each.frequency, "Hz"),
+                "amplitude": quantity(each.amplitude, "m"),
+                "half_interval": finite(each.half),
+            }
+            for each in diagnosis.vibrations
+        ],
+        "path_lag": None if diagnosis.lag is None else quantity(diagnosis.lag, "m"),
         "form": {str(order): quantity(amplitude, "m") for order, amplitude in diagnosis.form.items()},
         "noise": quantity(diagnosis.noise, "m"),
     }

@@ -234,7 +234,8 @@ def _likelier(problem: Problem, found: Tuned, T_pos: float) -> float:
     cycles = machine.cycles.model_copy(update={"position": T_pos})
     problem.machine = machine.model_copy(update={"cycles": cycles})
     try:
-        return likely(problem.fitted(found.names, found.values, found)) - likely(found)
+        # Cycles are told apart by more than such a fit is off its least.
+        return likely(problem.fitted(found.names, found.values, found, ROUGH)) - likely(found)
     finally:
         problem.machine = machine
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from command_helpers import feedsim, feedsim_process
 from feedsim.owned import LOCK
 from feedsim.trace import read_csv
 
@@ -35,14 +36,8 @@ def scenario_file(tmp_path: Path) -> Path:
     return file
 
 
-def feedsim(*words: str | Path, fmus: Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from feedsim.cli import entry; entry()", *map(str, words)]
-    environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master"), "PYTHONUTF8": "1"}
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, encoding="utf-8", check=False)
-
-
 def test_run_writes_results_and_one_line(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
-    done = feedsim("run", scenario_file, "--out", tmp_path / "out", fmus=fmus, cwd=tmp_path)
+    done = feedsim_process("run", scenario_file, "--out", tmp_path / "out", fmus=fmus, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert len(done.stdout.splitlines()) == 1
     assert done.stdout.startswith("short move: ")
@@ -141,7 +136,7 @@ def test_validate_and_schema(scenario_file: Path, fmus: Path, tmp_path: Path) ->
 def test_failed_step_ends_with_3_and_no_result(scenario_file: Path, fmus: Path, tmp_path: Path) -> None:
     entries = ("K_p=1e300 N.m.s/rad", "M_max=1e308 N.m", "ideal_current_loop=true")
     changes = [word for entry in entries for word in ("--set", f"machine.axes.Z.drive.{entry}")]
-    done = feedsim("run", scenario_file, *changes, fmus=fmus, cwd=tmp_path)
+    done = feedsim_process("run", scenario_file, *changes, fmus=fmus, cwd=tmp_path)
     assert done.returncode == 3, done.stderr
     assert " s: step of 0.000125 s failed: " in done.stderr
     assert {path.name for path in tmp_path.rglob("*.csv")} <= {"result.partial.csv"}
@@ -205,7 +200,7 @@ def test_missing_scenario(fmus: Path, tmp_path: Path) -> None:
 
 
 def test_usage_and_help(fmus: Path, tmp_path: Path) -> None:
-    assert feedsim(fmus=fmus, cwd=tmp_path).returncode == 2
+    assert feedsim_process(fmus=fmus, cwd=tmp_path).returncode == 2
     done = feedsim("--help", fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0
     for command in ("run", "validate", "schema", "convert", "exit codes"):

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
+from command_helpers import Done, feedsim
 from feedsim.analysis import Figure, compensation
 from feedsim.cli import main
 from feedsim.errors import SimulationError
@@ -41,17 +39,9 @@ W: 0.040 rad
 gamma: 0.35
 """
 
-Process = subprocess.CompletedProcess[str]
-
-
-def feedsim(*words: str | Path, fmus: Path, cwd: Path) -> Process:
-    command = [sys.executable, "-c", "from feedsim.cli import entry; entry()", *map(str, words)]
-    environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master"), "PYTHONUTF8": "1"}
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, encoding="utf-8", check=False)
-
 
 @pytest.fixture(scope="module")
-def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Process, Path]:
+def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Done, Path]:
     """Without the table, with a set and a delay given."""
     folder = tmp_path_factory.mktemp("compensate")
     (folder / "friction_z.yaml").write_text(FRICTION_Z, encoding="utf-8")
@@ -67,7 +57,7 @@ def summary_of(folder: Path) -> dict[str, Any]:
     return content
 
 
-def test_everything_is_written_and_told(done: tuple[Process, Path]) -> None:
+def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
     process, folder = done
     assert (process.returncode, process.stderr) == (0, "")
     first, second = process.stdout.splitlines()
@@ -84,7 +74,7 @@ def test_everything_is_written_and_told(done: tuple[Process, Path]) -> None:
     assert set(summary_of(folder)["files"]) == files
 
 
-def test_summary_tells_what_was_compensated_with(done: tuple[Process, Path]) -> None:
+def test_summary_tells_what_was_compensated_with(done: tuple[Done, Path]) -> None:
     summary = summary_of(done[1])
     axes = summary["compensation"]["axes"]
     assert list(axes) == ["X", "Z"]
@@ -108,7 +98,7 @@ def test_summary_tells_what_was_compensated_with(done: tuple[Process, Path]) -> 
     assert all(figure["unit"] and figure["meaning"] for figure in figures.values())
 
 
-def test_curves_can_be_read_back(done: tuple[Process, Path]) -> None:
+def test_curves_can_be_read_back(done: tuple[Done, Path]) -> None:
     folder = done[1] / "out"
     with_it, without, torque = (read_csv(folder / f"{name}.csv") for name in ("result", "uncompensated", "feedforward"))
     assert set(with_it.columns) == {"X.x_a", "Z.x_a", "X.n_a", "Z.n_a", "X.M_fr", "Z.M_fr"}
@@ -159,7 +149,7 @@ def test_worse_is_judged_figure_by_figure() -> None:
     assert "G 8 -> not determined" in told(G=np.nan)[0]
 
 
-def test_without_the_table_there_is_none(done: tuple[Process, Path]) -> None:
+def test_without_the_table_there_is_none(done: tuple[Done, Path]) -> None:
     out = done[1] / "out"
     assert not (out / "compensation.csv").exists()
     assert "What errors cost" not in (out / "report.html").read_text(encoding="utf-8")
@@ -192,7 +182,7 @@ def test_cards_never_round_to_nothing(value: float, shown: str) -> None:
     assert _um(Figure(value, "um", "")) == shown
 
 
-def test_report_shows_what_counts(done: tuple[Process, Path]) -> None:
+def test_report_shows_what_counts(done: tuple[Done, Path]) -> None:
     text = (done[1] / "out" / "report.html").read_text(encoding="utf-8")
     page = Page(text)
     assert "Friction compensation: X-Z circle" in text
@@ -205,7 +195,7 @@ def test_report_shows_what_counts(done: tuple[Process, Path]) -> None:
     assert len(page.ids) == len(set(page.ids))
 
 
-def test_nothing_of_an_earlier_run_is_left(done: tuple[Process, Path], fmus: Path, tmp_path: Path) -> None:
+def test_nothing_of_an_earlier_run_is_left(done: tuple[Done, Path], fmus: Path, tmp_path: Path) -> None:
     """Another command in the same folder takes the files away that it does not write itself."""
     (tmp_path / "out").mkdir()
     for name, data in contents(done[1] / "out").items():

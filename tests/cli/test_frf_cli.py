@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from command_helpers import Done, feedsim
 from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Plan, signal_of
 from feedsim.analysis.responses import Responses, frequencies, read_overlays
@@ -38,14 +36,8 @@ ROOT = Path(__file__).resolve().parents[2]
 SCENARIO = ROOT / "scenarios" / "z_positioning.yaml"
 
 
-def feedsim(*words: str | Path, fmus: Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from feedsim.cli import entry; entry()", *map(str, words)]
-    environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master"), "PYTHONUTF8": "1"}
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, encoding="utf-8", check=False)
-
-
 @pytest.fixture(scope="module")
-def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[subprocess.CompletedProcess[str], Path]:
+def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Done, Path]:
     """One run from a scenario with a setting, measured, with a curve laid over."""
     folder = tmp_path_factory.mktemp("frf")
     f = np.array([20.0, 60.0, 180.0])
@@ -72,7 +64,7 @@ def summary_of(folder: Path) -> dict[str, Any]:
     return content
 
 
-def test_everything_is_written_and_told(done: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
     process, folder = done
     assert (process.returncode, process.stderr) == (0, "")
     first, of_axis = process.stdout.splitlines()
@@ -83,7 +75,7 @@ def test_everything_is_written_and_told(done: tuple[subprocess.CompletedProcess[
     assert set(summary_of(folder)["files"]) == files
 
 
-def test_curves_can_be_read_back(done: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+def test_curves_can_be_read_back(done: tuple[Done, Path]) -> None:
     folder = done[1] / "out"
     closed, measured = (read_response_csv(folder / name) for name in ("frf.csv", "frf_measured.csv"))
     assert closed.names == names(("Z",), tool=False)
@@ -101,7 +93,7 @@ def test_curves_can_be_read_back(done: tuple[subprocess.CompletedProcess[str], P
     assert np.max(np.abs(20 * np.log10(np.abs(at / measured["Z.n_a/Z.M_a"])))) < limit
 
 
-def test_summary_tells_figures_inputs_and_excitation(done: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+def test_summary_tells_figures_inputs_and_excitation(done: tuple[Done, Path]) -> None:
     summary = summary_of(done[1])
     figures = summary["figures"]
     assert figures["Z.speed.bandwidth_first"]["unit"] == "Hz"
@@ -125,7 +117,7 @@ def test_summary_tells_figures_inputs_and_excitation(done: tuple[subprocess.Comp
     assert str(done[1]) not in json.dumps(summary)
 
 
-def test_truncation_is_told_of_what_is_shown_alone(done: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+def test_truncation_is_told_of_what_is_shown_alone(done: tuple[Done, Path]) -> None:
     summary = summary_of(done[1])
     told = {name for name in summary["figures"] if "truncation" in name}
     ends = ("truncation_below", "truncation", "truncation_below_corrected", "truncation_corrected")
@@ -175,7 +167,7 @@ def test_a_plant_that_follows_the_pose_agrees_with_the_closed_form(fmus: Path, t
 
 
 def test_page_is_self_contained_and_says_that_numbers_are_synthetic(
-    done: tuple[subprocess.CompletedProcess[str], Path],
+    done: tuple[Done, Path],
 ) -> None:
     text = (done[1] / "out" / "report.html").read_text(encoding="utf-8")
     page = Page(text)

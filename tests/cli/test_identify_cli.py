@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from command_helpers import Done, feedsim
 from feedsim.cli import main
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
@@ -49,13 +47,6 @@ MACHINE = ROOT / "scenarios" / "machines" / "test_centre"
 CIRCLE = ROOT / "scenarios" / "xz_circle.yaml"
 MOVES = ((5e-6, 10.0, 20), (20e-6, 5.0, 12), (100e-6, 2.0, 7), (200e-6, 1.0, 5))
 FILES = {"friction.yaml", "plateaus.csv", "residuals.csv", "report.html", "summary.json"}
-Done = subprocess.CompletedProcess[str]
-
-
-def feedsim(*words: str | Path, fmus: Path, cwd: Path) -> Done:
-    command = [sys.executable, "-c", "from feedsim.cli import entry; entry()", *map(str, words)]
-    environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master"), "PYTHONUTF8": "1"}
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, encoding="utf-8", check=False)
 
 
 @pytest.fixture(scope="module")

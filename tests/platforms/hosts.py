@@ -20,7 +20,9 @@ from platforms.cases import STEPS, Case, H
 HERE = Path(__file__).parent
 HEADERS = HERE.parents[1] / "src" / "fmi2" / "standard"
 SYSROOT = Path("/usr/aarch64-linux-gnu")  # Debian's libc6-arm64-cross
-TIMEOUT = 300  # s; a run takes some seconds, the first under Wine makes its folders
+# s, against what hangs: a run takes some seconds, but the first under Wine makes its folders, and zig what a platform's
+# programs need; on a busy machine minutes.
+TIMEOUT = 1800
 
 Floats = NDArray[np.float64]
 

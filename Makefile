@@ -162,8 +162,9 @@ test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)
 	    scenarios/z_positioning.yaml; fi
 
 # A file of tests stays together on one core: its fixtures are made once. Programs that packages bring (cmake) are found.
+# What tests start by the hundred finds feedsim compiled, even where the shell lets Python write no bytecode.
 test-python: fmus $(VENV)/.importers
-	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=25
+	PYTHONDONTWRITEBYTECODE= PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=25
 
 # Calls of the units made of bytes, and what reads files with files that are changed at random (ARGS="--seconds 3600 --seed 7").
 fuzz: fmus $(VENV)/.importers ## bytes as calls of the units, changed files into every reader (ARGS="--seconds N --seed S")

@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all release lint format schemas reference check-reference bench worst-case pose-study identification-study identification-accuracy lock ansys clean
+.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all release lint format schemas reference check-reference bench worst-case pictures pose-study identification-study identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -198,6 +198,9 @@ bench: fmus $(VENV)/.importers ## measure everything, other simulators too; tabl
 
 worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets
 	$(PY) benchmarks/worst_case.py
+
+pictures: fmus $(VENV)/.run ## draw README's and docs' pictures anew (docs/images; ARGS=--all: that of the large study too)
+	$(PY) docs/pictures.py $(ARGS)
 
 pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full model (some minutes; docs/position-dependence.md)
 	$(PY) benchmarks/pose_grid.py

@@ -44,7 +44,7 @@ def test_what_differs_is_told(results: tuple[Path, Path], tmp_path: Path, capsys
     assert list(summary["differing"]) == ["machine.axes.X.drive.K_v"]
     assert [source["name"] for source in summary["sources"]] == ["as_is", "changed"]
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "+1<" in page  # the difference of G
+    assert "+1.00<" in page  # the difference of G
     assert set(re.findall(r'<figure id="([\w-]+)" class="chart"', page)) >= {"contour-XZ", "position"}
 
 

@@ -60,7 +60,7 @@ def run(options: Namespace) -> None:
     finish(
         options.quiet,
         warnings,
-        *report.answers(causes),
+        *report.answers(result, figures, causes),
         f"{plan.name}: {report.summary_line(result, figures)} -> {directory}",
     )
 

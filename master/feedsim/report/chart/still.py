@@ -85,7 +85,8 @@ def _panel(panel: Panel, width: float, height: float, name: str) -> str:
     grid = []
     for at, text in _ticks(panel.x, across_span, (right - left) / 74):
         grid.append(f"M{float(across(at)):.1f} {TOP:g}V{bottom:g}")
-        parts.append(_text(float(across(at)), bottom + 16, text, "text-anchor='middle'"))
+        seen = min(float(across(at)), width - 3.6 * len(text))  # the last one stays inside
+        parts.append(_text(seen, bottom + 16, text, "text-anchor='middle'"))
     for at, text in _ticks(panel.y, up_span, (bottom - TOP) / 34):
         grid.append(f"M{left:g} {float(up(at)):.1f}H{right:g}")
         parts.append(_text(left - 6, float(up(at)) + 4, text, "text-anchor='end'"))

@@ -72,7 +72,7 @@ def accuracy_section(prefix: str, found: Accuracy, place: str = "") -> Section:
     """Means, standard deviations, reversal value and repeatability of every target. place: "tool" by the tool point."""
     columns = (*np.transpose([found.mean, found.s], (1, 0, 2)).reshape(4, -1), found.B, found.R)
     rows = [
-        (f"{1e3 * target:.6g}", *(minus(number(1e6 * float(column[i]), 3)) for column in columns))
+        (f"{1e3 * target:.6g}", *(minus(f"{1e6 * float(column[i]):.3f}") for column in columns))
         for i, target in enumerate(found.targets)
     ]
     by = " by the tool point" if place else ""

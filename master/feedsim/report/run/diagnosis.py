@@ -93,9 +93,13 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _value(term: Term) -> str:
+    """To the digits that its interval leaves it."""
     factor, unit = UNITS[term.unit]
-    interval = f" ± {number(factor * term.half, 2)}" if math.isfinite(term.half) else ""
-    return f"{minus(number(factor * term.value, 3))}{interval} {typeset(unit)}"
+    value, half = factor * term.value, factor * term.half
+    if not math.isfinite(half) or half <= 0:
+        return f"{minus(number(value, 3))} {typeset(unit)}"
+    places = max(0, 1 - math.floor(math.log10(half)))
+    return f"{minus(f'{value:.{places}f}')} ± {half:.{places}f} {typeset(unit)}"
 
 
 def _um(value: float) -> str:

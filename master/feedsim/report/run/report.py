@@ -40,6 +40,7 @@ from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
 from feedsim.report.run.pose import pose_part, pose_section
+from feedsim.report.run.words import accuracy_words, stop_words
 from feedsim.scenario import Level, Logging
 from feedsim.trace import Trace, write_csv
 from feedsim.units import show
@@ -135,7 +136,7 @@ def report_of(
     return Report(
         scenario.name,
         f"{machine.name} · {len(scenario.motions)} motion(s), {run.program.duration:.4g} s",
-        answer=[typeset(line) for line in answers(causes)],
+        answer=[typeset(line) for line in answers(run, figures, causes)],
         warnings=(*run.warnings, *doubts(figures, causes)),
         notes=(machine.note, scenario.note),
         tiles=[tile(name, figure) for name, figure in figures.items() if is_leading(name, HEADER)],
@@ -163,9 +164,17 @@ def accuracy_sections(run: Run) -> list[Section]:
     ]
 
 
-def answers(causes: Mapping[str, Diagnosis]) -> list[str]:
-    """What the circles are, why, and what to do: a line each."""
-    return [f"{prefix}: {answer(diagnosis)}" for prefix, diagnosis in causes.items()]
+def answers(run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[str]:
+    """What circles, stops and positioning cycles are, why, and what to do: a line each."""
+    found = [f"{prefix}: {answer(diagnosis)}" for prefix, diagnosis in causes.items()]
+    for task in tasks(run.scenario, run.program):
+        own = {
+            name.removeprefix(f"{task.prefix}."): f for name, f in figures.items() if name.startswith(f"{task.prefix}.")
+        }
+        if own and not isinstance(task, CircleTask):
+            words = stop_words(own, task.band) if isinstance(task, PositioningTask) else accuracy_words(own)
+            found.append(f"{task.prefix}: {words}")
+    return found
 
 
 def tile(name: str, figure: Figure) -> Tile:
@@ -274,7 +283,7 @@ def summary(
     scenario, machine = run.scenario, run.scenario.machine
     return {
         "format": FORMAT,
-        "answer": answers(causes),
+        "answer": answers(run, figures, causes),
         "warnings": [*run.warnings, *doubts(figures, causes)],
         "figures": figures_part(figures),
         "circles": _circles(run, causes),

@@ -17,7 +17,7 @@ from feedsim.analysis.side_by_side import SUMMARY as OF_RESULT
 from feedsim.analysis.side_by_side import Source, differing
 from feedsim.report import sections
 from feedsim.report.content import Bullets, Report, Section, Table, Text, code
-from feedsim.report.formatting import display_unit, minus, scale, shown
+from feedsim.report.formatting import display_unit, scale, shown
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.show.pictures import Stop, pictures_of, stop_seen, stops_of
@@ -147,7 +147,7 @@ def _figures(sources: Sequence[Source]) -> Section | None:
             cells.append(shown(Figure(value, unit, ""))[0] if name in source.figures and own == unit else "–")
             if k:
                 difference = value - first
-                cells.append(minus(f"{float(_rounded(difference)):+.4g}") if math.isfinite(difference) else "–")
+                cells.append(_difference(difference, unit))
             if math.isnan(first) and own == unit:
                 first = value
         rows.append((code(name), *cells, display_unit(unit)))
@@ -157,9 +157,12 @@ def _figures(sources: Sequence[Source]) -> Section | None:
     return Section("Figures", [Table("l" + "r" * (len(heads) - 1) + "l", [*heads, "Unit"], rows)])
 
 
-def _rounded(value: float) -> str:
-    """Four digits, and no difference where rounding alone made one."""
-    return f"{value:.4g}" if abs(value) > 1e-9 else "0"
+def _difference(value: float, unit: str) -> str:
+    """As many places as the values have, with a sign; 0 where rounding leaves nothing."""
+    if not math.isfinite(value):
+        return "–"
+    text, _ = shown(Figure(abs(value) if abs(value) > 1e-9 else 0.0, unit, ""))
+    return text if not any(digit in text for digit in "123456789") else f"{'+' if value > 0 else '−'}{text}"
 
 
 def _parameters(sources: Sequence[Source]) -> Section | None:

@@ -2,7 +2,7 @@
 // one drawing serves light, dark and paper. chart_use.js has what a reader does with them.
 const SPACE = "http://www.w3.org/2000/svg";
 const EDGE = { left: 62, right: 14, top: 28, bottom: 44 };
-const HEIGHT = 235, NARROW = 640, GAP = 18, ROUND = 520;
+const HEIGHT = 235, NARROW = 640, COLUMN = 280, GAP = 18, ROUND = 520;
 const DASHES = { dashed: "6 3", dotted: "2 3" };
 const FONT = 'system-ui, "Segoe UI", Arial, sans-serif';
 const RING_GAPS = { 1: 0.36, 2: 0.24 };
@@ -136,28 +136,33 @@ function whole_span(panel, values) {
 // One panel into box = {x, y, width, height}; returns its scales and ranges.
 function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent);
-  const names_width = panel.y.names.reduce((most, each) => Math.max(most, 6.6 * each.length + 26), 0);
-  const left = Math.min(Math.max(EDGE.left, names_width), box.width * 0.45);
-  const inner = { x: left, y: EDGE.top, width: box.width - left - EDGE.right, height: box.height - EDGE.top - EDGE.bottom };
   const shown = panel.curves.filter(each => !hidden.has(each.name));
   const span = zoom.x || whole_span(panel, values);
   const height = zoom.y || (!zoom.x && panel.y.span) || range_of(panel, shown, values, span);
+  const tall = box.height - EDGE.top - EDGE.bottom;
+  const heights = ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(tall / 34)));
+  const widest_of = (texts, wide, more) => texts.reduce((most, each) => Math.max(most, wide * each.length + more), 0);
+  const beside = panel.y.names.length ? widest_of(panel.y.names, 6.6, 26) : widest_of(heights.map(each => each.text || ""), 6.6, 30);
+  const left = Math.min(Math.max(EDGE.left, beside), box.width * 0.45);
+  const inner = { x: left, y: EDGE.top, width: box.width - left - EDGE.right, height: tall };
   const across = scale(span[0], span[1], inner.x, inner.x + inner.width, panel.x.log);
   const up = scale(height[0], height[1], inner.y + inner.height, inner.y, panel.y.log);
   const bottom = inner.y + inner.height, right = inner.x + inner.width;
-  make("text", { x: panel.y.names.length ? 0 : inner.x, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
-  const widest = panel.x.names.reduce((most, each) => Math.max(most, 7 * each.length + 14), 74);
+  const title = panel.y.names.length ? 0 : Math.max(0, Math.min(inner.x, box.width - 7.4 * panel.title.length));
+  make("text", { x: title, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
+  const widest = Math.max(74, widest_of(panel.x.names, 7, 14));
   for (const tick of ticks(panel.x, span[0], span[1], Math.max(2, Math.floor(inner.width / widest)))) {
     const at = across(tick.at).toFixed(1);
     make("line", { x1: at, x2: at, y1: inner.y, y2: bottom, stroke: colour("grid"), "stroke-width": tick.text ? 0.8 : 0.35 }, part);
-    if (tick.text) make("text", { x: at, y: bottom + 16, "text-anchor": "middle", fill: colour("ink") }, part, tick.text);
+    const seen = Math.min(at, box.width - 3.6 * tick.text.length); // the last one stays inside
+    if (tick.text) make("text", { x: seen, y: bottom + 16, "text-anchor": "middle", fill: colour("ink") }, part, tick.text);
   }
-  for (const tick of ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(inner.height / 34)))) {
+  for (const tick of heights) {
     const at = up(tick.at).toFixed(1);
     make("line", { x1: inner.x, x2: right, y1: at, y2: at, stroke: colour("grid"), "stroke-width": tick.text ? 0.8 : 0.35 }, part);
     if (tick.text) make("text", { x: inner.x - 6, y: +at + 4, "text-anchor": "end", fill: colour("ink") }, part, tick.text);
   }
-  make("text", { x: inner.x + inner.width / 2, y: bottom + 34, "text-anchor": "middle", fill: colour("ink") }, part, label_of(panel.x));
+  make("text", { x: Math.min(inner.x + inner.width / 2, box.width - 3.4 * label_of(panel.x).length), y: bottom + 34, "text-anchor": "middle", fill: colour("ink") }, part, label_of(panel.x));
   if (!panel.y.names.length)
     make("text", { transform: `translate(13 ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, label_of(panel.y));
   const clip = make("clipPath", { id }, part);
@@ -301,7 +306,7 @@ const grid_top = panel => 36 + 4.3 * panel.columns.reduce((most, each) => Math.m
 
 // Where every panel goes: boxes, and the height of all.
 function placed(chart, width) {
-  const columns = width < NARROW ? [1] : chart.widths, total = columns.reduce((a, b) => a + b, 0), boxes = [];
+  const columns = width < Math.max(NARROW, COLUMN * chart.widths.length) ? [1] : chart.widths, total = columns.reduce((a, b) => a + b, 0), boxes = [];
   let y = 4;
   for (let k = 0; k < chart.panels.length; k += columns.length) {
     const row = chart.panels.slice(k, k + columns.length);

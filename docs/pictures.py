@@ -1,0 +1,98 @@
+"""Draw the pictures of README and docs anew, from runs of the shipped examples: `make pictures`.
+
+The same runs give the same pictures, byte for byte. Those of measurements are drawn where these are made: performance
+by `make bench`, the grid of poses by `make pose-study`; that of the sweep by `make pictures ARGS=--all` (5632 runs).
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+import feedsim as fs
+from feedsim import cli
+from feedsim.report.compare.plots import picture_of
+
+ROOT = Path(__file__).resolve().parents[1]
+IMAGES, SCENARIOS = ROOT / "docs" / "images", ROOT / "scenarios"
+MACHINE = SCENARIOS / "machines" / "test_centre"
+
+
+def command(*words: str | Path) -> None:
+    """A command as a person types it; ends this where it fails."""
+    if code := cli.main([*map(str, words), "--quiet"]):
+        sys.exit(code)
+
+
+def taken(folder: Path, figure: str, name: str) -> None:
+    """A figure that a command has drawn becomes an image of the docs."""
+    shutil.copyfile(folder / "figures" / figure, IMAGES / name)
+
+
+def contour(place: Path) -> None:
+    """Of the README: the circle with its quadrant glitches."""
+    command("run", SCENARIOS / "xz_circle.yaml", "--figures", "png", "--out", place)
+    taken(place, "contour-XZ.png", "contour-XZ.png")
+
+
+def stribeck(place: Path) -> None:
+    """Of the README: plateaus and the curve identified through them, from logs with 5 % noise on the current."""
+    logs = []
+    for motion in ("constant", "sine"):
+        scenario = SCENARIOS / f"identify_z_{motion}.yaml"
+        command("run", scenario, "--set", "logging.noise.i_q=5 %", "--out", place / motion)
+        logs.append(place / motion / "log.csv")
+    command("identify", *logs, "--axis", "Z", "--machine", MACHINE, "--figures", "png", "--out", place / "found")
+    taken(place / "found", "stribeck.png", "stribeck-Z.png")
+
+
+def structure(place: Path) -> None:
+    """Of README and user's guide: the machine, and its bed rocking."""
+    command("machine", "show", MACHINE, "--out", place / "whole")
+    taken(place / "whole", "structure.png", "structure.png")
+    command("machine", "show", MACHINE, "--mode", "21Hz", "--out", place / "mode")
+    taken(place / "mode", "mode_3.png", "mode-21-Hz.png")
+
+
+def bode(place: Path) -> None:
+    """Of the user's guide: speed-controlled system of Z, in closed form and measured."""
+    command("frf", MACHINE, "--axes", "Z", "--figures", "png", "--out", place)
+    taken(place, "speed-controlled-system.png", "bode-Z.png")
+
+
+def tube(place: Path) -> None:
+    """Of docs/comparing.md: a torque that is 1.25 ms late where 1 ms and 0.2 N.m are allowed."""
+    reference = fs.run(SCENARIOS / "z_positioning.yaml").trace.select(["Z.M_a"])
+    late = np.interp(reference.time - 1.25e-3, reference.time, reference["Z.M_a"])
+    result = replace(reference, columns={"Z.M_a": late})
+    picture = picture_of(fs.compare(result, reference, ["Z.M_a=0.2 N.m,1 ms"]), 1)
+    if picture is None:
+        sys.exit("nothing was compared")
+    picture.save(IMAGES / "comparison.png")
+
+
+def wear(place: Path) -> None:
+    """Of docs/sweeps.md: which friction parameter moves the glitches."""
+    command("sweep", SCENARIOS / "studies" / "friction_wear.yaml", "--figures", "png", "--out", place)
+    taken(place, "XZ-glitch_Z.png", "friction-wear.png")
+
+
+DRAWN: tuple[Callable[[Path], None], ...] = (contour, stribeck, structure, bode, tube)
+
+
+def main() -> None:
+    """Draw them one after another."""
+    for draw in (*DRAWN, wear) if "--all" in sys.argv else DRAWN:
+        print(f"{draw.__name__}: {str(draw.__doc__).splitlines()[0]}", flush=True)
+        with TemporaryDirectory() as place:
+            draw(Path(place) / draw.__name__)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,33 @@
+"""What a report of a stop and of a positioning cycle says first."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from feedsim.analysis import Figure
+from feedsim.report.run.words import accuracy_words, stop_words
+
+
+def figures(**values: float) -> dict[str, Figure]:
+    return {name: Figure(value, "", "") for name, value in values.items()}
+
+
+def test_a_stop_is_told_with_what_it_waits_for() -> None:
+    told = stop_words(figures(overshoot=3.131, settling_time=99.02, ringing_frequency=20.75), 1e-6)
+    assert told == (
+        "3.13 um past its target, within +-1 um for good 99.0 ms after the end of the NC motion; "
+        "what it waits for rings at 20.8 Hz."
+    )
+    assert "rings" not in stop_words(figures(overshoot=0.2, settling_time=0.0, ringing_frequency=20.75), 1e-6)
+    assert "add a dwell" in stop_words(figures(overshoot=math.nan, settling_time=math.nan), 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("E", "B", "words"), [(0.25, 0.2, "scatters"), (3.0, 2.9, "backlash"), (3.0, 0.3, "compensation of the pitch")]
+)
+def test_accuracy_is_told_with_what_most_of_it_is(E: float, B: float, words: str) -> None:
+    told = accuracy_words(figures(A=4.0 if E > 1 else 1.31, R=1.31, E=E, B=B))
+    assert words in told
+    assert f"systematic deviation E {E:.2f} um" in told

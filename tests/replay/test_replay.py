@@ -69,11 +69,25 @@ def test_a_window_is_the_same_stretch(log: Path, tmp_path: Path) -> None:
     assert beside.time[-1] == pytest.approx(0.4)
 
 
-def test_another_machine_shows(log: Path, tmp_path: Path) -> None:
+def test_another_machine_shows(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Without feedforward the axis lags by v/K_v: 6 m/min by 25 mm/s; the record does not."""
     figures = replayed(log, tmp_path / "out", "--set", "axes.Z.drive.k_ffw=0 %")
     v, K_v = 0.1, 4e3 / 60
     assert figures["position_largest"] == pytest.approx(1e6 * v / K_v, rel=0.02)
+    assert "WRONG: axis Z: the simulated position is off by more" in capsys.readouterr().err
+
+
+def test_a_torque_limit_that_the_record_does_not_have_is_told(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    most = float(np.max(np.abs(read_csv(log)["Z.M_a"])))
+    replayed(log, tmp_path / "as_is")
+    assert "torque limit" not in capsys.readouterr().err
+    for share in (0.6, 0.9):  # the record is above it
+        replayed(log, tmp_path / f"{share}", "--set", f"axes.Z.drive.M_max={share * most} N.m")
+        assert "WRONG: axis Z: the simulated drive is at its torque limit" in capsys.readouterr().err
+    replayed(log, tmp_path / "same", "--set", f"axes.Z.drive.M_max={most} N.m")
+    assert "torque limit" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

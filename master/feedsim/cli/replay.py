@@ -61,7 +61,8 @@ def replay(options: Namespace) -> None:
         comparisons = list(replayed(machine, records, options.fmus).values())
         progress("report", 2, 3)
         sources = [each.provenance for each in read.values()]
-        told = dict.fromkeys(text for source in sources for text in source.warnings)
+        found = [finding for each in comparisons for finding in each.findings]
+        told = dict.fromkeys([*found, *(text for source in sources for text in source.warnings)])
         done = Replayed(
             comparisons, subject, sources, marks, dict(text.split("=", 1) for text in _given(options)),
             list(told),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +14,16 @@ from scipy.optimize import minimize_scalar
 from feedsim.analysis import Figure
 from feedsim.analysis.spectrum import amplitude_spectrum
 from feedsim.errors import InputError
+from feedsim.findings import Wrong
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
-from feedsim.scenario import Machine
+from feedsim.scenario import Drive, Machine
 from feedsim.trace.trace import Array
 
 TO_RPM = 30 / np.pi
 BINS = 60  # of the position
 LATEST = 5e-3  # [s]: no channel of a control is later than that against another
+NEAR = 0.98  # of a torque limit: what the record shows of it, behind its filters
 HELPS = 0.99  # of what is left without a delay
 
 
@@ -54,6 +56,7 @@ class Comparison:
         lag: following error of the record, setpoint less position, rms over the motion [m].
         delay: by how much the torque of the record is later than the simulated one [s], which is taken out; None
             where there is none.
+        limit: torque that the simulated drive cannot exceed [N.m]; limited: share of its rows at that limit.
     """
 
     axis: str
@@ -63,6 +66,28 @@ class Comparison:
     speed: SpeedSetpoint | None
     lag: float
     delay: float | None = None
+    limit: float = inf
+    limited: float = 0.0
+
+    @property
+    def findings(self) -> list[str]:
+        """Why the replay may tell nothing of the record."""
+        found: list[str] = []
+        torque = self.each.record.torque[self.each.rows] if self.each.record.driven else np.zeros(1)
+        recorded = float(np.max(np.abs(torque), initial=0.0))
+        if self.limited and not NEAR * self.limit < recorded < self.limit / NEAR:
+            found.append(Wrong(
+                f"axis {self.axis}: the simulated drive is at its torque limit, M_max = {self.limit:.4g} N.m, in "
+                f"{100 * self.limited:.2g} % of the rows, and that of the record is not; give the limit that the "
+                f"drive has (axes.{self.axis}.drive.M_max)"
+            ))  # fmt: skip
+        off = rms(self.channels["position"].error[self.each.moving])
+        if off > self.lag:
+            found.append(Wrong(
+                f"axis {self.axis}: the simulated position is off by more ({1e6 * off:.4g} um rms) than the recorded "
+                f"one is behind its setpoint ({1e6 * self.lag:.4g} um): this is not the machine of the record"
+            ))  # fmt: skip
+        return found
 
     @property
     def figures(self) -> dict[str, Figure]:
@@ -139,12 +164,16 @@ def replayed(machine: Machine, records: Mapping[str, AxisRecord], fmus: Path | N
     """
     replay = Replay(machine, records, fmus=fmus)
     per_row = per_row_of(replay.interval, machine)
-    found = replay.follow(machine, ("x_a", "M_a"), per_row)
-    return {axis: compared(each, found[axis], per_row) for axis, each in records.items()}
+    limits = {axis: each.drive.M_max for axis, each in machine.axes.items() if isinstance(each.drive, Drive)}
+    # A drive of another maker need not tell when it is at its limit.
+    signals = ("x_a", "M_a", *(("torque_limited",) if limits.keys() >= records.keys() else ()))
+    found = replay.follow(machine, signals, per_row)
+    return {axis: compared(each, found[axis], per_row, limits.get(axis, inf)) for axis, each in records.items()}
 
 
-def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1) -> Comparison:
-    """An axis beside its record. simulated: x_a [m] and M_a [N.m], `per_row` samples from row to row."""
+def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1, limit: float = inf) -> Comparison:
+    """An axis beside its record. simulated: x_a [m], M_a [N.m] and where it is known torque_limited [1], `per_row`
+    samples from row to row; limit: of the drive's torque [N.m]."""
     record = each.record
     assert record.setpoint is not None
     taps = speed = None
@@ -163,7 +192,9 @@ def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1)
         asked[: speed.taps.reach] = record.speed_setpoint[: speed.taps.reach]  # there is no past to form it from
         channels["speed setpoint"] = Channel(record.speed_setpoint, asked, "rad/s", "speed setpoint of the control")
     lag = rms((each.setpoint - each.position)[each.moving])
-    return Comparison(each.axis, each, channels, taps, speed, lag, delay)
+    limited = simulated.get("torque_limited", np.zeros_like(simulated["x_a"]))
+    limited = limited[np.repeat(each.rows, per_row)[per_row - 1 :]]
+    return Comparison(each.axis, each, channels, taps, speed, lag, delay, limit, float(np.mean(limited)))
 
 
 def _delayed(each: AxisRecord, torque: Array, per_row: int) -> tuple[float, Array]:

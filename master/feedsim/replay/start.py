@@ -16,6 +16,8 @@ INTEGRAL = 10e-3  # [s] T_n to begin with
 PRESLIDING = 5e-6  # [m] of travel after which friction is full
 ZONE = 0.06  # [rad] width of an engaging zone
 RESERVE = 1.5  # what the machine may do beyond what the record shows
+# A torque limit that is not known must not act: gentle moves tell nothing of the torque of rapid ones.
+NO_LIMIT = 20.0
 
 
 def start_values(each: AxisRecord) -> dict[str, float]:
@@ -55,5 +57,5 @@ def limits(each: AxisRecord) -> Mapping[str, float]:
         "acceleration": RESERVE * float(np.max(np.abs(acceleration))),
         "jerk": RESERVE * float(np.max(np.abs(jerk))),
         "low": low - reserve, "high": high + reserve,
-        "torque": RESERVE * float(np.max(np.abs(each.record.torque))),
+        "torque": NO_LIMIT * float(np.max(np.abs(each.record.torque))),
     }  # fmt: skip

@@ -180,6 +180,27 @@ def test_a_real_machine(axis: str, position: float, torque: float) -> None:
     assert found.estimates["T_dyn"].value + found.estimates["T_sym"].value == pytest.approx(8.25e-3, abs=1e-6)
 
 
+@pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
+@pytest.mark.parametrize(
+    ("seen", "unseen", "most"), [("0 s..2.6 s", "2.6 s..4.6 s", 50.0), ("2.6 s..4.6 s", "0 s..2.6 s", 2.0)]
+)
+def test_a_real_machine_on_motion_that_it_was_not_identified_from(
+    seen: str, unseen: str, most: float, tmp_path: Path
+) -> None:
+    """Two gentle moves of X, then rapids: intervals from either hold what the whole record tells, and the machine
+    follows the other, from the gentle ones to some percent of the lag of 1.2 mm."""
+    record = os.environ["FEEDSIM_CAPTURE"]
+    words = ["--axes", "X", "--quiet"]
+    assert main(["identify-drive", record, *words, "--window", seen, "--out", str(tmp_path / "machine")]) == 0
+    found = json.loads((tmp_path / "machine" / "summary.json").read_text())["axes"]["X"]["parameters"]
+    for name, value in (("T_sym", 0.724e-3), ("k_ffw", 1.00009), ("J", 0.0189)):
+        assert abs(found[name]["value"] - value) <= 2 * found[name]["sigma"], name
+    replay = ["replay", record, *words, "--machine", str(tmp_path / "machine")]
+    assert main([*replay, "--window", unseen, "--out", str(tmp_path / "replay")]) == 0
+    figures = json.loads((tmp_path / "replay" / "summary.json").read_text())["figures"]
+    assert figures["X.position_rms"]["value"] < most  # um
+
+
 @pytest.mark.skipif("FEEDSIM_EMPS" not in os.environ, reason="FEEDSIM_EMPS names no measured record")
 def test_the_published_controller_of_a_measured_axis() -> None:
     """Gains, friction and offset as published for EMPS lie in the intervals of six seconds of its record."""

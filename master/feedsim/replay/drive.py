@@ -169,7 +169,7 @@ def identify_drive(
     if not each.record.driven:
         predicted = predicted[0], nan
     estimates = _estimates(
-        problem, found, taps if exact_delay else None, speed if exact_gain else None, structure_known
+        problem, found, unseen, taps if exact_delay else None, speed if exact_gain else None, structure_known
     )
     likelier = {} if other_cycle is None else {other_cycle: _likelier(problem, found, other_cycle)}
     return DriveFound(
@@ -333,11 +333,16 @@ def _left_out(problem: Problem, found: Tuned, folds: Sequence[Rows]) -> tuple[fl
 
 
 def _estimates(
-    problem: Problem, found: Tuned, taps: Taps | None, speed: SpeedSetpoint | None, known: bool
+    problem: Problem,
+    found: Tuned,
+    unseen: tuple[float, float],
+    taps: Taps | None,
+    speed: SpeedSetpoint | None,
+    known: bool,
 ) -> dict[str, Estimate]:
     """In the parameters of drive and friction, with intervals."""
     values = problem.start | dict(found.values)
-    covariance = _covariance(problem, found)
+    covariance = _covariance(problem, found, unseen)
     spread = dict(zip(found.names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     told: dict[str, Estimate] = {}
 
@@ -394,13 +399,20 @@ def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:
     return found
 
 
-def _covariance(problem: Problem, found: Tuned) -> Array:
-    """Covariance (P, P), where residuals hang together as long as they do: every channel counts as many times less."""
+def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> Array:
+    """Covariance (P, P), where residuals hang together as long as they do: every channel counts as many times less.
+
+    unseen: rms of position and torque that the others do not predict, in their weights. Where a model is not quite that
+    of the axis, a fit to little motion leaves too little, and what it leaves of motion it has not seen tells the truth.
+    """
     scale = np.array([problem.spread(name, found.values) for name in found.names])
     J, r, count = found.jacobian, found.residuals, len(problem.rows)
     channels = slice(0, count), slice(count, 2 * count)
     prior = J[2 * count :].T @ J[2 * count :]
-    parts = [(J[rows].T @ J[rows], together(r[rows]), float(np.mean(r[rows] ** 2))) for rows in channels]
+    parts = [
+        (J[rows].T @ J[rows], together(r[rows]), max(float(np.mean(r[rows] ** 2)), left**2))
+        for rows, left in zip(channels, unseen, strict=True)
+    ]
     whole = np.linalg.pinv(sum((part for part, _, _ in parts), prior), hermitian=True)
     middle = sum((part * longer * variance for part, longer, variance in parts), prior)
     return np.asarray(whole @ middle @ whole * np.outer(scale, scale))

@@ -67,8 +67,12 @@ def summary_of(folder: Path) -> dict[str, Any]:
 def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
     process, folder = done
     assert (process.returncode, process.stderr) == (0, "")
-    first, of_axis = process.stdout.splitlines()
-    assert first.endswith(f"frequency responses -> {Path('out') / 'report.html'}")
+    first, of_axis, trust, last = process.stdout.splitlines()
+    assert ": The control loops are stable; least gain margin " in first
+    assert first.endswith("At least the usual 6 dB and 30 deg: while the axes move, no gain need be lowered.")
+    assert "without friction" in trust
+    assert "Measured against closed form" in trust
+    assert last == f"-> {Path('out') / 'report.html'}"
     assert of_axis.startswith("  Z: speed loop -3 dB first 71.7 Hz, last 208 Hz, margins 64 deg, ")
     files = set(contents(folder / "out"))
     assert {"frf.csv", "frf_measured.csv", "summary.json", "report.html", "figures/speed-reference.png"} <= files
@@ -243,8 +247,24 @@ def test_unstable_loops_are_told_and_not_measured(fmus: Path, tmp_path: Path) ->
     process = feedsim("frf", MACHINE, *words, fmus=fmus, cwd=tmp_path)
     assert process.returncode == 0, process.stderr
     assert "warning: the control loops are unstable" in process.stderr
-    assert "UNSTABLE" in process.stdout
+    assert "WRONG: axis Z: the position loop is unstable with K_v = 42 (m/min)/mm" in process.stderr
+    assert ": The control loops are UNSTABLE (" in process.stdout.splitlines()[1]  # after the gain that is WRONG
+    assert summary_of(tmp_path)["answer"][0] in process.stdout
     assert not (tmp_path / "out" / "frf_measured.csv").exists()
+
+
+def test_thin_margins_are_told_with_the_loop_and_the_gain_that_would_do(fmus: Path, tmp_path: Path) -> None:
+    words = ["--axes", "Z", "--no-tool", "--no-measure", "--set", "axes.Z.drive.K_v=300 1/s", "--out", "out"]
+    process = feedsim("frf", MACHINE, *words, fmus=fmus, cwd=tmp_path)
+    assert "axis Z: the position loop has thin margins with K_v = 18 (m/min)/mm" in process.stderr
+    first, _, trust, _ = process.stdout.splitlines()
+    figures = summary_of(tmp_path)["figures"]
+    least = 20 * np.log10(figures["Z.position.gain_margin"]["value"])
+    assert f"least gain margin {least:.1f} dB (position loop of Z, " in first
+    assert "Less than the usual 6 dB and 30 deg: motions ring there." in first
+    assert "not measured" in trust
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert '<p class="answer">The control loops are stable; least gain margin' in page
 
 
 # -- parts -------------------------------------------------------------------------------------------------------------
@@ -370,4 +390,4 @@ def test_figures_that_are_not_determined_are_null_and_said(tmp_path: Path) -> No
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["figures"]["Z.speed.bandwidth_first"]["value"] is None
     assert "not determined" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "-3 dB first - Hz" in report.summary_line(found)
+    assert "-3 dB first - Hz" in report.answers(found)[1]

@@ -41,6 +41,8 @@ def frf(options: Namespace) -> None:
     from feedsim.analysis import linear, responses, truncation
     from feedsim.analysis.campaign import run_campaign
     from feedsim.cosim.plant import plant_modes
+    from feedsim.cosim.trust import control
+    from feedsim.linear.judgement import judge
     from feedsim.report import frf as report
     from feedsim.scenario import load_subject
     from feedsim.structure.table_check import table_mismatch
@@ -72,6 +74,7 @@ def frf(options: Namespace) -> None:
             warnings.append(doubt)
         if result.unstable_poles:
             warnings.append(UNSTABLE.format(result.unstable_poles))
+        warnings += control(machine, judge(machine, modes))
         full = _full_model(machine, progress, warnings) if options.full_model else None
         campaign = None
         if not (options.no_measure or result.unstable_poles):
@@ -100,8 +103,9 @@ def frf(options: Namespace) -> None:
             warnings=tuple(warnings),
         )
         report.write(subject, found, directory, drawn=options.figures)
-    head = f"{subject.name}: frequency responses -> {directory / 'report.html'}"
-    finish(options.quiet, warnings, head, report.summary_line(found))
+    first, *further = report.answers(found)
+    lines = [f"{subject.name}: {first}", *(f"  {line}" for line in further), f"-> {directory / 'report.html'}"]
+    finish(options.quiet, warnings, *lines)
 
 
 def _full_model(machine: Machine, progress: Progress, warnings: list[str]) -> Truncation | None:

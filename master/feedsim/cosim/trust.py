@@ -52,7 +52,7 @@ def foreseen(
 ) -> tuple[str, ...]:
     """What the parameters and the loads alone tell a user to doubt, a sentence each."""
     return (
-        *_control(scenario.machine, program, loops), *_stability(scenario, modes),
+        *control(scenario.machine, loops, program), *_stability(scenario, modes),
         *_unbalanced_loads(scenario, loads), *_sizes_of_loads(scenario.machine, program, loads),
     )  # fmt: skip
 
@@ -66,10 +66,11 @@ def found(
     return (*lost, *_limits(recording), *told)
 
 
-def _control(machine: Machine, program: Program, loops: Sequence[Loop]) -> list[str]:
+def control(machine: Machine, loops: Sequence[Loop], program: Program | None = None) -> list[str]:
     """Loops that are unstable or have less than the usual margins, with the gain that would do, and those not judged.
 
-    A loop is wrong where it is unstable in a state that the motion brings about: axes that do not move rest.
+    A loop is wrong where it is unstable in a state that the motion brings about: axes that do not move rest. Without a
+    program every axis moves.
     """
     found: list[str] = []
     for axis, kind in dict.fromkeys((loop.axis, loop.kind) for loop in loops):
@@ -105,7 +106,9 @@ def _control(machine: Machine, program: Program, loops: Sequence[Loop]) -> list[
     return found
 
 
-def _moves(program: Program, axis: str) -> bool:
+def _moves(program: Program | None, axis: str) -> bool:
+    if program is None:
+        return True
     low, high = program.reached(axis)
     return low < high
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from feedsim.report.content import Report, Section, Table, Text, Tile, code, til
 from feedsim.report.formatting import display_unit, minus, number, typeset
 from feedsim.report.frf.bode_plots import pictures_of
 from feedsim.report.frf.truncation_plots import truncation_pictures
+from feedsim.report.frf.words import answers
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import InputFile, figures_part, hashed, inputs_part, machine_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
@@ -81,6 +82,7 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
         f"{responses.machine.name} · axes {', '.join(responses.axes)} · {low:g} to {high:g} Hz · {measured}",
         warnings=responses.warnings,
         notes=subject.notes,
+        answer=[typeset(line) for line in answers(responses)],
         tiles=list(_tiles(responses)),
         main=[*pictures, _resonances(responses), _agreement(responses), sections.figures_section(responses.figures)],
         provenance=_provenance(subject, responses),
@@ -187,6 +189,7 @@ def summary(subject: Subject, responses: Responses, files: Sequence[str]) -> dic
     return {
         "format": FORMAT,
         "warnings": list(responses.warnings),
+        "answer": answers(responses),
         "figures": figures_part(responses.figures),
         "subject": {
             "kind": subject.kind,
@@ -212,40 +215,6 @@ def summary(subject: Subject, responses: Responses, files: Sequence[str]) -> dic
         "software": software(),
         "files": list(files),
     }
-
-
-def summary_line(responses: Responses) -> str:
-    """Bandwidths and margins of every axis shown, in one line per axis."""
-    return "\n".join(f"  {axis}: {_of_axis(responses.figures, axis)}" for axis in responses.axes)
-
-
-def _of_axis(figures: Mapping[str, Figure], axis: str) -> str:
-    def number(name: str, digits: int = 3) -> str:
-        figure = figures.get(f"{axis}.{name}")
-        return f"{figure.value:.{digits}g}" if figure is not None and math.isfinite(figure.value) else "-"
-
-    def gain(loop: str) -> str:
-        figure = figures.get(f"{axis}.{loop}.gain_margin")
-        known = figure is not None and math.isfinite(figure.value)
-        return f"{20 * math.log10(figure.value):.1f} dB" if known and figure is not None else "-"
-
-    parts = []
-    if f"{axis}.speed.bandwidth_first" in figures:
-        parts.append(
-            f"speed loop -3 dB first {number('speed.bandwidth_first')} Hz, last {number('speed.bandwidth_last')} Hz, "
-            f"margins {number('speed.phase_margin', 2)} deg, {gain('speed')}"
-        )
-    if f"{axis}.position.bandwidth_first" in figures:
-        parts.append(
-            f"position loop -3 dB {number('position.bandwidth_first')} Hz, "
-            f"margins {number('position.phase_margin', 2)} deg, {gain('position')}"
-        )
-    if f"{axis}.n_M.measured_magnitude" in figures:
-        parts.append(
-            f"measured n/M within {number('n_M.measured_magnitude', 2)} dB, {number('n_M.measured_phase', 2)} deg"
-        )
-    unstable = "unstable_poles" in figures and figures["unstable_poles"].value > 0
-    return ("the closed loops are UNSTABLE; " if unstable else "") + ("; ".join(parts) or "no loop closed")
 
 
 def _measurement(campaign: Campaign) -> dict[str, Any]:

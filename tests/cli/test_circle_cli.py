@@ -121,6 +121,23 @@ def test_one_direction_asks_for_the_other(tmp_path: Path, capsys: pytest.Capture
     assert "the other one will" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("share", "code"), [(1.015, 0), (1.025, 2)])
+def test_turns_of_different_feed_are_refused(
+    share: float, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ccw, cw, *words = lengths_in_two_files(tmp_path)
+    head, *rows = Path(cw).read_text().splitlines()
+    slower = [f"{float(time) * share:.9f},{rest}" for time, _, rest in (row.partition(",") for row in rows)]
+    Path(cw).write_text("\n".join([head, *slower]) + "\n")
+    assert run(tmp_path, [ccw, cw, *words])[0] == code
+    if code:
+        said = capsys.readouterr().err
+        assert f"{ccw}: a turn counterclockwise, {SAMPLES} samples, from 0 s on, has a feed of 3000 mm/min" in said
+        assert f"{cw}: a turn clockwise, {SAMPLES} samples, from 0 s on, has a feed of 2926.8 mm/min" in said
+        assert "2.5 % apart; allowed: 2 %" in said
+        assert not (tmp_path / "out").exists()
+
+
 REFUSED = {
     "a deviation without radius": (lambda words: [words[0], *words[3:]], "'Deviation' is a deviation; give the radius"),
     "no feed and no time": (lambda words: words[:3], "has no column of time, and the feed is not known"),

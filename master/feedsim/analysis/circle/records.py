@@ -33,6 +33,8 @@ TIMES = ("time", "t", "zeit")
 TURNED_ROUND = math.radians(10)
 # A full turn may lack this share of it; files often end one sample ahead of the full turn.
 CLOSED = 0.01
+# Turns whose feeds differ by more than this share are of different circles: path lag and peaks grow with the feed.
+SAME_FEED = 0.02
 # A turn needs so many samples for its parts to be told apart.
 LEAST = 180
 
@@ -74,6 +76,7 @@ def read_circle(
     """
     notes: list[str] = []
     turns: list[RecordedTurn] = []
+    timed: list[tuple[Path, RecordedTurn, float]] = []
     radii: list[float] = []
     for file in files:
         recording = read_recording(file)
@@ -86,8 +89,10 @@ def read_circle(
         notes += recording.notes
         notes.append(f"{file}: {', '.join(turn.name for turn in found)}")
         turns += found
+        timed += [(file, turn, turn.duration) for turn in found if turn.duration is not None]
         radii.append(mean)
     nominal = radius if radius is not None else radii[0]
+    _one_feed(timed, nominal)
     speed = feed if feed is not None else _speed(turns, nominal, files)
     if radius is None:
         notes.append(f"the programmed radius is taken to be {nominal * 1e3:.6g} mm, that of the recorded turns")
@@ -102,6 +107,23 @@ def _speed(turns: Sequence[RecordedTurn], radius: float, files: Sequence[Path]) 
             f"{files[0]}: has no column of time, and the feed is not known: give it, for example --feed '1000 mm/min'"
         )
     return 2 * math.pi * radius / float(np.mean(known))
+
+
+def _one_feed(timed: Sequence[tuple[Path, RecordedTurn, float]], radius: float) -> None:
+    """Refuse turns of different feed. timed: file, turn and how long it took [s]."""
+    if not timed:
+        return
+    slowest, fastest = max(timed, key=lambda each: each[2]), min(timed, key=lambda each: each[2])
+    if (apart := slowest[2] / fastest[2] - 1) > SAME_FEED:
+        one, other = (
+            f"{file}: {turn.name}, from {turn.begin:.6g} s on, has a feed of "
+            f"{2 * math.pi * radius / duration * 6e4:.5g} mm/min"
+            for file, turn, duration in (fastest, slowest)
+        )
+        raise InputError(
+            f"{one}; {other}: {100 * apart:.3g} % apart; allowed: {100 * SAME_FEED:g} %. Give turns of one feed, each "
+            "feed by itself"
+        )
 
 
 def _plain(name: str) -> str:

@@ -6,6 +6,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 
 import fmpy
@@ -46,6 +47,7 @@ def begin(slave: FMU2Slave, start: float = 0.0) -> None:
     slave.exitInitializationMode()
 
 
+@cache
 def references(archive: Archive) -> dict[str, int]:
     return {name: int(each.attrib["valueReference"]) for name, each in archive.variables().items()}
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
 
-from importers import z_move
+from importers import loops, z_move
 from importers.registry import IMPORTERS, Importer
 from importers.system import Result, System
 
@@ -38,3 +40,9 @@ def system(move: z_move.Move, fmus: Path, tmp_path_factory: pytest.TempPathFacto
 def parallel(move: z_move.Move, fmus: Path) -> Result:
     """The Z move by this project's own master, all units in parallel."""
     return z_move.as_result(z_move.own(move, "parallel", fmus), move)
+
+
+@pytest.fixture(scope="session")
+def imitation(move: z_move.Move, system: System) -> Callable[[loops.Master], Result]:
+    """The Z move as a master algorithm steps it: of equal algorithms one run serves all tests."""
+    return cache(lambda master: loops.run(system, move.experiment, master))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from importers.system import RELEASE, Result, System
 # over the move. A hundred times that is allowed; another order or lag makes more than 100 nm, as tested below.
 SAME_X = 1e-5  # nm
 SAME_M = 1e-5  # mN.m
+Imitation = Callable[[Master], Result]
 
 
 def _same(a: Result, b: Result, move: z_move.Move) -> None:
@@ -32,23 +34,29 @@ def test_the_page_tells_how_many_steps_it_compares_and_its_commands_make(move: z
     assert told in page
 
 
-def test_our_master_in_parallel_is_the_plain_loop(move: z_move.Move, system: System, parallel: Result) -> None:
-    assert z_move.differences(loops.run(system, move.experiment, Master()), parallel, move) == (0.0, 0.0)
+def test_our_master_in_parallel_is_the_plain_loop(move: z_move.Move, imitation: Imitation, parallel: Result) -> None:
+    assert z_move.differences(imitation(Master()), parallel, move) == (0.0, 0.0)
 
 
-def test_an_imitation_can_fail(move: z_move.Move, system: System, parallel: Result) -> None:
+def test_an_imitation_can_fail(move: z_move.Move, system: System, imitation: Imitation, parallel: Result) -> None:
     """A step's lag, another order, another first step: each is far above what is allowed."""
-    for master in (Master(lag=1), Master(sequential=True), Master(zeros=True)):
+    found = {
+        "lag": imitation(Master(lag=1)),
+        "order": imitation(Master(sequential=True)),
         # A first step with zeros makes no difference to drives that are not released in it.
-        bare = system.without(RELEASE) if master.zeros else system
-        x, torque = z_move.differences(loops.run(bare, move.experiment, master), parallel, move)
-        assert x > 100.0, master
-        assert torque > 50.0, master
+        "zeros": loops.run(system.without(RELEASE), move.experiment, Master(zeros=True)),
+    }
+    for name, result in found.items():
+        x, torque = z_move.differences(result, parallel, move)
+        assert x > 100.0, name
+        assert torque > 50.0, name
 
 
-def test_the_z_move(importer: Importer, move: z_move.Move, system: System, parallel: Result, tmp_path: Path) -> None:
+def test_the_z_move(
+    importer: Importer, move: z_move.Move, system: System, imitation: Imitation, parallel: Result, tmp_path: Path
+) -> None:
     result = importer.run(system, move.experiment, tmp_path)
-    _same(result, loops.run(system, move.experiment, importer.master), move)
+    _same(result, imitation(importer.master), move)
     line = document.row(
         f"{importer.name} {importer.version()}",
         f"wired by hand, {importer.how}".rstrip(", "),
@@ -60,9 +68,9 @@ def test_the_z_move(importer: Importer, move: z_move.Move, system: System, paral
 
 
 @pytest.mark.parametrize(("late", "overshoot"), [("M_a", 2.52), ("", 2.54)])
-def test_a_cycle_later_still(late: str, overshoot: float, move: z_move.Move, system: System) -> None:
+def test_a_cycle_later_still(late: str, overshoot: float, move: z_move.Move, imitation: Imitation) -> None:
     """What the document says of masters that hand over M_a, or everything, one more cycle late."""
-    result = loops.run(system, move.experiment, Master(lag=1, late=late))
+    result = imitation(Master(lag=1, late=late))
     assert f"{z_move.overshoot(result, move):.2f}" == f"{overshoot:.2f}"
     assert f"{overshoot} um" in document.PAGE.read_text(encoding="utf-8")
 
@@ -96,7 +104,7 @@ def ssp(move: z_move.Move, fmus: Path, tmp_path_factory: pytest.TempPathFactory)
 
 
 @pytest.mark.parametrize("name", ["ecos", "libcosim", "FMPy"])
-def test_the_exported_ssp_file(name: str, ssp: Path, move: z_move.Move, system: System, parallel: Result) -> None:
+def test_the_exported_ssp_file(name: str, ssp: Path, move: z_move.Move, imitation: Imitation, parallel: Result) -> None:
     """The same file, unedited, in every importer that reads SSP; compared with the system wired by hand."""
     importer = _importer(name)
     if name == "ecos":
@@ -105,7 +113,7 @@ def test_the_exported_ssp_file(name: str, ssp: Path, move: z_move.Move, system: 
         result = with_libcosim.run(ssp, move.experiment)
     else:
         result = with_fmpy.run_file(ssp, move.experiment, with_fmpy.parameters(ssp))
-    _same(result, loops.run(system, move.experiment, importer.master), move)
+    _same(result, imitation(importer.master), move)
     line = document.row(
         f"{importer.name} {importer.version()}",
         "`feedsim ssp` file",

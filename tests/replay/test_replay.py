@@ -58,6 +58,7 @@ def test_a_log_of_the_machine_itself(log: Path, tmp_path: Path) -> None:
     beside = read_csv(tmp_path / "out" / "replay.csv")
     assert np.max(np.abs(beside["Z.x_a_simulated"] - beside["Z.x_a_recorded"])) < 1e-9
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {"report.html", "summary.json", "replay.csv"}
+    assert '<p class="answer">Z: position off by ' in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_window_is_the_same_stretch(log: Path, tmp_path: Path) -> None:

@@ -13,6 +13,8 @@ import pytest
 
 from feedsim.analysis import evaluate
 from feedsim.report import run as report
+from feedsim.report.content import Report
+from feedsim.report.page import html
 from feedsim.report.style import PALETTE
 from report_helpers import FakeRun, circle_run, positioning_run
 
@@ -216,6 +218,14 @@ def test_what_is_saved_is_what_is_shown(
     assert rows
     assert table[:, 0] == pytest.approx(run.trace.time, rel=1e-6)
     assert table[:, 3] == pytest.approx(1e3 * (run.trace["Z.x_a"] - run.trace["Z.x_a"][0]), rel=1e-5, abs=1e-6)
+
+
+def test_a_long_path_in_a_warning_does_not_widen_a_phone(browser: Any) -> None:
+    long = "/home/" + 20 * "somebody_"
+    page = browser.new_page(viewport={"width": 360, "height": 800})
+    page.set_content(html(Report("title", "subtitle", [], "", warnings=[long], notes=[long], answer=[long])))
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    page.close()
 
 
 @pytest.mark.parametrize("width", [360, 768])

@@ -86,6 +86,7 @@ def report_of(replayed: Replayed) -> Report:
         f"{machine.name} · axes {', '.join(each.axis for each in replayed.comparisons)}",
         warnings=replayed.warnings,
         notes=[note for note in (*replayed.subject.notes, *(source.note for source in replayed.sources)) if note],
+        answer=[typeset(line) for line in answers(replayed)],
         tiles=list(_tiles(replayed.figures)),
         main=[*pictures, figures_section(replayed.figures), _events(replayed), parameters_section(machine)],
         provenance=provenance_section(rows, hashed(_files(replayed))),
@@ -133,15 +134,21 @@ def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def summary_lines(replayed: Replayed, directory: Path) -> list[str]:
-    """For the terminal: what is left, by axis."""
-    lines = [f"{replayed.subject.machine.name} on {replayed.sources[0].file.name} -> {directory / REPORT}"]
+def answers(replayed: Replayed) -> list[str]:
+    """What is left, a line per axis."""
+    lines = []
     for each in replayed.comparisons:
         own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
-        text = f"  {each.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
+        text = f"{each.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
         text += f" ({own['share_of_lag']} of the lag)"
         text += f"; torque {own['torque_rms']} rms" if "torque_rms" in own else "; no torque is recorded"
         if "speed_setpoint_rms" in own:
             text += f"; speed setpoint {own['speed_setpoint_rms']} rms"
         lines.append(text)
     return lines
+
+
+def summary_lines(replayed: Replayed, directory: Path) -> list[str]:
+    """For the terminal: what is left, by axis."""
+    head = f"{replayed.subject.machine.name} on {replayed.sources[0].file.name} -> {directory / REPORT}"
+    return [head, *(f"  {line}" for line in answers(replayed))]

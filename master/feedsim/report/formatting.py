@@ -40,8 +40,8 @@ def shown(figure: Figure) -> tuple[str, str]:
 
 
 def display_unit(unit: str) -> str:
-    """A unit as it is printed: µm, N·m; nothing for a plain number."""
-    return DISPLAY_UNITS.get(unit, unit.replace(".", "·"))
+    """A unit as it is printed: µm, N·m, kg·m²; nothing for a plain number."""
+    return DISPLAY_UNITS.get(unit, typeset(re.sub(r"(?<=[a-z])\^?2\b", "²", unit.replace(".", "·"))))
 
 
 def minus(text: str) -> str:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
 from feedsim.identify import Identified
 from feedsim.identify.result import NORMAL_95, Estimate, Stationary
-from feedsim.report.formatting import display_unit, typeset
 from feedsim.report.provenance import InputFile, hashed
 
 MM_PER_MIN = 60e3  # per m/s
@@ -83,11 +80,6 @@ def at_slide(name: str, I_P: float) -> tuple[float, str] | None:
     if name == "W":
         return 1e6 * I_P, "um"
     return (1 / I_P**2, "kg") if name == "J" else None
-
-
-def unit_text(unit: str) -> str:
-    """A unit as it is printed: kg·m², N/µm."""
-    return typeset(re.sub(r"(?<=[a-z])\^?2\b", "²", display_unit(unit)))
 
 
 def shown_unit(estimate: Estimate) -> tuple[float, str]:

@@ -10,7 +10,7 @@ from feedsim.identify import Identified, friction_file
 from feedsim.identify.friction_file import FRICTION
 from feedsim.identify.result import NORMAL_95, Estimate, Identification
 from feedsim.report.content import Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code
-from feedsim.report.formatting import counted, minus, powers, typeset
+from feedsim.report.formatting import counted, display_unit, minus, powers, typeset
 from feedsim.report.identify import quantities
 from feedsim.report.identify.plots import describe, pictures_of
 from feedsim.report.identify.summary import open_loop_csv, plateaus_csv, residuals_csv, summary
@@ -111,7 +111,7 @@ def _tiles(identified: Identified) -> Iterator[Tile]:
         factor, unit = quantities.shown_unit(estimate)
         relative = friction_file.relative_text(estimate)
         label = f"{name}, {estimate.meaning}" + (f" (±{relative})" if relative else "")
-        value = f"{minus(powers(friction_file.value_text(estimate, factor)))} {quantities.unit_text(unit)}".strip()
+        value = f"{minus(powers(friction_file.value_text(estimate, factor)))} {display_unit(unit)}".strip()
         yield Tile(value, typeset(label), typeset(estimate.meaning))
     if found.dynamic is not None:
         meaning = "friction torque measured less that of the model, over all stretches"
@@ -198,9 +198,9 @@ def _rigid(found: Identification) -> Section | None:
 def _row(estimate: Estimate, I_P: float) -> tuple[Text, ...]:
     factor, unit = quantities.shown_unit(estimate)
     slide = quantities.at_slide(estimate.name, I_P)
-    here, unit_here = friction_file.value_text(estimate, factor), quantities.unit_text(unit)
+    here, unit_here = friction_file.value_text(estimate, factor), display_unit(unit)
     there = friction_file.value_text(estimate, slide[0]) if slide else ""
-    unit_there = quantities.unit_text(slide[1]) if slide else ""
+    unit_there = display_unit(slide[1]) if slide else ""
     interval, relative = friction_file.interval_text(estimate, factor), friction_file.relative_text(estimate)
     return (
         code(estimate.name), typeset(estimate.meaning), minus(powers(here)), unit_here, minus(powers(interval)),

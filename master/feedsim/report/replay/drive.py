@@ -124,6 +124,7 @@ def report_of(report: DriveReport) -> Report:
         f"identified from {report.sources[0].file.name}",
         warnings=report.warnings,
         notes=report.notes,
+        answer=[typeset(line) for line in answers(report)],
         tiles=[
             Tile(tile_value(figure), f"{name.partition('.')[0]}: {LEADING[key]}", typeset(figure.meaning))
             for name, figure in report.figures.items()
@@ -179,6 +180,7 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
     """Content of summary.json."""
     return {
         "kind": "drive",
+        "answer": answers(report),
         "settings": dict(report.settings),
         "axes": {
             axis: {
@@ -204,6 +206,23 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
         "inputs": inputs_part(hashed(_files(report))),
         "files": list(files),
     }  # fmt: skip
+
+
+def answers(report: DriveReport) -> list[str]:
+    """How near what was found comes to the record, how far it is to be trusted, and what to do next."""
+    lines = []
+    for each in report.comparisons:
+        one = report.found.drives[each.axis]
+        own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
+        torque = f", its torque to {own['torque_rms']}" if "torque_rms" in own else ""
+        told = [name for name, found in one.estimates.items() if found.status == "estimated"]
+        lines.append(
+            f"{each.axis}: the position of the record is met to {own['position_rms']} rms ({own['share_of_lag']} of "
+            f"the lag){torque}; of motion that a fit has not seen, to {1e6 * one.predicted[0]:.3g} um. The record "
+            f"tells {', '.join(told) or 'no parameter'}."
+        )
+    lines.append("Replay another record on it before trusting it with other motion.")
+    return lines
 
 
 def summary_lines(report: DriveReport, directory: Path) -> list[str]:

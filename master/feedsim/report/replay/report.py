@@ -124,6 +124,7 @@ def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
     time = each.record.time[each.rows]
     return {
         "kind": "replay",
+        "answer": answers(replayed),
         "machine": machine_part(replayed.subject.machine),
         "settings": dict(replayed.settings),
         "window": [quantity(float(time[0]), "s"), quantity(float(time[-1]), "s")],

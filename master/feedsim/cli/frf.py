@@ -42,6 +42,7 @@ def frf(options: Namespace) -> None:
     from feedsim.analysis.campaign import run_campaign
     from feedsim.cosim.plant import plant_modes
     from feedsim.cosim.trust import control
+    from feedsim.findings import severity
     from feedsim.linear.judgement import judge
     from feedsim.report import frf as report
     from feedsim.scenario import load_subject
@@ -72,9 +73,10 @@ def frf(options: Namespace) -> None:
         progress("closed form", 1, 1)
         if not doubts and (doubt := table_mismatch(machine)) is not None:
             warnings.append(doubt)
-        if result.unstable_poles:
-            warnings.append(UNSTABLE.format(result.unstable_poles))
-        warnings += control(machine, judge(machine, modes))
+        told = control(machine, judge(machine, modes))
+        if result.unstable_poles and not any(severity(each) == "wrong" for each in told):
+            told.append(UNSTABLE.format(result.unstable_poles))
+        warnings += told
         full = _full_model(machine, progress, warnings) if options.full_model else None
         campaign = None
         if not (options.no_measure or result.unstable_poles):

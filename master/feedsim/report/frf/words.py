@@ -14,8 +14,9 @@ USUAL = f"the usual {20 * math.log10(GAIN_MARGIN):.0f} dB and {PHASE_MARGIN:g} d
 
 
 def answers(responses: Responses) -> list[str]:
-    """The verdict, a line per axis with its bandwidths and margins, and what that is worth."""
-    by_axis = [f"{axis}: {_of_axis(responses.figures, axis)}" for axis in responses.axes]
+    """The verdict, of stable loops a line per axis with bandwidths and margins, and what that is worth."""
+    axes = () if responses.result.unstable_poles else responses.axes
+    by_axis = [f"{axis}: {_of_axis(responses.figures, axis)}" for axis in axes]
     return [verdict(responses), *by_axis, _trust(responses)]
 
 

@@ -20,6 +20,7 @@ from feedsim.files.columns import (
     resulting,
     target_of,
 )
+from feedsim.findings import Note
 from feedsim.identify.signal_names import alias_of
 from feedsim.trace import Recording
 
@@ -139,7 +140,7 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
     driving = [role for role in DRIVING if role in names]
     for role in driving[1:]:
         left = names.pop(role)
-        notes.append(f"{recording.path}: {left!r} is not used; the {driving[0]} {names[driving[0]]!r} is")
+        notes.append(Note(f"{recording.path}: {left!r} is not used; the {driving[0]} {names[driving[0]]!r} is"))
     missing = [] if driving or not driven else ["torque or current"]
     missing += [] if "position" in names or "speed" in names else ["position or speed"]
     if missing:

@@ -256,6 +256,22 @@ def test_palettes_of_dark_screens_and_of_paper(pages: dict[str, Any]) -> None:
     page.emulate_media(media="screen", color_scheme="light")
 
 
+def test_on_paper_panels_stand_side_by_side(pages: dict[str, Any]) -> None:
+    """A sheet is narrow; three columns that are stacked would be printed at half the width."""
+    page = pages["circle"]
+    size = page.viewport_size
+    page.set_viewport_size({"width": 680, "height": 900})
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    across = page.evaluate(
+        "() => [...document.querySelectorAll('figure.chart')].map(each => "
+        "each.querySelector('svg.chart').viewBox.baseVal.width)"
+    )
+    assert min(across) == 720
+    assert max(across) > 720  # of the one with three columns
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.set_viewport_size(size)
+
+
 def test_without_script_there_is_a_still_picture(browser: Any, runs: dict[str, tuple[FakeRun, Path]]) -> None:
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()

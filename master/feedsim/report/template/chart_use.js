@@ -351,5 +351,9 @@ addEventListener("resize", () => {
   cancelAnimationFrame(frame);
   frame = requestAnimationFrame(() => { for (const live of lives) if (live.room.clientWidth !== live.width) live.draw(live.room.clientWidth || live.width); });
 });
-addEventListener("beforeprint", () => { while (waiting.length) begin(waiting.shift()); for (const live of lives) live.draw(720); });
+// On paper panels stand side by side, however narrow the sheet is: it is read from nearer than a screen.
+addEventListener("beforeprint", () => {
+  while (waiting.length) begin(waiting.shift());
+  for (const live of lives) live.draw(Math.max(720, COLUMN * live.chart.widths.length));
+});
 addEventListener("afterprint", () => { for (const live of lives) live.draw(live.room.clientWidth); });

@@ -40,8 +40,8 @@ STEP = 0.05  # relative step of the frequencies between resonances; drives and d
 # Points about a resonance, in its half widths: a circle is a polygon of these.
 ABOUT = np.array([-5.0, -2.4, -1.3, -0.7, -0.3, 0.0, 0.3, 0.7, 1.3, 2.4, 5.0])
 SHOWS = 0.03  # of an open-loop gain: a resonance that adds less at its peak is not looked at closely
-# Factors on a gain that are looked at: of a stable loop, and of one that is not, since a unit left out may be 1000. A
-# step is 1.2 %.
+# Factors on a gain within which a stable loop has its limits, and those that are tried for one that is not or hardly,
+# since a unit left out may be 1000. A step is 1.2 %.
 WITHIN = 1e-2, 1e2
 GAINS = np.geomspace(1e-6, 1e6, 2401)
 LEAST = np.finfo(np.float64).tiny  # a loop without gain is no reason to take the logarithm of 0
@@ -131,12 +131,13 @@ def _judged(
 
     growing: solutions that grow with it closed; closed: with all loops closed; inner: in the loops below it alone.
     """
-    limits = _limits(L, WITHIN if not growing else (GAINS[0], GAINS[-1]))
+    limits = _limits(L, WITHIN)
     gain_margin, phase_margin = _gain_margin(limits, 1.0), _phase_margin(L, 1.0)
     if not growing and gain_margin >= GAIN_MARGIN and phase_margin >= PHASE_MARGIN:
         limit = gain * float(min(limits, key=_far)) if limits.size else None
         return Loop(axis, kind, state, gain, closed, False, limit, gain_margin, phase_margin, gain)
-    # between two limits the number of growing solutions is the same
+    # between two limits, of all gains that are tried, the number of growing solutions is the same
+    limits = _limits(L, (GAINS[0], GAINS[-1]))
     ends = np.concatenate([[GAINS[0]], limits, [GAINS[-1]]])
     winds = _windings(1 + L)
     counts = np.array([growing + winds - _windings(1 + k * L) for k in np.sqrt(ends[1:] * ends[:-1])])

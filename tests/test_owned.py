@@ -8,7 +8,7 @@ import sys
 import textwrap
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -113,6 +113,28 @@ def test_many_take_turns_without_a_gap(tmp_path: Path) -> None:
         thread.join()
     assert most == [1]
     assert {*tmp_path.rglob("*")} <= {tmp_path / "out"}  # which goes with who has made it, unless another has it then
+
+
+def test_a_folder_that_comes_and_goes_is_no_file(tmp_path: Path) -> None:
+    """Others make and remove it between any two looks of ours."""
+    folder, done = tmp_path / "out", threading.Event()
+
+    def others() -> None:
+        while not done.is_set():
+            with suppress(OSError):
+                folder.mkdir()
+            with suppress(OSError):
+                folder.rmdir()
+
+    thread = threading.Thread(target=others)
+    thread.start()
+    try:
+        for _ in range(300):
+            with claimed(folder, wait=60.0):
+                pass
+    finally:
+        done.set()
+        thread.join()
 
 
 @pytest.mark.parametrize("elsewhere", [True, False])

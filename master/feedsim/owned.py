@@ -36,6 +36,7 @@ YOUNG = 60.0  # s within which a folder without a lock may be one that is just b
 _HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what a lock that another has is told by
 _FAR = 1 << 30  # where Windows locks: there a locked byte cannot be read
 _LOOK = 0.02  # s between two looks at a lock that is waited for
+_BETWEEN = 1e-4  # s between two attempts
 _ATTEMPTS = 100  # at what others may remove at the same moment
 _claims: set[tuple[str, int]] = set()  # lock and thread
 
@@ -57,10 +58,16 @@ def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[No
     if key in _claims:
         yield
         return
-    existing = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.exists())
-    if not existing.is_dir():
-        raise OutputError(f"{directory}: cannot be written, {existing} is a file; allowed: a directory")
-    made = [path for path in (directory.absolute(), *directory.absolute().parents) if not path.exists()]
+    made = []
+    for path in (directory.absolute(), *directory.absolute().parents):
+        try:  # one look: what another makes or removes in between is either there or not
+            mode = path.stat().st_mode
+        except OSError:
+            made.append(path)
+            continue
+        if not stat.S_ISDIR(mode):
+            raise OutputError(f"{directory}: cannot be written, {path} is a file; allowed: a directory")
+        break
     try:
         held = _taken(directory, lock, time.monotonic() + wait)
         try:
@@ -87,6 +94,7 @@ def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
             attempts += 1
             between = isinstance(error, (FileNotFoundError, FileExistsError))  # made or removed by another just now
             if between and attempts < _ATTEMPTS:
+                time.sleep(_BETWEEN)  # not in step with the other
                 continue
             raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error
         held = [lock]

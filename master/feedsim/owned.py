@@ -36,8 +36,8 @@ YOUNG = 60.0  # s within which a folder without a lock may be one that is just b
 _HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what a lock that another has is told by
 _FAR = 1 << 30  # where Windows locks: there a locked byte cannot be read
 _LOOK = 0.02  # s between two looks at a lock that is waited for
-_BETWEEN = 1e-4  # s between two attempts
-_ATTEMPTS = 100  # at what others may remove at the same moment
+_BETWEEN = 1e-4  # s between two attempts at what others may remove at the same moment
+_UNSETTLED = 5.0  # s for which they may
 _claims: set[tuple[str, int]] = set()  # lock and thread
 
 
@@ -85,15 +85,14 @@ def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[No
 
 def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
     """The locks that make a folder ours. OutputError."""
-    attempts = 0
+    began = time.monotonic()
     while True:
         try:
             directory.mkdir(parents=True, exist_ok=True)
             lock = _Lock(directory / name)
         except OSError as error:
-            attempts += 1
             between = isinstance(error, (FileNotFoundError, FileExistsError))  # made or removed by another just now
-            if between and attempts < _ATTEMPTS:
+            if between and not directory.is_symlink() and time.monotonic() < began + _UNSETTLED:
                 time.sleep(_BETWEEN)  # not in step with the other
                 continue
             raise OutputError(f"{directory}: cannot be written: {error.strerror or error}") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -15,6 +16,8 @@ from scipy.sparse import block_diag, csc_array, diags_array, eye_array, kron
 
 from feedsim.scenario.structure import Damping
 from feedsim.structure.assembly import Assembly
+from feedsim.structure.factor import SparseFactor
+from feedsim.structure.solve import Solution
 
 Floats = NDArray[np.float64]
 DATA = Path(__file__).resolve().parent / "structure" / "data" / "test_centre"
@@ -107,3 +110,17 @@ def stiffened(assembly: Assembly, spring: float, along: Floats) -> Assembly:
     """The model with one more spring, stretched by along^T u."""
     vector = csc_array(along[:, None])
     return replace(assembly, stiffness=csc_array(assembly.stiffness + spring * (vector @ vector.T)))
+
+
+def error_bounds(assembly: Assembly, found: Solution) -> Floats:
+    """(n,) bound on the relative error of lambda + shift of each mode, pseudo-modes aside.
+
+    With B = K + shift M and r = K phi - lambda M phi an exact eigenvalue lambda* has
+    |1 - (lambda + shift)/(lambda* + shift)| <= |r|_B^-1 / |phi|_B (B. N. Parlett, The Symmetric Eigenvalue Problem,
+    1998, sec. 15.9).
+    """
+    kept, shift = len(found.modes.frequency) - found.corrections, (200 * math.pi) ** 2
+    values, shapes = (2 * math.pi * found.modes.frequency[:kept]) ** 2, found.shapes[:, :kept]
+    residual = assembly.stiffness @ shapes - (assembly.mass @ shapes) * values
+    square = np.einsum("ij,ij->j", residual, SparseFactor(assembly, -shift).solve(residual))
+    return np.asarray(np.sqrt(np.maximum(square, 0) / (values + shift)))

@@ -202,16 +202,3 @@ def _ritz(assembly: Assembly, factor: Factor, shapes: Floats) -> tuple[Floats, F
     shapes /= np.sqrt(np.einsum("ij,ij->j", shapes, assembly.mass @ shapes))
     values, rotation = linalg.eigh(shapes.T @ (assembly.stiffness @ shapes), shapes.T @ (assembly.mass @ shapes))
     return values, shapes @ rotation
-
-
-def error_bounds(assembly: Assembly, pairs: Eigenpairs, values: Floats, shapes: Floats) -> Floats:
-    """(n,) bound on the relative error of lambda + shift of each pair; rounding where the pairs are right.
-
-    With B = K + shift M and r = K phi - lambda M phi an exact eigenvalue lambda* has
-    |1 - (lambda + shift)/(lambda* + shift)| <= |r|_B^-1 / |phi|_B (B. N. Parlett, The Symmetric Eigenvalue Problem,
-    1998, sec. 15.9).
-    """
-    mass_shapes = assembly.mass @ shapes
-    residual = assembly.stiffness @ shapes - mass_shapes * values
-    square = np.einsum("ij,ij->j", residual, pairs.factor.solve(residual))
-    return np.asarray(np.sqrt(np.maximum(square, 0) / (values + pairs.shift)))

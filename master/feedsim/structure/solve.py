@@ -16,7 +16,7 @@ from scipy.sparse.linalg import LinearOperator, cg, splu
 from feedsim.errors import InputError
 from feedsim.scenario.structure import Damping
 from feedsim.structure.assembly import Assembly, Floats
-from feedsim.structure.eigenpairs import MASSLESS, Eigenpairs, dense, error_bounds, lanczos
+from feedsim.structure.eigenpairs import MASSLESS, Eigenpairs, dense, lanczos
 from feedsim.structure.modes import TOOL_PORTS, Modes
 from feedsim.structure.moving import Motion, what_moves
 from feedsim.structure.rigid import check_count, cleaned, definite_basis, definite_signs, rigid_count, rotor_rows
@@ -53,11 +53,9 @@ class Solution:
         dropped: number of modes of the model above the cut-off.
         J_inf_full: axis -> 1 / sum of n^2 over all modes of the model [kg.m2]; modes.J_inf has it over the kept ones
             (and pseudo-modes). 0 where the rotor has no mass.
-        error_bound: (n_modes - corrections,) bound on the relative error of omega^2 + shift per mode.
         method: "dense" or "Lanczos".
         verification: how it is known that no mode up to the cut-off is missing; begins with NOT where it is not.
         seconds: wall time.
-        memory: largest memory that the process had until then [byte]; None where the system does not tell.
     """
 
     modes: Modes
@@ -68,11 +66,9 @@ class Solution:
     above: Floats
     dropped: int
     J_inf_full: Mapping[str, float]
-    error_bound: Floats
     method: str
     verification: str
     seconds: float
-    memory: int | None
 
 
 def solve(
@@ -124,7 +120,6 @@ def solve(
     kept = int(np.count_nonzero(values <= cutoff**2))
     above = np.sqrt(values[kept:]) / (2 * math.pi)
     values, shapes = values[:kept], shapes[:, :kept]
-    bounds = error_bounds(assembly, pairs, values, shapes)
     corrections = 0
     if static_correction:
         loads = np.column_stack([assembly.ports[port] for port in _input_ports(assembly)])
@@ -142,11 +137,9 @@ def solve(
         above=above,
         dropped=pairs.finite - kept,
         J_inf_full={axis: _sudden_inertia(assembly, assembly.ports[f"n_{axis}"]) for axis in assembly.axes},
-        error_bound=bounds,
         method=pairs.method,
         verification=pairs.verification,
         seconds=time.monotonic() - began,
-        memory=_peak_memory(),
     )
 
 
@@ -216,16 +209,6 @@ def _sudden_inertia(assembly: Assembly, port: Floats) -> float:
     answer, failed = cg(scaled, force, rtol=CG_TOLERANCE, atol=0.0, maxiter=10 * len(force))
     mobility = float(force @ answer)
     return math.nan if failed or mobility <= 0 else 1 / mobility
-
-
-def _peak_memory() -> int | None:
-    try:
-        import resource
-        import sys
-    except ImportError:  # Windows
-        return None
-    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return used if sys.platform == "darwin" else 1024 * used
 
 
 def pseudo_modes(assembly: Assembly, pairs: Eigenpairs, kept: Floats, loads: Floats) -> tuple[Floats, Floats]:

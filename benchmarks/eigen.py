@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import Any
 
 from harness import arguments, digits, table
-from watched import memory
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_array
+from watched import memory
 
 from feedsim.scenario.structure import Damping
 from feedsim.structure.assembly import Assembly, Geometry

@@ -28,7 +28,7 @@ LANCZOS_STEPS = 60
 
 def mass_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
     """Faults and warnings of the mass matrix. Degrees of freedom without mass are fine where stiffness holds them."""
-    faults = _indefinite(assembly, assembly.mass, "mass", "mass")
+    faults = _indefinite(assembly, assembly.mass, "mass")
     if faults:
         return faults, []
     massless = np.flatnonzero(assembly.mass.diagonal() == 0)
@@ -50,16 +50,16 @@ def mass_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
 
 def stiffness_faults(assembly: Assembly) -> tuple[list[str], list[str]]:
     """Faults and warnings of the stiffness matrix."""
-    return _indefinite(assembly, assembly.stiffness, "stiffness", "stiffness"), []
+    return _indefinite(assembly, assembly.stiffness, "stiffness"), []
 
 
-def _indefinite(assembly: Assembly, matrix: sparse.csc_array, what: str, quantity: str) -> list[str]:
+def _indefinite(assembly: Assembly, matrix: sparse.csc_array, what: str) -> list[str]:
     diagonal = matrix.diagonal()
     negative = np.flatnonzero(diagonal < 0)
     if len(negative):
         worst = negative[np.argsort(diagonal[negative])]
         return [
-            f"{counted(len(worst), 'degree of freedom has', 'degrees of freedom have')} negative {quantity} on the "
+            f"{counted(len(worst), 'degree of freedom has', 'degrees of freedom have')} negative {what} on the "
             f"diagonal, down to {diagonal[worst[0]]:.6g} at {few(assembly.labels, worst)}"
         ]
     pair = _worst_pair(matrix, diagonal)
@@ -76,7 +76,7 @@ def _indefinite(assembly: Assembly, matrix: sparse.csc_array, what: str, quantit
         most = most[np.abs(vector[most]) > 0.3 * np.abs(vector[most[0]])]
         return [
             f"the {what} matrix is not positive semidefinite: a motion mainly of {few(assembly.labels, most)} has "
-            f"negative {quantity} ({value:.3g} of that of its degrees of freedom alone)"
+            f"negative {what} ({value:.3g} of that of its degrees of freedom alone)"
         ]
     return []
 

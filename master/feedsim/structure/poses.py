@@ -34,13 +34,11 @@ HYSTERESIS = 0.01
 MOST_CELLS = 20000
 
 
-def grid_axis(axis: str, low: float, high: float, cell: float, hysteresis: float | None = None) -> GridAxis:
+def grid_axis(axis: str, low: float, high: float, cell: float) -> GridAxis:
     """Cells of equal width from `low` to `high` [m], as few as are no wider than `cell` [m].
 
-    hysteresis: [m]; by default a hundredth of a cell.
-
     Raises:
-        InputError: the range is empty, or the cell or the hysteresis is out of range.
+        InputError: the range is empty, or the cell is out of range.
     """
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise InputError(
@@ -53,15 +51,8 @@ def grid_axis(axis: str, low: float, high: float, cell: float, hysteresis: float
         raise InputError(f"grid of poses along {axis}: {wanted:.3g} cells; at most {MOST_CELLS} are allowed")
     count = max(1, math.ceil(wanted - 1e-9))
     width = (high - low) / count
-    if hysteresis is None:
-        hysteresis = HYSTERESIS * width
-    if not 0 <= hysteresis < width:
-        raise InputError(
-            f"grid of poses along {axis}: hysteresis {units.show(hysteresis, 'm')}; 0 m to less than a cell, "
-            f"{units.show(width, 'm')}, is allowed"
-        )
     edges = np.linspace(low, high, count + 1)
-    return GridAxis(axis, (edges[:-1] + edges[1:]) / 2, edges[1:-1], hysteresis)
+    return GridAxis(axis, (edges[:-1] + edges[1:]) / 2, edges[1:-1], HYSTERESIS * width)
 
 
 def pose_grid(

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from feedsim import units
-from feedsim.errors import FeedsimError, InputError
+from feedsim.errors import FeedsimError
 from feedsim.scenario import Machine
-from feedsim.scenario.structure import Structure
-from feedsim.structure.geometry.assemble import State, assembler_of, movable, state_of, structure_axes, structure_of
+from feedsim.structure.geometry.assemble import State, assembler_of, state_of, structure_axes, structure_of
 from feedsim.structure.modes import Modes, read_modes
 
 # A table and a structure that belong together agree to the eigensolver's error (1e-8); a changed structure is far off.
@@ -88,26 +87,3 @@ def stale(table: Modes, built: Modes, tolerance: float = SAME) -> str:
             if abs(own - other) > tolerance * other:
                 return f"{what} of {axis} is {own:.6g} kg.m2 by it; the structure gives {other:.6g} kg.m2"
     return ""
-
-
-def check_same_machine(modes: Modes, structure: Structure, pose: Mapping[str, float]) -> None:
-    """A mode table is that of the structure at `pose` (axis -> position [m]): a grid of poses goes on from it.
-
-    Raises:
-        InputError: it has other frequencies.
-    """
-    from feedsim.structure.solve import solve
-
-    own = modes.frequency[~modes.rigid]
-    assembly = movable(structure).at({axis: pose[axis] for axis in structure_axes(structure)})
-    found = solve(assembly, cutoff=structure.cutoff, damping=structure.damping).modes.frequency
-    found = found[found > 0]
-    count = min(len(own), len(found))
-    wrong = np.flatnonzero(np.abs(own[:count] - found[:count]) > SAME_FREQUENCY * found[:count])
-    if len(wrong):
-        i = int(wrong[0])
-        where = ", ".join(f"{axis} {units.show(position, 'm')}" for axis, position in assembly.pose.items())
-        raise InputError(
-            f"{modes.file}: elastic mode {i} has {own[i]:.6g} Hz; the structure's has {found[i]:.6g} Hz at {where}. A "
-            "grid of poses would be another machine: compute the table anew (feedsim machine build)"
-        )

@@ -124,7 +124,6 @@ def _write_grid(machine: Machine, pose: Mapping[str, float], modes: Path, option
     from feedsim.structure.modes import read_modes
     from feedsim.structure.poses import pose_grid
     from feedsim.structure.poses_file import write_poses
-    from feedsim.structure.table_check import check_same_machine
 
     if machine.structure is None:
         raise InputError(
@@ -134,8 +133,6 @@ def _write_grid(machine: Machine, pose: Mapping[str, float], modes: Path, option
     structure = load_structure(machine.structure)
     movable(structure)
     grid = grid_axes(machine, options.poses)
-    if not options.at:  # else its modes were computed from the structure just now
-        check_same_machine(read_modes(machine.modes, list(machine.axes)), structure, machine.pose)
     _announce(machine, pose, grid, len(read_modes(modes, list(machine.axes)).frequency))
     with progress_bar(False, " poses") as progress:
         axes = list(machine.axes)

@@ -80,6 +80,8 @@ class LoadCourse(Model):
     """What all loads have in common: where their course over time is from."""
 
     UNIT: ClassVar[str]
+    INPUT: ClassVar[str]
+    WORDS: ClassVar[str]
 
     file: File | None = Field(default=None, description="CSV file with the load over time, relative to this file")
     column: Column | None = Field(default=None, description="Column of the load in the file")
@@ -126,38 +128,30 @@ class LoadCourse(Model):
         return self
 
     @property
+    def axis_name(self) -> str:
+        """The axis whose motor mostly carries it, if there is one of that name."""
+        raise NotImplementedError
+
+    @property
     def input(self) -> str:
         """The plant's variable at which it acts."""
-        raise NotImplementedError
+        return self.INPUT.format(self.axis_name)
 
     @property
     def words(self) -> str:
         """Where it acts, for people."""
-        raise NotImplementedError
-
-    @property
-    def axis_name(self) -> str:
-        """The axis whose motor mostly carries it, if there is one of that name."""
-        raise NotImplementedError
+        return self.WORDS.format(self.axis_name)
 
 
 class MotorLoad(LoadCourse):
     """A torque at the motor of an axis, counted against the motor torque like constant_load, to which it adds."""
 
-    UNIT = "N.m"
+    UNIT, INPUT, WORDS = "N.m", "{}.M_0", "at the motor of {}"
 
     kind: Literal["motor"] = "motor"
     axis: AxisName
     table: TorqueTable | None = Field(default=None, description="The load over time, in place of a file")
     noise: TorqueNoise | None = Field(default=None, description="The load at random, in place of a file")
-
-    @property
-    def input(self) -> str:
-        return f"{self.axis}.M_0"
-
-    @property
-    def words(self) -> str:
-        return f"at the motor of {self.axis}"
 
     @property
     def axis_name(self) -> str:
@@ -167,20 +161,12 @@ class MotorLoad(LoadCourse):
 class SlideLoad(LoadCourse):
     """A force on the slide of an axis where its scale is, positive in its direction, with its reaction on the rail."""
 
-    UNIT = "N"
+    UNIT, INPUT, WORDS = "N", "{}.F_a", "on the slide of {}"
 
     kind: Literal["slide"] = "slide"
     axis: AxisName
     table: ForceTable | None = Field(default=None, description="The load over time, in place of a file")
     noise: ForceNoise | None = Field(default=None, description="The load at random, in place of a file")
-
-    @property
-    def input(self) -> str:
-        return f"{self.axis}.F_a"
-
-    @property
-    def words(self) -> str:
-        return f"on the slide of {self.axis}"
 
     @property
     def axis_name(self) -> str:
@@ -190,20 +176,12 @@ class SlideLoad(LoadCourse):
 class ToolLoad(LoadCourse):
     """A force on the tool in a direction of the machine's frame, with its reaction on the workpiece."""
 
-    UNIT = "N"
+    UNIT, INPUT, WORDS = "N", "tool.F_{}", "on the tool in {}"
 
     kind: Literal["tool"] = "tool"
     direction: Direction = Field(description="X, Y or Z, positive as in the machine's frame")
     table: ForceTable | None = Field(default=None, description="The load over time, in place of a file")
     noise: ForceNoise | None = Field(default=None, description="The load at random, in place of a file")
-
-    @property
-    def input(self) -> str:
-        return f"tool.F_{self.direction}"
-
-    @property
-    def words(self) -> str:
-        return f"on the tool in {self.direction}"
 
     @property
     def axis_name(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil, hypot, inf, sqrt
 
@@ -14,46 +13,19 @@ from feedsim.identify.averages import derivative, mean, resolution, white, windo
 from feedsim.identify.record import Array, Record, runs
 from feedsim.identify.result import Plateau
 
-
-@dataclass(frozen=True)
-class Search:
-    """How plateaus are looked for. Times [s], the travel [rad].
-
-    Attributes:
-        block: speeds are compared as means over this time.
-        change: largest relative change of speed from block to block; half of it bounds how far the speed may be from
-            the plateau's.
-        settle_time: left out at the start: control and structure ring down.
-        settle_travel: left out at the start as well: bristles and the engaging zone (0.04 rad is usual)
-            come to rest. Of a stretch short of travel at most the share `settle_share` is left out for it.
-        drift: relative difference of torque between the first and the last third that passes for settled.
-        limit: the same, beyond which a stretch is refused; between both, the drift adds to the standard deviation.
-        margin: left out at the end, for channels that are late.
-        taper: over which the weights of the mean rise and fall; two periods of the lowest mode damp it best, one does.
-        shortest: time that must be left.
-    """
-
-    block: float = 0.04
-    change: float = 0.01
-    settle_time: float = 0.1
-    settle_travel: float = 0.06
-    settle_share: float = 0.4
-    drift: float = 1e-3
-    limit: float = 0.05
-    margin: float = 0.01
-    taper: float = 0.05
-    shortest: float = 0.1
-
-
-@dataclass(frozen=True)
-class Found:
-    """Plateaus of a record in time order, and the stretches that were not taken: (begin [s], end [s], why)."""
-
-    plateaus: tuple[Plateau, ...]
-    refused: tuple[tuple[float, float, str], ...]
-
-
-STANDARD = Search()
+# How plateaus are looked for: times [s], the travel [rad].
+BLOCK = 0.04  # speeds are compared as means over this time
+CHANGE = 0.01  # largest relative change of speed from block to block, twice that from the plateau's own
+SETTLE_TIME = 0.1  # left out at the start: control and structure ring down
+# Left out at the start as well: bristles and the engaging zone (0.04 rad is usual) come to rest. Of a stretch short of
+# travel at most that share is left out for it.
+SETTLE_TRAVEL, SETTLE_SHARE = 0.06, 0.4
+# Relative difference of torque between the first and the last third that passes for settled, and that beyond which a
+# stretch is refused; between both, the drift adds to the standard deviation.
+DRIFT, LIMIT = 1e-3, 0.05
+MARGIN = 0.01  # left out at the end, for channels that are late
+TAPER = 0.05  # the weights of the mean rise and fall over it; two periods of the lowest mode damp it best, one does
+SHORTEST = 0.1  # time that must be left
 MOST_DROPPED = 0.6  # of a stretch, looking for where its torque has settled
 CERTAIN = 4.0  # standard deviations that pass for noise
 QUIETER = 1.5  # times less noise in the speed that the angle tells, for the recorded speed to be passed over
@@ -66,32 +38,26 @@ DWELL = 0.1  # of its own duration that a stretch in coarse steps of speed may h
 FEWEST = 20  # rows that a mean and its correlation can be had from
 
 
-def plateaus(record: Record, J: float, search: Search = STANDARD) -> tuple[Plateau, ...]:
-    """Plateaus of a record. J: inertia seen at the motor [kg.m2]; the mean of J dn/dt is small, J need not be sharp."""
-    return find(record, J, search).plateaus
+def plateaus(record: Record, J: float) -> tuple[Plateau, ...]:
+    """Plateaus of a record in time order.
 
-
-def find(record: Record, J: float, search: Search = STANDARD) -> Found:
-    """Plateaus of a record, and what was left out why."""
+    J: inertia seen at the motor [kg.m2]; the mean of J dn/dt is small, J need not be sharp.
+    """
     taken: list[Plateau] = []
-    refused: list[tuple[float, float, str]] = []
     highest = inf
     for longer in LONGER:
         # Blocks as long as noise asks for: slow plateaus show in long ones only, fast ones are too short for them.
-        motion = _Motion(record, replace(search, block=longer * search.block))
+        motion = _Motion(record, longer * BLOCK)
         lowest = motion.noise(motion.rows) * CERTAIN / COARSE if longer < LONGER[-1] else 0.0
-        for first, last in _candidates(motion, search):
+        for first, last in _candidates(motion):
             if not lowest <= abs(float(np.median(motion.blocks[first:last]))) < highest:
                 continue
-            outcome = _plateau(record, motion, first, last, J, search)
-            if isinstance(outcome, Plateau):
-                taken.append(outcome)
-            elif outcome:
-                refused.append((float(record.time[first]), float(record.time[last - 1]), outcome))
+            if (found := _plateau(record, motion, first, last, J)) is not None:
+                taken.append(found)
         highest = lowest
         if lowest <= SLOWEST * float(np.max(np.abs(motion.blocks))):
             break
-    return Found(tuple(sorted(taken, key=lambda plateau: plateau.begin)), tuple(sorted(refused)))
+    return tuple(sorted(taken, key=lambda plateau: plateau.begin))
 
 
 class _Motion:
@@ -101,9 +67,9 @@ class _Motion:
     travel: (N,) [rad]. blocks: (N,) mean speed over a block about each row [rad/s]. direct: from the speed.
     """
 
-    def __init__(self, record: Record, search: Search) -> None:
+    def __init__(self, record: Record, block: float) -> None:
         self.interval = record.interval
-        self.rows = max(ceil(search.block / self.interval) | 1, 3)
+        self.rows = max(ceil(block / self.interval) | 1, 3)
         half = self.rows // 2
         self.direct = record.speed is not None and (
             record.angle is None or self._noise(record.speed, True) <= QUIETER * self._noise(record.angle, False)
@@ -138,7 +104,7 @@ class _Motion:
         return float((self.signal[last - 1] - self.signal[first]) / ((last - 1 - first) * self.interval))
 
 
-def _candidates(motion: _Motion, search: Search) -> list[tuple[int, int]]:
+def _candidates(motion: _Motion) -> list[tuple[int, int]]:
     """Rows (first, behind the last) of stretches whose speed changes little from block to block and that do move."""
     rows, blocks = motion.rows, motion.blocks
     if len(blocks) < 3 * rows:
@@ -147,7 +113,7 @@ def _candidates(motion: _Motion, search: Search) -> list[tuple[int, int]]:
     noise = motion.noise(rows)
     # Blocks that adjoin at each row.
     ahead, behind = np.roll(blocks, -half - 1), np.roll(blocks, half + 1)
-    quiet = np.abs(ahead - behind) <= search.change * np.abs(blocks) + CERTAIN * np.sqrt(2) * noise
+    quiet = np.abs(ahead - behind) <= CHANGE * np.abs(blocks) + CERTAIN * np.sqrt(2) * noise
     moving = np.abs(blocks) > max(CERTAIN * noise, SLOWEST * float(np.max(np.abs(blocks))))
     inside = quiet & moving
     inside[: half + 1] = inside[len(inside) - half - 1 :] = False
@@ -170,46 +136,46 @@ def _joined(parts: list[tuple[int, int]], blocks: Array, rows: int) -> list[tupl
     return whole
 
 
-def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float, search: Search) -> Plateau | str:
-    """The plateau within a candidate; else why there is none, empty where nobody would have expected one."""
+def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float) -> Plateau | None:
+    """The plateau within a candidate, if there is one."""
     interval = motion.interval
-    least = max(ceil(search.shortest / interval), FEWEST)
+    least = max(ceil(SHORTEST / interval), FEWEST)
     if last - first < least:
-        return ""
+        return None
     speed = float(np.median(motion.blocks[first:last]))
     noise = CERTAIN * motion.noise(motion.rows)
     if abs(speed) <= noise:  # joined across a stretch that may be at rest
-        return "the speed drifts"
-    allowed = 0.5 * search.change * abs(speed) + noise
+        return None
+    allowed = 0.5 * CHANGE * abs(speed) + noise
     near = np.flatnonzero(np.abs(motion.blocks[first:last] - speed) <= allowed)
     # Of an even number of blocks in coarse steps the median may lie between two of them, and near to none.
     if len(near) < 0.5 * (last - first):
-        return "the speed drifts"
+        return None
     begin, end = first + int(near[0]), first + int(near[-1]) + 1
-    if not _steady(motion, begin, end, search) or _crest(motion, begin, end, search):
-        return "the speed drifts"
-    end -= ceil(search.margin / interval)
-    earliest = begin + max(ceil(search.settle_time / interval), _travelled(motion, begin, end, search))
+    if not _steady(motion, begin, end) or _crest(motion, begin, end):
+        return None
+    end -= ceil(MARGIN / interval)
+    earliest = begin + max(ceil(SETTLE_TIME / interval), _travelled(motion, begin, end))
     if end - earliest < least:
-        return f"too short: {search.shortest:g} s and {FEWEST} rows must be left once friction has settled"
+        return None
     torque = record.torque if record.load is None else record.torque - record.load
     step = resolution(record.torque)
-    start, drift = _settled(torque, earliest, begin + int(MOST_DROPPED * (end - begin)), end, least, step, search)
+    start, drift = _settled(torque, earliest, begin + int(MOST_DROPPED * (end - begin)), end, least, step)
     if record.clipped is not None and np.any(record.clipped[start:end]):
-        return "the torque is cut off at a limit"
-    weights = _weights(end - start, search.taper, interval)
+        return None
+    weights = _weights(end - start, TAPER, interval)
     order = 1 if motion.direct else 2
     average, sigma = mean(torque[start:end], weights, step)
     average -= J * derivative(weights, motion.signal[start:end], interval, order)
-    if drift > search.limit * abs(average):
-        return f"the torque drifts by {100 * drift / max(abs(average), 1e-300):.2g} %"
+    if drift > LIMIT * abs(average):
+        return None
     mean_speed = (
         float(np.sum(weights * motion.signal[start:end]))
         if motion.direct
         else derivative(weights, motion.signal[start:end], interval, 1)
     )
     if abs(mean_speed - speed) > allowed:
-        return "the speed drifts"
+        return None
     return Plateau(
         record.name,
         float(record.time[start]),
@@ -223,7 +189,7 @@ def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float, s
     )
 
 
-def _steady(motion: _Motion, begin: int, end: int, search: Search) -> bool:
+def _steady(motion: _Motion, begin: int, end: int) -> bool:
     """Whether the speed of the later part keeps its value over four quarters (the start may still ring)."""
     begin += (end - begin) // 5
     bounds = np.linspace(begin, end, 5).astype(int)
@@ -231,7 +197,7 @@ def _steady(motion: _Motion, begin: int, end: int, search: Search) -> bool:
         return False
     means = [motion.speed(int(a), int(b)) for a, b in pairwise(bounds)]
     noise = CERTAIN * np.sqrt(2) * motion.noise(int(bounds[1] - bounds[0]))
-    allowed = search.change * abs(float(np.mean(means)))
+    allowed = CHANGE * abs(float(np.mean(means)))
     return bool(np.ptp(means) <= allowed + noise) and _bend(motion, begin, end) <= allowed
 
 
@@ -255,24 +221,24 @@ def _bend(motion: _Motion, begin: int, end: int) -> float:
     return scale * (float(np.ptp(legendre.legval(place, shape))) - noise)
 
 
-def _crest(motion: _Motion, begin: int, end: int, search: Search) -> bool:
+def _crest(motion: _Motion, begin: int, end: int) -> bool:
     """Whether a speed in steps coarser than what may change seems constant only: a crest, parabola over time, spends at
     least 0.2 times as long in the next step on either side of it; a plateau is left at once."""
     if not motion.direct:
         return False
     step, rows = resolution(motion.signal), end - begin
     level = float(np.median(motion.signal[begin:end]))
-    if not search.change * abs(level) < step < 0.75 * abs(level):  # else fine, or the next step is rest
+    if not CHANGE * abs(level) < step < 0.75 * abs(level):  # else fine, or the next step is rest
         return False
     sides = motion.signal[max(begin - rows, 0) : begin], motion.signal[end : end + rows]
     spent = [np.count_nonzero(np.abs(np.abs(side - level) / step - 1) < 0.5) for side in sides]
     return bool(min(spent) > DWELL * rows)
 
 
-def _travelled(motion: _Motion, begin: int, end: int, search: Search) -> int:
+def _travelled(motion: _Motion, begin: int, end: int) -> int:
     """Rows until the settling travel is behind."""
     travel = np.abs(motion.travel[begin:end] - motion.travel[begin])
-    needed = min(search.settle_travel, search.settle_share * float(travel[-1]))
+    needed = min(SETTLE_TRAVEL, SETTLE_SHARE * float(travel[-1]))
     return int(np.argmax(travel >= needed))
 
 
@@ -281,10 +247,8 @@ def _weights(rows: int, taper: float, interval: float) -> Array:
     return window(rows, min(ceil(taper / interval), rows // 5))
 
 
-def _settled(
-    torque: Array, earliest: int, latest: int, end: int, least: int, step: float, search: Search
-) -> tuple[int, float]:
-    """Row from which on the torque has settled, and how much it still drifts (0: not beyond noise and `search.drift`).
+def _settled(torque: Array, earliest: int, latest: int, end: int, least: int, step: float) -> tuple[int, float]:
+    """Row from which on the torque has settled, and how much it still drifts (0: not beyond noise and `DRIFT`).
 
     Where it never settles (torque that depends on position) the earliest row stays: leaving more out gains nothing.
     """
@@ -297,7 +261,7 @@ def _settled(
         before, before_sigma = mean(torque[start : start + third], weights, step, trend=True)
         after, after_sigma = mean(torque[end - third : end], weights, step, trend=True)
         drift = abs(after - before)
-        if drift <= max(CERTAIN * hypot(before_sigma, after_sigma), search.drift * abs(after)):
+        if drift <= max(CERTAIN * hypot(before_sigma, after_sigma), DRIFT * abs(after)):
             return int(start), 0.0
         if start == earliest:
             first_drift = drift

@@ -61,7 +61,6 @@ def test_mapping_gives_units_signs_and_the_motor_side(tmp_path: Path) -> None:
     assert (source.axis, source.name, source.note, source.mapping) == ("Q", "r", "n", tmp_path / "m.yaml")
     assert (source.pitch, source.torque_constant, source.torque_delay) == (PITCH, K_T, 0.0005)
     assert source.inertia == pytest.approx(95 * LEAD**2)
-    assert source.position_at == "scale"
     assert source.warnings == ()
 
 
@@ -72,7 +71,7 @@ def test_a_motor_encoder_in_increments_needs_no_pitch(tmp_path: Path) -> None:
     )
     found = read_records(path, columns)
     np.testing.assert_allclose(only(found).angle, ANGLE, **DIGITS)
-    assert (found.provenance.position_at, found.provenance.pitch) == ("motor", None)
+    assert found.provenance.pitch is None
 
 
 def test_speeds_of_the_slide_and_forces(tmp_path: Path) -> None:

@@ -43,7 +43,6 @@ class Provenance:
         mapping: mapping file; None where columns were found by their names.
         axis: "" where nothing tells it.
         name, note: of the mapping.
-        position_at: "scale" or "motor", where the position is measured; "" without a position.
         columns: role -> column used (position, speed, torque, current, force, load, setpoint, time).
         pitch: [m]; torque_constant: [N.m/A]; None where not needed and not given.
         inertia: [kg.m^2] on the motor's side, where the mapping gives it or a mass.
@@ -56,7 +55,6 @@ class Provenance:
     sha256: str
     axis: str
     columns: Mapping[str, str]
-    position_at: str = ""
     mapping: Path | None = None
     name: str = ""
     note: str = ""
@@ -298,7 +296,6 @@ def _provenance(
         sha256=hashlib.sha256(content(path)).hexdigest(),
         axis=chosen.axis,
         columns=columns,
-        position_at=chosen.channels["position"].at if "position" in chosen.channels else "",
         mapping=mapping.file if mapping is not None else None,
         name=mapping.name if mapping is not None else "",
         note=mapping.note if mapping is not None else "",

@@ -9,19 +9,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal
-
-Place = Literal["scale", "motor"] | None
 
 
 @dataclass(frozen=True)
 class Alias:
-    """A name of a signal: its role in a mapping file, who calls it so, and where it is measured if the name tells."""
+    """A name of a signal: its role in a mapping file, and who calls it so."""
 
     name: str
     role: str
     source: str
-    at: Place = None
 
 
 _S120 = "SINAMICS list manuals"
@@ -35,60 +31,60 @@ _CIA = "CiA 402 object"
 _HAL = "LinuxCNC, pins of motion"
 _SERVICE = "SINUMERIK, service display of axes"
 
-# Role, whose names they are, where it is measured if the name tells, the names.
-_NAMES: tuple[tuple[str, str, Place, str], ...] = (
-    ("position", "plain words", None, "actual position"),
-    ("position", _CIA, None, "position actual value | 6064h | 0x6064"),
-    ("position", _SERVICE, None,
+# Role, whose names they are, the names.
+_NAMES: tuple[tuple[str, str, str], ...] = (
+    ("position", "plain words", "actual position"),
+    ("position", _CIA, "position actual value | 6064h | 0x6064"),
+    ("position", _SERVICE,
      "actual position value | actual position value measuring system 1 | actual position value measuring system 2"),
-    ("position", _DE, None, "Lageistwert | Lageistwert Messsystem 1 | Lageistwert Messsystem 2"),
-    ("position", _NCK, None, "nckServoDataActPos1stEnc | nckServoDataActPos2ndEnc"),
-    ("position", _EDGE, None, "ENC_POS | ENC1_POS | ENC2_POS"),  # ENC_POS: the active encoder
-    ("position", _TNC, None, "Actual pos"),  # TNC 430
-    ("position", _TNC, "scale", "S ACTUAL"),  # TNC 407
-    ("position", _TWINCAT, None, "ActPos"),
-    ("position", _SERCOS, None, "S-0-0051 | position feedback value 1"),
-    ("position", _HAL, None, "motor-pos-fb | pos-fb | joint-pos-fb"),
-    ("speed", "plain words", None, "actual speed | actual velocity"),
-    ("speed", _NCK, "motor", "actual speed motor"),
-    ("speed", _DE, "motor", "Drehzahl-/Geschwindigkeitsistwert Motor"),
-    ("speed", _CIA, None, "velocity actual value | 606Ch | 0x606C"),
-    ("speed", _S120, "motor", "r0061 | actual speed unsmoothed | r0063 | actual speed smoothed"),
-    ("speed", _DE, "motor", "Drehzahlistwert"),
-    ("speed", _NCK, "motor", "nckServoDataActVelMot"),
-    ("speed", _TNC, "scale", "Actl. speed"),  # TNC 430: from the position encoder
-    ("speed", _TNC, "motor", "V (act rpm)"),  # iTNC 530, in mm/min from the speed encoder
-    ("speed", _TWINCAT, None, "ActVelo"),
-    ("speed", _SERCOS, None, "S-0-0040 | velocity feedback value"),
-    ("torque", "plain words", None, "actual torque"),
-    ("torque", f"{_S120}; {_CIA}", None, "torque actual value"),  # r0080; 6077h
-    ("torque", _S120, None, "r0080"),
-    ("torque", _DE, None, "Drehmomentistwert"),
-    ("torque", _EDGE, None, "TORQUE"),
-    ("torque", _TNC, None, "M actual"),  # iTNC 530
-    ("torque", _TWINCAT, None, "ActTorque"),
-    ("torque", _CIA, None, "6077h | 0x6077"),
-    ("torque", _SERCOS, None, "S-0-0084 | torque/force feedback value"),
-    ("current", _S120, None, "torque-generating current"),
-    ("current", _S120, None,  # r0078
+    ("position", _DE, "Lageistwert | Lageistwert Messsystem 1 | Lageistwert Messsystem 2"),
+    ("position", _NCK, "nckServoDataActPos1stEnc | nckServoDataActPos2ndEnc"),
+    ("position", _EDGE, "ENC_POS | ENC1_POS | ENC2_POS"),  # ENC_POS: the active encoder
+    ("position", _TNC, "Actual pos"),  # TNC 430
+    ("position", _TNC, "S ACTUAL"),  # TNC 407
+    ("position", _TWINCAT, "ActPos"),
+    ("position", _SERCOS, "S-0-0051 | position feedback value 1"),
+    ("position", _HAL, "motor-pos-fb | pos-fb | joint-pos-fb"),
+    ("speed", "plain words", "actual speed | actual velocity"),
+    ("speed", _NCK, "actual speed motor"),
+    ("speed", _DE, "Drehzahl-/Geschwindigkeitsistwert Motor"),
+    ("speed", _CIA, "velocity actual value | 606Ch | 0x606C"),
+    ("speed", _S120, "r0061 | actual speed unsmoothed | r0063 | actual speed smoothed"),
+    ("speed", _DE, "Drehzahlistwert"),
+    ("speed", _NCK, "nckServoDataActVelMot"),
+    ("speed", _TNC, "Actl. speed"),  # TNC 430: from the position encoder
+    ("speed", _TNC, "V (act rpm)"),  # iTNC 530, in mm/min from the speed encoder
+    ("speed", _TWINCAT, "ActVelo"),
+    ("speed", _SERCOS, "S-0-0040 | velocity feedback value"),
+    ("torque", "plain words", "actual torque"),
+    ("torque", f"{_S120}; {_CIA}", "torque actual value"),  # r0080; 6077h
+    ("torque", _S120, "r0080"),
+    ("torque", _DE, "Drehmomentistwert"),
+    ("torque", _EDGE, "TORQUE"),
+    ("torque", _TNC, "M actual"),  # iTNC 530
+    ("torque", _TWINCAT, "ActTorque"),
+    ("torque", _CIA, "6077h | 0x6077"),
+    ("torque", _SERCOS, "S-0-0084 | torque/force feedback value"),
+    ("current", _S120, "torque-generating current"),
+    ("current", _S120,  # r0078
      "current actual value torque-generating | torque-generating current actual value | r0078"),
-    ("current", _DE, None, "Momentenbildender Stromistwert | Stromistwert momentenbildend"),
-    ("current", _NCK, None, "nckServoDataActCurr"),
-    ("current", _EDGE, None, "CURRENT"),
-    ("current", _TNC, None, "I nominal"),  # the nominal current that determines torque
-    ("current", "Beckhoff AX5000 IDN", None, "P-0-0459 | actual torque generating current"),
-    ("current", "ODrive", None, "Iq_measured"),
-    ("setpoint", _EDGE, None, "DES_POS"),
-    ("deviation", _EDGE, None, "CONT_DEV"),
-    ("speed_setpoint", _EDGE, None, "CMD_SPEED"),
-    ("feedforward", _EDGE, None, "VEL_FFW"),
-    ("setpoint", _TWINCAT, None, "SetPos"),
-    ("setpoint", _HAL, None, "motor-pos-cmd | pos-cmd | joint-pos-cmd"),
-    ("setpoint", _TNC, None, "Noml. pos | S NOMINAL"),
-    ("setpoint", _SERVICE, None, "position setpoint"),
-    ("time", "plain words", None, "time | t | Zeit"),
+    ("current", _DE, "Momentenbildender Stromistwert | Stromistwert momentenbildend"),
+    ("current", _NCK, "nckServoDataActCurr"),
+    ("current", _EDGE, "CURRENT"),
+    ("current", _TNC, "I nominal"),  # the nominal current that determines torque
+    ("current", "Beckhoff AX5000 IDN", "P-0-0459 | actual torque generating current"),
+    ("current", "ODrive", "Iq_measured"),
+    ("setpoint", _EDGE, "DES_POS"),
+    ("deviation", _EDGE, "CONT_DEV"),
+    ("speed_setpoint", _EDGE, "CMD_SPEED"),
+    ("feedforward", _EDGE, "VEL_FFW"),
+    ("setpoint", _TWINCAT, "SetPos"),
+    ("setpoint", _HAL, "motor-pos-cmd | pos-cmd | joint-pos-cmd"),
+    ("setpoint", _TNC, "Noml. pos | S NOMINAL"),
+    ("setpoint", _SERVICE, "position setpoint"),
+    ("time", "plain words", "time | t | Zeit"),
 )  # fmt: skip
-ALIASES = tuple(Alias(name, role, source, at) for role, source, at, names in _NAMES for name in names.split(" | "))
+ALIASES = tuple(Alias(name, role, source) for role, source, names in _NAMES for name in names.split(" | "))
 
 # What may stand before the number or the letter of an axis, and letters that axes have.
 _AXIS_WORDS = ("axis", "achse", "joint", "drive", "antrieb")

@@ -13,7 +13,6 @@ from feedsim.files.columns import (
     DIMENSIONS,
     DRIVING,
     Columns,
-    MotionSignal,
     Signal,
     is_rms,
     known_unit,
@@ -44,7 +43,6 @@ class Channel:
         target: SI unit that the values get.
         scale: what the column's numbers are multiplied with, sign included.
         rms: the unit says that it is an effective value.
-        at: "scale" or "motor", where a motion is measured; "" where nothing tells it.
     """
 
     role: str
@@ -52,7 +50,6 @@ class Channel:
     target: str
     scale: float
     rms: bool = False
-    at: str = ""
 
 
 @dataclass(frozen=True)
@@ -156,11 +153,9 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
     for role, name in names.items():
         try:
             unit = "s" if role == "time" and not recording.units[name] else None
-            alias = alias_of(name, axis, axes)
-            at = alias.at if alias else None
             against = role in DRIVING and len(recording.axes) == 1 and recording.axes[0].sign < 0
             sign: Literal[1, -1] = -1 if against else 1
-            channels[role] = column(recording, role, MotionSignal(column=name, unit=unit, at=at, sign=sign))
+            channels[role] = column(recording, role, Signal(column=name, unit=unit, sign=sign))
         except InputError as error:
             problem = f"{recording.header}: {error}; mapping: {_line(role, recording, name)}"
             if role in OF_CONTROL:
@@ -257,8 +252,7 @@ def column(recording: Recording, role: str, signal: Signal) -> Channel:
         times = f" times a factor in {factor.unit}" if factor else ""
         raise InputError(f"column {column!r} in {unit or 'no unit'}{times}: {error}") from None
     scale *= signal.sign * float(given.factor / units.unit(target).factor)
-    at = getattr(signal, "at", None) or {"m": "scale", "m/s": "scale", "rad": "motor", "rad/s": "motor"}.get(target, "")
-    return Channel(role, column, target, scale, is_rms(unit), at)
+    return Channel(role, column, target, scale, is_rms(unit))
 
 
 def _line(role: str, recording: Recording, column: str = "...") -> str:

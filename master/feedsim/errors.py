@@ -1,6 +1,9 @@
-"""Exception types. Messages say what is wrong, where (file:line if there is one), the actual value, what is allowed."""
+"""Exception types, and how their messages tell many names and the one that was meant.
 
-from collections.abc import Iterable
+Messages say what is wrong, where (file:line if there is one), the actual value, what is allowed.
+"""
+
+from collections.abc import Iterable, Sequence
 
 
 class FeedsimError(Exception):
@@ -37,3 +40,16 @@ class OutputError(FeedsimError):
     """A result cannot be written."""
 
     exit_code = 4
+
+
+def few(names: Sequence[str], most: int) -> str:
+    """The first names, and how many there are beyond."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """The name that a word most likely means; "" where it resembles none."""
+    from difflib import get_close_matches  # not for those who make no mistakes
+
+    same = [name for name in known if name.lower() == word.lower()]
+    return next(iter(same or get_close_matches(word, known, n=1, cutoff=0.6)), "")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache, lru_cache
 from math import inf, isfinite
 from pathlib import Path
@@ -29,7 +28,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from feedsim import units
-from feedsim.errors import InputError
+from feedsim.errors import InputError, nearest
 from feedsim.variables import Variable
 
 # Studies check a scenario for every run, most of whose texts are those of the run before.
@@ -249,6 +248,5 @@ def brief(value: Any) -> str:
 
 def did_you_mean(word: str, known: list[str]) -> str:
     """'; did you mean ...?', else '; allowed: ...', as the tail of a message."""
-    same = [name for name in known if name.lower() == word.lower()]
-    close = same or get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"; did you mean {close[0]!r}?" if close else f"; allowed: {', '.join(known)}"
+    near = nearest(word, known)
+    return f"; did you mean {near!r}?" if near else f"; allowed: {', '.join(known)}"

@@ -18,7 +18,7 @@ from fractions import Fraction
 from functools import cache, lru_cache
 from math import inf, isfinite
 
-from feedsim.errors import InputError
+from feedsim.errors import InputError, nearest
 from feedsim_packager import units as algebra
 
 # What may be written, in the order of messages.
@@ -272,10 +272,8 @@ def _hint(given: Unit, target: Unit) -> str:
 
 
 def _suggest(symbol: str) -> str:
-    known = [*SYMBOLS, *ALIASES]
-    same = [name for name in known if name.lower() == symbol.lower()]
-    close = same or get_close_matches(symbol, known, n=1, cutoff=0.6)
-    return f"; did you mean {close[0]!r}?" if close else f"; known are {', '.join(SYMBOLS)}"
+    near = nearest(symbol, [*SYMBOLS, *ALIASES])
+    return f"; did you mean {near!r}?" if near else f"; known are {', '.join(SYMBOLS)}"
 
 
 def _suggest_for(symbol: str, text: str, target: Unit) -> str:

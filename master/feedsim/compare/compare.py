@@ -10,11 +10,11 @@ import numpy as np
 
 from feedsim.compare.between import ABOVE, BELOW, Between, check_bounds
 from feedsim.compare.options import (
+    LISTED,
     Options,
     check_used,
     chosen,
     factor,
-    listed,
     missing,
     sources,
     units_told,
@@ -24,7 +24,7 @@ from feedsim.compare.overlap import Overlap
 from feedsim.compare.tolerance import OF_MAGNITUDE, Tolerances, allowed
 from feedsim.compare.tube import along, bounds
 from feedsim.compare.verdict import Comparison, Coverage, Curves, Variable, Verdict, percent
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.trace import Array, Series, Trace, as_series, matches
 
 # A conversion of units rounds twice.
@@ -86,7 +86,7 @@ def compare(
             variables.append(variable)
         elif not options.common:
             variables.append(Variable(name, "missing", reason=missing(name, result.names)))
-    notes += [f"{listed(who)}: {remark}" for remark, who in told.items()]
+    notes += [f"{few(who, LISTED)}: {remark}" for remark, who in told.items()]
     verdict: Verdict = "same"
     if over.uncovered or any(each.verdict in ("different", "missing") for each in variables):
         verdict = "different"

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from feedsim import units
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.files.columns import spelled
 from feedsim.trace import Series, matches
 from feedsim.trace.trace import suggest
+
+LISTED = 4  # columns that a note names
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,7 @@ def units_told(headers: Mapping[str, str], names: Iterable[str], given: Mapping[
                 "without one, and a header that is wrong must be put right"
             )
         twice.setdefault(unit, []).append(name)
-    return [f"{listed(those)}: the {whose}'s header tells {unit} already" for unit, those in twice.items()]
+    return [f"{few(those, LISTED)}: the {whose}'s header tells {unit} already" for unit, those in twice.items()]
 
 
 def factor(result: str, reference: str) -> tuple[float, str]:
@@ -159,11 +161,6 @@ def no_match(pattern: str, names: Sequence[str]) -> str:
     """That a pattern matches no name, and which there are."""
     more = ", ..." if len(names) > 12 else ""
     return f"{pattern!r}, which matches no column; there is {', '.join(names[:12])}{more}"
-
-
-def listed(names: Sequence[str]) -> str:
-    """The first few names, and how many more there are."""
-    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
 
 
 def _any(name: str, patterns: Iterable[str]) -> bool:

@@ -9,10 +9,10 @@ from math import floor, log10
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.compare.options import Options, chosen, factor, listed, sources, with_units
+from feedsim.compare.options import LISTED, Options, chosen, factor, sources, with_units
 from feedsim.compare.tolerance import Tolerances
 from feedsim.compare.tube import Rows, usual_step
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.trace import Array, Series
 
 # Positions tried over the whole range before the best is refined, at most.
@@ -38,8 +38,8 @@ class Shift:
         reasons: dict[str, list[str]] = {}
         for name, reason in self.left_out.items():
             reasons.setdefault(reason, []).append(name)
-        without = "".join(f"; without {listed(names)}: {reason}" for reason, names in reasons.items())
-        return f"the shift in time is found from {listed(self.used)}{without}"
+        without = "".join(f"; without {few(names, LISTED)}: {reason}" for reason, names in reasons.items())
+        return f"the shift in time is found from {few(self.used, LISTED)}{without}"
 
 
 def estimated_shift(
@@ -82,7 +82,7 @@ def estimated_shift(
         else:
             found[name] = expected / span, values / span
     if not found:
-        why = f" ({listed([*left_out])}: {next(iter(left_out.values()))})" if left_out else ""
+        why = f" ({few([*left_out], LISTED)}: {next(iter(left_out.values()))})" if left_out else ""
         raise InputError(f"the shift in time cannot be found: no column of the reference moves{why}")
     misfit = _Misfit(
         reference.time,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import floor, inf, isfinite
 from typing import Literal
 
+from feedsim.errors import few
 from feedsim.trace import Array
 
 Verdict = Literal["same", "different", "unusable"]
@@ -186,9 +187,8 @@ class Comparison:
             parts.append(f"{beyond} of {len(compared)} variables outside")
         for kind, words in (("missing", "missing: "), ("unusable", "cannot be compared: ")):
             if named := self.those(kind):
-                shown = ", ".join(each.name for each in named[:3])
                 why = f" ({named[0].reason})" if kind == "unusable" else ""
-                parts.append(words + shown + (f" and {len(named) - 3} more" if len(named) > 3 else "") + why)
+                parts.append(words + few([each.name for each in named], 3) + why)
         if self.verdict == "same":
             parts.append(f"{len(compared)} variable{'s'[: len(compared) != 1]}")
         if self.coverage is not None:

@@ -11,7 +11,7 @@ from typing import Any
 from feedsim import units
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.unit import Alias
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.fields import did_you_mean
 from feedsim.scenario import ForeignUnit, Machine
 from feedsim.scenario.machine import Parameter
@@ -258,8 +258,7 @@ def _named(name: str, known: list[str], kind: str) -> str:
 def _listed(known: Sequence[str], kind: str) -> str:
     if not known:
         return f"; it has no {kind} at all"
-    more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
-    return f"; {kind}: {', '.join(known[:MOST_NAMES])}{more}"
+    return f"; {kind}: {few(known, MOST_NAMES)}"
 
 
 def check_instances(filled: Iterable[RoleUnit]) -> None:

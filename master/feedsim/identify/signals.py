@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from feedsim import units
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.files.columns import (
     DIMENSIONS,
     DRIVING,
@@ -91,7 +91,7 @@ def _mapped(recording: Recording, mapping: Columns, axis: str, driven: bool) -> 
         if signal is None:
             continue
         if signal.column not in recording.names:
-            missing = f"{recording.header} has no column {signal.column!r}; there is {_listed(recording.names)}"
+            missing = f"{recording.header} has no column {signal.column!r}; there is {few(recording.names, 20)}"
             faults.append(f"{mapping.where(role)}: {missing}")
             continue
         try:
@@ -144,7 +144,7 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
         known = f" known are {', '.join(names.values())};" if names else ""
         raise InputError(
             f"{recording.header}: no column is called like a {' nor a '.join(missing)} of "
-            f"{f'axis {axis}' if axis else 'a drive trace'};{known} there is {_listed(recording.names)}; name the "
+            f"{f'axis {axis}' if axis else 'a drive trace'};{known} there is {few(recording.names, 20)}; name the "
             f"columns in a mapping file: {'; '.join(_line(part.split()[0], recording) for part in missing)}"
         )
     names["time"] = _named_time(recording, axis)
@@ -224,7 +224,7 @@ def _named_time(recording: Recording, axis: str) -> str:
     if known_unit(recording.units[first]) and units.unit(recording.units[first] or "1").dimension == "time":
         return first
     raise InputError(
-        f"{recording.header}: no column of time; there is {_listed(recording.names)}; name it in a mapping file: "
+        f"{recording.header}: no column of time; there is {few(recording.names, 20)}; name it in a mapping file: "
         "time: {column: ..., unit: s}, or give time: {interval: 2 ms} where there is none"
     )
 
@@ -260,8 +260,3 @@ def _line(role: str, recording: Recording, column: str = "...") -> str:
     told = column in recording.units and known_unit(recording.units[column]) and recording.units[column]
     name = column if re.fullmatch(r"[\w.]+", column) else f'"{column}"'
     return f"{role}: {{column: {name}}}" if told else f"{role}: {{column: {name}, unit: {_EXAMPLE.get(role, 'N.m')}}}"
-
-
-def _listed(names: Iterable[str]) -> str:
-    every = list(names)
-    return ", ".join(every[:20]) + (f" and {len(every) - 20} more" if len(every) > 20 else "")

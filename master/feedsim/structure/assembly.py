@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim import errors
+
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
@@ -87,8 +89,7 @@ def translating_mass(assembly: Assembly) -> Floats:
 
 def few(labels: Sequence[str], indices: Integers) -> str:
     """The first labels, and how many there are beyond."""
-    text = ", ".join(labels[int(i)] for i in indices[:SHOWN])
-    return text + (f" and {len(indices) - SHOWN} more" if len(indices) > SHOWN else "")
+    return errors.few([labels[int(i)] for i in indices], SHOWN)
 
 
 def counted(count: int, one: str, several: str) -> str:

@@ -9,7 +9,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from feedsim.errors import InputError
-from feedsim.structure.assembly import Assembly, Floats
+from feedsim.structure.assembly import Assembly, Floats, few
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 # A factorisation without pivoting is trusted where it solves a random system to this backward error: an eigenvalue
 # that near to the shift, relative to the largest one, may be counted on the wrong side of it, and no other.
 TRUSTED = 1e-9
-SHOWN = 5
 
 
 class Factor(Protocol):
@@ -39,10 +38,9 @@ def shifted(assembly: Assembly, sigma: float) -> tuple[csc_array, Floats]:
     size = assembly.stiffness.diagonal() + abs(sigma) * assembly.mass.diagonal()
     if not np.all(size > 0):
         wrong = np.flatnonzero(~(size > 0))
-        names = ", ".join(assembly.labels[i] for i in wrong[:SHOWN])
         raise InputError(
             f"{assembly.name}: {len(wrong)} degrees of freedom have neither mass nor stiffness (or negative ones): "
-            f"{names}{', ...' if len(wrong) > SHOWN else ''}"
+            f"{few(assembly.labels, wrong)}"
         )
     scale = 1 / np.sqrt(size)
     diagonal = sparse.diags_array(scale)

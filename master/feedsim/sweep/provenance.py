@@ -18,7 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.scenario import Base
 from feedsim.scenario.study import Parameter, Study
 from feedsim.sweep.design import Design
@@ -166,8 +166,7 @@ def differences(answers: Mapping[str, Mapping[str, str]]) -> list[str]:
             if answer.get(name) != here[name]:
                 found.setdefault(f"{name} {answer.get(name)} in place of {here[name]}", []).append(address)
     return [
-        f"{', '.join(addresses[:3])}{f' and {len(addresses) - 3} more' if len(addresses) > 3 else ''}: {what}; figures "
-        "from there may differ in the last digits"
+        f"{few(addresses, 3)}: {what}; figures from there may differ in the last digits"
         for what, addresses in found.items()
     ]
 

@@ -3,7 +3,6 @@
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few, nearest
 from feedsim.extras import need
 from feedsim.trace.table import STRETCH, release, stretches, unchangeable
 
@@ -175,15 +174,9 @@ def check_unit(unit: str) -> str:
 def suggest(name: str, known: Iterable[str]) -> str:
     """'; did you mean ...?' or the list of what there is, as the tail of a message."""
     names = [str(item) for item in known]
-    if close := get_close_matches(name, names, n=1, cutoff=0.6):
-        return f"; did you mean {close[0]!r}?"
-    lowered = [item for item in names if item.lower() == name.lower()]
-    if lowered:
-        return f"; did you mean {lowered[0]!r}?"
-    if not names:
-        return "; there is none"
-    shown = ", ".join(names[:12])
-    return f"; there is {shown}" + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+    if near := nearest(name, names):
+        return f"; did you mean {near!r}?"
+    return f"; there is {few(names, 12) or 'none'}"
 
 
 def first_not_finite(values: Array) -> int | None:

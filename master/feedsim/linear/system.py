@@ -12,7 +12,7 @@ sinusoid and of its mirror image meet; what is measured there depends on the pha
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Literal, Self
@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.linear.drive import LinearDrive, OperatingPoint
-from feedsim.linear.kept import Kept
 from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats, Hold, ModalPlant
 from feedsim.scenario import Machine
 from feedsim.structure import Modes
-from feedsim.trace.response import FrequencyResponse
+from feedsim.trace.response import FrequencyResponse, quotient_unit
 
 # Which loops of an axis are closed: position and speed; speed alone (K_v = k_ffw = 0); none (the torque is an input).
 Closed = Literal["position", "speed", "none"]
@@ -39,6 +38,30 @@ SLOW_INPUTS = ("x_s", "n_ffw")  # per axis, sampled every T_pos
 OUTPUTS = ("n_a", "x_a", "M_a", "n_s")  # per axis
 # Integrators and rigid modes are infinite where a component lies at 0 Hz: such frequencies are moved by this share.
 ASIDE = 1e-9
+# Points of a grid; the fewer at which crossings are searched are asked for once.
+KEPT_FROM = 500
+
+
+class Kept:
+    """The last results at grids, by what they are of."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._found: dict[tuple[Hashable, bytes], Complexes] = {}
+
+    def __call__(self, of: Hashable, s: Complexes, compute: Callable[[Complexes], Complexes]) -> Complexes:
+        """What ``compute`` gives at s (F,), read-only where it is kept."""
+        if len(s) < KEPT_FROM:
+            return compute(s)
+        key = (of, s.tobytes())
+        found = self._found.pop(key, None)
+        if found is None:
+            found = compute(s)
+            found.flags.writeable = False
+        self._found[key] = found  # the last one used stands last
+        if len(self._found) > self._most:
+            del self._found[next(iter(self._found))]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,11 +354,4 @@ class LinearSystem:
 
 def unit_of(output: str, name: str) -> str:
     """Unit of the response of `output` to `name`, such as "(rad/s)/(N.m)"; "1" where both have the same."""
-    above, below = (UNITS[each.partition(".")[2]] for each in (output, name))
-    if above == below:
-        return "1"
-
-    def quoted(unit: str) -> str:
-        return f"({unit})" if "/" in unit or "." in unit else unit
-
-    return f"{quoted(above)}/{quoted(below)}"
+    return quotient_unit(*(UNITS[each.partition(".")[2]] for each in (output, name)))

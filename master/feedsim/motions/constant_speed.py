@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Discriminator, Field, StrictInt, Tag, model_validator
+from pydantic import Field, StrictInt, Tag, model_validator
 
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, Model, Quantity, fault
-from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Peaks, Start, in_turn
+from feedsim.motions.kind import LIST_OR_RANGE, Array, Course, Geometry, MotionKind, Peaks, Start, in_turn
 from feedsim.motions.profile import Profile, rest_to_rest
 
 # Time at constant speed [s] below which a stroke says nothing of the stationary friction: the drive settles in it.
@@ -34,13 +34,9 @@ class SpeedRange(Model):
         return self
 
 
-def _list_or_range(value: Any) -> str:
-    return "[range]" if isinstance(value, (dict, SpeedRange)) else "[list]"
-
-
 Speeds = Annotated[
     Annotated[Annotated[tuple[Speed, ...], Field(min_length=1)], Tag("[list]")] | Annotated[SpeedRange, Tag("[range]")],
-    Discriminator(_list_or_range),
+    LIST_OR_RANGE,
 ]
 
 

@@ -12,6 +12,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Discriminator
 
 from feedsim.errors import InputError
 from feedsim.fields import Model
@@ -20,6 +21,10 @@ Array = NDArray[np.float64]
 
 # An instant within this share of a cycle of the grid lies on it: exact ends carry rounding errors.
 ON_GRID = 1e-6
+
+
+# Tells values that are a list ("[list]") from those that are {from: ..., to: ..., count: ...} ("[range]").
+LIST_OR_RANGE = Discriminator(lambda value: "[range]" if isinstance(value, (dict, Model)) else "[list]")
 
 
 class MotionKind(Model):

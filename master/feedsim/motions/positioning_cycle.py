@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Discriminator, Field, StrictInt, Tag, model_validator
+from pydantic import Field, StrictInt, Tag, model_validator
 
 from feedsim.fields import AxisName, Model, Quantity, fault
-from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Peaks, Start, in_turn
+from feedsim.motions.kind import LIST_OR_RANGE, Array, Course, Geometry, MotionKind, Peaks, Start, in_turn
 from feedsim.motions.path import Position
 from feedsim.motions.profile import rest_to_rest
 
@@ -24,14 +24,10 @@ class TargetRange(Model):
     count: Annotated[StrictInt, Field(ge=2, le=1000)] = Field(default=5, description="Number of targets")
 
 
-def _list_or_range(value: Any) -> str:
-    return "[range]" if isinstance(value, (dict, TargetRange)) else "[list]"
-
-
 Targets = Annotated[
     Annotated[Annotated[tuple[Position, ...], Field(min_length=2)], Tag("[list]")]
     | Annotated[TargetRange, Tag("[range]")],
-    Discriminator(_list_or_range),
+    LIST_OR_RANGE,
 ]
 
 

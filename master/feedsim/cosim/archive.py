@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import IO, Any
 
 from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
@@ -20,6 +20,7 @@ from fmpy.fmi2 import FMU2Slave
 from feedsim.cosim import signals, untrusted
 from feedsim.cosim.unpacked import STORE, Content, check_there
 from feedsim.errors import InputError
+from feedsim.owned import Closing
 
 _DESCRIPTION = "modelDescription.xml"
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # units of FMI 2.0
@@ -45,7 +46,7 @@ class UnitDefinition:
         return ".".join(f"{name}^{power}" for name, power in self.exponents.items()) or "1"
 
 
-class Archive:
+class Archive(Closing):
     """An ``.fmu`` file, unpacked for as long as this object is open (a context manager).
 
     Unpacked is what a run needs: description, resources, and the library for this platform. Archives of the same
@@ -90,12 +91,6 @@ class Archive:
         content, self._content = self._content, None
         if content is not None:
             STORE.give_back(content)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def declared_unit(self, name: str) -> str | None:
         """Unit of variable `name` as the archive declares it; None where it declares none."""

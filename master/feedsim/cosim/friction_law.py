@@ -7,7 +7,6 @@ import ctypes
 from collections.abc import Mapping
 from pathlib import Path
 from threading import Lock
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +16,7 @@ from feedsim.cosim.binaries import fmus_directory
 from feedsim.cosim.unit import Floats, Unit
 from feedsim.errors import InputError, SimulationError
 from feedsim.installation import mend
+from feedsim.owned import Closing
 
 RESPONSE = "friction_response"  # src/friction_fmu/response.h
 FREE_AXIS = "friction_free_axis"  # src/friction_fmu/free_axis.h
@@ -33,7 +33,7 @@ _FREE_AXIS = ctypes.CFUNCTYPE(
 )
 
 
-class FrictionLaw:
+class FrictionLaw(Closing):
     """The law of ``friction.fmu`` as a function, for as long as this object is open (a context manager).
 
     The numbers are those of stepping the unit with the slope of its speed. Calls are independent of each other and may
@@ -79,12 +79,6 @@ class FrictionLaw:
             self._unit.close()
             self._unit = None
         self._archive.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def __call__(
         self,

@@ -8,7 +8,7 @@ import os
 import re
 import signal
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
 from feedsim.errors import InputError
@@ -133,18 +133,9 @@ def _end(cluster: Any) -> None:
         process = getattr(getattr(nanny, "process", None), "process", None)
         nanny.auto_restart = False
         if process is not None and process.pid is not None:
-            with _suppressed():
+            with suppress(Exception):  # it is being ended anyway
                 os.kill(process.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
     cluster.close(timeout=5)
-
-
-@contextmanager
-def _suppressed() -> Iterator[None]:
-    """Faults of what is being ended anyway."""
-    try:
-        yield
-    except Exception as error:
-        logging.getLogger(__name__).debug("while ending: %s", error)
 
 
 @contextmanager

@@ -14,12 +14,11 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from feedsim.cosim.signals import held
 from feedsim.errors import InputError, OutputError
-from feedsim.owned import claimed
+from feedsim.owned import Closing, claimed
 from feedsim.sweep.design import Outcome
 
 NAME = "runs.jsonl"
@@ -28,7 +27,7 @@ FORMAT = 1
 SYNC = 1.0  # seconds after which what was written is on the disk at the latest
 
 
-class Journal:
+class Journal(Closing):
     """The journal of a folder, open for adding; a context manager.
 
     Attributes:
@@ -168,12 +167,6 @@ class Journal:
         self.sync()
         self._file.close()
         self._claim.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     def _count(self, outcome: Outcome) -> None:
         self.done.add(outcome.run)

@@ -19,6 +19,7 @@ from feedsim.scenario import load_machine
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure import read_modes
 from feedsim.structure.build import build
+from feedsim.structure.modes import write_modes
 from feedsim.structure.pack import pack
 from machine_helpers import write_machine, write_scenario
 
@@ -170,8 +171,9 @@ def test_pack_command_computes_the_modes_of_another_pose(tmp_path: Path, fmus: P
         packed = read_modes(archive.directory / "resources" / "modes.csv", list(pose))
     assert np.array_equal(packed.frequency, built.frequency)
     # Directly from the modes, the same archive.
-    given = {"modes": built, "pose": pose, "name": machine.name, "note": machine.note}
-    pack(fmus / "plant.fmu", tmp_path / "direct.fmu", **given)
+    table = tmp_path / "modes.csv"
+    write_modes(table, built)
+    pack(fmus / "plant.fmu", tmp_path / "direct.fmu", modes=table, pose=pose, name=machine.name, note=machine.note)
     assert (tmp_path / "direct.fmu").read_bytes() == out.read_bytes()
 
 

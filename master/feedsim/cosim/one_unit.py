@@ -30,7 +30,6 @@ def pack_whole(
     name: str = "",
     note: str = "",
     trial: bool = True,
-    level: int = 9,
 ) -> Packed:
     """Pack a machine into the archive `base` of the unit `machine`; write it to `out`, whole or not at all.
 
@@ -39,7 +38,6 @@ def pack_whole(
         program: motion that the unit holds; without, its setpoints are inputs.
         name, note: what the archive's description and documentation say of the machine.
         trial: instantiate the packed unit once, where the base has a binary for this platform.
-        level: of compression, 0 (none) to 9.
 
     Raises:
         InputError: a role is filled by another maker's unit, a file is not what it should be, or the unit refuses.
@@ -55,7 +53,7 @@ def pack_whole(
             setpoint_table(program) if program is not None else None,
             {name: whole_machine.spelled(value) for name, value in settings.items()},
         )
-        return packed(base, out, given, name=name, note=note, trial=trial, level=level)
+        return packed(base, out, given, name=name, note=note, trial=trial)
 
 
 def pack_tables(base: Path, out: Path, machine: Machine) -> None:

@@ -139,7 +139,7 @@ def run(
             scenario=scenario,
             program=program,
             trace=recording.trace(),
-            coupling=trust.energies(system, cycle),
+            coupling=trust.energies(cycle),
             wall_time=wall_time,
             units=system.archives,
             pose=pose,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from feedsim.cosim.roles import RoleUnit, archive_path, check_instances, filled
 from feedsim.cosim.unit import Floats, Port, Unexecuted, Unit
 from feedsim.errors import InputError
 from feedsim.nc import Program
+from feedsim.owned import Closing
 from feedsim.scenario import Machine
 from feedsim.scenario.roles import DRIVE, FRICTION, Role
 
@@ -48,7 +48,7 @@ class Contact:
     torque: Port  # M_fr
 
 
-class System:
+class System(Closing):
     """All units of a machine (a context manager that frees them).
 
     Without friction there are no friction units, and M_fr stays 0: a LuGre model cannot be parameterised away.
@@ -189,7 +189,7 @@ class System:
         for contact in self.contacts:
             contact.speed.set()
             contact.torque.get()
-        self.set_setpoints(program, 0)
+        self.set_setpoints(program)
         for control in self.controllers:
             control.measured.set()
             control.torque.get()
@@ -206,11 +206,11 @@ class System:
         for unit in self.instances.values():
             unit.exit_initialisation()
 
-    def set_setpoints(self, program: Program, i: int) -> None:
-        """Hand over the setpoints of position cycle i."""
+    def set_setpoints(self, program: Program) -> None:
+        """Hand over the first setpoints."""
         for axis, control in zip(self.axes, self.controllers, strict=True):
             columns = {"x_s": program.x_s[axis], "n_ffw": program.n_ffw[axis]}
-            control.setpoint.values[:] = [columns[name][i] for name in control.setpoint.names]
+            control.setpoint.values[:] = [columns[name][0] for name in control.setpoint.names]
             control.setpoint.set()
 
     @property
@@ -236,12 +236,6 @@ class System:
         for part in reversed(self._open):
             part.close()
         self._open.clear()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def plant_parameters(machine: Machine, modes_file: Path | None) -> dict[str, float | int | bool | str]:

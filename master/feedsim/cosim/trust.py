@@ -40,11 +40,11 @@ DRIVING, MATTERS = 0.5, 0.05
 AMISS, APART, SHOWN = 0.5, 0.1, 0.3
 
 
-def energies(system: System, cycle: Cycle) -> dict[str, float]:
+def energies(cycle: Cycle) -> dict[str, float]:
     """Per axis "A.residual", "A.residual_peak" and "A.friction_work" [J]; see feedsim.cosim.operations.Bond."""
     bond = cycle.bond
     kinds = {"residual": bond.residual, "residual_peak": bond.residual_peak, "friction_work": bond.dissipated}
-    return {f"{axis}.{kind}": float(kinds[kind][i]) for i, axis in enumerate(system.axes) for kind in kinds}
+    return {f"{axis}.{kind}": float(kinds[kind][i]) for i, axis in enumerate(cycle.system.axes) for kind in kinds}
 
 
 def foreseen(
@@ -61,7 +61,7 @@ def found(
     scenario: Scenario, cycle: Cycle, recording: Recording, loops: Sequence[Loop], loads: Sequence[Work] = ()
 ) -> tuple[str, ...]:
     """What the run itself tells a user to doubt, a sentence each."""
-    lost = _energy(scenario, cycle.system, cycle, loops)
+    lost = _energy(scenario, cycle, loops)
     told = (*_driving_loads(scenario, cycle, loads), *_contradicted_loads(scenario, loads))
     return (*lost, *_limits(recording), *told)
 
@@ -241,7 +241,7 @@ def _contradicted_loads(scenario: Scenario, loads: Sequence[Work]) -> list[str]:
     return told
 
 
-def _energy(scenario: Scenario, system: System, cycle: Cycle, loops: Sequence[Loop]) -> list[str]:
+def _energy(scenario: Scenario, cycle: Cycle, loops: Sequence[Loop]) -> list[str]:
     """The coupling is blamed where nothing else is known to make an axis chatter."""
     bond = cycle.bond
     if any(loop.growing for loop in loops):
@@ -254,7 +254,7 @@ def _energy(scenario: Scenario, system: System, cycle: Cycle, loops: Sequence[Lo
     return [
         f"axis {axis}: the exchange between plant and friction has lost {residual:.3g} J against {work:.3g} J of "
         f"friction work (scheme {cycle.scheme.name}, exchange step {cycle.step * 1e6:.6g} us): {why}"
-        for axis, residual, work in zip(system.axes, bond.residual_peak, np.abs(bond.dissipated), strict=True)
+        for axis, residual, work in zip(cycle.system.axes, bond.residual_peak, np.abs(bond.dissipated), strict=True)
         if residual > max(TRUSTED_SHARE * work, TRUSTED_ENERGY)
     ]
 

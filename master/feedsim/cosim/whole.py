@@ -73,7 +73,7 @@ class Whole(System):
 
     def initialise(self, program: Program, stop: float) -> None:
         self._enter_initialisation(stop)
-        self.set_setpoints(program, 0)
+        self.set_setpoints(program)
         for port in (self.plant_outputs, self.motor_torque, self.friction_torque):
             port.get()
         self.n_start[:] = self.n[:] = self.n_end

@@ -144,8 +144,7 @@ class _Problem:
 
     def weighted(self, left: Sequence[str], reasons: Mapping[str, str]) -> tuple[Fit, float]:
         """Fit with the plateaus' own noise; where that does not explain the scatter, with a share of torque added."""
-        starts = STARTS
-        found = self.fit(left, reasons, 0.0, starts)
+        found = self.fit(left, reasons, 0.0, STARTS)
         freedom = len(self.points.speed) - len(left)
         if freedom < 1 or 2 * found.cost <= chi2.ppf(DOUBTFUL, freedom):
             return found, 0.0
@@ -158,7 +157,7 @@ class _Problem:
                 low = middle
             else:
                 high = middle
-        return self.fit(left, reasons, high, starts, found), high
+        return self.fit(left, reasons, high, STARTS, found), high
 
     def fit(
         self, left: Sequence[str], reasons: Mapping[str, str], extra: float, starts: int, near: Fit | None = None
@@ -173,17 +172,15 @@ class _Problem:
 
         return fit(residuals, [self.parameter(name, begin[name]) for name in left], starts=starts, seed=self.seed)
 
-    def marginal(
-        self, found: Fit, reasons: Mapping[str, str], extra: float, warms: float = drift.WARMS
-    ) -> tuple[Array, Array]:
-        """Covariance (P, P) of what was found, and its part by warming, in which viscous friction changes by `warms`.
+    def marginal(self, found: Fit, reasons: Mapping[str, str], extra: float) -> tuple[Array, Array]:
+        """Covariance (P, P) of what was found, and its part by warming, which changes viscous friction.
 
         What is held because the plateaus do not tell it is not known: it adds what the rest would move by if it had
         another usual value, as far as the plateaus allow that one, and what it moves by if it has the value that suits
         them best. So does the course of viscous friction over time.
         """
         without, moved = self._hidden(found, reasons, extra, 0.0)
-        within, warmed = self._hidden(found, reasons, extra, warms)
+        within, warmed = self._hidden(found, reasons, extra, drift.WARMS)
         known = np.isfinite(within) & np.isfinite(without)
         part = np.where(known, within - np.where(known, without, 0.0), 0.0) + np.outer(warmed - moved, warmed - moved)
         # With nothing hidden what was found is the best there is, at a bound too.

@@ -43,12 +43,10 @@ class Exported:
     warnings: tuple[str, ...]
 
 
-def export(scenario: Scenario, out: Path, *, program: Program | None = None, fmus: Path | None = None) -> Exported:
+def export(scenario: Scenario, out: Path, *, fmus: Path | None = None) -> Exported:
     """Write `scenario` to the SSP file `out`, whole or not at all; the same bytes for the same scenario and archives.
 
-    Args:
-        program: the scenario's planned motions, where they are at hand already.
-        fmus: folder with the archives of the four units; default :func:`feedsim.cosim.fmus_directory`.
+    fmus: folder with the archives of the four units; default :func:`feedsim.cosim.fmus_directory`.
 
     Raises:
         InputError: the motion violates a limit, an archive is missing, a unit refuses its parameters, or there are
@@ -60,7 +58,7 @@ def export(scenario: Scenario, out: Path, *, program: Program | None = None, fmu
             f"{scenario.at('loads')}: an SSP file holds no loads; leave them out with --set loads=[], and connect the "
             "plant's inputs there"
         )
-    program = program or plan(scenario)
+    program = plan(scenario)
     fmus = fmus or fmus_directory()
     warnings = check(scenario, program, fmus=fmus)
     with TemporaryFolder() as folder, ExitStack() as stack:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 from feedsim.errors import InputError, OutputError
 from feedsim.owned import TemporaryFolder
-from feedsim.structure.modes import Modes, write_modes
 
 if TYPE_CHECKING:
     from feedsim.nc import Program
@@ -48,7 +47,7 @@ def pack(
     base: Path,
     out: Path,
     *,
-    modes: Modes | Path,
+    modes: Path,
     pose: Mapping[str, float],
     poses: Path | None = None,
     name: str = "",
@@ -59,7 +58,7 @@ def pack(
     """Pack a machine into the plant archive `base`; write it to `out`, whole or not at all.
 
     Args:
-        modes: modes at the pose, with the ports of all axes; of a file the bytes are packed as they are.
+        modes: table of the modes at the pose, with the ports of all axes; its bytes are packed as they are.
         pose: axis -> position at the start [m]; the axes in the order that the archive shall have them.
         poses: poses.bin, the modes of a grid of poses, for a plant that follows its axes.
         name, note: what the archive's description and documentation say of the machine.
@@ -70,13 +69,6 @@ def pack(
         InputError: a file is not what it should be, or the unit refuses the machine.
         OutputError: `out` cannot be written.
     """
-    if isinstance(modes, Modes):
-        with TemporaryFolder() as folder:
-            written = folder / "modes.csv"
-            write_modes(written, modes)
-            return pack(
-                base, out, modes=written, pose=pose, poses=poses, name=name, note=note, trial=trial, level=level
-            )  # fmt: skip
     with packaging():
         return packed(base, out, plant_tables(modes, pose, poses), name=name, note=note, trial=trial, level=level)
 

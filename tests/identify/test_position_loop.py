@@ -10,6 +10,7 @@ import pytest
 from feedsim.errors import InputError
 from feedsim.identify import Record, read_records
 from feedsim.identify.position_loop import setpoint_delay, speed_setpoint
+from feedsim.identify.result import NORMAL_95
 
 H = 2e-3
 
@@ -58,7 +59,7 @@ def test_interval_of_the_delay_holds_it() -> None:
     misses = 0
     for seed in range(40):
         found = setpoint_delay([record(4, [0.5, 0.5], noise=1e-4, seed=seed)])
-        misses += abs(found.delay - 4.5 * H) > found.half_width
+        misses += abs(found.delay - 4.5 * H) > NORMAL_95 * found.sigma
     assert misses <= 7
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from feedsim import units, variables
 from feedsim.errors import InputError
+from feedsim.fields import Quantity
 from feedsim.identify.record import Array
 from feedsim.identify.result import Estimate, Status
 from feedsim.scenario import Friction
@@ -55,12 +56,9 @@ class Kind:
     @property
     def range(self) -> str:
         """In words."""
-        low, high = units.show(self.lower, self.unit), units.show(self.upper, self.unit)
-        if self.above > -inf:
-            return f"more than {units.show(self.above, self.unit)}"
-        if self.lower == -inf:
+        if (self.lower, self.upper, self.above) == (-inf, inf, -inf):
             return "any finite value"
-        return f"at least {low}" if self.upper == inf else f"from {low} to {high}"
+        return Quantity(self.unit, self.lower, self.upper, self.above).range
 
     def check(self, what: str, value: float) -> None:
         """Raises InputError, which begins with `what`: the value is not finite or not possible."""

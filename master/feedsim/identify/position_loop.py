@@ -20,7 +20,6 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.identify.record import Array, Record
-from feedsim.identify.result import NORMAL_95
 
 LONGEST = 0.1  # [s]: no control delays its setpoint by more
 ROUNDING = 1e-13  # of the range of a signal: no residual is worth more
@@ -59,11 +58,6 @@ class Taps:
     def reach(self) -> int:
         """Rows at the begin of a record that it has no past for."""
         return self.first + len(self.weights) - 1
-
-    @property
-    def half_width(self) -> float:
-        """Of the 95 % interval of the delay [s]."""
-        return NORMAL_95 * self.sigma
 
     def of(self, values: Array) -> Array:
         """(N,) weighted past of values (N,); what lies ahead of them is as the first one."""

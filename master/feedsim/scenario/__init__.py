@@ -7,44 +7,12 @@ Start with load.py: ``load``.
 from feedsim.scenario.base import Base, Change
 from feedsim.scenario.load import Subject, load, load_machine, load_subject
 from feedsim.scenario.logging import Delay, Level, Logging, Noise, Quantisation
-from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine, PathLimits
-from feedsim.scenario.model import (
-    CircleTest,
-    Coupling,
-    Evaluation,
-    Positioning,
-    PositioningAccuracy,
-    Recording,
-    Scenario,
-)
+from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine
+from feedsim.scenario.model import CircleTest, Coupling, Positioning, PositioningAccuracy, Recording, Scenario
 from feedsim.scenario.roles import ForeignUnit
 
 __all__ = [
-    "Axis",
-    "Base",
-    "Change",
-    "CircleTest",
-    "Coupling",
-    "CurrentController",
-    "Cycles",
-    "Delay",
-    "Drive",
-    "Evaluation",
-    "Filter",
-    "ForeignUnit",
-    "Friction",
-    "Level",
-    "Logging",
-    "Machine",
-    "Noise",
-    "PathLimits",
-    "Positioning",
-    "PositioningAccuracy",
-    "Quantisation",
-    "Recording",
-    "Scenario",
-    "Subject",
-    "load",
-    "load_machine",
-    "load_subject",
-]
+    "Axis", "Base", "Change", "CircleTest", "Coupling", "CurrentController", "Cycles", "Delay", "Drive", "Filter",
+    "ForeignUnit", "Friction", "Level", "Logging", "Machine", "Noise", "Positioning", "PositioningAccuracy",
+    "Quantisation", "Recording", "Scenario", "Subject", "load", "load_machine", "load_subject",
+]  # fmt: skip

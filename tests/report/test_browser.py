@@ -13,8 +13,10 @@ import pytest
 
 from feedsim.analysis import evaluate
 from feedsim.report import run as report
+from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.content import Report
 from feedsim.report.page import html
+from feedsim.report.picture import Picture
 from feedsim.report.style import PALETTE
 from report_helpers import FakeRun, circle_run, positioning_run
 
@@ -270,6 +272,38 @@ def test_on_paper_panels_stand_side_by_side(pages: dict[str, Any]) -> None:
     assert max(across) > 720  # of the one with three columns
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     page.set_viewport_size(size)
+
+
+def test_other_units_at_the_other_side_and_axes_that_are_logarithmic_both_ways(browser: Any, tmp_path: Path) -> None:
+    x = np.linspace(0.0, 10.0, 200)
+    across = Axis("v", "rad/s", span=(0.0, 10.0), also=("feed", "mm/min", 60.0))
+    up = Axis("M", "N·m", span=(0.0, 4.0), also=("force", "N", 500.0))
+    both_ways = Panel("", Axis("t", "s"), Axis("n", symlog=1.0), [Curve("", x, 4000 * np.sin(x))])
+    chart = Chart([Panel("", across, up, [Curve("", x, x)]), both_ways])
+    (tmp_path / "report.html").write_text(html(Report("t", "", [Picture("one", "t", "", chart)], "")), encoding="utf-8")
+    page = browser.new_page(viewport={"width": 1200, "height": 900})
+    said: list[str] = []
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.goto((tmp_path / "report.html").as_uri())
+    page.wait_for_selector(".still", state="detached")
+    panels = [
+        dict(
+            page.locator(f"#one svg.chart > g:nth-of-type({k}) > text").evaluate_all(
+                "all => all.map(each => [`${each.textContent} ${each.getAttribute('y') < 60}`, "
+                "[Number(each.getAttribute('x')), Number(each.getAttribute('y'))]])"
+            )
+        )
+        for k in (1, 2)
+    ]
+    page.close()
+    assert said == []
+    first, second = panels
+    assert {"v [rad/s]", "M [N·m]", "feed [mm/min]", "force [N]"} <= {text.rpartition(" ")[0] for text in first}
+    assert first["300 true"][0] == pytest.approx(first["5 false"][0], abs=0.2)
+    assert first["1000 false"][1] == pytest.approx(first["2 false"][1], abs=0.2)
+    place = {text.rpartition(" ")[0]: y for text, (_, y) in second.items()}
+    assert place["100"] - place["1000"] == pytest.approx(place["10"] - place["100"], rel=0.06)  # far from zero
+    assert place["0"] == pytest.approx((place["1000"] + place["−1000"]) / 2, abs=0.2)
 
 
 def test_without_script_there_is_a_still_picture(browser: Any, runs: dict[str, tuple[FakeRun, Path]]) -> None:

@@ -16,6 +16,7 @@ import pytest
 from feedsim.errors import OutputError
 from feedsim.identify.friction_file import open_loop_line
 from feedsim.identify.result import Balance, Correlation, Identification
+from feedsim.report.chart import Grid
 from feedsim.report.identify import check_writable, headline, rigid_line, table_lines, terminal_warnings, write
 from feedsim.report.identify.plots import (
     _length,
@@ -333,6 +334,7 @@ class TestFigures:
         picture = plateaus_picture(self.found, replace(stage, plateaus=spread), many)
         assert picture is not None
         assert "2 more records with plateaus are not shown" in picture.caption
+        assert picture.png
 
     def test_loops_show_each_move_once(self) -> None:
         stage = self.found.dynamic
@@ -374,6 +376,15 @@ class TestFigures:
         matrix = np.array([[1, 0.95, np.nan], [0.95, 1, -0.2], [np.nan, -0.2, 1]])
         picture = correlation_picture("Z", Correlation(names, matrix))
         assert picture is not None
+        assert picture.chart is not None
+        (grid,) = picture.chart.panels
+        assert isinstance(grid, Grid)
+        np.testing.assert_array_equal(
+            grid.values, [[np.nan, 0.95, np.nan], [0.95, np.nan, -0.2], [np.nan, -0.2, np.nan]]
+        )
+        assert grid.bold is not None
+        assert np.argwhere(grid.bold).tolist() == [[0, 1], [1, 0]]
+        assert picture.png
         assert correlation_picture("Z", Correlation(("F_C",), np.eye(1))) is None
 
 

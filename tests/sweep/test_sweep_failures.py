@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from feedsim.report.chart import Panel
 from feedsim.report.sweep.account import Account, measures
 from feedsim.report.sweep.figure_plots import scatter_picture
 from feedsim.scenario.study import load_study
@@ -114,4 +115,11 @@ def test_runs_without_a_value_are_marked_in_the_picture(tmp_path: Path) -> None:
     account = account_of(tmp_path, "{method: latin_hypercube, runs: 60}", "F_S < 0.2")
     picture = scatter_picture(account.outputs[0], account.inputs, measures(account)["XZ.G"], "g")
     assert picture is not None
-    assert "a cross on the axis" in picture.caption
+    assert "a stroke at the foot" in picture.caption
+    assert picture.chart is not None
+    panel = picture.chart.panels[0]
+    assert isinstance(panel, Panel)
+    output, each = account.outputs[0], next(each for each in account.inputs if each.name == panel.title)
+    strokes = [level for level in panel.levels if level.upright]
+    assert sorted(level.at for level in strokes) == sorted(each.sample[~np.isfinite(output.sample)].tolist())
+    assert all(level.ends is not None and level.ends[1] < float(output.known.min()) for level in strokes)

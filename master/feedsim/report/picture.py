@@ -1,4 +1,4 @@
-"""A figure of a report: what it shows as data, for pages, and what draws it, for print."""
+"""A figure of a report, for its page and for print."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from feedsim.errors import InputError, OutputError
 from feedsim.report.chart import Chart
+from feedsim.report.chart.printed import printed
 from feedsim.report.style import PALETTE, PAPER, REMARK, Drawn, said
 
 # Files that a drawing is written as.
@@ -18,23 +19,31 @@ KINDS = ("png", "svg")
 
 @dataclass(frozen=True, repr=False)
 class Picture:
-    """A figure: file stem, title, caption (plain text), and what draws it, once it is asked for.
+    """A figure: file stem, title, caption (plain text), and what it shows: a chart, or what draws it.
 
-    chart: the same as data, which a page draws by itself; without one the page holds the drawing.
+    A chart is drawn by the page, and by matplotlib once a drawing is asked for; of what is no chart the page holds the
+    drawing. worded: title and caption stand within the drawing of a chart.
     """
 
     stem: str
     title: str
     caption: str
-    draw: Callable[[], Drawn]
-    chart: Chart | None = None
+    shows: Chart | Callable[[], Drawn]
+    worded: bool = False
     remark: str = field(default_factory=lambda: REMARK.get())
+
+    @property
+    def chart(self) -> Chart | None:
+        """What it shows as data; None where it is no chart."""
+        return self.shows if isinstance(self.shows, Chart) else None
 
     @cached_property
     def drawn(self) -> Drawn:
         """The figure as matplotlib draws it."""
         with said(self.remark):
-            return self.draw()
+            if isinstance(self.shows, Chart):
+                return printed(self.shows, self.stem, self.title, self.caption, worded=self.worded)
+            return self.shows()
 
     @property
     def png(self) -> bytes:

@@ -10,12 +10,11 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from html import escape
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings, filterwarnings
 
@@ -59,9 +58,6 @@ PNG_DPI = 160
 PNG_EFFORT = {"compress_level": 3}
 # An inline SVG above this size [bytes] is put into the page as PNG instead.
 LARGEST_SVG = 400_000
-# Points per curve that a figure some 1500 pixels wide can show: least and largest value of every bin are kept.
-MOST_POINTS = 6000
-
 
 # What stands in small print in every figure that is finished inside remarked().
 REMARK: ContextVar[str] = ContextVar("remark", default="")
@@ -150,10 +146,14 @@ def said(remark: str) -> Iterator[None]:
         REMARK.reset(token)
 
 
-def finish(figure: Drawing, stem: str, title: str, caption: str = "", *, worded: bool = False) -> Drawn:
+def finish(
+    figure: Drawing, stem: str, title: str, caption: str = "", *, worded: bool = False,
+    then: Callable[[], object] = lambda: None,
+) -> Drawn:  # fmt: skip
     """Render ``figure``; call inside its ``drawing``. The result depends on nothing but what was drawn.
 
-    worded: title and caption stand above the PNG, which travels alone; the page has them beside the SVG.
+    worded: title and caption stand above the PNG, which travels alone; the page has them beside the SVG. then: called
+    when the layout is known. Legends of the figure stand above everything but these words.
     """
     head, words_above = _head(figure, title, caption) if worded else (0.0, [])
     if remark := REMARK.get():
@@ -161,6 +161,11 @@ def finish(figure: Drawing, stem: str, title: str, caption: str = "", *, worded:
         words.set_in_layout(False)
         words.set_y(0.995 - head / figure.get_figheight())
     room = head + (0.13 * (1 + remark.count("\n")) if remark else 0.0)
+    for legend in figure.legends:
+        tall = legend.get_window_extent().height / figure.dpi
+        figure.set_figheight(figure.get_figheight() + tall)
+        legend.set_bbox_to_anchor((0.06 / figure.get_figwidth(), 1 - (room + 0.04) / figure.get_figheight()))
+        room += tall
     if room:
         layout: Any = figure.get_layout_engine()
         layout.set(rect=(0, 0, 1, 1 - room / figure.get_figheight()))  # inches to a share of the height
@@ -170,7 +175,7 @@ def finish(figure: Drawing, stem: str, title: str, caption: str = "", *, worded:
     with catch_warnings():
         # Names in scripts that the font lacks; the page around the picture has them.
         filterwarnings("ignore", message=r"Glyph \d+ .*missing from")
-        _lay_out(figure)
+        _lay_out(figure, then)
         figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None}, pil_kwargs=PNG_EFFORT)
         figure.patch.set_visible(False)
         for text in words_above:
@@ -201,28 +206,15 @@ def _head(figure: Drawing, title: str, caption: str) -> tuple[float, list[Text]]
     return head, texts
 
 
-def _lay_out(figure: Drawing) -> None:
+def _lay_out(figure: Drawing, then: Callable[[], object]) -> None:
     """Give the rooms their places once: saving would for each format, and draw everything once more to do it."""
     engine = figure.get_layout_engine()
     if engine is not None:
         dpi, figure.dpi = figure.dpi, PNG_DPI
         engine.execute(figure)
-        figure.dpi = dpi
         figure.set_layout_engine(None)  # "none" would leave one that does nothing, but costs as much
-
-
-def thinned(x: Array, *ys: Array) -> tuple[Array, ...]:
-    """x and ys, thinned to MOST_POINTS rows at most, keeping the extremes of every y in every bin (x increasing)."""
-    if len(x) <= MOST_POINTS:
-        return (x, *ys)
-    bins = MOST_POINTS // (2 * len(ys))
-    edges = np.linspace(0, len(x), bins + 1).astype(int)
-    keep = {0, len(x) - 1}
-    for first, last in pairwise(edges.tolist()):
-        for y in ys:
-            keep |= {first + int(np.argmin(y[first:last])), first + int(np.argmax(y[first:last]))}
-    rows = np.array(sorted(keep))
-    return (x[rows], *(y[rows] for y in ys))
+        then()
+        figure.dpi = dpi
 
 
 def _inline(svg: str, stem: str, title: str) -> str:

@@ -1,8 +1,8 @@
-"""Charts as data: what a page draws by itself, to be zoomed into and read with a cursor, and what it shows without.
+"""Charts as data: what a page draws by itself, to be zoomed into and read with a cursor, and what is drawn of it once.
 
 May use the report's palette. The script that draws charts in a page: template/*.js.
-Start with model.py, which says what a chart is; embedded.py is how a page holds its curves, still.py draws it once for
-readers without script.
+Start with model.py, which says what a chart is; embedded.py is how a page holds its curves, still.py draws it for
+readers without script, printed.py for print.
 """
 
 from feedsim.report.chart.model import (

@@ -58,7 +58,8 @@ def _part(part: Part, pool: _Pool) -> dict[str, Any]:
     if isinstance(part, Grid):
         return {
             "kind": "grid", "title": part.title, "columns": list(part.columns), "rows": list(part.rows),
-            "values": pool(part.values.ravel()), "span": list(part.span), "digits": part.digits,
+            "values": pool(part.values.ravel()), "span": list(part.span), "decimals": part.decimals,
+            **({} if part.bold is None else {"bold": np.flatnonzero(part.bold).tolist()}),
         }  # fmt: skip
     return {
         "kind": "xy", "title": part.title, "x": _axis(part.x), "y": _axis(part.y),
@@ -70,7 +71,8 @@ def _part(part: Part, pool: _Pool) -> dict[str, Any]:
 
 def _axis(axis: Axis) -> dict[str, Any]:
     span = list(axis.span) if axis.span is not None else None
-    return {"label": axis.label, "unit": axis.unit, "log": axis.log, "span": span, "names": list(axis.names)}
+    more = {name: value for name, value in (("symlog", axis.symlog), ("also", list(axis.also or ()))) if value}
+    return {"label": axis.label, "unit": axis.unit, "log": axis.log, "span": span, "names": list(axis.names), **more}
 
 
 def _curve(curve: Curve, pool: _Pool) -> dict[str, Any]:

@@ -28,6 +28,8 @@ class Axis:
         label: quantity; unit: as it is printed, "" for a plain number.
         log: logarithmic. span: shown at first; None: all of the curves.
         names: of the values 0, 1, 2, ..., where they are no numbers.
+        symlog: logarithmic in both directions, linear within this distance from zero.
+        also: quantity and unit at the other side of the panel, and its factor.
     """
 
     label: str
@@ -35,6 +37,8 @@ class Axis:
     log: bool = False
     span: tuple[float, float] | None = None
     names: Sequence[str] = ()
+    symlog: float = 0.0
+    also: tuple[str, str, float] | None = None
 
     @property
     def title(self) -> str:
@@ -151,12 +155,23 @@ class Polar:
     sense: int = 0
     note: str = ""
 
+    @property
+    def gap(self) -> float:
+        """Distance of the rings as drawn, where the programmed circle's radius is 1."""
+        return {1: 0.36, 2: 0.24}[self.rings]
+
+    @property
+    def magnification(self) -> float:
+        """How many times larger than the circle its deviations are drawn."""
+        return self.gap / self.ring * 1e3 * self.radius
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Numbers in cells, coloured by their size; a number that is not finite leaves its cell empty.
 
-    span: the values of the palest and the deepest colour; about zero, signs have colours of their own.
+    span: the values of the palest and the deepest colour; about zero, signs have colours of their own. decimals: of the
+    numbers; None: three digits that count. bold: cells that stand out.
     """
 
     title: str
@@ -164,8 +179,8 @@ class Grid:
     rows: Sequence[str]
     values: Array
     span: tuple[float, float]
-    digits: int = 2
-    heading: str = ""
+    decimals: int | None = None
+    bold: NDArray[np.bool_] | None = None
 
 
 Part = Panel | Polar | Grid

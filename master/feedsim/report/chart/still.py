@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from html import escape
 
 import numpy as np
 
-from feedsim.report.chart.model import Axis, Chart, Curve, Grid, Panel, Polar, extremes, spans
-from feedsim.report.formatting import minus
+from feedsim.report.chart.model import Axis, Chart, Curve, Grid, Panel, Polar, extremes
+from feedsim.report.chart.scales import bent, ranges, ticks
+from feedsim.report.formatting import minus, powers
 from feedsim.report.style import INK, MUTED, Array, named
 
 WIDTH, HEIGHT, ROUND = 960.0, 250.0, 430.0
@@ -17,7 +18,6 @@ LEFT, RIGHT, TOP, BOTTOM = 62.0, 12.0, 26.0, 42.0
 MOST_ROWS = 400  # of a curve: two for a pixel or so
 DASHES = {"": "", "dashed": ' stroke-dasharray="6 3"', "dotted": ' stroke-dasharray="2 3"'}
 Scaled = Callable[[Array | float], Array]  # values to pixels
-PHASES = (15, 30, 45, 90, 180, 360, 720, 1440)
 
 
 def still(chart: Chart, stem: str, title: str) -> str:
@@ -69,32 +69,31 @@ def _panel(panel: Panel, width: float, height: float, name: str) -> str:
     left = max(LEFT, max((6.6 * len(each) + 20 for each in panel.y.names), default=0.0))
     right, bottom = width - RIGHT, height - BOTTOM
     curves = [each for each in panel.curves if len(each.x)]
-    across_span = _reach(panel.x, spans([each.x for each in curves]), 0.0)
-    heights = [_seen(each, panel.x, across_span) for each in curves] + [np.array([mark.y for mark in panel.marks])]
-    up_span = _reach(
-        panel.y, spans([np.where(each > 0, each, np.nan) if panel.y.log else each for each in heights]), 0.07
-    )
+    across_span, up_span = ranges(panel)
     parts = [_text(left if not panel.y.names else 2, 15, panel.title, "font-weight='600'")]
 
     def across(x: Array | float) -> Array:
         return _scaled(x, across_span, left, right, panel.x.log)
 
     def up(y: Array | float) -> Array:
+        if within := panel.y.symlog:
+            low, high = (float(bent(within, each)) for each in up_span)
+            return _scaled(bent(within, y), (low, high), bottom, TOP, False)
         return _scaled(y, up_span, bottom, TOP, panel.y.log)
 
     grid = []
-    for at, text in _ticks(panel.x, across_span, (right - left) / 74):
+    for at, text in ticks(panel.x, across_span, (right - left) / 74):
         grid.append(f"M{float(across(at)):.1f} {TOP:g}V{bottom:g}")
         seen = min(float(across(at)), width - 3.6 * len(text))  # the last one stays inside
         parts.append(_text(seen, bottom + 16, text, "text-anchor='middle'"))
-    for at, text in _ticks(panel.y, up_span, (bottom - TOP) / 34):
+    for at, text in ticks(panel.y, up_span, (bottom - TOP) / 34):
         grid.append(f"M{left:g} {float(up(at)):.1f}H{right:g}")
         parts.append(_text(left - 6, float(up(at)) + 4, text, "text-anchor='end'"))
     parts.append(f'<path d="{"".join(grid)}" stroke="var(--grid)" stroke-width=".8" fill="none"/>')
-    parts.append(_text((left + right) / 2, bottom + 34, panel.x.title, "text-anchor='middle'"))
+    parts.append(_text((left + right) / 2, bottom + 34, _named(panel.x), "text-anchor='middle'"))
     if not panel.y.names:
         middle = f"text-anchor='middle' transform='translate(13 {(TOP + bottom) / 2:g}) rotate(-90)'"
-        parts.append(_text(0, 0, panel.y.title, middle))
+        parts.append(_text(0, 0, _named(panel.y), middle))
     box = f'x="{left:g}" y="{TOP:g}" width="{right - left:g}" height="{bottom - TOP:g}"'
     inside = [f'<clipPath id="{name}"><rect {box}/></clipPath>',
               f'<g clip-path="url(#{name})" fill="none">']  # fmt: skip
@@ -135,6 +134,11 @@ def _panel(panel: Panel, width: float, height: float, name: str) -> str:
     return "".join([*parts, *inside, "</g>", frame, *notes])
 
 
+def _named(axis: Axis) -> str:
+    """What stands along an axis, and what it is in the other unit."""
+    return axis.title + (f", 1 {axis.unit} is {axis.also[2]:.4g} {axis.also[1]}" if axis.also is not None else "")
+
+
 def _curve(curve: Curve, span: tuple[float, float], across: Scaled, up: Scaled, zero: float) -> str:
     x, y = curve.x, curve.y
     if curve.ascending:
@@ -155,7 +159,7 @@ def _curve(curve: Curve, span: tuple[float, float], across: Scaled, up: Scaled, 
 
 
 def _polar(panel: Polar, width: float, height: float) -> str:
-    gap = {1: 0.36, 2: 0.24}[panel.rings]
+    gap = panel.gap
     half = min(width, height - 24) / 2 - 20
     cx, cy, one = width / 2, 24 + (height - 24) / 2, half / (1 + 1.16 * gap * panel.rings)
     parts = [_text(4, 15, panel.title, "font-weight='600'")]
@@ -201,8 +205,6 @@ def _polar(panel: Polar, width: float, height: float) -> str:
 def _grid(grid: Grid, width: float) -> str:
     left, top = min(260.0, 16 + 6.4 * max(map(len, grid.rows))), _over(grid)
     cell = min(64.0, (width - left - 8) / len(grid.columns))
-    low, high = grid.span
-    signs = low < 0 < high
     parts = [_text(4, 15, grid.title, "font-weight='600'")]
     for j, name in enumerate(grid.columns):
         parts.append(
@@ -219,38 +221,32 @@ def _grid(grid: Grid, width: float) -> str:
             value = float(grid.values[i, j])
             if not math.isfinite(value):
                 continue
-            share = abs(value) / max(-low, high) if signs else (value - low) / (high - low or 1)
-            colour, deep = "vermillion" if signs and value < 0 else "blue", 0.75 * min(1, max(0, share))
+            deep, negative = share_of(value, grid)
+            colour = "vermillion" if negative else "blue"
             box = f'x="{left + j * cell:.1f}" y="{top + 24 * i:g}" width="{cell:.1f}" height="24"'
             parts.append(f'<rect {box} fill="var(--{colour})" fill-opacity="{deep:.2f}" stroke="var(--grid)"/>')
             if cell >= 30:
-                parts.append(_text(left + (j + 0.5) * cell, top + 24 * i + 16, _digits(value, grid),
-                                   "font-size='11' text-anchor='middle'"))  # fmt: skip
+                weight = " font-weight='700'" if grid.bold is not None and grid.bold[i, j] else ""
+                parts.append(_text(left + (j + 0.5) * cell, top + 24 * i + 16, cell_text(value, grid),
+                                   f"font-size='11' text-anchor='middle'{weight}"))  # fmt: skip
     return "".join(parts)
 
 
-def _digits(value: float, grid: Grid) -> str:
-    return minus(f"{value:.{grid.digits + (not grid.span[0] < 0 < grid.span[1])}g}")
+def share_of(value: float, grid: Grid) -> tuple[float, bool]:
+    """How deep the colour of a cell is, from 0 to 1, and whether it is that of negative values."""
+    low, high = grid.span
+    signs = low < 0 < high
+    share = abs(value) / max(-low, high) if signs else (value - low) / (high - low or 1)
+    return 0.75 * min(1.0, max(0.0, share)), signs and value < 0
+
+
+def cell_text(value: float, grid: Grid) -> str:
+    """The number of a cell."""
+    return minus(powers(f"{value:.3g}") if grid.decimals is None else f"{value:.{grid.decimals}f}")
 
 
 def _over(grid: Grid) -> float:
     return 36 + 4.3 * max(map(len, grid.columns))
-
-
-def _seen(curve: Curve, axis: Axis, span: tuple[float, float]) -> Array:
-    if axis.span is None:
-        return np.append(curve.y, 0.0) if curve.filled else curve.y
-    return curve.y[(curve.x >= span[0]) & (curve.x <= span[1])]
-
-
-def _reach(axis: Axis, found: tuple[float, float] | None, room: float) -> tuple[float, float]:
-    if axis.span is not None:
-        return axis.span
-    low, high = found or ((0.1, 10.0) if axis.log else (0.0, 1.0))
-    if axis.log:
-        return (low, high) if not room and high > low else (low / 1.3, high * 1.3)
-    more = room * (high - low) or (0.0 if high > low else 0.05 * abs(high) or 0.5)
-    return low - more, high + more
 
 
 def _scaled(value: Array | float, span: tuple[float, float], first: float, last: float, log: bool) -> Array:
@@ -260,29 +256,6 @@ def _scaled(value: Array | float, span: tuple[float, float], first: float, last:
             v = np.log10(np.where(v > 0, v, np.nan))
         low, high = math.log10(low), math.log10(high)
     return np.asarray(first + (v - low) / ((high - low) or 1.0) * (last - first))
-
-
-def _ticks(axis: Axis, span: tuple[float, float], most: float) -> Iterator[tuple[float, str]]:
-    low, high = span
-    most = max(2.0, most)
-    if axis.names:
-        yield from ((float(k), name) for k, name in enumerate(axis.names) if low <= k <= high)
-        return
-    if axis.log and high / low > 8:
-        few = high / low < 150
-        for k in range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1):
-            for part in (1, 2, 5) if few else (1,):
-                if low * 0.9999 <= part * 10.0**k <= high * 1.0001:
-                    yield part * 10.0**k, f"{part * 10.0**k:g}"
-        return
-    rough = (high - low) / most
-    if axis.unit == "°" and high - low > 60:
-        step = float(next((each for each in PHASES if each >= rough), PHASES[-1]))
-    else:
-        decade = 10.0 ** math.floor(math.log10(rough)) if rough > 0 else 1.0
-        step = decade * next((each for each in (1, 2, 5, 10) if each * decade >= 0.999 * rough), 10)
-    for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1):
-        yield k * step, minus(f"{k * step:.6g}")
 
 
 def _path(a: Array, b: Array) -> str:

@@ -22,9 +22,8 @@ from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.run import circle_plots
-from feedsim.report.run.charts import circle_chart, turned
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
-from feedsim.report.style import BLUE, MUTED, VERMILLION, Array, Drawn, drawing, finish
+from feedsim.report.style import BLUE, MUTED, VERMILLION, Array
 
 FORMAT = 1
 SENSES = {1: ("counterclockwise", BLUE), -1: ("clockwise", VERMILLION)}
@@ -123,41 +122,22 @@ def picture(circle: CircleUnderTest, recorded: RecordedCircle, diagnosis: Diagno
     """All turns over each other, magnified, and what the model says of them."""
     turns = _centred([turn.path for turn in recorded.turns], circle, diagnosis, recorded.centred)
     on = circle_plots.circle(circle, max(float(np.abs(turn.deviation).max()) for turn in turns))
-    ring, rings = on.ring, on.rings
     fitted = _centred(
         [TurnedPath(a, e, s) for (a, e), s in zip(diagnosis.rest, diagnosis.senses, strict=True)],
         circle, diagnosis, recorded.centred,
     )  # fmt: skip
     plane = f"{circle.axes[0]}-{circle.axes[1]}"
-
-    def draw() -> Drawn:
-        with drawing(10.0, 6.0) as figure:
-            polar, unrolled = figure.subplots(1, 2, width_ratios=[1.35, 1])
-            circle_plots.polar_ground(polar, circle, ring, rings)
-            seen: set[int] = set()
-            for turn in turns:
-                words, colour = SENSES[turn.sense]
-                look = {"color": colour, "linewidth": 1.3, "label": "" if turn.sense in seen else words}
-                seen.add(turn.sense)
-                circle_plots.polar_curve(polar, turn, ring, rings, **look)
-                circle_plots.unrolled_curve(unrolled, turn, **look)
-            for i, turn in enumerate(fitted):
-                label = "" if i else "model without peaks"
-                circle_plots.unrolled_curve(
-                    unrolled, turn, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label=label
-                )
-            circle_plots.unrolled_ground(unrolled, circle)
-            return finish(figure, f"circle-{plane}", f"Recorded circle in the plane {plane}", caption)
-
     caption = (
         f"Radius {circle.radius * 1e3:.6g} mm. Radius deviation magnified "
-        f"{circle_plots.magnification(on):,.0f} times; rings at ±{ring:g} µm about the "
+        f"{on.magnification:,.0f} times; rings at ±{on.ring:g} µm about the "
         f"circle{', about its fitted centre' if recorded.centred else ''}. Dashed: the fitted model without peaks."
     )
-    curves = [turned(*SENSES[turn.sense], turn.angle, turn.deviation) for turn in turns]
-    curves += [turned("model without peaks", MUTED, each.angle, each.deviation, "dashed", 0.9) for each in fitted]
-    chart = circle_chart(on, curves)
-    return Picture(f"circle-{plane}", f"Recorded circle in the plane {plane}", caption, draw, chart)
+    curves = [circle_plots.turned(*SENSES[turn.sense], turn.angle, turn.deviation) for turn in turns]
+    curves += [
+        circle_plots.turned("model without peaks", MUTED, each.angle, each.deviation, "dashed", 0.9) for each in fitted
+    ]
+    title = f"Recorded circle in the plane {plane}"
+    return Picture(f"circle-{plane}", title, caption, circle_plots.circle_chart(on, curves))
 
 
 def _centred(

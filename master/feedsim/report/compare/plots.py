@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from feedsim.compare import Comparison, Curves, Variable, along, seconds
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Mark, Panel
 from feedsim.report.formatting import display_unit, minus, powers
-from feedsim.report.labels import heading, legend_above
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, GREEN, MUTED, VERMILLION, Array, Drawn, drawing, finish, thinned
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from feedsim.report.style import BLUE, GREEN, MUTED, VERMILLION, Array
 
 MOST = 4  # variables in a picture
 AROUND = 60  # rows of the result to either side of the worst one
-SHADE = 0.18
 FAR = 1e30  # beyond every panel
 
 
@@ -35,18 +28,6 @@ def picture_of(comparison: Comparison, number: int) -> Picture | None:
     variables = drawn(comparison)
     if not variables:
         return None
-
-    def draw() -> Drawn:
-        with drawing(10.0, 0.5 + 2.9 * len(variables)) as figure:
-            rooms = figure.subplots(len(variables), 2, squeeze=False, width_ratios=[1.5, 1])
-            for (whole, near), variable in zip(rooms, variables, strict=True):
-                assert variable.curves is not None
-                _whole(whole, variable, variable.curves)
-                _near(near, variable, variable.curves)
-            for axes in rooms[-1]:
-                axes.set_xlabel("time [s]")
-            return finish(figure, f"comparison-{number}", title, caption)
-
     outside = len(comparison.those("different"))
     shown = f"the {len(variables)} worst of {outside} variables outside" if outside > len(variables) else ""
     title = f"{comparison.result} against {comparison.reference}"
@@ -56,7 +37,7 @@ def picture_of(comparison: Comparison, number: int) -> Picture | None:
         "ground is shaded." + (f" Drawn are {shown}." if shown else "")
     )
     panels = [panel for variable in variables for panel in _panels(variable)]
-    return Picture(f"comparison-{number}", title, caption, draw, Chart(panels, (1.5, 1.0)))
+    return Picture(f"comparison-{number}", title, caption, Chart(panels, (1.5, 1.0)))
 
 
 def _panels(variable: Variable) -> list[Panel]:
@@ -109,53 +90,6 @@ def _around(variable: Variable, curves: Curves) -> slice:
 def _worst(variable: Variable) -> str:
     off = f"{variable.deviation:.3g} of {variable.allowed:.3g} {display_unit(variable.unit)}".strip()
     return (minus(powers(off)) if np.isfinite(variable.deviation) else "no number") + f" at {variable.time:.6g} s"
-
-
-def _whole(axes: Axes, variable: Variable, curves: Curves) -> None:
-    _band(axes, curves, slice(None))
-    _outside(axes, curves, slice(None))
-    axes.plot(*thinned(curves.reference_time, curves.reference), color=MUTED, linewidth=1.1, label="reference",
-              drawstyle="steps-post" if curves.hold else "default")  # fmt: skip
-    axes.plot(*thinned(curves.time, curves.values), color=BLUE, linewidth=1.3, label="result")
-    axes.axvline(variable.time, color=VERMILLION if variable.outside else MUTED, linewidth=0.9, linestyle=(0, (1, 2)))
-    unit = display_unit(variable.unit)
-    axes.set_ylabel(f"{variable.name} [{unit}]" if unit else variable.name)
-    axes.margins(x=0.01)
-    heading(axes, variable.name)
-    legend_above(axes)
-
-
-def _near(axes: Axes, variable: Variable, curves: Curves) -> None:
-    part = _around(variable, curves)
-    time = curves.time[part]
-    expected = along(curves.reference_time, curves.reference, time)
-    axes.fill_between(
-        time, curves.lower[part] - expected, curves.upper[part] - expected, color=GREEN, alpha=SHADE, lw=0
-    )
-    _outside(axes, curves, part)
-    axes.axhline(0.0, color=MUTED, linewidth=1.1)
-    axes.plot(time, curves.values[part] - expected, color=BLUE, linewidth=1.3, marker=".", markersize=3)
-    if np.isfinite(variable.value):
-        there = variable.value - along(curves.reference_time, curves.reference, np.array([variable.time]))
-        colour = VERMILLION if variable.outside else BLUE
-        axes.plot([variable.time], there, color=colour, marker="o", markersize=6)
-    unit = display_unit(variable.unit)
-    heading(axes, _worst(variable))
-    axes.set_ylabel(f"less the reference [{unit}]" if unit else "less the reference")
-    axes.margins(x=0.01)
-
-
-def _band(axes: Axes, curves: Curves, part: slice) -> None:
-    time, lower, upper = thinned(curves.time[part], curves.lower[part], curves.upper[part])
-    axes.fill_between(time, lower, upper, color=GREEN, alpha=SHADE, linewidth=0, label="tolerance")
-    for edge in (lower, upper):
-        axes.plot(time, edge, color=GREEN, linewidth=0.6, alpha=0.8)
-
-
-def _outside(axes: Axes, curves: Curves, part: slice) -> None:
-    """Shade the spans of time in which the result is outside."""
-    for begin, end in _spans(curves, part):
-        axes.axvspan(begin, end, color=VERMILLION, alpha=SHADE, linewidth=0)
 
 
 def _spans(curves: Curves, part: slice) -> list[tuple[float, float]]:

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from feedsim.analysis import Contour, Turn, contour
 from feedsim.analysis.circularity import quadrant
 from feedsim.analysis.compensation import Compensation, Variation
-from feedsim.report.chart import Axis, Chart, Curve, Level, Panel
+from feedsim.report.chart import Axis, Chart, Curve, Level, Panel, spans
 from feedsim.report.formatting import minus
-from feedsim.report.labels import heading, legend_above, reversed_note, torque_label
 from feedsim.report.picture import Picture
-from feedsim.report.run import circle_plots
-from feedsim.report.run.charts import circle_chart, turned
-from feedsim.report.style import BLUE, GREEN, MUTED, ORANGE, VERMILLION, Array, Drawn, drawing, finish, thinned
+from feedsim.report.run.axis_plots import TIME, reversed_note, torque_axis
+from feedsim.report.run.circle_plots import circle, circle_chart, turned
+from feedsim.report.style import BLUE, GREEN, ORANGE, VERMILLION, Array
 
-BEFORE: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.3, "label": "without"}
-AFTER: dict[str, Any] = {"color": BLUE, "linewidth": 1.6, "label": "with compensation"}
 AROUND = 0.03  # s to either side of a reversal
 
 
@@ -29,36 +25,25 @@ def pictures_of(compensation: Compensation) -> list[Picture]:
     turn = compensation.turn
     before, after = (contour(run.trace, turn) for run in (compensation.before, compensation.after))
     plane = f"{turn.axes[0]}-{turn.axes[1]}"
-    pictures = [
+    pictures: list[Picture | None] = [
         _contour_picture(turn, before, after, plane),
         _reversals_picture(turn, before, after, plane),
         _torque_picture(compensation),
     ]
-    return [*pictures, _errors_picture(compensation)] if compensation.table else pictures
+    pictures += [_errors_picture(compensation)] if compensation.table else []
+    return [picture for picture in pictures if picture is not None]
 
 
 def _contour_picture(turn: Turn, before: Contour, after: Contour, plane: str) -> Picture:
-    on = circle_plots.circle(turn, float(np.abs(before.deviation).max()))
-    ring, rings = on.ring, on.rings
-
-    def draw() -> Drawn:
-        with drawing(10.0, 6.0) as figure:
-            polar, unrolled = figure.subplots(1, 2, width_ratios=[1.35, 1])
-            circle_plots.polar_ground(polar, turn, ring, rings)
-            for measured, style in ((before, BEFORE), (after, AFTER)):
-                circle_plots.polar_curve(polar, measured, ring, rings, **style)
-                circle_plots.unrolled_curve(unrolled, measured, **style)
-            circle_plots.unrolled_ground(unrolled, turn)
-            return finish(figure, "compensation-contour", title, caption)
-
+    on = circle(turn, float(np.abs(before.deviation).max()))
     title = f"Circular test in the plane {plane}, without and with friction compensation"
     caption = (
         f"Radius {turn.radius * 1e3:.6g} mm, turn from {turn.begin:.4f} to {turn.end:.4f} s, by the linear scales. "
-        f"Radius deviation magnified {circle_plots.magnification(on):,.0f} times; rings "
-        f"at ±{ring:g} µm about the programmed circle."
+        f"Radius deviation magnified {on.magnification:,.0f} times; rings "
+        f"at ±{on.ring:g} µm about the programmed circle."
     )
     curves = [turned(name, colour, each.angle, each.deviation) for name, colour, each in _both(before, after)]
-    return Picture("compensation-contour", title, caption, draw, circle_chart(on, curves, sense=turn.sense))
+    return Picture("compensation-contour", title, caption, circle_chart(on, curves, sense=turn.sense))
 
 
 def _both(before: Contour, after: Contour) -> list[tuple[str, str, Contour]]:
@@ -66,38 +51,25 @@ def _both(before: Contour, after: Contour) -> list[tuple[str, str, Contour]]:
 
 
 def _reversals_picture(turn: Turn, before: Contour, after: Contour, plane: str) -> Picture:
-    def draw() -> Drawn:
-        with drawing(10.0, 6.4) as figure:
-            rooms = figure.subplots(2, 4, sharex=True, sharey="row")
-            for room, glitch in zip(rooms.T, before.glitches, strict=True):
-                for axes, curves in zip(room, (((before, BEFORE), (after, AFTER)), ((after, AFTER),)), strict=True):
-                    for measured, style in curves:
-                        axes.plot(*_about(measured, glitch.crossing), **style)
-                    axes.axhline(0.0, color=MUTED, linewidth=0.8)
-                heading(room[0], f"{minus(glitch.name)}: {glitch.axis} reverses")
-                room[1].set(xlabel="angle from the crossing [°]")
-                room[1].set_xticks((-45, 0, 45))
-            legend_above(rooms[0, 0])
-            rooms[0, 0].set_ylabel("radius deviation [µm]")
-            rooms[1, 0].set_ylabel("with compensation [µm]")
-            return finish(figure, "compensation-reversals", title, caption)
-
     title = f"Circular test in the plane {plane}: the contour around the reversals"
     caption = (
         "Radius deviation by the linear scales within ±45° of every crossing. Below: the compensated contour "
         "alone, on a scale of its own."
     )
     panels = []
+    across = Axis("angle from the crossing", "°", span=(-45.0, 45.0))
     for both in (_both(before, after), _both(before, after)[1:]):
-        for glitch in before.glitches:
-            curves = []
-            for name, colour, each in both:
-                angle, deviation = _about(each, glitch.crossing)
-                curves.append(Curve(name, angle, deviation, colour))
+        row = [
+            [Curve(name, *_about(each, glitch.crossing), colour) for name, colour, each in both]
+            for glitch in before.glitches
+        ]
+        low, high = spans([curve.y for curves in row for curve in curves]) or (0.0, 1.0)
+        more = 0.07 * (high - low) or 1.0
+        up = Axis("radius deviation", "µm", span=(low - more, high + more))
+        for glitch, curves in zip(before.glitches, row, strict=True):
             heads = f"{minus(glitch.name)}: {glitch.axis} reverses" if len(both) > 1 else "compensated alone"
-            axis = Axis("angle from the crossing", "°", span=(-45.0, 45.0))
-            panels.append(Panel(heads, axis, Axis("radius deviation", "µm"), curves, [Level(0.0, dash="")]))
-    return Picture("compensation-reversals", title, caption, draw, Chart(panels, (1.0,) * 4))
+            panels.append(Panel(heads, across, up, curves, [Level(0.0, dash="")]))
+    return Picture("compensation-reversals", title, caption, Chart(panels, (1.0,) * 4))
 
 
 def _about(measured: Contour, crossing: float) -> tuple[Array, Array]:
@@ -108,37 +80,14 @@ def _about(measured: Contour, crossing: float) -> tuple[Array, Array]:
     return angle[order], measured.deviation[near][order] * 1e6
 
 
-def _torque_picture(compensation: Compensation) -> Picture:
+def _torque_picture(compensation: Compensation) -> Picture | None:
     turn, feedforward = compensation.turn, compensation.feedforward
     axes_of = [axis for axis in turn.axes if f"{axis}.M_ff" in feedforward.columns]
     signs = {axis: compensation.scenario.machine.axes[axis].display_sign for axis in axes_of}
     torque = feedforward.between(turn.begin, turn.end)
+    if not axes_of:
+        return None
     real = compensation.after.trace.between(turn.begin, turn.end)
-
-    def draw() -> Drawn:
-        with drawing(10.0, 3.4 * max(1, len(axes_of))) as figure:
-            rooms = figure.subplots(max(1, len(axes_of)), 2, squeeze=False, width_ratios=[1.5, 1])
-            for (whole, near), axis in zip(rooms, axes_of, strict=True):
-                sign = signs[axis]
-                reversal = _reversal(real.time, real[f"{axis}.n_a"])
-                for room in (whole, near):
-                    room.plot(
-                        *thinned(torque.time, sign * torque[f"{axis}.M_ff"]), color=GREEN, label="feedforward $M_{ff}$"
-                    )
-                    room.plot(
-                        *thinned(real.time, sign * real[f"{axis}.M_fr"]), color=ORANGE, linestyle=(0, (4, 2)),
-                        label=r"friction $M_{fr}$",
-                    )  # fmt: skip
-                    room.axhline(0.0, color=MUTED, linewidth=0.8)
-                    room.set(xlabel="time [s]")
-                near.set_xlim(reversal - AROUND, reversal + AROUND)
-                heading(whole, f"Axis {axis}: torque over the turn")
-                heading(near, "Around a reversal")
-                legend_above(whole)
-                whole.set_ylabel(torque_label(sign))
-                whole.margins(x=0.01)
-            return finish(figure, "compensation-torque", title, caption)
-
     title = "Torque feedforward of the friction compensation"
     caption = (
         "Feedforward as it is added to the torque setpoint, and the friction torque of the compensated run. The "
@@ -152,13 +101,13 @@ def _torque_picture(compensation: Compensation) -> Picture:
         ]
         reversal = _reversal(real.time, real[f"{axis}.n_a"])
         near = Axis("time", "s", span=(reversal - AROUND, reversal + AROUND))
-        ordinate = Axis("torque" if signs[axis] > 0 else "torque, sign reversed", "N·m")
+        ordinate = torque_axis(signs[axis])
         zero = [Level(0.0, dash="")]
         panels += [
-            Panel(f"Axis {axis}: torque over the turn", Axis("time", "s"), ordinate, curves, zero, linked="t"),
+            Panel(f"Axis {axis}: torque over the turn", TIME, ordinate, curves, zero, linked="t"),
             Panel("Around a reversal", near, ordinate, curves, zero),
         ]
-    return Picture("compensation-torque", title, caption, draw, Chart(panels, (1.5, 1.0)) if panels else None)
+    return Picture("compensation-torque", title, caption, Chart(panels, (1.5, 1.0)))
 
 
 def _reversal(time: Array, n: Array) -> float:
@@ -172,29 +121,6 @@ def _errors_picture(compensation: Compensation) -> Picture:
     by_delay = [each for each in compensation.table if each.what == "delay"]
     others = [each for each in compensation.table if each.what != "delay"]
     names = list(dict.fromkeys(each.what for each in others))
-
-    def draw() -> Drawn:
-        with drawing(10.0, 4.6) as figure:
-            left, right = figure.subplots(1, 2, width_ratios=[1, 1.1])
-            error, G = _by_change(by_delay, compensation.figures["after.G"].value)
-            left.plot(error, G, color=BLUE, marker="o", markersize=4)
-            left.set(xlabel="error of the delay [ms]", ylabel="circular deviation G [µm]")
-            left.set_ylim(bottom=0.0)
-            heading(left, "Delay")
-            for offset, low, colour in ((0.19, True, VERMILLION), (-0.19, False, BLUE)):
-                chosen = {each.what: each for each in others if (each.change < 0) == low}
-                widths = [chosen[name].quality.G * 1e6 if name in chosen else 0.0 for name in names]
-                share = next((each.change for each in chosen.values()), 0.0)
-                right.barh(
-                    [-i + offset for i in range(len(names))], widths, height=0.36, color=colour,
-                    label=minus(f"{share:+.3g} %"),
-                )  # fmt: skip
-            right.axvline(compensation.figures["after.G"].value, color=MUTED, linewidth=1.1, linestyle=(0, (1, 2)))
-            right.set_yticks([-i for i in range(len(names))], names)
-            right.set(xlabel="circular deviation G [µm]")
-            heading(right, "Parameters")
-            legend_above(right)
-            return finish(figure, "compensation-errors", title, caption)
 
     title = "What errors of the compensation cost"
     caption = (
@@ -213,11 +139,12 @@ def _errors_picture(compensation: Compensation) -> Picture:
         share = next((each.change for each in chosen), 0.0)
         curves.append(Curve(minus(f"{share:+.3g} %"), x, y, colour, width=8.0))
     axis = Axis("", names=list(rows), span=(-0.6, len(rows) - 0.4))
+    points = [Curve("", np.array(error), np.array(G), BLUE, width=width, dots=width > 2) for width in (1.4, 2.4)]
     G_axis = Axis("circular deviation G", "µm")
-    panels = [Panel("Delay", Axis("error of the delay", "ms"), G_axis, [Curve("", np.array(error), np.array(G), BLUE)])]
+    panels = [Panel("Delay", Axis("error of the delay", "ms"), G_axis, points)]
     if others:
         panels.append(Panel("Parameters", G_axis, axis, curves, [without]))
-    return Picture("compensation-errors", title, caption, draw, Chart(panels, (1.0,) * len(panels)))
+    return Picture("compensation-errors", title, caption, Chart(panels, (1.0,) * len(panels)))
 
 
 def _by_change(variations: Sequence[Variation], without_error: float) -> tuple[list[float], list[float]]:

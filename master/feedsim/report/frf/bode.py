@@ -1,39 +1,32 @@
 """Bode plots: magnitude, phase and coherence over frequency, a column of panels per axis.
 
-Closed forms are lines, measured responses are points (faded where their coherence is low), curves laid over are dashed.
+Closed forms are lines, measured responses are points (paler where their coherence is low), curves laid over are dashed.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.report.labels import heading, keep_inside, legend_above, plain_box
-from feedsim.report.style import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, VERMILLION, Array
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
+from feedsim.linear.margins import Bandwidth, Margins, Pair
+from feedsim.report import chart
+from feedsim.report.chart import Axis, Chart, Level, Mark, Panel
+from feedsim.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, Array
 
 Complexes = NDArray[np.complex128]
 Kind = Literal["closed form", "measured", "overlaid"]
 
 HIGH_COHERENCE = 0.99
-COLOURS = {"closed form": BLUE, "measured": VERMILLION, "overlaid": GREEN}
+COLOURS = {"closed form": BLUE, "measured": VERMILLION}
 OTHERS = (GREEN, PURPLE, ORANGE)  # of several overlaid curves
 LOWEST_DB = -400.0  # what is exactly zero
 ALIKE = 1.01  # crossings closer than this ratio are one
 EDGE = 1e-9  # of a frequency: quotients of times carry rounding
-# Ticks of the phase [deg]: the finest that leaves this many.
-PHASE_STEPS, MOST_PHASE_TICKS = (15, 30, 45, 90, 180, 360, 720, 1440), 9
-MAGNITUDE_STEPS, MOST_MAGNITUDE_TICKS = (1, 2, 5, 10, 20, 40, 50, 100), 8
-COLUMN_WIDTHS = {1: 9.0, 2: 5.2, 3: 4.0}  # inches per column
-HEIGHTS = {"magnitude": 2.9, "phase": 2.0, "coherence": 1.05}  # inches
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +64,7 @@ class Ordinate:
     """How a magnitude is shown: in dB, or on a logarithmic axis in a unit of its own."""
 
     label: str
+    unit: str = "dB"
     decibel: bool = True
     scale: float = 1.0  # display unit per SI unit
 
@@ -92,87 +86,100 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Panels:
-    """The axes of a column; coherence is None where nothing was measured."""
+class Told:
+    """What is marked in a column: lines and points of the magnitude, lines and points of the phase, words."""
 
-    magnitude: Axes
-    phase: Axes | None
-    coherence: Axes | None
-
-
-def size(columns: Sequence[Column], *, phase: bool = True) -> tuple[float, float]:
-    """Width and height of a drawing for these columns [inches]."""
-    rows = ["magnitude", *(["phase"] if phase else []), *(["coherence"] if _any_coherence(columns) else [])]
-    count = len(columns)
-    return max(count * COLUMN_WIDTHS.get(count, COLUMN_WIDTHS[3]), 9.0), 1.0 + sum(HEIGHTS[row] for row in rows)
+    levels: Sequence[Level] = ()
+    marks: Sequence[Mark] = ()
+    phase_levels: Sequence[Level] = ()
+    phase_marks: Sequence[Mark] = ()
+    note: str = ""
 
 
-def bode(
-    figure: Drawing,
+def bode_chart(
     columns: Sequence[Column],
     ordinate: Ordinate,
+    told: Mapping[str, Told],
     *,
     phase: bool = True,
     span: tuple[float, float] | None = None,
     floor: float | None = None,
-) -> list[Panels]:
-    """Draw the curves of all columns; returns their panels, for marks.
+) -> Chart:
+    """Magnitude and, unless it is left out, phase of all columns, and the coherence of what was measured.
 
-    phase: whether the phase is shown. span: frequencies shown [Hz]; those of the curves by default. floor: lowest
-    magnitude shown, in display units.
+    told: what is marked, by the columns' titles. span: frequencies shown [Hz]; those of the curves by default. floor:
+    lowest magnitude shown, in display units.
     """
-    with_coherence = _any_coherence(columns)
-    rows = ["magnitude", *(["phase"] if phase else []), *(["coherence"] if with_coherence else [])]
-    rooms = figure.subplots(
-        len(rows), len(columns), sharex="col", sharey="row", squeeze=False, height_ratios=[HEIGHTS[row] for row in rows]
-    )
     span = span or span_of(columns)
     columns = [within(column, *span) for column in columns]
-    result = []
-    for j, column in enumerate(columns):
-        own = dict(zip(rows, rooms[:, j], strict=True))
-        panels = Panels(own["magnitude"], own.get("phase"), own.get("coherence"))
-        heading(panels.magnitude, column.title)
-        for curve, style in _styled(column.curves):
-            _draw(panels, curve, style, ordinate, reference_of(column.curves, curve), floor)
-        own[rows[-1]].set_xlabel("frequency [Hz]")
-        panels.magnitude.set_xscale("log")
-        panels.magnitude.set_xlim(*span)
-        if len(column.curves) > 1:
-            legend_above(panels.magnitude)
-        result.append(panels)
-    _finish_rows(result, columns, ordinate, floor)
-    return result
+    frequency = Axis("frequency", "Hz", log=True, span=span)
+    heights = [(column, curve, ordinate.of(curve.value)) for column in columns for curve in column.curves]
+    low_high = chart.spans([height[curve.sure & (height > -300.0)] for _, curve, height in heights])
+    magnitude, coherence = [], []
+    turns = []
+    for column in columns:
+        own = told.get(column.title, Told())
+        curves = [each for curve in column.curves for each in _magnitude(curve, column, ordinate)]
+        axis = Axis(ordinate.label, ordinate.unit, log=not ordinate.decibel, span=_span(low_high, ordinate, floor))
+        panel = Panel(column.title, frequency, axis, curves, own.levels, marks=own.marks, linked="f", note=own.note)
+        magnitude.append(panel)
+        curves = [each for curve in column.curves for each in _phase(curve, column, ordinate, floor)]
+        turns.append(Panel("", frequency, Axis("phase", "°"), curves, own.phase_levels, marks=own.phase_marks,
+                           linked="f", height=0.75))  # fmt: skip
+        curves = [
+            _styled(curve, column, curve.frequency, curve.coherence)
+            for curve in column.curves
+            if curve.coherence is not None
+        ]
+        axis = Axis("coherence", "", span=(-0.04, 1.08))
+        coherence.append(Panel("", frequency, axis, curves, linked="f", height=0.5))
+    rows = [magnitude, *([turns] if phase else []), *([coherence] if any(each.curves for each in coherence) else [])]
+    return Chart([panel for row in rows for panel in row], (1.0,) * len(columns))
 
 
-def note(axes: Axes, text: str, *, corner: Literal["lower left", "upper right"] = "lower left") -> None:
-    """A few lines in a corner of the panel."""
-    x, y, ha, va = (0.02, 0.04, "left", "bottom") if corner == "lower left" else (0.98, 0.96, "right", "top")
-    box = plain_box() | {"alpha": 0.85}
-    look: dict[str, Any] = {"fontsize": 8.5, "color": INK, "linespacing": 1.35, "bbox": box, "zorder": 8}
-    keep_inside(axes.text(x, y, text, transform=axes.transAxes, ha=ha, va=va, **look))
+def told_of_bandwidth(bandwidth: Bandwidth | None) -> Told:
+    """The -3 dB line and where a closed loop crosses it."""
+    line = Level(-3.0, "−3 dB")
+    if bandwidth is None:
+        return Told([line])
+    if not math.isfinite(bandwidth.first):
+        return Told([line], note="stays above −3 dB")
+    first = Mark(bandwidth.first, -3.0, "", INK)
+    if bandwidth.last < bandwidth.first * ALIKE:
+        return Told([line], [first], note=f"−3 dB at {hertz(bandwidth.first)}")
+    marks = [first, Mark(bandwidth.last, -3.0, "", INK, hollow=True)]
+    return Told([line], marks, note=f"−3 dB, first {hertz(bandwidth.first)}\n−3 dB, last {hertz(bandwidth.last)}")
 
 
-def level(axes: Axes, value: float, text: str = "") -> None:
-    """Dashed horizontal line, labelled at its right end."""
-    axes.axhline(value, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
-    if text:
-        label = axes.annotate(
-            text, (1, value), xycoords=("axes fraction", "data"), xytext=(-3, 3), textcoords="offset points",
-            color=MUTED, fontsize=8.5, ha="right", va="bottom",
-        )  # fmt: skip
-        keep_inside(label)
+def told_of_margins(curve: Curve, margins: Margins) -> Told:
+    """Where a loop's gain is 1 and what it lacks to its limit there; where its phase is at the limit."""
+    marks, levels, phase_marks, phase_levels, lines = [], [Level(0.0)], [], [], []
+    crossing, gain = margins.phase_margin, margins.gain_margin
+    if math.isfinite(crossing.frequency):
+        turned = float(np.interp(np.log(crossing.frequency), np.log(curve.frequency), phases(curve, None)))
+        limit = turned - crossing.margin
+        lines.append(f"phase margin {crossing.margin:.0f}° at {hertz(crossing.frequency)}".replace("-", "−"))
+        marks.append(Mark(crossing.frequency, 0.0, "", INK))
+        phase_marks.append(Mark(crossing.frequency, turned, "", INK))
+        ends = (min(turned, limit), max(turned, limit))
+        phase_levels += [Level(crossing.frequency, upright=True, colour=INK, dash="", ends=ends), Level(limit)]
+    if math.isfinite(gain.frequency) and curve.frequency[0] <= gain.frequency <= curve.frequency[-1]:
+        decibel = 20 * math.log10(gain.factor)
+        lines.append(f"gain margin {decibel:.1f} dB at {hertz(gain.frequency)}")
+        marks.append(Mark(gain.frequency, -decibel, "", INK))
+        ends = (min(-decibel, 0.0), max(-decibel, 0.0))
+        levels.append(Level(gain.frequency, upright=True, colour=INK, dash="", ends=ends))
+    return Told(levels, marks, phase_levels, phase_marks, "\n".join(lines))
 
 
-def dot(axes: Axes, x: float, y: float, *, hollow: bool = False, colour: str = INK) -> None:
-    """A marker on a curve."""
-    face = {"markerfacecolor": "none", "markeredgewidth": 1.4} if hollow else {}
-    axes.plot([x], [y], "o", color=colour, markersize=5.5, zorder=7, **face)  # type: ignore[arg-type]
-
-
-def stretch(axes: Axes, x: float, low: float, high: float) -> None:
-    """Vertical line between two heights: a margin."""
-    axes.plot([x, x], [low, high], color=INK, linewidth=1.3, zorder=6)
+def told_of_pairs(curve: Curve, pairs: Sequence[Pair]) -> Told:
+    """The most marked resonances (full) and their anti-resonances (hollow), in Hz."""
+    marks = []
+    for pair in pairs:
+        peak, dip = pair.resonance.frequency, pair.antiresonance.frequency
+        marks.append(Mark(dip, 20 * math.log10(abs(at(curve, dip))), "", INK, hollow=True))
+        marks.append(Mark(peak, 20 * math.log10(abs(at(curve, peak))), f"{dip:.1f} / {peak:.1f}", INK))
+    return Told([Level(0.0)], marks)
 
 
 def at(curve: Curve, frequency: float) -> complex:
@@ -210,118 +217,11 @@ def reference_of(curves: Sequence[Curve], curve: Curve) -> Curve | None:
     return closed
 
 
-def _styled(curves: Sequence[Curve]) -> list[tuple[Curve, dict[str, Any]]]:
-    others = iter(OTHERS * len(curves))
-    styled = []
-    for curve in curves:
-        if curve.kind == "measured":
-            style: dict[str, Any] = {
-                "color": COLOURS["measured"], "linestyle": "none", "marker": ".", "markersize": 5.5,
-                "markeredgewidth": 0, "zorder": 2,
-            }  # fmt: skip
-        elif curve.kind == "overlaid":
-            style = {"color": next(others), "linestyle": (0, (4, 1.6)), "linewidth": 1.5, "zorder": 4}
-        else:
-            style = {"color": COLOURS["closed form"], "linewidth": 1.2, "zorder": 3}
-        styled.append((curve, style))
-    return styled
-
-
-def _draw(
-    panels: Panels,
-    curve: Curve,
-    style: dict[str, Any],
-    ordinate: Ordinate,
-    reference: Curve | None,
-    floor: float | None,
-) -> None:
-    f, magnitude = curve.frequency, ordinate.of(curve.value)
-    phase = visible(phases(curve, reference), magnitude, floor)
-    for which, look in ((curve.sure, style), (~curve.sure, style | {"alpha": 0.35})):
-        if not which.any():
-            continue
-        label = curve.label if look is style else "_faded"
-        panels.magnitude.plot(f[which], magnitude[which], label=label, **look)
-        if panels.phase is not None:
-            panels.phase.plot(f[which], phase[which], **look)
-    if panels.coherence is not None and curve.coherence is not None:
-        panels.coherence.plot(f, curve.coherence, **style | {"markersize": 3.0})
-
-
 def visible(phase: Array, magnitude: Array, floor: float | None) -> Array:
     """Phases, up to where the magnitude falls below what is shown for good: from there on they say nothing."""
     if floor is None or not (above := np.flatnonzero(magnitude >= floor)).size:
         return phase
     return np.where(np.arange(len(phase)) <= above[-1], phase, np.nan)
-
-
-def _finish_rows(panels: Sequence[Panels], columns: Sequence[Column], ordinate: Ordinate, floor: float | None) -> None:
-    curves = [curve for column in columns for curve in column.curves]
-    heights = np.concatenate([ordinate.of(curve.value)[curve.sure] for curve in curves] or [np.zeros(0)])
-    heights = heights[np.isfinite(heights) & ((heights > 0) | ordinate.decibel)]
-    first = panels[0]
-    if len(heights):
-        low, high = float(heights.min()), float(heights.max())
-        low = max(low, floor) if floor is not None else low
-        _magnitude_axis(first.magnitude, low, high, ordinate.decibel)
-    first.magnitude.set_ylabel(ordinate.label)
-    turns = [
-        visible(phases(curve, reference_of(column.curves, curve)), ordinate.of(curve.value), floor)[curve.sure]
-        for column in columns
-        for curve in column.curves
-    ]
-    if first.phase is not None:
-        first.phase.set_ylabel("phase [°]")
-        _phase_axis(first.phase, np.concatenate(turns or [np.zeros(0)]))
-    if first.coherence is not None:
-        first.coherence.set_ylabel("coherence [1]")
-        first.coherence.set_ylim(-0.04, 1.08)
-        first.coherence.set_yticks([0.0, 0.5, 1.0])
-    for each in panels:
-        frequency_axis(each.magnitude)
-
-
-def _magnitude_axis(axes: Axes, low: float, high: float, decibel: bool) -> None:
-    if not decibel:
-        from matplotlib.ticker import FuncFormatter
-
-        axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.set_ylim(
-            10 ** (math.floor(4 * math.log10(low)) / 4) / 1.1, 10 ** (math.ceil(4 * math.log10(high)) / 4) * 1.1
-        )
-        return
-    room = max(0.06 * (high - low), 1.0)
-    axes.set_ylim(low - room, high + room)
-    _ticks(axes, MAGNITUDE_STEPS, MOST_MAGNITUDE_TICKS)
-
-
-def _phase_axis(axes: Axes, values: Array) -> None:
-    values = values[np.isfinite(values)]
-    if len(values):
-        low, high = float(values.min()), float(values.max())
-        room = max(0.06 * (high - low), 8.0)
-        axes.set_ylim(low - room, high + room)
-    _ticks(axes, PHASE_STEPS, MOST_PHASE_TICKS)
-
-
-def _ticks(axes: Axes, steps: Sequence[int], most: int) -> None:
-    from matplotlib.ticker import MultipleLocator
-
-    low, high = axes.get_ylim()
-    axes.yaxis.set_major_locator(MultipleLocator(next((s for s in steps if (high - low) / s <= most), steps[-1])))
-
-
-def frequency_axis(axes: Axes) -> None:
-    """Plain numbers at the decades, finer lines between them."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axes.xaxis.set_major_locator(LogLocator(numticks=20))
-    axes.xaxis.set_minor_locator(LogLocator(subs=tuple(range(2, 10)), numticks=20))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    for each in axes.figure.axes:
-        each.grid(visible=True, axis="x", which="minor", linewidth=0.35)
 
 
 def within(column: Column, low: float, high: float) -> Column:
@@ -335,10 +235,6 @@ def within(column: Column, low: float, high: float) -> Column:
     return Column(column.title, curves)
 
 
-def _any_coherence(columns: Sequence[Column]) -> bool:
-    return any(curve.coherence is not None for column in columns for curve in column.curves)
-
-
 def span_of(columns: Sequence[Column]) -> tuple[float, float]:
     """Lowest and highest frequency of all curves."""
     ends = [(curve.frequency[0], curve.frequency[-1]) for column in columns for curve in column.curves]
@@ -348,3 +244,41 @@ def span_of(columns: Sequence[Column]) -> tuple[float, float]:
 def hertz(frequency: float) -> str:
     """A frequency in three digits."""
     return f"{frequency:.3g} Hz" if frequency < 100 else f"{frequency:.0f} Hz"
+
+
+def _magnitude(curve: Curve, column: Column, ordinate: Ordinate) -> list[chart.Curve]:
+    return _split(curve, column, ordinate.of(curve.value))
+
+
+def _phase(curve: Curve, column: Column, ordinate: Ordinate, floor: float | None) -> list[chart.Curve]:
+    turned = visible(phases(curve, reference_of(column.curves, curve)), ordinate.of(curve.value), floor)
+    return _split(curve, column, turned)
+
+
+def _split(curve: Curve, column: Column, y: Array) -> list[chart.Curve]:
+    """A curve, and paler what of it is not sure."""
+    sure = curve.sure
+    if sure.all():
+        return [_styled(curve, column, curve.frequency, y)]
+    parts = ((sure, False), (~sure, True))
+    return [_styled(curve, column, curve.frequency[rows], y[rows], faint) for rows, faint in parts if rows.any()]
+
+
+def _styled(curve: Curve, column: Column, x: Array, y: Array, faint: bool = False) -> chart.Curve:
+    overlaid = [each for each in column.curves if each.kind == "overlaid"]
+    if curve.kind == "measured":
+        name = f"{curve.label}, low coherence" if faint else curve.label
+        return chart.Curve(name, x, y, COLOURS["measured"], width=1.6, dots=True, faint=faint)
+    colour = OTHERS[overlaid.index(curve) % len(OTHERS)] if curve in overlaid else COLOURS["closed form"]
+    return chart.Curve(curve.label, x, y, colour, "dashed" if curve in overlaid else "", 1.4, faint=faint)
+
+
+def _span(found: tuple[float, float] | None, ordinate: Ordinate, floor: float | None) -> tuple[float, float] | None:
+    if found is None:
+        return None
+    low, high = found
+    if not ordinate.decibel:
+        return low / 1.3, high * 1.3
+    low = max(low, floor) if floor is not None else low
+    room = max(0.07 * (high - low), 1.0)
+    return low - room, high + room

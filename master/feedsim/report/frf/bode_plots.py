@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -19,34 +19,21 @@ from feedsim.linear.loops import COMPLIANCE, QUANTITIES
 from feedsim.linear.margins import Bandwidth, Margins, Pair
 from feedsim.linear.plant import TOOL_DIRECTIONS
 from feedsim.report.frf.bode import (
-    ALIKE,
     Column,
     Curve,
     Ordinate,
-    Panels,
-    at,
-    bode,
-    dot,
-    hertz,
-    level,
-    note,
-    phases,
-    size,
-    stretch,
+    Told,
+    bode_chart,
+    told_of_bandwidth,
+    told_of_margins,
+    told_of_pairs,
 )
-from feedsim.report.frf.charts import Told, bode_chart, told_of_bandwidth, told_of_margins, told_of_pairs
-from feedsim.report.labels import keep_inside
 from feedsim.report.picture import Picture
-from feedsim.report.style import INK, Drawn, drawing, finish
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Columns = Mapping[str, Sequence[Curve]]  # by axis or direction
 Span = tuple[float, float] | None  # frequencies shown [Hz]; None: all
 
 MOST_COLUMNS = 3
-LABEL_ROOM, LABEL_INCHES = 0.4, 0.9  # above the curves, in shares of their height; of the drawing
 LOWEST_GAIN_DB = -40.0  # of a loop: what is below says nothing about it
 LOWEST_CLOSED_DB = -45.0  # of a closed loop
 
@@ -61,7 +48,7 @@ APART = 0.24  # of the logarithm of their frequencies: labels of two resonances 
 def speed_controlled_pictures(columns: Columns, span: Span) -> list[Picture]:
     """n_a/M_a per axis, magnitude and phase (the paper's Fig. 4). Values [(rad/s)/(N.m)]."""
     return _pictures(
-        columns, "speed-controlled-system", Ordinate("$|n_a/M_a|$ [dB re 1 (rad/s)/(N·m)]"), span,
+        columns, "speed-controlled-system", Ordinate("|n_a/M_a|", "dB re 1 (rad/s)/(N·m)"), span,
         "Speed-controlled system n/M of {}",
         "Motor speed over motor torque, the position loop left out. At low frequencies the line falls as 1/(J ω) with "
         "the total inertia J; above, the structure shows. ",
@@ -76,18 +63,14 @@ def inertia_pictures(
     J_tot: [kg.m2]; pairs: anti-resonances and resonances to be annotated.
     """
 
-    def mark(axis: str, panels: Panels, curve: Curve) -> None:
-        level(panels.magnitude, 0.0)
-        _annotate(panels.magnitude, curve, pairs.get(axis, ()))
-
     return _pictures(
         {axis: [c.scaled(2 * np.pi * c.frequency * J_tot[axis]) for c in curves] for axis, curves in columns.items()},
-        "inertia-view", Ordinate("$|n_a/M_a| \\; J_{tot}\\, \\omega$ [dB]"), span,
+        "inertia-view", Ordinate("|n_a/M_a| J_tot ω"), span,
         "Speed-controlled system of {} against a rigid inertia",
         "The speed-controlled system multiplied by the total inertia and the angular frequency: 0 dB where the machine "
         "moves as one rigid mass, more where the motor feels less inertia. Annotated: the most marked pairs of "
         "anti-resonance (hollow) and resonance (full), in Hz. ",
-        mark=mark, phase=False, labelled_above=True,
+        phase=False,
         told=lambda axis, curve: told_of_pairs(curve, pairs.get(axis, ())),
     )  # fmt: skip
 
@@ -96,14 +79,14 @@ def speed_reference_pictures(columns: Columns, bandwidths: Mapping[str, Bandwidt
     """n_a/n_s per axis with its -3 dB line and crossings (the paper's Fig. 5)."""
     what = "Reference frequency response of the speed controller n_a/n_s of {}"
     about = "Motor speed over speed setpoint, the position loop open. "
-    return _closed_loops(columns, bandwidths, "speed-reference", "$|n_a/n_s|$ [dB]", what, about, span)
+    return _closed_loops(columns, bandwidths, "speed-reference", "|n_a/n_s|", what, about, span)
 
 
 def position_reference_pictures(columns: Columns, bandwidths: Mapping[str, Bandwidth], span: Span) -> list[Picture]:
     """x_a/x_s per axis with its -3 dB line and crossings."""
     what = "Reference frequency response of the position controller x_a/x_s of {}"
     about = "Position at the linear scale over position setpoint, the speed feedforward left out. "
-    return _closed_loops(columns, bandwidths, "position-reference", "$|x_a/x_s|$ [dB]", what, about, span)
+    return _closed_loops(columns, bandwidths, "position-reference", "|x_a/x_s|", what, about, span)
 
 
 def loop_pictures(
@@ -117,15 +100,11 @@ def loop_pictures(
         "stands",
     }[loop]
 
-    def mark(axis: str, panels: Panels, curve: Curve) -> None:
-        if axis in margins:
-            _margins(panels, curve, margins[axis])
-
     return _pictures(
-        columns, f"{loop}-loop", Ordinate("open-loop gain [dB]"), span, f"Open-loop gain of the {loop} loop of {{}}",
+        columns, f"{loop}-loop", Ordinate("open-loop gain"), span, f"Open-loop gain of the {loop} loop of {{}}",
         f"Loop gain {cut}. Marked: the gain margin (vertical line from the curve to 0 dB) and the phase margin (from "
         "the curve to ±180°, where a loop of gain 1 would be at its limit). ",
-        mark=mark, floor=LOWEST_GAIN_DB,
+        floor=LOWEST_GAIN_DB,
         told=lambda axis, curve: told_of_margins(curve, margins[axis]) if axis in margins else Told(),
     )  # fmt: skip
 
@@ -133,7 +112,7 @@ def loop_pictures(
 def scale_pictures(columns: Columns, span: Span) -> list[Picture]:
     """x_a/M_a per axis. Values [m/(N.m)], shown in um/(N.m)."""
     return _pictures(
-        columns, "scale-response", Ordinate("$|x_a/M_a|$ [µm/(N·m)]", decibel=False, scale=1e6), span,
+        columns, "scale-response", Ordinate("|x_a/M_a|", "µm/(N·m)", decibel=False, scale=1e6), span,
         "From motor torque to linear scale, x/M of {}",
         "Position at the linear scale over motor torque, the position loop left out: what the drive train and the "
         "structure put between motor and scale. ",
@@ -143,7 +122,7 @@ def scale_pictures(columns: Columns, span: Span) -> list[Picture]:
 def compliance_pictures(columns: Columns, span: Span) -> list[Picture]:
     """Tool compliance per direction. Values [m/N], shown in um/N."""
     return _pictures(
-        columns, "tool-compliance", Ordinate("$|x_{tool}/F|$ [µm/N]", decibel=False, scale=1e6), span,
+        columns, "tool-compliance", Ordinate("|x_tool/F|", "µm/N", decibel=False, scale=1e6), span,
         "Dynamic compliance at the tool",
         "Displacement of the tool against the workpiece over the force between them, all loops closed. ",
         of="Direction",
@@ -153,16 +132,12 @@ def compliance_pictures(columns: Columns, span: Span) -> list[Picture]:
 def _closed_loops(
     columns: Columns, bandwidths: Mapping[str, Bandwidth], stem: str, ordinate: str, title: str, about: str, span: Span
 ) -> list[Picture]:
-    def mark(axis: str, panels: Panels, curve: Curve) -> None:
-        level(panels.magnitude, -3.0)
-        if axis in bandwidths:
-            _bandwidth(panels.magnitude, bandwidths[axis])
 
     caption = (
         f"{about}Dashed line: −3 dB. A curve with an anti-resonance can fall through it, return and fall again: full "
         "marker, first crossing; hollow marker, last crossing. "
     )
-    return _pictures(columns, stem, Ordinate(ordinate), span, title, caption, mark=mark, floor=LOWEST_CLOSED_DB,
+    return _pictures(columns, stem, Ordinate(ordinate), span, title, caption, floor=LOWEST_CLOSED_DB,
                      told=lambda axis, _: told_of_bandwidth(bandwidths.get(axis)))  # fmt: skip
 
 
@@ -174,87 +149,24 @@ def _pictures(
     title: str,
     caption: str,
     *,
-    mark: Callable[[str, Panels, Curve], None] | None = None,
     told: Callable[[str, Curve], Told] | None = None,
     phase: bool = True,
     floor: float | None = None,
-    labelled_above: bool = False,
     of: str = "Axis",
 ) -> list[Picture]:
     """A picture per group of columns.
 
-    title: {} in it are the names of the columns. mark, told: called for each column with its name, (its panels) and its
-    first curve: what draws the marks, and the marks as data. labelled_above: with room above the curves. of: what the
-    columns are.
+    title: {} in it are the names of the columns. told: what is marked in a column, by its name and its first curve. of:
+    what the columns are.
     """
 
     def picture(part: Columns, name: str) -> Picture:
         shown = [Column(f"{of} {each}", curves) for each, curves in part.items()]
-
-        def draw() -> Drawn:
-            width, height = size(shown, phase=phase)
-            with drawing(width, height + (LABEL_INCHES if labelled_above else 0.0)) as figure:
-                drawn = bode(figure, shown, ordinate, phase=phase, span=span, floor=floor)
-                if labelled_above:
-                    low, high = drawn[0].magnitude.get_ylim()  # shared by all columns
-                    drawn[0].magnitude.set_ylim(low, high + LABEL_ROOM * (high - low))
-                if mark is not None:
-                    for each, panels, column in zip(part, drawn, shown, strict=True):
-                        mark(each, panels, column.curves[0])
-                return finish(figure, name, title.format(_axes(part)))
-
         marks = {c.title: told(each, c.curves[0]) for each, c in zip(part, shown, strict=True)} if told else {}
         chart = bode_chart(shown, ordinate, marks, phase=phase, span=span, floor=floor)
-        return Picture(name, title.format(_axes(part)), caption + _kinds(part), draw, chart)
+        return Picture(name, title.format(_axes(part)), caption + _kinds(part), chart)
 
     return [picture(part, name) for part, name in _parts(columns, stem)]
-
-
-def _bandwidth(axes: Axes, bandwidth: Bandwidth) -> None:
-    if not math.isfinite(bandwidth.first):
-        return note(axes, "stays above −3 dB")
-    dot(axes, bandwidth.first, -3.0)
-    if bandwidth.last < bandwidth.first * ALIKE:
-        return note(axes, f"−3 dB at {hertz(bandwidth.first)}")
-    dot(axes, bandwidth.last, -3.0, hollow=True)
-    return note(axes, f"−3 dB, first {hertz(bandwidth.first)}\n−3 dB, last {hertz(bandwidth.last)}")
-
-
-def _margins(panels: Panels, curve: Curve, margins: Margins) -> None:
-    lines = []
-    level(panels.magnitude, 0.0)
-    phase = panels.phase
-    low, high = curve.frequency[0], curve.frequency[-1]
-    crossing, gain = margins.phase_margin, margins.gain_margin
-    if math.isfinite(crossing.frequency):
-        lines.append(f"phase margin {crossing.margin:.0f}° at {hertz(crossing.frequency)}".replace("-", "−"))
-        dot(panels.magnitude, crossing.frequency, 0.0)
-        if phase is not None:
-            turned = float(np.interp(np.log(crossing.frequency), np.log(curve.frequency), phases(curve, None)))
-            stretch(phase, crossing.frequency, turned, turned - crossing.margin)
-            dot(phase, crossing.frequency, turned)
-            level(phase, turned - crossing.margin)
-    if math.isfinite(gain.frequency) and low <= gain.frequency <= high:
-        decibel = 20 * math.log10(gain.factor)
-        lines.append(f"gain margin {decibel:.1f} dB at {hertz(gain.frequency)}")
-        stretch(panels.magnitude, gain.frequency, -decibel, 0.0)
-        dot(panels.magnitude, gain.frequency, -decibel)
-    if lines:
-        note(panels.magnitude, "\n".join(lines))
-
-
-def _annotate(axes: Axes, curve: Curve, pairs: Sequence[Pair]) -> None:
-    """Mark resonances by a dot, anti-resonances by a hollow one; their frequencies stand above the resonance."""
-    for pair in pairs:
-        peak, dip = pair.resonance.frequency, pair.antiresonance.frequency
-        top = 20 * math.log10(abs(at(curve, peak)))
-        dot(axes, peak, top)
-        dot(axes, dip, 20 * math.log10(abs(at(curve, dip))), hollow=True)
-        label = axes.annotate(
-            f"{dip:.1f} / {peak:.1f}", (peak, top), xytext=(0, 8), textcoords="offset points", ha="center", va="bottom",
-            fontsize=8.5, color=INK, rotation=90, zorder=8,
-        )  # fmt: skip
-        keep_inside(label)
 
 
 def _parts(columns: Columns, stem: str) -> list[tuple[dict[str, Sequence[Curve]], str]]:

@@ -10,21 +10,10 @@ from feedsim.report.provenance import InputFile, hashed
 
 MM_PER_MIN = 60e3  # per m/s
 LEAST_SPEEDS = 3  # that make a curve
-LONGEST_WORD = 6  # that stands beside a symbol
 _GREEK = (
     "alpha", "beta", "gamma", "delta", "zeta", "eta", "kappa", "lambda", "mu", "rho", "sigma", "tau", "psi", "omega",
 )  # fmt: skip
 SAME_SPEED = 1.05  # ratio up to which two speeds are one: that of a direction and of the other, or of a repetition
-
-
-def symbol(name: str) -> str:
-    """A parameter's name in the letters of mathematics, for pictures: sigma_0, F_log; words are cut."""
-    base, _, index = name.partition("_")
-    if base in _GREEK:
-        base = rf"\{base}"
-    elif len(base) > 1:
-        return name if len(name) <= LONGEST_WORD else f"{name[:4]}."
-    return f"${base}_{{{index}}}$" if index else f"${base}$"
 
 
 def remark(identified: Identified) -> str:

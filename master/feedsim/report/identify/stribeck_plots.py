@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
 
 import numpy as np
 
 from feedsim.identify.parameters import torque as motor_torque
 from feedsim.identify.record import Record
-from feedsim.identify.result import NORMAL_95, Identification, Stationary
-from feedsim.report import style
+from feedsim.identify.result import NORMAL_95, Identification, Plateau, Stationary
+from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
 from feedsim.report.formatting import counted
-from feedsim.report.identify.charts import plateaus_chart, stribeck_chart
 from feedsim.report.identify.quantities import MM_PER_MIN, curve_error, is_curve, speeds_of
-from feedsim.report.labels import heading, legend_above
 from feedsim.report.picture import Picture
-from feedsim.report.style import Array, Drawn, drawing, finish, thinned
+from feedsim.report.style import BLUE, GREEN, ORANGE, PURPLE, VERMILLION, Array
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-DIRECTIONS = ((1, style.BLUE, "^", "positive"), (-1, style.VERMILLION, "v", "negative"))
-TITLE_PAD, LEGEND_PAD = 58.0, 37.0  # points above the axes, clear of the scale at the top
-FEW_DECADES = 20  # ratio of speeds below which an axis is labelled between the decades too, or is linear
+SPEED, TIME = Axis("motor speed", "rad/s"), Axis("time", "s")
+FRICTION = Axis("friction torque", "N·m")
+ZERO = Level(0.0, dash="")
+DIRECTIONS = ((1, BLUE, "positive"), (-1, VERMILLION, "negative"))
+FEW_DECADES = 20  # ratio of speeds below which they are shown on a linear axis
 MOST_RECORDS = 3  # with plateaus, that are shown over time
 
 
@@ -34,54 +30,8 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
     Where stage 1 did not enter the estimates, the curve of the set that is delivered stands beside it.
     """
     values = {name: each.value for name, each in stage.estimates.items()}
-    load, asymmetry = values["M_0"], values["asymmetry"]
+    asymmetry = values["asymmetry"]
     curve, alone = is_curve(stage), "" if found.prior else " of stage 1 alone"
-
-    def draw() -> Drawn:
-        with drawing(9.6, 6.4) as figure:
-            main, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [2.6, 1]})
-            half = NORMAL_95 * stage.sigma
-            if curve:
-                band: dict[str, Any] = {"color": style.GREEN, "alpha": 0.25, "linewidth": 0}
-                main.fill_between(stage.speeds, stage.torque - half, stage.torque + half, label="95 % band", **band)
-                below.fill_between(stage.speeds, -100 * half / stage.torque, 100 * half / stage.torque, **band)
-            main.plot(
-                stage.speeds,
-                stage.torque,
-                color=style.GREEN,
-                label="curve" if found.prior else "stage 1 alone",
-                zorder=3,
-            )
-            below.axhline(0.0, color=style.GREEN, linewidth=1.4)
-            for sign, colour, marker, word in DIRECTIONS:
-                chosen = [p for p in stage.plateaus if p.speed * sign > 0]
-                if not chosen:
-                    continue
-                speed = np.array([abs(p.speed) for p in chosen])
-                friction = np.array([sign * (p.torque - load) for p in chosen])
-                spread = NORMAL_95 * np.array([p.sigma for p in chosen])
-                look = {"fmt": marker, "color": colour, "markersize": 5.5, "elinewidth": 0.9, "capsize": 2, "zorder": 4}
-                label = f"plateaus, {word} direction" if found.prior else f"plateaus, {'+' if sign > 0 else '−'}"
-                main.errorbar(speed, friction, spread, label=label, **look)
-                expected = _of_direction(values, sign, speed)
-                if asymmetry:
-                    dashes = {"color": colour, "linewidth": 0.9, "linestyle": (0, (4, 2)), "zorder": 2}
-                    main.plot(stage.speeds, _of_direction(values, sign, stage.speeds), **dashes)
-                below.errorbar(speed, 100 * (friction / expected - 1), 100 * spread / expected, **look)
-            if not found.prior:
-                _delivered(main, found, stage.speeds)
-            main.set_xscale("log")
-            main.set_ylim(bottom=0)
-            main.set_ylabel("friction torque [N·m]")
-            below.set_ylabel("deviation [%]")
-            below.set_xlabel("motor speed [rad/s]")
-            _feed_axis(main, found.I_P)
-            main.set_title(stribeck_title(found, stage), pad=TITLE_PAD)
-            _legend(main)
-            slide = main.secondary_yaxis("right", functions=(lambda M: M / found.I_P, lambda F: F * found.I_P))
-            slide.set_ylabel("at the slide [N]")
-            return finish(figure, "stribeck", "Stribeck curve", caption)
-
     delivered = (
         " Identified set: the friction that is delivered, which stage 1 did not enter, with its constant load less "
         "stage 1's."
@@ -94,7 +44,7 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
         + f". Largest deviation of a plateau {100 * stage.worst_curve:.2g} %."
         + ("" if found.prior else delivered)
     )
-    return Picture("stribeck", "Stribeck curve", caption, draw, stribeck_chart(found, stage, _of_direction))
+    return Picture("stribeck", "Stribeck curve", caption, _curves(found, stage))
 
 
 def stribeck_title(found: Identification, stage: Stationary) -> str:
@@ -105,7 +55,45 @@ def stribeck_title(found: Identification, stage: Stationary) -> str:
     return f"Axis {found.axis}: friction over speed{'' if found.prior else ', stage 1 alone'}, {known}"
 
 
-def _delivered(axes: Axes, found: Identification, speeds: Array) -> None:
+def _curves(found: Identification, stage: Stationary) -> Chart:
+    """Friction over speed with its band and the plateaus, and how far these are from the curve."""
+    values = {name: each.value for name, each in stage.estimates.items()}
+    half = NORMAL_95 * stage.sigma
+    bands, below_bands = [], []
+    if is_curve(stage):
+        bands = [Band("95 % band", stage.torque - half, stage.torque + half, stage.speeds, GREEN)]
+        share = 100 * half / stage.torque
+        below_bands = [Band("95 % band", -share, share, stage.speeds, GREEN)]
+    curves = [Curve("curve" if found.prior else "stage 1 alone", stage.speeds, stage.torque, GREEN, width=1.8)]
+    below = []
+    for sign, colour, word in DIRECTIONS:
+        chosen = sorted((p for p in stage.plateaus if p.speed * sign > 0), key=lambda p: abs(p.speed))
+        if not chosen:
+            continue
+        speed = np.array([abs(p.speed) for p in chosen])
+        friction = np.array([sign * (p.torque - values["M_0"]) for p in chosen])
+        spread = NORMAL_95 * np.array([p.sigma for p in chosen])
+        expected = _of_direction(values, sign, speed)
+        name = f"plateaus, {word} direction"
+        curves += _with_bars(name, speed, friction, spread, colour)
+        below += _with_bars(name, speed, 100 * (friction / expected - 1), 100 * spread / expected, colour)
+        if values["asymmetry"]:
+            shown = _of_direction(values, sign, stage.speeds)
+            curves.append(Curve(f"curve, {word} direction", stage.speeds, shown, colour, "dashed", 0.9))
+    if not found.prior:
+        curves += _delivered(found, stage)
+    axis = Axis(SPEED.label, SPEED.unit, log=True)
+    above = replace(axis, also=("axis speed", "mm/min", found.I_P * MM_PER_MIN))
+    top = max(float(np.nanmax(each.y)) for each in curves)
+    ordinate = replace(FRICTION, span=(0.0, 1.08 * top), also=("at the slide", "N", 1 / found.I_P))
+    return Chart([
+        Panel(stribeck_title(found, stage), above, ordinate, curves, bands=bands, linked="n", height=1.5),
+        Panel("Deviation from the curve", axis, Axis("deviation", "%"), below, [Level(0.0, colour=GREEN, dash="")],
+              below_bands, linked="n"),
+    ])  # fmt: skip
+
+
+def _delivered(found: Identification, stage: Stationary) -> list[Curve]:
     """The set that is delivered, in both directions.
 
     The plateaus have stage 1's constant load taken off, the set has its own: the difference belongs to the curves, else
@@ -114,12 +102,20 @@ def _delivered(axes: Axes, found: Identification, speeds: Array) -> None:
     values = {name: each.value for name, each in found.estimates.items()}
     # A load that no stage tells is not in the set; it is taken off the curve in any case.
     values.setdefault("M_0", 0.0)
-    first = found.stationary.estimates.get("M_0") if found.stationary is not None else None
+    first = stage.estimates.get("M_0")
     more = values["M_0"] - first.value if first is not None else 0.0
-    for sign, mark, dashes in ((1, "+", "solid"), (-1, "−", (0, (1.5, 1.5)))):
-        look: dict[str, Any] = {"color": style.PURPLE, "linewidth": 1.3, "linestyle": dashes, "zorder": 3}
-        shown = _of_direction(values, sign, speeds) + sign * more
-        axes.plot(speeds, shown, label=f"identified set, {mark}", **look)
+    return [
+        Curve(f"identified set, {mark}", stage.speeds, _of_direction(values, sign, stage.speeds) + sign * more, PURPLE,
+              "" if sign > 0 else "dotted", 1.3)
+        for sign, mark in ((1, "+"), (-1, "−"))
+    ]  # fmt: skip
+
+
+def _with_bars(name: str, x: Array, y: Array, spread: Array, colour: str) -> list[Curve]:
+    gaps = np.full(len(x), np.nan)
+    bars = Curve(name, np.column_stack([x, x, gaps]).ravel(), np.column_stack([y - spread, y + spread, gaps]).ravel(),
+                 colour, width=0.9)  # fmt: skip
+    return [Curve(name, x, y, colour, width=3.0, dots=True), bars]
 
 
 def plateaus_picture(found: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:
@@ -128,35 +124,7 @@ def plateaus_picture(found: Identification, stage: Stationary, records: Sequence
     shown = sorted((r for r in records if count[r.name]), key=lambda r: -count[r.name])[:MOST_RECORDS]
     if not shown:
         return None
-
-    def draw() -> Drawn:
-        with drawing(10.0, 0.6 + 4.4 * len(shown)) as figure:
-            rooms = figure.subplots(2 * len(shown), 1, squeeze=False)[:, 0]
-            for record, torque, speed in zip(shown, rooms[::2], rooms[1::2], strict=True):
-                speed.sharex(torque)
-                own = [p for p in stage.plateaus if p.record == record.name]
-                _over_time(torque, record.time, record.torque, "motor torque")
-                _over_time(speed, record.time, _speed(record) * found.I_P * MM_PER_MIN, "")
-                for room in (torque, speed):
-                    for p in own:
-                        room.axvspan(p.begin, p.end, color=style.ORANGE, alpha=0.2, linewidth=0)
-                    room.axhline(0.0, color=style.MUTED, linewidth=0.8)
-                    room.margins(x=0.01)
-                for k, p in enumerate(own):
-                    label = "mean of a plateau" if k == 0 else None
-                    torque.plot(
-                        [p.begin, p.end], [p.torque, p.torque], color=style.VERMILLION, linewidth=2.0, label=label
-                    )
-                heading(torque, f"{record.name}: {counted(len(own), 'plateau')}")
-                torque.set_ylabel("torque [N·m]")
-                speed.set_ylabel("speed [mm/min]")
-                _decades(speed, min(abs(p.speed) for p in own) * found.I_P * MM_PER_MIN)
-                speed.set_xlabel("time [s]")
-                legend_above(torque)
-            return finish(figure, "plateaus", "Plateaus found in the traces", caption)
-
     own = [(record, [p for p in stage.plateaus if p.record == record.name]) for record in shown]
-    chart = plateaus_chart(own, _speed, found.I_P)
     left = sum(1 for number in count.values() if number) - len(shown)
     fate = "is not shown" if left == 1 else "are not shown"
     more = f" {counted(left, 'more record')} with plateaus {fate}." if left else ""
@@ -164,26 +132,37 @@ def plateaus_picture(found: Identification, stage: Stationary, records: Sequence
         "Shaded: stretches at constant speed whose mean torque (line) counts as friction. Speeds of several "
         f"decades are drawn logarithmically in both directions.{more}"
     )
-    return Picture("plateaus", "Plateaus found in the traces", caption, draw, chart)
+    return Picture("plateaus", "Plateaus found in the traces", caption, _over_time(own, found.I_P))
 
 
-def _over_time(axes: Axes, time: Array, values: Array, label: str) -> None:
-    t, y = thinned(time, values)
-    axes.plot(t, y, color=style.BLUE, linewidth=0.8, label=label)
+def _over_time(shown: Sequence[tuple[Record, Sequence[Plateau]]], I_P: float) -> Chart:
+    """Torque and speed of records over time, their plateaus shaded."""
+    panels = []
+    for k, (record, own) in enumerate(shown):
+        zones = [
+            Band("stretches that count", -1e9, 1e9, np.array([plateau.begin, plateau.end]), ORANGE) for plateau in own
+        ]
+        gap = [np.nan]
+        ends = np.array([t for plateau in own for t in (plateau.begin, plateau.end, *gap)])
+        means = np.array([m for plateau in own for m in (plateau.torque, plateau.torque, *gap)])
+        torques = [
+            Curve("motor torque", record.time, record.torque, BLUE, width=0.9),
+            Curve("mean of a plateau", ends, means, VERMILLION, width=2.2),
+        ]
+        speed = Curve("speed", record.time, _speed(record) * I_P * MM_PER_MIN, BLUE, width=0.9)
+        title = f"{record.name}: {counted(len(own), 'plateau')}"
+        panels += [
+            Panel(title, TIME, Axis("torque", "N·m"), torques, [ZERO], zones, linked=f"t{k}"),
+            Panel("", TIME, _speeds(speed.y, own, I_P), [speed], [ZERO], zones, linked=f"t{k}", height=0.8),
+        ]  # fmt: skip
+    return Chart(panels)
 
 
-def _decades(axes: Axes, smallest: float) -> None:
-    """A scale that is logarithmic in both directions, with a tick per decade from the slowest plateau on; linear where
-    the speeds are of one order."""
-    if float(np.max(np.abs(axes.dataLim.intervaly))) < FEW_DECADES * smallest:
-        return
-    axes.set_yscale("symlog", linthresh=smallest, linscale=0.5)
-    largest = float(np.max(np.abs(axes.dataLim.intervaly)))
-    first, last = math.floor(math.log10(smallest) + 1e-9), math.floor(math.log10(max(largest, smallest)))
-    decades = [10.0**k for k in range(first, last + 1) if 10.0**k >= 0.5 * smallest]
-    axes.set_yticks([*(-v for v in reversed(decades)), 0.0, *decades])
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))
-    axes.minorticks_off()
+def _speeds(speed: Array, own: Sequence[Plateau], I_P: float) -> Axis:
+    """Logarithmic in both directions from the slowest plateau on; linear where the speeds are of one order."""
+    slowest = min(abs(plateau.speed) for plateau in own) * I_P * MM_PER_MIN
+    wide = float(np.max(np.abs(speed))) >= FEW_DECADES * slowest
+    return Axis("speed", "mm/min", symlog=slowest if wide else 0.0)
 
 
 def _speed(record: Record) -> Array:
@@ -196,35 +175,3 @@ def _speed(record: Record) -> Array:
 def _of_direction(values: Mapping[str, float], sign: int, speed: Array) -> Array:
     """The curve in one direction."""
     return np.asarray(sign * (motor_torque(values, sign * speed) - values["M_0"]))
-
-
-def _feed_axis(axes: Axes, I_P: float) -> None:
-    per = I_P * MM_PER_MIN
-
-    def to_feed(speed: Any) -> Any:
-        return speed * per
-
-    def to_speed(feed: Any) -> Any:
-        return feed / per
-
-    top = axes.secondary_xaxis("top", functions=(to_feed, to_speed))
-    top.set_xlabel("axis speed [mm/min]", labelpad=4)
-    low, high = axes.get_xlim()
-    few = high < FEW_DECADES * low
-
-    def minor(value: float, _: float) -> str:
-        return f"{value:g}" if few and f"{value:e}"[0] in "235" else ""
-
-    for axis in (top.xaxis, axes.xaxis):
-        axis.set_major_formatter(lambda value, _: f"{value:g}")
-        axis.set_minor_formatter(minor)
-
-
-def _legend(axes: Axes) -> None:
-    from matplotlib.transforms import ScaledTranslation
-
-    shift = ScaledTranslation(0, LEGEND_PAD / 72, axes.figure.dpi_scale_trans)
-    legend_above(axes)
-    legend = axes.get_legend()
-    assert legend is not None
-    legend.set_bbox_to_anchor((0, 1), transform=axes.transAxes + shift)

@@ -8,9 +8,8 @@ from feedsim.analysis import Accuracy
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
 from feedsim.report.content import Section, Table
 from feedsim.report.formatting import minus, number
-from feedsim.report.labels import legend_above
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, MUTED, VERMILLION, Drawn, drawing, finish
+from feedsim.report.style import BLUE, VERMILLION
 
 HEADS = (
     "Target [mm]", "Mean upwards [µm]", "s upwards [µm]", "Mean downwards [µm]", "s downwards [µm]", "B [µm]", "R [µm]"
@@ -20,8 +19,6 @@ NOTE = (
     "approaches from below (upwards) and from above (downwards), reversal value B and bidirectional repeatability R. "
     "Letters after ISO 230-2."
 )
-
-
 SIDES = (("approached upwards", BLUE), ("approached downwards", VERMILLION))
 
 
@@ -30,20 +27,6 @@ def accuracy_picture(prefix: str, found: Accuracy, stem: str) -> Picture:
     x = 1e3 * np.asarray(found.targets)
     readings, mean, s = 1e6 * found.deviations, 1e6 * found.mean, 1e6 * found.s
     runs = readings.shape[2]
-
-    def draw() -> Drawn:
-        with drawing(10.0, 4.4) as figure:
-            room = figure.subplots()
-            for (name, colour), own, middle, spread in zip(SIDES, readings, mean, s, strict=True):
-                room.fill_between(x, middle - 2 * spread, middle + 2 * spread, color=colour, alpha=0.15, linewidth=0)
-                room.plot(np.repeat(x, runs), own.ravel(), ".", color=colour, markersize=4)
-                room.plot(x, middle, color=colour, label=name)
-            room.axhline(0.0, color=MUTED, linewidth=0.8)
-            room.set_xlabel("target [mm]")
-            room.set_ylabel("deviation [µm]")
-            legend_above(room)
-            return finish(figure, stem, title, caption)
-
     title = f"Positioning accuracy of {prefix}"
     caption = (
         "Deviation of the measured position from its target at the end of each rest, by the linear scale: every "
@@ -65,7 +48,7 @@ def accuracy_picture(prefix: str, found: Accuracy, stem: str) -> Picture:
     across = Axis("target", "mm", span=(float(x[0]) - reach, float(x[-1]) + reach))
     up = Axis("deviation", "µm", span=(low - 0.05 * (high - low), high + 0.05 * (high - low)))
     panel = Panel(title, across, up, curves, [Level(0.0, dash="")], bands, height=1.6)
-    return Picture(stem, title, caption, draw, Chart([panel]))
+    return Picture(stem, title, caption, Chart([panel]))
 
 
 def accuracy_section(prefix: str, found: Accuracy, place: str = "") -> Section:

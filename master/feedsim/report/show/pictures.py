@@ -14,24 +14,17 @@ from feedsim.analysis.side_by_side import SIGNALS, Source
 from feedsim.analysis.spectrum import amplitude_spectrum
 from feedsim.errors import InputError
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
-from feedsim.report.formatting import plain
-from feedsim.report.labels import heading
 from feedsim.report.picture import Picture
-from feedsim.report.run import circle_plots
-from feedsim.report.run.charts import ZOOM_AFTER, ZOOM_BEFORE, circle_chart, turned
+from feedsim.report.run.axis_plots import ZOOM_AFTER, ZOOM_BEFORE
+from feedsim.report.run.circle_plots import circle, circle_chart, turned
 from feedsim.report.style import (
     BLUE,
     GREEN,
-    MUTED,
     ORANGE,
     PURPLE,
     SKY,
     VERMILLION,
     Array,
-    Drawn,
-    drawing,
-    finish,
-    thinned,
 )
 from feedsim.trace import Trace
 
@@ -39,20 +32,19 @@ COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 ABSCISSA = Axis("time from the first row", "s")
 AFTER = Axis("time after the end of the motion", "ms", span=(-1e3 * ZOOM_BEFORE, 1e3 * ZOOM_AFTER))
 FREQUENCY = Axis("frequency", "Hz", log=True)
-DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1.5, 1.5)))
 SHAKEN = 0.02
 LEFT_OUT = f"Axes with less than {100 * SHAKEN:g} % of the largest range are left out."
 # What a picture answers: stem, title, signal, factor from SI, ordinate.
 QUESTIONS = (
-    ("following-error", "How far do the axes lag?", "x_e", 1e6, "following error [µm]"),
-    ("torque", "What do the motors need?", "M_a", 1.0, "motor torque [N·m]"),
-    ("speed", "How fast are the motors?", "n_a", 1.0, "motor speed [rad/s]"),
-    ("position", "Where are the axes?", "x_a", 1e3, "position [mm]"),
+    ("following-error", "How far do the axes lag?", "x_e", 1e6, Axis("following error", "µm")),
+    ("torque", "What do the motors need?", "M_a", 1.0, Axis("motor torque", "N·m")),
+    ("speed", "How fast are the motors?", "n_a", 1.0, Axis("motor speed", "rad/s")),
+    ("position", "Where are the axes?", "x_a", 1e3, Axis("position", "mm")),
 )
 # Stops of an axis that are drawn, and the distance beyond the target that is shown at least [um].
 MOST_STOPS, LEAST_REACH = 6, 2.2
-# Spectra: signal, title, factor from SI, ordinate; stretch [s], rows of it at least, and how far down they are drawn.
-SPECTRA = (("x_e", "following error", 1e6, "amplitude [µm]"), ("M_a", "motor torque", 1.0, "amplitude [N·m]"))
+# Spectra: signal, title, factor from SI, unit; stretch [s], rows of it at least, and how far down they are drawn.
+SPECTRA = (("x_e", "following error", 1e6, "µm"), ("M_a", "motor torque", 1.0, "N·m"))
 STRETCH, LEAST_ROWS, DOWN = 1.0, 64, 1e-4
 
 
@@ -60,11 +52,6 @@ STRETCH, LEAST_ROWS, DOWN = 1.0, 64, 1e-4
 class _Curve:
     angle: Array
     deviation: Array
-
-
-def look(k: int) -> dict[str, object]:
-    """Colour and dashes of the k-th source."""
-    return {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k // len(COLOURS) % len(DASHES)]}
 
 
 def _dash(k: int) -> Dash:
@@ -105,24 +92,10 @@ def contour_picture(sources: Sequence[Source], prefix: str) -> Picture | None:
     if not own:
         return None
     curves = [(k, source, turns, contours(source, turns)) for k, source, turns in own]
-    on = circle_plots.circle(own[0][2][0], max(float(np.abs(c.deviation).max()) for *_, drawn in curves for c in drawn))
-    ring, rings = on.ring, on.rings
-
-    def draw() -> Drawn:
-        with drawing(10.0, 6.0) as figure:
-            polar, unrolled = figure.subplots(1, 2, width_ratios=[1.35, 1])
-            circle_plots.polar_ground(polar, own[0][2][0], ring, rings)
-            for k, source, turns, drawn in curves:
-                for i, (turn, curve) in enumerate(zip(turns, drawn, strict=True)):
-                    thin = {"linewidth": 1.4 if turn.sense > 0 else 0.8, "label": "" if i else plain(source.name)}
-                    circle_plots.polar_curve(polar, curve, ring, rings, **look(k), **thin)
-                    circle_plots.unrolled_curve(unrolled, curve, **look(k), **thin)
-            circle_plots.unrolled_ground(unrolled, own[0][2][0])
-            return finish(figure, stem, title, caption)
-
+    on = circle(own[0][2][0], max(float(np.abs(c.deviation).max()) for *_, drawn in curves for c in drawn))
     axes = "-".join(own[0][2][0].axes)
     caption = (
-        f"Rings at ±{ring:g} µm about the programmed circle; clockwise turns are drawn thin. Where the radii are "
+        f"Rings at ±{on.ring:g} µm about the programmed circle; clockwise turns are drawn thin. Where the radii are "
         "not the same, the deviation is what is compared."
     )
     shown = [
@@ -132,7 +105,7 @@ def contour_picture(sources: Sequence[Source], prefix: str) -> Picture | None:
         for turn, curve in zip(turns, drawn, strict=True)
     ]  # fmt: skip
     stem, title = f"contour-{prefix.replace('#', '-')}", f"Is the circle round? Plane {axes}"
-    return Picture(stem, title, caption, draw, circle_chart(on, shown))
+    return Picture(stem, title, caption, circle_chart(on, shown))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,39 +116,36 @@ class Stop:
     trace: Trace
 
 
-@dataclass(frozen=True, eq=False)
-class _Room:
-    """A room of a drawing and panel of its chart: a curve each for some of the sources, by their numbers."""
+# A curve of a source, by its number: abscissae and ordinates.
+_Own = tuple[int, Array, Array]
 
-    title: str
-    x: Axis
-    y: Axis
-    curves: Sequence[tuple[int, Array, Array]]
-    levels: Sequence[Level] = ()
-    linked: str = "t"
+
+def _curves(sources: Sequence[Source], own: Sequence[_Own]) -> list[Curve]:
+    return [Curve(sources[k].name, x, y, COLOURS[k % len(COLOURS)], _dash(k), 1.2) for k, x, y in own]
 
 
 def _over_time(
-    sources: Sequence[Source], stem: str, title: str, signal: str, factor: float, ordinate: str
+    sources: Sequence[Source], stem: str, title: str, signal: str, factor: float, ordinate: Axis
 ) -> Picture | None:
-    found: dict[str, list[tuple[int, Array, Array]]] = {}
+    found: dict[str, list[_Own]] = {}
     for axis in dict.fromkeys(axis for source in sources for axis in source.axes):
         curves = ((k, source, source.curve(f"{axis}.{signal}", SIGNALS[signal])) for k, source in enumerate(sources))
         found[axis] = [(k, source.t, factor * y) for k, source, y in curves if y is not None]
-    rooms = [
-        _Room(f"Axis {axis}", ABSCISSA, _axis(ordinate), found[axis], [Level(0.0, dash="")])
-        for axis in _moved({axis: max((float(np.ptp(y)) for *_, y in curves), default=0.0)
-                            for axis, curves in found.items()})
-    ]  # fmt: skip
+    sizes = {axis: max((float(np.ptp(y)) for *_, y in curves), default=0.0) for axis, curves in found.items()}
+    panels = [
+        Panel(f"Axis {axis}", ABSCISSA, ordinate, _curves(sources, found[axis]), [Level(0.0, dash="")], linked="t")
+        for axis in _moved(sizes)
+    ]
     caption = f"Over the time of the first source, from its first row on. {LEFT_OUT}"
-    return _rooms(sources, stem, title, caption, rooms)
+    return Picture(stem, title, caption, Chart(panels)) if panels else None
 
 
 def stop_picture(sources: Sequence[Source], stops: Sequence[Sequence[Approach]]) -> Picture | None:
-    """Distance beyond the target about the ends of motions, a room for every stop of an axis."""
-    rooms = []
+    """Distance beyond the target about the ends of motions, a panel for every stop of an axis."""
+    panels = []
     for axis, number in stops_of(stops):
-        curves, most, said = [], LEAST_REACH, []
+        own: list[_Own] = []
+        most, said = LEAST_REACH, []
         for k, (source, found) in enumerate(zip(sources, stops, strict=True)):
             if (seen := stop_seen(source, found, axis, number)) is None:
                 continue
@@ -183,21 +153,21 @@ def stop_picture(sources: Sequence[Source], stops: Sequence[Sequence[Approach]])
             time, beyond = deviation(seen.trace, approach, f"{axis}.x_a")
             after = 1e3 * (time - approach.end)
             near = (after >= -1e3 * ZOOM_BEFORE) & (after <= 1e3 * ZOOM_AFTER)
-            curves.append((k, after[near], 1e6 * beyond[near]))
+            own.append((k, after[near], 1e6 * beyond[near]))
             most = max(most, 1e6 * float(beyond.max()))
             said.append(f"{approach.target * 1e3:.6g}")
         title = f"Axis {axis}, stop {number + 1} at {' and '.join(dict.fromkeys(said))} mm"
         ordinate = Axis("beyond the target", "µm", span=(-1.45 * most, 1.45 * most))
         levels = [Level(0.0, dash=""), Level(0.0, upright=True, dash="dotted")]
-        if curves and number < MOST_STOPS:
-            rooms.append(_Room(title, AFTER, ordinate, curves, levels, "stop"))
+        if own and number < MOST_STOPS:
+            panels.append(Panel(title, AFTER, ordinate, _curves(sources, own), levels, linked="stop"))
     caption = (
         "Actual position less end position in the sense of the motion, positive past it, over the time after the "
         "setpoint has come to rest."
     )
     if any(number >= MOST_STOPS for _, number in stops_of(stops)):
         caption += f" The first {MOST_STOPS} stops of each axis are drawn; the table has all."
-    return _rooms(sources, "stop", "How do the axes come to rest?", caption, rooms)
+    return Picture("stop", "How do the axes come to rest?", caption, Chart(panels)) if panels else None
 
 
 def stops_of(stops: Sequence[Sequence[Approach]]) -> list[tuple[str, int]]:
@@ -218,22 +188,23 @@ def stop_seen(source: Source, found: Sequence[Approach], axis: str, number: int)
 
 def spectrum_picture(sources: Sequence[Source]) -> Picture | None:
     """Amplitude spectra of following error and torque of every axis, over the whole of each source."""
-    rooms = []
-    for signal, words, factor, ordinate in SPECTRA:
-        found: dict[str, list[tuple[int, Array, Array]]] = {}
+    panels = []
+    for signal, words, factor, unit in SPECTRA:
+        found: dict[str, list[_Own]] = {}
         for axis in dict.fromkeys(axis for source in sources for axis in source.axes):
             curves = [(k, _spectrum(source, f"{axis}.{signal}", factor)) for k, source in enumerate(sources)]
             found[axis] = [(k, *curve) for k, curve in curves if curve is not None]
         tops = {axis: max((float(a.max()) for *_, a in curves), default=0.0) for axis, curves in found.items()}
         for axis in _moved(tops):
-            y = Axis(*_labelled(ordinate), log=True, span=(DOWN * tops[axis], 2 * tops[axis]))
-            rooms.append(_Room(f"Axis {axis}: {words}", FREQUENCY, y, found[axis], (), "f"))
+            y = Axis("amplitude", unit, log=True, span=(DOWN * tops[axis], 2 * tops[axis]))
+            panels.append(Panel(f"Axis {axis}: {words}", FREQUENCY, y, _curves(sources, found[axis]), linked="f"))
     caption = (
         f"Amplitude spectra over the whole of each source: Hann windows of {STRETCH:g} s, half over each other, "
         "averaged by power. A steady vibration stands there with its amplitude; what only rings now and then stands "
         f"lower. {LEFT_OUT}"
     )
-    return _rooms(sources, "spectrum", "Which frequencies are in it?", caption, rooms, 2)
+    chart = Chart(panels, (1.0, 1.0))
+    return Picture("spectrum", "Which frequencies are in it?", caption, chart) if panels else None
 
 
 def _spectrum(source: Source, name: str, factor: float) -> tuple[Array, Array] | None:
@@ -248,55 +219,5 @@ def _spectrum(source: Source, name: str, factor: float) -> tuple[Array, Array] |
 
 
 def _moved(sizes: Mapping[str, float]) -> list[str]:
-    """Axes that are worth a room, by how large what they do is."""
+    """Axes that are worth a panel, by how large what they do is."""
     return [axis for axis, size in sizes.items() if size > SHAKEN * max(sizes.values())]
-
-
-def _rooms(
-    sources: Sequence[Source], stem: str, title: str, caption: str, rooms: Sequence[_Room], columns: int = 1
-) -> Picture | None:
-    """A picture of rooms below one another, in columns; None without any."""
-    if not rooms:
-        return None
-
-    def draw() -> Drawn:
-        lines = -(-len(rooms) // columns)
-        with drawing(10.0, 0.6 + 2.3 * lines) as figure:
-            places = figure.subplots(lines, columns, squeeze=False, sharex=True).ravel()
-            for place in places[len(rooms) :]:
-                place.set_visible(False)
-            for place, room in zip(places, rooms, strict=False):
-                for k, x, y in room.curves:
-                    place.plot(*thinned(x, y), **look(k), linewidth=1.1, label=plain(sources[k].name))
-                for level in room.levels:
-                    (place.axvline if level.upright else place.axhline)(level.at, color=MUTED, linewidth=0.8)
-                place.margins(x=0.01)
-                if room.x.log:
-                    place.set(xscale="log", yscale="log")
-                place.set(xlim=room.x.span, ylim=room.y.span, ylabel=room.y.title)
-                heading(place, room.title)
-            once = {line.get_label(): line for place in places for line in place.get_lines()}
-            handles = [line for label, line in once.items() if not str(label).startswith("_")]
-            figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 4))
-            for place in places[-columns:]:
-                place.set_xlabel(rooms[0].x.title)
-            return finish(figure, stem, title, caption)
-
-    panels = [
-        Panel(
-            room.title, room.x, room.y,
-            [Curve(sources[k].name, x, y, COLOURS[k % len(COLOURS)], _dash(k), 1.2) for k, x, y in room.curves],
-            room.levels, linked=room.linked,
-        )
-        for room in rooms
-    ]  # fmt: skip
-    return Picture(stem, title, caption, draw, Chart(panels, (1.0,) * columns))
-
-
-def _axis(ordinate: str) -> Axis:
-    return Axis(*_labelled(ordinate))
-
-
-def _labelled(ordinate: str) -> tuple[str, str]:
-    label, _, unit = ordinate.removesuffix("]").rpartition(" [")
-    return label, unit

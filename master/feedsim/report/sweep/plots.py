@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from feedsim.report.formatting import plain
+import numpy as np
+
+from feedsim.report.chart import Chart, Grid
 from feedsim.report.picture import Picture
 from feedsim.report.run.report import HEADER, is_leading
-from feedsim.report.style import BLUE, GRID, VERMILLION, Drawn, drawing, finish
-from feedsim.report.sweep.account import NOTHING, Account, Measure, Output, measures
-from feedsim.report.sweep.charts import matrix_chart
+from feedsim.report.sweep.account import NOTHING, RANK, TOTAL, Account, Output, measures
 from feedsim.report.sweep.figure_plots import grid_picture, of_account
 from feedsim.sweep.sensitivity import is_constant
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 MOST_FIGURES = 8  # drawn one by one; the tables hold all
 MOST_ROWS, MOST_COLUMNS = 30, 20  # of the overview
-DEPTH = 0.8  # of the colour of a 1
 
 
 def varying(account: Account) -> list[Output]:
@@ -68,52 +61,14 @@ def overview_picture(account: Account) -> Picture | None:
         return None
     ranks = sorted(range(len(account.inputs)), key=lambda k: -max(each.size(k) for each in found))
     columns = sorted(ranks[:MOST_COLUMNS])
-    width = max(6.0, 2.2 + 0.62 * len(columns))
-
-    def draw() -> Drawn:
-        with drawing(width, max(2.4, 1.5 + 0.32 * len(found))) as figure:
-            _matrix(figure.subplots(), account, found, columns)
-            return finish(
-                figure, "sensitivities", "Which parameter moves which figure", found[0].caption + more, worded=True
-            )
-
     left_out = len(account.inputs) - len(columns)
     more = f" {left_out} parameters that move no figure more are left out." if left_out else ""
-    chart = matrix_chart([each.name for each in account.inputs], found, columns)
-    return Picture("sensitivities", "Which parameter moves which figure", found[0].caption + more, draw, chart)
-
-
-def _matrix(axes: Axes, account: Account, found: Sequence[Measure], columns: Sequence[int]) -> None:
-    from matplotlib.patches import Rectangle
-
-    axes.set_axisbelow(False)
-    axes.grid(visible=False)
-    for i, measure in enumerate(found):
-        for j, column in enumerate(columns):
-            value = float(measure.values[column])
-            if not math.isfinite(value):
-                continue
-            depth = DEPTH * min(abs(value), 1.0)
-            colour = BLUE if value > 0 else VERMILLION
-            axes.add_patch(Rectangle((j, i), 1, 1, facecolor=colour, alpha=depth, linewidth=0))
-            if abs(value) >= NOTHING:
-                text = f"{value:.2f}".replace("-", "−")
-                weight = "bold" if measure.told(column) else "normal"
-                axes.text(j + 0.5, i + 0.5, text, ha="center", va="center", fontsize=8, fontweight=weight)
-    for k in range(len(columns) + 1):
-        axes.axvline(k, color=GRID, linewidth=0.6)
-    for k in range(len(found) + 1):
-        axes.axhline(k, color=GRID, linewidth=0.6)
-    names = [plain(account.inputs[k].name) for k in columns]
-    turned = max(map(len, names)) > 6
-    axes.set_xticks(
-        [k + 0.5 for k in range(len(columns))], names,
-        rotation=40 if turned else 0, ha="left" if turned else "center", rotation_mode="anchor",
-    )  # fmt: skip
-    axes.xaxis.tick_top()
-    axes.set_yticks([k + 0.5 for k in range(len(found))], [plain(each.figure) for each in found])
-    axes.tick_params(length=0)
-    axes.set_xlim(0, len(columns))
-    axes.set_ylim(len(found), 0)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    values = np.array([[float(measure.values[k]) for k in columns] for measure in found])
+    bold = np.array([[measure.told(k) for k in columns] for measure in found])
+    if found[0].kind == TOTAL:
+        values = np.where(np.abs(values) < NOTHING, np.nan, values)
+    names, figures = [account.inputs[k].name for k in columns], [each.figure for each in found]
+    span = (-1.0, 1.0) if found[0].kind == RANK else (0.0, 1.0)
+    chart = Chart([Grid("", names, figures, values, span, 2, bold)])
+    title = "Which parameter moves which figure"
+    return Picture("sensitivities", title, found[0].caption + more, chart, worded=True)

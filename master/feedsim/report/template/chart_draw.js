@@ -28,12 +28,13 @@ const unit_of = axis => axis.unit ? ` ${axis.unit}` : "";
 const HALO = { "fill": "var(--ink)", "font-size": 11, "paint-order": "stroke", stroke: "var(--ground)", "stroke-width": 3, "stroke-linejoin": "round" };
 const label_of = axis => axis.unit ? `${axis.label} [${axis.unit}]` : axis.label;
 
-// A scale from values to pixels and back.
-function scale(low, high, first, last, log) {
-  const by = log ? Math.log10 : value => value;
+// A scale from values to pixels and back; within: linear to this distance from zero, beyond logarithmic both ways.
+function scale(low, high, first, last, { log, symlog: within }) {
+  const by = within ? value => Math.sign(value) * Math.log10(1 + Math.abs(value) / within) : log ? Math.log10 : value => value;
+  const back = within ? seen => Math.sign(seen) * within * (10 ** Math.abs(seen) - 1) : log ? seen => 10 ** seen : seen => seen;
   const from = by(low), per = (last - first) / (by(high) - from || 1);
   const to = value => first + (by(value) - from) * per;
-  to.back = pixel => log ? 10 ** (from + (pixel - first) / per) : from + (pixel - first) / per;
+  to.back = pixel => back(from + (pixel - first) / per);
   return to;
 }
 
@@ -46,6 +47,11 @@ function ticks(axis, low, high, most) {
   if (axis.names.length) {
     const every = Math.ceil(axis.names.length / Math.max(1, most));
     return axis.names.map((name, k) => ({ at: k, text: name })).filter((each, k) => k % every === 0 && k >= low && k <= high);
+  }
+  if (axis.symlog) {
+    const decades = [];
+    for (let at = 10 ** Math.ceil(Math.log10(axis.symlog * 2) - 1e-9); at <= Math.max(-low, high); at *= 10) decades.push(at);
+    return [...decades.map(at => -at).reverse(), 0, ...decades].filter(at => at >= low && at <= high).map(at => ({ at, text: number(at) }));
   }
   if (axis.log && high / low > 8) {
     const found = [], decades = Math.log10(high / low), few = decades < 2.2, every = Math.ceil(decades / most);
@@ -120,6 +126,7 @@ function range_of(panel, curves, values, span) {
   for (const mark of panel.marks) if (mark.x >= span[0] && mark.x <= span[1]) seen(mark.y);
   if (low > high) return panel.y.span || (panel.y.log ? [0.1, 10] : [-1, 1]);
   if (panel.y.log) return [low / 1.3, high * 1.3];
+  if (panel.y.symlog) return [low * 1.21, high * 1.21];
   const room = 0.07 * (high - low) || 0.05 * Math.abs(high) || 1;
   return [low - (low === 0 && curves.some(each => each.filled) ? 0 : room), high + room];
 }
@@ -139,14 +146,14 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   const shown = panel.curves.filter(each => !hidden.has(each.name));
   const span = zoom.x || whole_span(panel, values);
   const height = zoom.y || (!zoom.x && panel.y.span) || range_of(panel, shown, values, span);
-  const tall = box.height - EDGE.top - EDGE.bottom;
+  const above = top_of(panel), tall = box.height - above - EDGE.bottom;
   const heights = ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(tall / 34)));
   const widest_of = (texts, wide, more) => texts.reduce((most, each) => Math.max(most, wide * each.length + more), 0);
   const beside = panel.y.names.length ? widest_of(panel.y.names, 6.6, 26) : widest_of(heights.map(each => each.text || ""), 6.6, 30);
   const left = Math.min(Math.max(EDGE.left, beside), box.width * 0.45);
-  const inner = { x: left, y: EDGE.top, width: box.width - left - EDGE.right, height: tall };
-  const across = scale(span[0], span[1], inner.x, inner.x + inner.width, panel.x.log);
-  const up = scale(height[0], height[1], inner.y + inner.height, inner.y, panel.y.log);
+  const inner = { x: left, y: above, width: box.width - left - box.aside, height: tall };
+  const across = scale(span[0], span[1], inner.x, inner.x + inner.width, panel.x);
+  const up = scale(height[0], height[1], inner.y + inner.height, inner.y, panel.y);
   const bottom = inner.y + inner.height, right = inner.x + inner.width;
   const title = panel.y.names.length ? 0 : Math.max(0, Math.min(inner.x, box.width - 7.4 * panel.title.length));
   make("text", { x: title, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
@@ -165,6 +172,18 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   make("text", { x: Math.min(inner.x + inner.width / 2, box.width - 3.4 * label_of(panel.x).length), y: bottom + 34, "text-anchor": "middle", fill: colour("ink") }, part, label_of(panel.x));
   if (!panel.y.names.length)
     make("text", { transform: `translate(13 ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, label_of(panel.y));
+  if (panel.x.also) {
+    const [label, unit, factor] = panel.x.also, named = { label, unit, log: panel.x.log, names: [] };
+    for (const tick of ticks(named, span[0] * factor, span[1] * factor, Math.max(2, Math.floor(inner.width / 74))))
+      if (tick.text) make("text", { x: across(tick.at / factor), y: inner.y - 5, "text-anchor": "middle", fill: colour("ink") }, part, tick.text);
+    make("text", { x: inner.x + inner.width / 2, y: inner.y - 20, "text-anchor": "middle", fill: colour("ink") }, part, label_of(named));
+  }
+  if (panel.y.also) {
+    const [label, unit, factor] = panel.y.also, named = { label, unit, log: panel.y.log, names: [] };
+    for (const tick of ticks(named, height[0] * factor, height[1] * factor, Math.max(2, Math.floor(tall / 34))))
+      if (tick.text) make("text", { x: right + 6, y: up(tick.at / factor) + 4, fill: colour("ink") }, part, tick.text);
+    make("text", { transform: `translate(${box.width - 5} ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, label_of(named));
+  }
   const clip = make("clipPath", { id }, part);
   make("rect", { x: inner.x, y: inner.y, width: inner.width, height: inner.height }, clip);
   const field = make("g", { "clip-path": `url(#${id})` }, part);
@@ -290,6 +309,7 @@ function draw_grid(panel, box, parent, values) {
   const [low, high] = panel.span, about_zero = low < 0 && high > 0;
   panel.columns.forEach((name, j) => make("text", { transform: `translate(${left + (j + 0.5) * width} ${top - 6}) rotate(-40)`, fill: colour("ink"), "font-size": 11 }, part, name));
   panel.rows.forEach((name, i) => make("text", { x: left - 8, y: top + (i + 0.5) * height + 4, "text-anchor": "end", fill: colour("ink"), "font-size": 11 }, part, name));
+  const bold = new Set(panel.bold || []);
   panel.rows.forEach((row, i) => panel.columns.forEach((column, j) => {
     const value = cells[i * columns + j], box = { x: left + j * width, y: top + i * height, width, height };
     make("rect", { ...box, fill: "none", stroke: colour("grid"), "stroke-width": 0.6 }, part);
@@ -297,28 +317,31 @@ function draw_grid(panel, box, parent, values) {
     const share = about_zero ? Math.abs(value) / Math.max(-low, high) : (value - low) / (high - low || 1);
     const cell = make("rect", { ...box, fill: colour(about_zero && value < 0 ? "vermillion" : "blue"), "fill-opacity": (0.75 * Math.min(1, Math.max(0, share))).toFixed(3) }, part);
     make("title", {}, cell, `${row}, ${column}: ${number(value)}`);
-    if (numbers) make("text", { x: box.x + width / 2, y: box.y + height / 2 + 4, "text-anchor": "middle", fill: colour("ink"), "font-size": 11 }, part, about_zero ? number(value, panel.digits) : number(value, panel.digits + 1));
+    if (numbers) make("text", { x: box.x + width / 2, y: box.y + height / 2 + 4, "text-anchor": "middle", fill: colour("ink"), "font-size": 11, "font-weight": bold.has(i * columns + j) ? 700 : 400 }, part, panel.decimals === null ? number(value, 3) : value.toFixed(panel.decimals).replace("-", "−"));
   }));
   return { panel, part };
 }
 const grid_left = panel => Math.min(260, 16 + 6.4 * panel.rows.reduce((most, each) => Math.max(most, each.length), 0));
 const grid_top = panel => 36 + 4.3 * panel.columns.reduce((most, each) => Math.max(most, each.length), 0);
 
+const top_of = panel => EDGE.top + (panel.x.also ? 34 : 0);
+
 // Where every panel goes: boxes, and the height of all.
 function placed(chart, width) {
   const columns = width < Math.max(NARROW, COLUMN * chart.widths.length) ? [1] : chart.widths, total = columns.reduce((a, b) => a + b, 0), boxes = [];
+  const aside = chart.panels.some(panel => panel.y && panel.y.also) ? EDGE.left : EDGE.right; // panels below one another end alike
   let y = 4;
   for (let k = 0; k < chart.panels.length; k += columns.length) {
     const row = chart.panels.slice(k, k + columns.length);
     const widths = columns.map(each => (width - GAP * (columns.length - 1)) * each / total);
     const natural = row.map((panel, j) => panel.kind === "polar" ? Math.min(widths[j], ROUND) + 24
       : panel.kind === "grid" ? grid_top(panel) + 24 * panel.rows.length + 12
-      : panel.y.names.length ? EDGE.top + EDGE.bottom + 26 * panel.y.names.length : HEIGHT * panel.height + EDGE.bottom);
+      : panel.y.names.length ? EDGE.top + EDGE.bottom + 26 * panel.y.names.length : HEIGHT * panel.height + EDGE.bottom + top_of(panel) - EDGE.top);
     const height = Math.max(...natural);
     let x = 0;
     row.forEach((panel, j) => {
       const own = row.some(each => each.kind === "polar") && panel.kind === "xy" ? Math.min(height, 360) : height;
-      boxes.push({ x, y, width: widths[j], height: panel.y && panel.y.names.length ? natural[j] : own });
+      boxes.push({ x, y, aside, width: widths[j], height: panel.y && panel.y.names.length ? natural[j] : own });
       x += widths[j] + GAP;
     });
     y += height + 10;

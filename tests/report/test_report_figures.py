@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from feedsim.analysis import Figure, PositioningTask, evaluate, tasks
-from feedsim.motions import Dwell, Move
+from feedsim.motions import Circle, Dwell, Move
 from feedsim.report import chart
 from feedsim.report.chart import Band, Chart, Curve, Grid, Level, Mark, Panel, Polar, printed
 from feedsim.report.chart.placing import Ground
@@ -22,7 +22,7 @@ from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import ring_step
 from feedsim.report.run.report import draw
 from feedsim.report.style import LARGEST_SVG, drawing, finish
-from feedsim.scenario import Axis, Positioning
+from feedsim.scenario import Axis, CircleTest, Positioning
 from report_helpers import FakeRun, circle_run, positioning_run, run_of, small_run
 from scenario_helpers import default_machine, scenario
 
@@ -302,6 +302,20 @@ def test_contour_says_what_its_labels_are() -> None:
     picture = next(picture for picture in draw(run, evaluate(run)) if picture.stem == "contour-XZ")
     assert "(less the median)" in picture.svg
     assert "median (scales)" in picture.svg
+
+
+def test_a_circle_driven_both_ways_is_drawn_both_ways() -> None:
+    circle = Circle(plane=("X", "Z"), radius=0.015, feed=0.1, turns=3, direction="both")
+    run = run_of(scenario(circle, Dwell(duration=0.25), evaluate=(CircleTest(),)))
+    picture = next(picture for picture in draw(run, evaluate(run)) if picture.stem == "contour-XZ")
+    assert "Dotted: clockwise, from" in picture.caption
+    polar = picture.chart.panels[0] if picture.chart else None
+    assert isinstance(polar, Polar)
+    turned = {curve.name: np.diff(np.unwrap(curve.x)) for curve in polar.curves}
+    assert np.all(turned["linear scales"] > 0)
+    assert np.all(turned["linear scales, clockwise"] < 0)
+    for steps in turned.values():
+        assert abs(steps.sum()) == pytest.approx(2 * math.pi, abs=3 * np.abs(steps).max())
 
 
 def test_all_axes_are_shown_over_the_whole_run() -> None:

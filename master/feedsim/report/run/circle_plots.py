@@ -8,12 +8,12 @@ from typing import Protocol
 
 import numpy as np
 
-from feedsim.analysis import Contour, Turn, contour
+from feedsim.analysis import Turn, contour
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Mark, Panel, Polar
 from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import TIME, TOOL, reversed_note, torque_axis
-from feedsim.report.style import BLUE, ORANGE, VERMILLION, Array
+from feedsim.report.style import BLUE, GREEN, ORANGE, VERMILLION, Array
 from feedsim.trace import Trace
 
 RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
@@ -28,37 +28,44 @@ class OnCircle(Protocol):
     def radius(self) -> float: ...
 
 
-def contour_picture(trace: Trace, turn: Turn, stem: str) -> Picture:
-    """Contour error of one turn in polar form, magnified, with scale rings and the quadrant glitches."""
+def contour_picture(trace: Trace, turn: Turn, stem: str, back: Turn | None = None) -> Picture:
+    """Contour error of a turn in polar form, magnified, with scale rings and the quadrant glitches.
+
+    back: the turn in the other sense, which is drawn over it.
+    """
     by_scale = contour(trace, turn)
-    tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
-    by_tool = contour(trace, turn, tool) if all(name in trace.columns for name in tool) else None
     on = circle(turn, float(np.abs(by_scale.deviation).max()))
+    curves = []
+    tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
+    if all(name in trace.columns for name in tool):
+        by_tool = contour(trace, turn, tool)
+        curves.append(turned(TOOL, ORANGE, by_tool.angle, by_tool.deviation, "dashed", 1.2))
+    curves.append(turned("linear scales", BLUE, by_scale.angle, by_scale.deviation, width=1.6))
+    over = ""
+    if back is not None:
+        other = contour(trace, back)
+        curves.append(turned(f"linear scales, {way(back)}", GREEN, other.angle, other.deviation, "dotted", 1.2))
+        over = f" Dotted: {way(back)}, from {back.begin:.4f} to {back.end:.4f} s."
     title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
     caption = (
-        f"Radius {turn.radius * 1e3:.6g} mm, {'counterclockwise' if turn.sense > 0 else 'clockwise'} from "
-        f"{turn.axes[0]} to {turn.axes[1]}, turn from {turn.begin:.4f} to {turn.end:.4f} s. "
-        f"Radius deviation magnified {on.magnification:,.0f} times; rings at ±{on.ring:g} µm about the programmed "
-        "circle. The markers show the quadrant glitches: the largest deviation within ±45° of an axis crossing, "
-        "less the median of the turn."
+        f"Radius {turn.radius * 1e3:.6g} mm, {way(turn)} from {turn.axes[0]} to {turn.axes[1]}, turn from "
+        f"{turn.begin:.4f} to {turn.end:.4f} s.{over} Radius deviation magnified {on.magnification:,.0f} times; rings "
+        f"at ±{on.ring:g} µm about the programmed circle. The markers show the quadrant glitches: the largest "
+        "deviation within ±45° of an axis crossing, less the median of the turn."
     )
-    return Picture(stem, title, caption, _contour(by_scale, by_tool, on, turn.sense))
-
-
-def _contour(by_scale: Contour, by_tool: Contour | None, on: Polar, sense: int) -> Chart:
-    """Contour error of a turn about the programmed circle and over the angle. on: the circle, without curves."""
-    curves: list[tuple[str, Contour, str, Dash, float]] = [("linear scales", by_scale, BLUE, "", 1.6)]
-    if by_tool is not None:
-        curves.insert(0, (TOOL, by_tool, ORANGE, "dashed", 1.2))
     marks = [
         Mark(glitch.angle, glitch.deviation * 1e6, f"{minus(glitch.name)}: {glitch.height * 1e6:.2f} µm", VERMILLION)
         for glitch in by_scale.glitches
     ]
-    drawn = [
-        turned(name, colour, each.angle, each.deviation, dash, width) for name, each, colour, dash, width in curves
-    ]
     median = Level(by_scale.median * 1e6, "median (scales)", dash="dotted")
-    return circle_chart(on, drawn, marks, (median,), sense, "quadrant glitches\n(less the median)")
+    sense = turn.sense if back is None else 0
+    chart = circle_chart(on, curves, marks, (median,), sense, "quadrant glitches\n(less the median)")
+    return Picture(stem, title, caption, chart)
+
+
+def way(turn: Turn) -> str:
+    """The sense of a turn in words."""
+    return "counterclockwise" if turn.sense > 0 else "clockwise"
 
 
 def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str) -> Picture | None:

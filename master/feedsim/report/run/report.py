@@ -204,7 +204,7 @@ def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
                 )
             )
         elif isinstance(task, CircleTask):
-            pictures.append(contour_picture(run.trace, task.turn, f"contour-{stem}"))
+            pictures.append(contour_picture(run.trace, task.turn, f"contour-{stem}", task.back))
             torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
             pictures += [torques] if torques is not None else []
         else:

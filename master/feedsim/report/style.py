@@ -153,7 +153,8 @@ def finish(
     """Render ``figure``; call inside its ``drawing``. The result depends on nothing but what was drawn.
 
     worded: title and caption stand above the PNG, which travels alone; the page has them beside the SVG. then: called
-    when the layout is known. Legends of the figure stand above everything but these words.
+    when the layout is known. Legends of the figure that the layout leaves out stand above everything but
+    these words.
     """
     head, words_above = _head(figure, title, caption) if worded else (0.0, [])
     if remark := REMARK.get():
@@ -161,7 +162,7 @@ def finish(
         words.set_in_layout(False)
         words.set_y(0.995 - head / figure.get_figheight())
     room = head + (0.13 * (1 + remark.count("\n")) if remark else 0.0)
-    for legend in figure.legends:
+    for legend in [each for each in figure.legends if not each.get_in_layout()]:
         tall = legend.get_window_extent().height / figure.dpi
         figure.set_figheight(figure.get_figheight() + tall)
         legend.set_bbox_to_anchor((0.06 / figure.get_figwidth(), 1 - (room + 0.04) / figure.get_figheight()))

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 Place = Callable[[], None]  # what is done when the layout is known
 WIDTH, WIDEST, COLUMN = 10.0, 12.0, 3.6  # inches of a figure, and that a column takes at least
 PANEL, ENDS, ROUND, NAMED, CELL = 2.3, 0.5, 6.0, 0.27, (0.62, 0.31)  # inches: see _height
+SIDE, HEAD = 0.85, 0.35  # inches beside a panel's curves and above them
+FEW = 2  # marks with words that need no room of their own
 DASHES: dict[str, Any] = {"": "-", "dashed": (0, (5, 1.5)), "dotted": (0, (2, 1.3))}
 DOT = 2.0  # points, of a dot whose width is 1
 SHAPES = ("^", "v", "o", "s")  # of large dots of several names
@@ -47,13 +49,16 @@ def printed(chart: Chart, stem: str, title: str, caption: str = "", *, worded: b
     with drawing(_width(chart), sum(heights)) as figure:
         places: list[Place] = []
         shapes = _shapes(chart)
+        shares = [_width(chart) * share / sum(chart.widths) for share in chart.widths]
         grid = figure.add_gridspec(len(rows), len(chart.widths), width_ratios=chart.widths, height_ratios=heights)
         for i, row in enumerate(rows):
             for j, part in enumerate(row):
                 axes = figure.add_subplot(grid[i, j])
                 if isinstance(part, Panel):
                     same = j > 0 and isinstance(left := row[j - 1], Panel) and left.y == part.y
-                    places.append(_panel(axes, part, shapes, bare=_hides(chart, i, j), unnamed=same))
+                    bare = _hides(chart, i, j)
+                    size = (shares[j] - SIDE, heights[i] - HEAD - (0.0 if bare else ENDS))
+                    places.append(_panel(axes, part, shapes, size, bare=bare, unnamed=same))
                 elif isinstance(part, Polar):
                     places.append(_polar(axes, part))
                 else:
@@ -106,13 +111,18 @@ def _text(text: str) -> str:
 # -- panels ------------------------------------------------------------------------------------------------------------
 
 
-def _panel(axes: Axes, panel: Panel, shapes: Mapping[str, str], *, bare: bool, unnamed: bool) -> Place:
+def _panel(
+    axes: Axes, panel: Panel, shapes: Mapping[str, str], size: tuple[float, float], *, bare: bool, unnamed: bool
+) -> Place:
     """Curves over one pair of axes.
 
-    shapes: of dots, by their names. bare, unnamed: without the names of abscissa or ordinate.
+    shapes: of dots, by their names. size: about that of the room for the curves [inches], for the number of ticks: the
+    layout needs to know how wide their texts are. bare, unnamed: without the names of abscissa or ordinate.
     """
     across, up = ranges(panel)
     up = _with_bands(panel, up)
+    if sum(bool(mark.text) for mark in panel.marks) > FEW and not panel.y.log:
+        up = (up[0], up[1] + 0.25 * (up[1] - up[0]))  # room for what is said of them
     if panel.x.span is None:
         across = _wider(across, panel.x.log)
     axes.set_xscale("log" if panel.x.log else "linear")
@@ -140,16 +150,13 @@ def _panel(axes: Axes, panel: Panel, shapes: Mapping[str, str], *, bare: bool, u
 
     def place() -> None:
         room = axes.get_window_extent().transformed(axes.figure.dpi_scale_trans.inverted())  # inches
-        _marked(axes.xaxis, panel.x, across, room.width / (1.05 if panel.x.names else 0.75), bare)
-        _marked(axes.yaxis, panel.y, up, len(panel.y.names) or min(room.height / 0.25, 9), False)
         fit(axes, title)
         for line in axes.lines if panel.y.names else ():  # bars are as wide as their rows allow
             line.set_linewidth(line.get_linewidth() * min(2.0, room.height / (up[1] - up[0]) / NAMED))
         _words(axes, panel, across, up)
 
-    # The layout needs to know how wide the ticks' texts will be.
-    _marked(axes.xaxis, panel.x, across, 6, bare)
-    _marked(axes.yaxis, panel.y, up, len(panel.y.names) or 5 * panel.height, False)
+    _marked(axes.xaxis, panel.x, across, size[0] / (1.05 if panel.x.names else 0.75), bare)
+    _marked(axes.yaxis, panel.y, up, len(panel.y.names) or min(size[1] / 0.25, 9), False)
     if panel.y.names:
         axes.grid(visible=False, axis="y")
         axes.tick_params(axis="y", length=0)

@@ -172,32 +172,35 @@ def test_a_log_without_torque(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
-@pytest.mark.parametrize(("axis", "position", "torque"), [("X", 1.3e-6, 0.36), ("Y", 1.5e-6, 0.75)])
-def test_a_real_machine(axis: str, position: float, torque: float) -> None:
+@pytest.mark.parametrize(
+    ("axis", "position", "torque", "gain"), [("X", 1.15e-6, 0.36, "estimated"), ("Y", 1.4e-6, 0.75, "undetermined")]
+)
+def test_a_real_machine(axis: str, position: float, torque: float, gain: str) -> None:
     """A SINUMERIK 840D sl, rigid axes: what a first study had reached by hand was 1.10 um and 0.32 N.m on X, 1.28 um
-    and 0.68 N.m on Y, the vertical axis."""
+    and 0.68 N.m on Y, the vertical axis. K_p of X is told: its gentle moves and its rapids, each alone, give the same
+    (the test below). Y has one kind of fast stroke only."""
     found, _ = identified(Path(os.environ["FEEDSIM_CAPTURE"]), axis)
     assert found.position < position
     assert found.torque < torque
-    assert found.estimates["K_p"].status == "undetermined"
+    assert found.estimates["K_p"].status == gain
     assert "asymmetry" not in found.chosen
     assert found.estimates["T_dyn"].value + found.estimates["T_sym"].value == pytest.approx(8.25e-3, abs=1e-6)
 
 
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
 @pytest.mark.parametrize(
-    ("seen", "unseen", "most"), [("0 s..2.6 s", "2.6 s..4.6 s", 50.0), ("2.6 s..4.6 s", "0 s..2.6 s", 2.0)]
+    ("seen", "unseen", "most"), [("0 s..2.6 s", "2.6 s..4.6 s", 8.0), ("2.6 s..4.6 s", "0 s..2.6 s", 2.0)]
 )
 def test_a_real_machine_on_motion_that_it_was_not_identified_from(
     seen: str, unseen: str, most: float, tmp_path: Path
 ) -> None:
     """Two gentle moves of X, then rapids: intervals from either hold what the whole record tells, and the machine
-    follows the other, from the gentle ones to some percent of the lag of 1.2 mm."""
+    follows the other, from the gentle ones to some thousandths of the lag of 1.2 mm."""
     record = os.environ["FEEDSIM_CAPTURE"]
     words = ["--axes", "X", "--quiet"]
     assert main(["identify-drive", record, *words, "--window", seen, "--out", str(tmp_path / "machine")]) == 0
     found = json.loads((tmp_path / "machine" / "summary.json").read_text())["axes"]["X"]["parameters"]
-    for name, value in (("T_sym", 0.724e-3), ("k_ffw", 1.00009), ("J", 0.0189)):
+    for name, value in (("T_sym", 0.716e-3), ("k_ffw", 1.0001), ("J", 0.0189), ("K_p", 6.5)):
         assert abs(found[name]["value"] - value) <= 2 * found[name]["sigma"], name
     replay = ["replay", record, *words, "--machine", str(tmp_path / "machine")]
     assert main([*replay, "--window", unseen, "--out", str(tmp_path / "replay")]) == 0

@@ -42,10 +42,10 @@ DAMPED, BARELY = 0.7, 0.2
 SPAN = 4.0  # usual deviations that a logarithm may be off its start
 LEAST = {"position": 1e-9, "torque": 1e-3}  # [m], share of the torque: no channel is weighted as better than that
 
-# Of the cost: what a step has to promise. The cost counts rows, of which some twenty say the same. A fit that ends
-# COMPARED off its least is off by a few hundredths of the logarithm of the likelihood, or a fifth of a standard
+# Of the cost: what a step has to promise. The cost counts what rows say of their own, some hundred pieces. A fit that
+# ends COMPARED off its least is off by a few hundredths of the logarithm of the likelihood, or a fifth of a standard
 # deviation; FINAL is a tenth of that, and a third of the deviation. ROUGH is to begin with, where weights are guessed.
-ROUGH, COMPARED, FINAL = 1e-2, 1e-3, 1e-4
+ROUGH, COMPARED, FINAL = 3e-3, 2e-4, 3e-5
 DIFFERENCE = 1e-3  # of the logarithm, or of a tenth of the usual deviation
 
 
@@ -193,14 +193,14 @@ class Problem:
     def weigh(self, found: Tuned) -> None:
         """Take what is left with what was found as what a residual is worth.
 
-        What is left of the position is what is left of the torque, integrated twice: it hangs together for longer, and
-        counts by as many rows as say something of their own.
+        What is left of either channel hangs together over rows, and counts by as many as say something of their own:
+        so the channels are weighed against each other, and against what is usual.
         """
         position, torque = found.position, found.torque
         least = LEAST["torque"] * rms(self.each.record.torque[self.rows]) if self.each.record.driven else 1.0
         self.weights = {
             "position": max(rms(position), LEAST["position"]) * sqrt(together(position)),
-            "torque": max(rms(torque), least),
+            "torque": max(rms(torque), least) * sqrt(together(torque)),
         }
 
     def fitted(

@@ -80,7 +80,7 @@ def tube(place: Path) -> None:
 def wear(place: Path) -> None:
     """Of docs/sweeps.md: which friction parameter moves the glitches."""
     command("sweep", SCENARIOS / "studies" / "friction_wear.yaml", "--figures", "png", "--out", place)
-    taken(place, "XZ-glitch_Z.png", "friction-wear.png")
+    taken(place, "distribution-XZ-glitch_Z.png", "friction-wear.png")
 
 
 DRAWN: tuple[Callable[[Path], None], ...] = (contour, stribeck, structure, bode, tube)

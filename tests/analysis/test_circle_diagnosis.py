@@ -96,6 +96,44 @@ def test_a_peak_has_its_height_width_and_decay() -> None:
         assert peak.decay == pytest.approx(falls, abs=2 * step)
 
 
+def test_a_narrow_peak_has_its_height_within_its_interval() -> None:
+    """20 ms of 0.4 deg: seven samples, a mean over a degree would take half of it."""
+    circle = CircleUnderTest(("X", "Z"), radius=0.15, speed=0.05)
+    t = np.linspace(0, 0.1, 100_001)
+    shape = (1 - np.exp(-t / 0.004)) * np.exp(-t / 0.016)
+    above = np.flatnonzero(shape > shape.max() / 2)
+    assert t[above[-1]] - t[above[0]] == pytest.approx(0.020, rel=0.02)
+    causes = Causes(peak=(8e-6, 0.0), decay=0.016, lost=(3e-6, 0.0), noise=0.2e-6)
+    within = []
+    for seed in range(10):
+        found = both(circle, causes, seed, samples=20_000)
+        assert all(peak.height == 0 for peak in found.peaks if peak.axis == "Z")
+        within += [abs(peak.height - 8e-6 * shape.max()) <= peak.half for peak in found.peaks if peak.axis == "X"]
+    assert sum(within) >= 0.9 * len(within) == 36
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.1])
+@pytest.mark.parametrize("frequency", [9.0, 40.0, 60.0])
+def test_vibration_is_not_taken_for_peaks(radius: float, frequency: float) -> None:
+    circle = replace(BALLBAR, radius=radius)
+    for seed, swing in enumerate([(1e-6, 0.0), (0.0, 1e-6)]):
+        for noise in (0.0, 0.1e-6, 0.5e-6):
+            found = both(circle, Causes(swing=swing, frequency=frequency, noise=noise), seed, samples=8000)
+            assert [peak.height for peak in found.peaks] == [0.0] * 8
+
+
+def test_a_step_of_lost_motion_that_an_ellipse_shifts_is_no_peak() -> None:
+    """An instrument writes the programmed angle: a delay of 2 ms of one axis is 0.14 deg of it, seven samples."""
+    rng, delay = np.random.default_rng(3), 2e-3
+    paths = []
+    for sense in (1, -1):
+        path = driven(SMALL, Causes(delay=(delay, 0.0), lost=(0.0, 5e-6), noise=0.2e-6), sense, rng, 40_000)
+        assert path.phase is not None
+        told = path.phase - math.pi / 8 - SMALL.speed / SMALL.radius * delay / 2  # by the mean delay of both axes
+        paths.append(TurnedPath(np.arctan2(sense * np.sin(told), np.cos(told)), path.deviation, sense))
+    assert [peak.height for peak in diagnose(SMALL, paths).peaks if peak.axis == "Z"] == [0.0] * 4
+
+
 def test_a_vibration_has_its_frequency_and_amplitude() -> None:
     rng = np.random.default_rng(1)
     path = replace(driven(BALLBAR, Causes(noise=0.2e-6), 1, rng, SAMPLES), phase=None)  # as a ballbar has it

@@ -4,8 +4,8 @@ vibration, what remains, and the share that each has of G."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,12 @@ from feedsim.analysis.circle.model import CircleUnderTest, Fit, TurnedPath, fit
 from feedsim.analysis.circle.vibration import Vibration, averaged, vibrations
 from feedsim.analysis.figures import Array
 
-# A peak is seen where its mean over this angle [deg] exceeds this multiple of what noise makes of such means and of the
-# fitted rest below them.
-SEEN, OVER = 5.0, 1.0
-# Noise may change a height by this share: over so many samples it is averaged, and no more; nor over more than a
-# quarter of the peak's width, which would take from its height.
+# A peak is seen where its mean over this angle [deg], or over half of it again and again down to the least count of
+# samples, exceeds this multiple of what noise makes of such means and of the fitted rest below them, and that multiple
+# of what only this share of such means between the reversals exceed.
+OVER, LEAST, SEEN, ELSEWHERE, SELDOM = 1.0, 3, 5.5, 1.5, 1e-3
+# Noise may change a height by this share: over so many samples it is averaged, and no more; nor over more than half of
+# the angle in which the peak falls to half its height on its steeper side, which would take from its height.
 BLUR = 0.015
 FLOOR = 1e-9  # a deviation of less [m] is not worth a word
 FORM = (3, 4, 5)
@@ -221,45 +222,107 @@ def _value(circle: CircleUnderTest, found: Fit, peaks: Sequence[Peak], key: str,
 def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak]:
     """What stands out behind every reversal of path ``k``."""
     rate = circle.speed / circle.radius
-    rest_error = found.rest_error
+    calm = _Calm(found, k, sense)
+    per_sample = 2 * math.pi / len(found.angle[k])
+    wide = max(1, round(math.radians(OVER) / per_sample))
+    counts = [wide]
+    while counts[-1] // 2 >= LEAST:
+        counts.append(counts[-1] // 2)
+    levels = {count: calm.level(count) for count in counts}
+    ellipse = math.hypot(found["scale"], found["squareness"] + sense * found["servo"]) / circle.radius
     peaks = []
     for which in range(4):
         axis = circle.axes[which % 2]
         name = f"{axis}{'+' if which < 2 else '-'}"
+        nothing = Peak(name, axis, sense, 0.0, math.nan, which * math.pi / 2, math.nan, math.nan)
         own = np.flatnonzero(found.reversal[k] == which)
         own = own[np.argsort(found.since[k][own])]
-        at_crossing = which * math.pi / 2
-        per_sample = float(np.ptp(found.since[k][own])) / max(len(own) - 1, 1)
-        # Between two samples nobody knows on which side of a step of lost motion one is.
-        own = own[np.abs(found.since[k][own]) > 1.5 * per_sample]
-        if len(own) < 5:
-            peaks.append(Peak(name, axis, sense, 0.0, math.nan, at_crossing, math.nan, math.nan))
+        # Between two samples nobody knows on which side of a step of lost motion one is; nor within the angle from the
+        # point that is told to the one that an ellipse makes of it, as instruments write the one or the other.
+        own = own[np.abs(found.since[k][own]) > 1.5 * per_sample + ellipse]
+        if len(own) < 5 * wide:
+            peaks.append(nothing)
             continue
         since, off = found.since[k][own], found.residual[k][own]
-        wide = max(1, round(math.radians(OVER) / per_sample))
-        smooth = averaged(off, wide)
-        most = float(np.abs(smooth).max())
-        level = max(SEEN * math.hypot(found.noise / math.sqrt(wide), rest_error), FLOOR)
-        if most < level:
-            peaks.append(Peak(name, axis, sense, 0.0, level, at_crossing, math.nan, math.nan))
+        clear, count = _clearest(off, levels)
+        if clear < 1:
+            peaks.append(replace(nothing, half=levels[wide]))
             continue
-        top = int(np.abs(smooth).argmax())
-        broad = np.flatnonzero(np.abs(smooth[top:]) < most / 2)  # half of it, in samples
-        enough = min(
-            wide,
-            max(1, math.ceil((found.noise / (BLUR * most)) ** 2)),
-            max(1, int(broad[0]) // 2 if len(broad) else wide),
-        )
-        curve = averaged(off, enough)
-        at = int(np.abs(curve).argmax())
+        curve, at, count = _sharpened(off, count, found.noise)
         height = float(curve[at])
-        half = math.hypot(found.quantile * found.noise / math.sqrt(enough), found.quantile * rest_error)
+        # What averaging over as much again takes from it is not less than what averaging has taken already.
+        blur = float(averaged(off, 2 * count)[at]) - height if count > 1 else 0.0
         relative = curve / height
         begin, end = _falls(since, relative, at, 0.5, -1), _falls(since, relative, at, 0.5, 1)
-        width, decay = (end - begin) / rate, (_falls(since, relative, at, 1 / math.e, 1) - since[at]) / rate
-        angle = float(found.angle[k][own[at]])
-        peaks.append(Peak(name, axis, sense, height, half, angle, float(width), float(decay)))
+        peaks.append(
+            replace(
+                nothing,
+                height=height,
+                half=math.hypot(found.quantile * calm.spread(count), blur),
+                angle=float(found.angle[k][own[at]]),
+                width=float(end - begin) / rate,
+                decay=float(_falls(since, relative, at, 1 / math.e, 1) - since[at]) / rate,
+            )
+        )
     return peaks
+
+
+def _clearest(off: Array, levels: Mapping[int, float]) -> tuple[float, int]:
+    """How far means stand out, as a multiple of their level, and over how many samples they do so most.
+
+    A narrow peak stands out most where as much is averaged as it is wide. levels: number of samples -> level [m].
+    """
+    clear = []
+    for count, level in levels.items():
+        curve, at = _top(off, count)
+        clear.append((abs(float(curve[at])) / level, count))
+    return max(clear)
+
+
+def _sharpened(off: Array, count: int, noise: float) -> tuple[Array, int, int]:
+    """Means over ``count`` samples, or over as few as noise allows and the steeper side of the peak needs; number of
+    the largest, and over how many samples they are.
+
+    Averaging makes a narrow peak look wide: as often as fewer samples show it narrower, fewer are taken.
+    """
+    while True:
+        curve, at = _top(off, count)
+        relative = np.abs(curve) / abs(curve[at])
+        below = [np.flatnonzero(side < 0.5) for side in (relative[at:], relative[at::-1])]
+        steeper = min((int(side[0]) for side in below if len(side)), default=2 * count)
+        enough = max(1, min(count, math.ceil((noise / (BLUR * abs(curve[at]))) ** 2), steeper // 2))
+        if enough == count:
+            return curve, at, count
+        count = enough
+
+
+def _top(off: Array, count: int) -> tuple[Array, int]:
+    """Means over ``count`` samples and the number of the largest; not of one at an end, which fewer samples make."""
+    curve, end = averaged(off, count), count // 2
+    return curve, end + int(np.abs(curve[end : len(curve) - end]).argmax())
+
+
+class _Calm:
+    """Means of neighbouring samples of path ``k`` where no axis reverses: what those behind a reversal compare with."""
+
+    def __init__(self, found: Fit, k: int, sense: int) -> None:
+        order = np.argsort(sense * found.angle[k])
+        self._off, self._free = found.residual[k][order], (found.reversal[k] < 0)[order]
+        self._noise, self._rest = found.noise, found.rest_error
+
+    def spread(self, count: int) -> float:
+        """Standard deviation of a mean over ``count`` samples behind a reversal [m]."""
+        scatter = float(np.sqrt(np.mean(self._means(count) ** 2)))
+        return math.hypot(max(self._noise / math.sqrt(count), scatter), self._rest)
+
+    def level(self, count: int) -> float:
+        """What such a mean must exceed to be a peak [m]; noise does not, nor what swings all the way round."""
+        usual = float(np.quantile(np.abs(self._means(count)), 1 - SELDOM))
+        return max(SEEN * math.hypot(self._noise / math.sqrt(count), self._rest), ELSEWHERE * usual, FLOOR)
+
+    def _means(self, count: int) -> Array:
+        whole = np.convolve(self._free, np.ones(count), "same") > count - 0.5
+        return averaged(self._off, count)[whole if whole.any() else self._free]
 
 
 def _falls(since: Array, relative: Array, at: int, level: float, way: int) -> float:

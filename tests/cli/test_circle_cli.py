@@ -121,6 +121,30 @@ def test_one_direction_asks_for_the_other(tmp_path: Path, capsys: pytest.Capture
     assert "the other one will" in capsys.readouterr().out
 
 
+def test_a_turn_listed_against_its_motion_is_said_to_contradict_the_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = []
+    for angle, deviation, sense in turns():
+        rising = np.argsort(angle)
+        table = np.column_stack([np.degrees(angle), deviation * 1e6])[rising]
+        file = tmp_path / ("ccw.csv" if sense > 0 else "cw.csv")
+        np.savetxt(file, table, "%.4f", ",", header="Angle [deg],Deviation [um]", comments="")
+        files.append(file)
+    ccw, cw = map(str, files)
+    assert run(tmp_path, [ccw, cw, "--radius", "100 mm", "--feed", "3000 mm/min"])[0] == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert "turns that were read as one direction contradict each other by" in first
+    assert "angles that rise from row to row are read as counterclockwise" in first
+    assert "no single cause" not in first
+    head, *rows = files[1].read_text().splitlines()
+    files[1].write_text("\n".join([head, *reversed(rows)]) + "\n")  # as the message says
+    assert run(tmp_path, [ccw, cw, "--radius", "100 mm", "--feed", "3000 mm/min"])[0] == 0
+    assert "mostly: Y answers 0.799 ms later than X" in capsys.readouterr().out.splitlines()[0]
+    assert run(tmp_path, [ccw, ccw, "--radius", "100 mm", "--feed", "3000 mm/min"])[0] == 0
+    assert "the other one will" in capsys.readouterr().out.splitlines()[0]
+
+
 @pytest.mark.parametrize(("share", "code"), [(1.015, 0), (1.025, 2)])
 def test_turns_of_different_feed_are_refused(
     share: float, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ OVER, LEAST, SEEN, ELSEWHERE, SELDOM = 1.0, 3, 5.5, 1.5, 1e-3
 BLUR = 0.015
 FLOOR = 1e-9  # a deviation of less [m] is not worth a word
 FORM = (3, 4, 5)
+PARTS = 36  # of a turn, over whose means turns of one sense are compared
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,7 @@ class Diagnosis:
         noise: standard deviation of what remains outside the windows behind the reversals [m].
         centre: fitted, from the programmed one [m].
         left_out: axes for whose pitch the circle is too small.
+        apart: how far turns of one sense contradict each other, from peak to valley [m]; 0 where each is the only one.
         rest: of every turn, what the model says without peaks: angle (N,) [rad], deviation (N,) [m].
     """
 
@@ -99,6 +102,7 @@ class Diagnosis:
     noise: float
     left_out: tuple[str, ...]
     centre: tuple[float, float]
+    apart: float
     rest: tuple[tuple[Array, Array], ...]
 
     def __getitem__(self, key: str) -> Term:
@@ -159,6 +163,7 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         noise=found.noise,
         left_out=found.left_out,
         centre=(found["offset_0"], found["offset_1"]),
+        apart=_apart(paths),
         rest=tuple(
             (path.angle, path.deviation - residual) for path, residual in zip(paths, found.residual, strict=True)
         ),
@@ -337,6 +342,26 @@ def _falls(since: Array, relative: Array, at: int, level: float, way: int) -> fl
     out, before = side[below[0]], side[below[0] - 1]
     share = (relative[before] - level) / (relative[before] - relative[out])
     return float(since[before] + share * (since[out] - since[before]))
+
+
+def _apart(paths: Sequence[TurnedPath]) -> float:
+    """Difference of turns of one sense, from peak to valley of its means over PARTS of a turn; the largest [m].
+
+    Without its mean and its first order: the centre and the radius may drift from one turn to the next.
+    """
+    worst = 0.0
+    for one, other in combinations(paths, 2):
+        if one.sense == other.sense:
+            orders = np.fft.rfft(_coarse(one) - _coarse(other))
+            orders[:2] = 0
+            worst = max(worst, float(np.ptp(np.fft.irfft(orders, PARTS))))
+    return worst
+
+
+def _coarse(path: TurnedPath) -> Array:
+    """Mean deviation in each of PARTS of a turn (PARTS,) [m]; 0 where there is no sample."""
+    part = np.floor((path.angle / (2 * math.pi) + 0.5) * PARTS).astype(int) % PARTS
+    return np.bincount(part, path.deviation, PARTS) / np.maximum(np.bincount(part, minlength=PARTS), 1)
 
 
 def _form(found: Fit) -> dict[int, float]:

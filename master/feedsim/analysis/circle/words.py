@@ -12,12 +12,20 @@ WORTH = 0.05
 NOISY = 0.3
 # Of a cause that lies elsewhere than where G is measured there is, if it alone makes so much of it.
 BESIDES = 0.25
+# Turns of one direction that differ by more than this share of G are not turns of one circle.
+CONTRADICT = 0.5
 
 
 def answer(diagnosis: Diagnosis) -> str:
     """Why the circle is not round, in a sentence or two: what it means, whether it can be trusted, what to do next."""
     told = worth_telling(diagnosis)
     G = f"G {_um(diagnosis.G)}"
+    if diagnosis.apart > CONTRADICT * diagnosis.G:
+        return (
+            f"{G}: turns that were read as one direction contradict each other by {_um(diagnosis.apart)}, so no cause "
+            "can be told. One may have been driven the other way: angles that rise from row to row are read as "
+            "counterclockwise, angles that fall as clockwise. Reverse the rows of that turn, or give each by itself."
+        )
     if not told:
         return f"{G}: no single cause stands out; what remains is {_um(_rest(diagnosis).size)}."
     first = f"{G}, {'mostly: ' if told[0].share > 0.5 else 'first: '}{sentence(diagnosis, told[0])}"

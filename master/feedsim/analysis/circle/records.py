@@ -178,6 +178,11 @@ def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool]
             return angle, length, float(np.abs(_values(recording, length, "m")).min()) > LEAST_RADIUS
         return angle, length, deviation is None
     has = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in recording.units.items())
+    if all(_plain(name) in (*units.SYMBOLS, *units.ALIASES) for name in recording.names):
+        raise InputError(
+            f"{recording.header}: is a row of units, {has}; needed is one row of names with their units, such as "
+            "Angle [deg] and Deviation [um], and no other row between it and the values"
+        )
     raise InputError(
         f"{recording.header}: holds {has}; needed are positions of both axes ({axes[0]} [mm], {axes[1]} [mm]; --axes "
         "says which two), or angle [deg] with deviation [um] or radius [mm]"

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
 
 from feedsim import cli, examples, scenario
+from feedsim.cli.options import Command
 from feedsim.errors import InputError, OutputError
 from feedsim.scenario.study import load_study
 
@@ -80,3 +83,31 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     assert capsys.readouterr().out == "all there already\n"
     (tmp_path / "there" / "xz_circle.yaml").write_text("")
     assert cli.main(["example", "xz_circle", "--to", "there"]) == 4
+
+
+def test_the_list_has_one_column_of_texts(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["example"]) == 0
+    printed = capsys.readouterr().out
+    rows = [next(row for row in printed.splitlines() if each.about in row) for each in examples.examples()]
+    assert len({row.index(each.about) for row, each in zip(rows, examples.examples(), strict=True)}) == 1
+
+
+def _told(commands: Iterable[Command]) -> Iterator[str]:
+    for command in commands:
+        yield command.epilog or ""
+        yield from _told(command.commands)
+
+
+def test_what_a_help_names_can_be_copied_as_it_says(tmp_path: Path) -> None:
+    """Who has installed a wheel has no folder scenarios/: the examples of a help begin with what brings their files."""
+    seen = set()
+    for number, told in enumerate([cli.EPILOG, *_told(cli.COMMANDS)]):
+        folder = tmp_path / str(number)
+        for names in re.findall(r"feedsim example ((?:\w+ ?)+)", told):
+            examples.copy(names.split(), folder)
+        words = {word for word in re.findall(r"[\w./]+", told) if "/" in word or word.endswith(".yaml")}
+        named = {word for word in words if (SCENARIOS / word).exists()}
+        assert "scenarios/" not in told
+        assert {word for word in named if not (folder / word).exists()} == set(), told
+        seen |= named
+    assert {"xz_circle.yaml", "machines/test_centre", "studies/z_stop.yaml"} <= seen

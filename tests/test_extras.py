@@ -68,6 +68,26 @@ def test_a_run_says_what_installs_what_it_lacks(missing: str, tmp_path: Path) ->
     assert not list(tmp_path.rglob("*.csv")), "nothing is half-written"
 
 
+@pytest.mark.parametrize("module", ["scipy", "distributed"])
+@pytest.mark.parametrize("what", ["feedsim sweep", "feedsim.sweep"])
+def test_a_study_asks_for_all_at_once(module: str, what: str) -> None:
+    told = extras.missing(ModuleNotFoundError("x", name=module), what)
+    asked = str(told).partition("pip install ")[2].split()
+    extra = PROJECT["optional-dependencies"]["run"] + PROJECT["optional-dependencies"]["sweep"][1:]
+    assert asked == [re.split(r"[\[>=]", each)[0] for each in extra]
+    run = str(extras.missing(ModuleNotFoundError("x", name="scipy"), "feedsim run"))
+    assert "distributed" not in run
+    assert "distributed" not in str(extras.missing(ModuleNotFoundError("x", name="pyarrow"), what))
+
+
+def test_the_command_of_studies_asks_for_all_at_once(tmp_path: Path) -> None:
+    done = without("scipy,distributed", "sweep", str(ROOT / "scenarios" / "studies" / "z_stop.yaml"), cwd=tmp_path)
+    assert done.returncode == 2
+    assert re.search(
+        r"^feedsim: feedsim sweep needs the package \w+, .* pip install fmpy .* distributed$", done.stderr, re.M
+    )
+
+
 def test_what_is_no_extra_is_an_error_of_its_own() -> None:
     assert extras.missing(ModuleNotFoundError("x", name="feedsim.unknown")) is None
     assert extras.missing(ImportError("cannot import name", name="scipy")) is None

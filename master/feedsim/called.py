@@ -14,10 +14,19 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+from feedsim.errors import InputError
 from feedsim.extras import missing
 
 
 class _CalledRoom(ModuleType):
+    @property
+    def __doc__(self) -> str | None:  # type: ignore[override]
+        """What is called is what a person asks for help on; without the packages for it, the room."""
+        try:
+            return inspect.getdoc(self._call)
+        except InputError:
+            return str(vars(self)["__doc__"])
+
     def __call__(self, *given: Any, **named: Any) -> Any:
         return self._call(*given, **named)
 

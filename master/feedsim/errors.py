@@ -7,13 +7,29 @@ from collections.abc import Iterable, Sequence
 
 
 class FeedsimError(Exception):
-    """Base of everything that the package raises on purpose. `exit_code` is what the command line ends with."""
+    """Base of everything that the package raises on purpose. `exit_code` is what the command line ends with.
+
+    >>> import feedsim as fs
+    >>> try:
+    ...     fs.run("xz_circle.yaml", set={"motions.0.radius": "15 kg"})
+    ... except fs.FeedsimError as error:
+    ...     error.exit_code
+    2
+    """
 
     exit_code = 1
 
 
 class InputError(FeedsimError):
-    """A file, an option or an argument is wrong. `problems` holds one line per fault; the message lists them all."""
+    """A file, an option or an argument is wrong. `problems` holds one line per fault; the message lists them all.
+
+    >>> import feedsim as fs
+    >>> try:
+    ...     fs.load("xz_circle.yaml", {"motions.0.radius": "15 kg", "motions.0.feed": "-1 mm/min"})
+    ... except fs.InputError as error:
+    ...     len(error.problems)
+    2
+    """
 
     exit_code = 2
 
@@ -31,13 +47,26 @@ class InputError(FeedsimError):
 
 
 class SimulationError(FeedsimError):
-    """A simulation unit failed or the coupled run is not usable."""
+    """A simulation unit failed or the coupled run is not usable.
+
+    >>> import feedsim as fs
+    >>> fs.SimulationError.exit_code
+    3
+    """
 
     exit_code = 3
 
 
 class OutputError(FeedsimError):
-    """A result cannot be written."""
+    """A result cannot be written.
+
+    >>> import feedsim as fs
+    >>> try:
+    ...     fs.example("z_positioning", "log.csv")  # a file, no folder
+    ... except fs.OutputError as error:
+    ...     error.exit_code
+    4
+    """
 
     exit_code = 4
 

@@ -68,9 +68,10 @@ def copy(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
 
     A file that is there with the same content stays; a scenario and the machine of the same name come both.
 
+    >>> import feedsim as fs
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     len(copy("xz_circle", folder))
+    ...     len(fs.example("xz_circle", folder))
     7
 
     Raises:

@@ -18,6 +18,8 @@ EXTRAS = {
     "fmpy": "run", "scipy": "run", "ruckig": "run", "matplotlib": "run", "jinja2": "run", "tqdm": "run",
     "distributed": "sweep", "dask": "sweep", "pyuff": "uff", "pyarrow": "parquet", "pandas": "pandas",
 }  # fmt: skip
+# Work -> the extra that it takes whole: nobody is to install those of `run` and be told of the next one then.
+WHOLE = {"feedsim sweep": "sweep", "feedsim.sweep": "sweep"}
 
 
 class MissingPackage(InputError):
@@ -29,7 +31,9 @@ def missing(error: ImportError, what: str = "this") -> MissingPackage | None:
     module = (error.name or "").partition(".")[0]
     if not isinstance(error, ModuleNotFoundError) or module not in EXTRAS:
         return None
-    names = " ".join(dict.fromkeys(packages(EXTRAS[module]))) or module
+    extra = EXTRAS[module]
+    extra = WHOLE.get(what, extra) if extra == "run" else extra
+    names = " ".join(dict.fromkeys(packages(extra))) or module
     return MissingPackage(f"{what} needs the package {module}, which is not installed: pip install {names}")
 
 

@@ -49,10 +49,16 @@ class Reading:
     position_cycle: float | None = None  # T_pos [s], where it is a multiple of the control cycle
 
 
+def _without_examples(schema: dict[str, Any]) -> None:
+    """Schemas tell what docstrings say; their examples are for a Python prompt."""
+    if told := schema.get("description"):
+        schema["description"] = told.partition("\n\n>>> ")[0]
+
+
 class Model(BaseModel):
     """Base of all scenario models: values that do not change, no unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=False, json_schema_extra=_without_examples)
 
     IN_FOLDER: ClassVar[str] = ""  # name of the file, where its folder may be named in its place
     TOLD_BY: ClassVar[str | None] = None  # the key that tells it from another model that may stand at its place

@@ -20,7 +20,13 @@ SAME_INSTANT = 1e-6
 
 @dataclass(frozen=True)
 class Figure:
-    """One derived number. ``value`` is NaN where the trace does not contain what the definition asks for."""
+    """One derived number. ``value`` is NaN where the trace does not contain what the definition asks for.
+
+    >>> import feedsim as fs
+    >>> figure = fs.run("z_positioning.yaml").figures["Z.overshoot"]
+    >>> print(figure, "-", figure.meaning)  # doctest: +ELLIPSIS
+    3.13... um - ...
+    """
 
     value: float
     unit: str

@@ -43,24 +43,25 @@ EPILOG = """exit codes:
   feedsim compare: 0 same    1 different    2 unusable
 
 examples:
-  feedsim example xz_circle && feedsim run xz_circle.yaml
-  feedsim run scenarios/z_positioning.yaml --out results/z
-  feedsim run scenarios/xz_circle.yaml --set "machine.axes.*.friction.W=0 rad" --out results/lugre
-  feedsim validate scenarios/xz_circle.yaml
-  feedsim machine info scenarios/machines/test_centre
-  feedsim machine show scenarios/machines/test_centre --mode 21Hz --animate --out results/structure
-  feedsim machine pack scenarios/machines/test_centre --out my_plant.fmu
-  feedsim frf scenarios/machines/test_centre --axes X,Z
-  feedsim identify results/identify_z_constant/log.csv --axis Z --machine scenarios/machines/test_centre
+  feedsim example xz_circle z_positioning identify_z_constant friction_wear
+  feedsim run z_positioning.yaml --out results/z
+  feedsim run xz_circle.yaml --set "machine.axes.*.friction.W=0 rad" --out results/lugre
+  feedsim validate xz_circle.yaml
+  feedsim machine info machines/test_centre
+  feedsim machine show machines/test_centre --mode 21Hz --animate --out results/structure
+  feedsim machine pack machines/test_centre --out my_plant.fmu
+  feedsim frf machines/test_centre --axes X,Z
+  feedsim run identify_z_constant.yaml
+  feedsim identify results/identify_z_constant/log.csv --axis Z --machine machines/test_centre
   feedsim identify-drive capture.json --axes X,Y --out results/my_machine
   feedsim replay capture.json --machine results/my_machine
-  feedsim compensate scenarios/xz_circle.yaml
+  feedsim compensate xz_circle.yaml
   feedsim circle ballbar.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
-  feedsim pack scenarios/xz_circle.yaml --out machine.fmu
-  feedsim show results/as_is results/worn
-  feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
+  feedsim pack xz_circle.yaml --out machine.fmu
+  feedsim show results/z results/lugre
+  feedsim ssp xz_circle.yaml --out xz_circle.ssp
   feedsim run xz_circle.ssp
-  feedsim sweep scenarios/studies/friction_wear.yaml
+  feedsim sweep studies/friction_wear.yaml
   feedsim compare result.csv reference.csv --tol 1e-6 --report compare.html
 """
 

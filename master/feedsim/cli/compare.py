@@ -26,7 +26,8 @@ examples:
   feedsim compare result.csv reference.csv --tol 1e-6 --tol "*.x_a=2 nm" --tol "*.M_a=1e-3 N.m,1 ms" --report out.html
   feedsim compare results/ references/ --junit compare.xml
   feedsim compare ecos.csv reference.csv --column "plant::*=*" --column "controller_*::M_a=*.M_a" --common
-  feedsim compare results/emps/result.csv DATA_EMPS.mat --reference-columns emps/columns.yaml --axis X \\
+  feedsim example emps
+  feedsim compare results/emps/result.csv DATA_EMPS.mat --reference-columns machines/emps/columns.yaml --axis X \\
       --shift estimate --max-shift "2 s" --tol "X.x_a=20 um" --tol "X.M_a=ignore"
 """
 MOST_LINES = 10

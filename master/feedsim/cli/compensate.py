@@ -19,9 +19,10 @@ with the lag of the axis, gives a torque that is added to the torque setpoint of
 --friction the model has the machine's own parameters: what is possible at best. With the file of an identified set it
 shows what that set is worth."""
 EPILOG = """examples:
-  feedsim compensate scenarios/xz_circle.yaml --out results/compensate
-  feedsim compensate scenarios/xz_circle.yaml --friction X=friction_x.yaml --friction Z=friction_z.yaml
-  feedsim compensate scenarios/xz_circle.yaml --delay "4.2 ms" --no-table
+  feedsim example xz_circle
+  feedsim compensate xz_circle.yaml --out results/compensate
+  feedsim compensate xz_circle.yaml --friction X=friction_x.yaml --friction Z=friction_z.yaml
+  feedsim compensate xz_circle.yaml --delay "4.2 ms" --no-table
 """
 
 

@@ -17,11 +17,13 @@ def example(options: Namespace) -> None:
         print("\n".join(map(str, written)) or "all there already")
         return
     kind = ""
-    for each in examples.examples():
+    there = examples.examples()
+    width = max(len(each.name) for each in there)
+    for each in there:
         if each.kind != kind:
             kind = each.kind
             print(f"{kind}:")
-        print(f"  {each.name:21} {each.about}")
+        print(f"  {each.name:{width}}  {each.about}")
     print("\nfeedsim example NAME copies one into the working folder, with the files that it names")
 
 
@@ -34,6 +36,7 @@ COMMAND = Command(
         Option("--to", "DIR", "folder to copy into (default: the working folder)", type=folder, default=Path()),
     ),
     description="List the scenarios, studies, machines and structures that come along, or copy some into a folder of "
-    "yours to begin with. The numbers of the machines are synthetic, but for EMPS. Nothing is overwritten.",
+    "yours to begin with. The machines are synthetic, but for emps and sinumerik_840d, which were measured. Nothing is "
+    "overwritten.",
     epilog="example:\n  feedsim example xz_circle && feedsim run xz_circle.yaml",
 )

@@ -29,10 +29,11 @@ UNSTABLE = (
     "ones, and nothing was measured"
 )
 EPILOG = """examples:
-  feedsim frf scenarios/machines/test_centre --axes X,Z --out results/frf
-  feedsim frf scenarios/xz_circle.yaml --set "machine.axes.Z.drive.K_p=4 N.m.s/rad" --no-measure
-  feedsim frf scenarios/machines/test_centre --axes Z --friction --offset-speed "5 rad/s" --realisations 4
-  feedsim frf scenarios/machines/test_centre --axes Z --overlay measured.csv:Z.n_a/Z.n_s
+  feedsim example xz_circle
+  feedsim frf machines/test_centre --axes X,Z --out results/frf
+  feedsim frf xz_circle.yaml --set "machine.axes.Z.drive.K_p=4 N.m.s/rad" --no-measure
+  feedsim frf machines/test_centre --axes Z --friction --offset-speed "5 rad/s" --realisations 4
+  feedsim frf machines/test_centre --axes Z --overlay measured.csv:Z.n_a/Z.n_s
 """
 
 

@@ -21,11 +21,13 @@ DESCRIPTION = """Friction parameters of an axis from recorded traces: the Stribe
 speed, pre-sliding from moves that reverse, with confidence intervals. Leaves friction.yaml, which scenarios and machine
 files take as it is, a report with figures, and what the figures show as CSV."""
 EPILOG = """examples:
+  feedsim example identify_z_constant identify_z_sine xz_circle
+  feedsim run identify_z_constant.yaml && feedsim run identify_z_sine.yaml
   feedsim identify results/identify_z_constant/log.csv results/identify_z_sine/log.csv --axis Z \\
-      --machine scenarios/machines/test_centre
+      --machine machines/test_centre
   feedsim identify record.mat --columns record.yaml --delay 0
   feedsim identify z.csv --axis Z --machine my_machine --hold "beta=1" --free v_log
-  feedsim run scenarios/xz_circle.yaml --set machine.axes.Z.friction=results/identify_z/friction.yaml --out results/own
+  feedsim run xz_circle.yaml --set machine.axes.Z.friction=results/identify_z/friction.yaml --out results/own
 """
 ESTIMATE = "estimate"  # of --inertia and --delay: whatever mapping and machine say
 

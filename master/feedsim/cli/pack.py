@@ -15,9 +15,10 @@ unit; no compiler is needed. Of a scenario the motion is inside, so that the uni
 with --inputs, setpoints are inputs. Any importer gets at steps of any length what feedsim run gets
 (docs/importing.md)."""
 EXAMPLES = """examples:
-  feedsim pack scenarios/xz_circle.yaml --out machine.fmu
-  feedsim pack scenarios/machines/test_centre --out machine.fmu
-  feedsim pack scenarios/z_positioning.yaml --set "machine.axes.Z.friction.W=0 rad" --out lugre.fmu
+  feedsim example xz_circle z_positioning
+  feedsim pack xz_circle.yaml --out machine.fmu
+  feedsim pack machines/test_centre --out machine.fmu
+  feedsim pack z_positioning.yaml --set "machine.axes.Z.friction.W=0 rad" --out lugre.fmu
 """
 
 

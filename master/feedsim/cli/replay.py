@@ -18,17 +18,19 @@ if TYPE_CHECKING:
 REPLAY_DESCRIPTION = """Run the position setpoints of a record through the simulated axes, in closed loop, and show
 what is left of position, torque and speed setpoint: over time, as figures, as a spectrum and over the position."""
 REPLAY_EPILOG = """examples:
-  feedsim replay capture.json --machine scenarios/machines/sinumerik_840d --axes X,Y
-  feedsim replay log.csv --machine scenarios/machines/test_centre --axes Z --window "0.5 s..2 s"
+  feedsim example sinumerik_840d test_centre
+  feedsim replay capture.json --machine machines/sinumerik_840d --axes X,Y
+  feedsim replay log.csv --machine machines/test_centre --axes Z --window "0.5 s..2 s"
   feedsim replay log.csv --machine my_machine --axes Z --set axes.Z.drive.K_v="2 (m/min)/mm" --out results/other
 """
 DRIVE_DESCRIPTION = """The drive of axes from a record of their control: delay of the setpoint, gain and feedforward of
 the position loop by regression, speed controller, inertia and friction by output error in closed loop, each with its
 interval. Leaves a machine folder (or, with --machine, the drive's parameters), and a report."""
 DRIVE_EPILOG = """examples:
+  feedsim example test_centre
   feedsim identify-drive capture.json --axes X,Y --out results/my_machine
   feedsim replay capture.json --machine results/my_machine --axes X,Y
-  feedsim identify-drive log.csv --axes Z --machine scenarios/machines/test_centre
+  feedsim identify-drive log.csv --axes Z --machine machines/test_centre
 """
 
 

@@ -28,9 +28,10 @@ machine, a controller and a friction unit per axis with their parameters, the se
 plays them, and the wiring; with --one, the machine as one unit with the motion inside. Other simulators run it without
 anything of feedsim (docs/ssp.md); feedsim run FILE.ssp runs it here."""
 SSP_EXAMPLES = """examples:
-  feedsim ssp scenarios/xz_circle.yaml --out xz_circle.ssp
-  feedsim ssp scenarios/xz_circle.yaml --one --out one.ssp
-  feedsim ssp scenarios/z_positioning.yaml --set "machine.axes.Z.friction.W=0 rad" --out lugre.ssp
+  feedsim example xz_circle z_positioning
+  feedsim ssp xz_circle.yaml --out xz_circle.ssp
+  feedsim ssp xz_circle.yaml --one --out one.ssp
+  feedsim ssp z_positioning.yaml --set "machine.axes.Z.friction.W=0 rad" --out lugre.ssp
 """
 
 

@@ -13,10 +13,12 @@ circles, stops, following error, torque, speed, position and spectra, a table of
 the parameters in which they differ. Sources are aligned by their setpoints, circles by the angle; the page says how.
 A run of a study is FOLDER:17, FOLDER:min=FIGURE or FOLDER:max=FIGURE; it is made once more."""
 EPILOG = """examples:
-  feedsim run scenarios/xz_circle.yaml --out results/as_is
-  feedsim run scenarios/xz_circle.yaml --set machine.axes.Z.drive.K_v="5 (m/min)/mm" --out results/faster
+  feedsim example xz_circle z_stop
+  feedsim run xz_circle.yaml --out results/as_is
+  feedsim run xz_circle.yaml --set machine.axes.Z.drive.K_v="5 (m/min)/mm" --out results/faster
   feedsim show results/as_is results/faster
   feedsim show results/as_is/result.csv record.csv --out results/against_record
+  feedsim sweep studies/z_stop.yaml
   feedsim show results/z_stop:min=Z.overshoot results/z_stop:max=Z.overshoot results/z_stop:17
 """
 

@@ -29,11 +29,12 @@ EPILOG = """exit codes:
   4 results cannot be written    130 interrupted (143, 129: by SIGTERM, SIGHUP); the same command continues
 
 examples:
-  feedsim sweep scenarios/studies/friction_wear.yaml
-  feedsim sweep scenarios/studies/z_stop.yaml --runs 20 --out results/try --dry-run
-  feedsim sweep scenarios/studies/z_stop.yaml --set "machine.axes.Z.friction.W=0 rad" --format parquet
-  feedsim sweep scenarios/studies/friction_wear.yaml --scheduler tcp://node1:8786
-  feedsim sweep scenarios/studies/z_stop.yaml --row 17
+  feedsim example friction_wear z_stop
+  feedsim sweep studies/friction_wear.yaml
+  feedsim sweep studies/z_stop.yaml --runs 20 --out results/try --dry-run
+  feedsim sweep studies/z_stop.yaml --set "machine.axes.Z.friction.W=0 rad" --format parquet
+  feedsim sweep studies/friction_wear.yaml --scheduler tcp://node1:8786
+  feedsim sweep studies/z_stop.yaml --row 17
 """
 
 

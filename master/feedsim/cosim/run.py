@@ -45,6 +45,11 @@ class Run:
         fine: the log's signals, and the setpoints of its axes, at the control cycle; None without a log. Other logs can
             be made of it: :func:`feedsim.cosim.logged`.
         log: the log as the scenario asks for it; None without one.
+
+    >>> import feedsim as fs
+    >>> run: fs.Run = fs.run("z_positioning.yaml")  # what that returns is one, with figures
+    >>> run.trace.unit("Z.M_fr"), run.log
+    ('N.m', None)
     """
 
     scenario: Scenario

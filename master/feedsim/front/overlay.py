@@ -31,6 +31,11 @@ class Overlay:
 
     Attributes:
         names: of the results, in their order.
+
+    >>> import feedsim as fs
+    >>> over: fs.Overlay = fs.show(fs.run("z_positioning.yaml"))
+    >>> over.names
+    ('Z positioning',)
     """
 
     def __init__(self, results: Mapping[str, Shown]) -> None:

@@ -28,6 +28,10 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     scenario's own `set` group. File names in them are relative to the working folder, those in a file relative to it.
 
     Raises InputError that lists every problem with file and line.
+
+    >>> import feedsim as fs
+    >>> fs.load_scenario("xz_circle.yaml", ["motions.0.radius=20 mm"]).motions[0].radius
+    0.02
     """
     draft = drafted(Path(path), overrides)
     draft.settle()
@@ -117,6 +121,10 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
 
     `overrides` as for load(), with the keys of the machine; "machine.axes.Z..." is the same as "axes.Z...". Raises
     InputError like load().
+
+    >>> import feedsim as fs
+    >>> fs.load_machine("machines/test_centre", ["axes.Z.friction.F_C=1.8 N.m"]).axes["Z"].friction.F_C
+    1.8
     """
     path = Path(path)
     path = path / Machine.IN_FOLDER if path.is_dir() else path

@@ -306,7 +306,13 @@ class PathLimits(Model):
 
 
 class Machine(Model):
-    """A machine: structure data, pose, cycles, path limits and axes."""
+    """A machine: structure data, pose, cycles, path limits and axes.
+
+    >>> import feedsim as fs
+    >>> machine: fs.Machine = fs.load("xz_circle.yaml").machine
+    >>> machine
+    Machine 'Test centre': axes X, Y, Z
+    """
 
     def __repr__(self) -> str:
         return f"Machine {self.name!r}: axes {', '.join(self.axes)}"

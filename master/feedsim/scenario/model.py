@@ -98,7 +98,13 @@ Evaluation = Annotated[Positioning | CircleTest | PositioningAccuracy, Field(dis
 
 
 class Scenario(Model):
-    """Everything that a run needs, checked."""
+    """Everything that a run needs, checked.
+
+    >>> import feedsim as fs
+    >>> scenario: fs.Scenario = fs.load("xz_circle.yaml")
+    >>> scenario
+    Scenario 'X-Z circle' on Test centre: 2 motions
+    """
 
     def __repr__(self) -> str:
         return f"Scenario {self.name!r} on {self.machine.name}: {len(self.motions)} motions"

@@ -33,6 +33,10 @@ def read_csv(
     time_unit  unit of the time where the header does not tell it; default s
 
     Units of columns stay as written; the time is converted to s. Raises InputError with file and line.
+
+    >>> import feedsim as fs
+    >>> fs.read_trace("log.csv").names
+    ('Z.x_s', 'Z.x_a', 'Z.n_a', 'Z.i_q')
     """
     path = Path(path)
     table = read_table(path)

@@ -88,6 +88,11 @@ class Trace(TimeColumns):
     Arrays are copied to float64 and made read-only; those that nobody can change any more are taken as they are, so
     that a part of a trace costs no memory. InputError: lengths that differ, time that does not increase, a
     name or unit that could not be written to a CSV header and read back, a unit for a column that does not exist.
+
+    >>> import feedsim as fs
+    >>> trace = fs.Trace([0.0, 1.0], {"Z.x_a": [0.1, 0.2]}, {"Z.x_a": "m"})
+    >>> trace["Z.x_a"], trace.unit("Z.x_a")
+    (array([0.1, 0.2]), 'm')
     """
 
     time: Array

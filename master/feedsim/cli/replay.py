@@ -181,7 +181,7 @@ IDENTIFY_DRIVE = Command(
         _COLUMNS, _WINDOW,
         Option("--position-cycle", "VALUE",
                "cycle of the position loop of rigid axes, e.g. '2 ms' (default: the control cycle, as where the "
-               "drive closes that loop itself)"),
+               "drive closes that loop itself, or that of the record's rows where the record speaks for it)"),
         Option("--name", "NAME", "of the machine that is written (default: name of the record)"),
         out("drive_<name of the record>"), FIGURES,
         settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,

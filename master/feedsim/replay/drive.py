@@ -56,6 +56,7 @@ FAST = 0.1  # of the top speed: what is faster is another kind of motion
 BETTER = 2.0  # of the logarithm of the likelihood: what predicts hardly better is not worth having
 BLOCK = 0.05  # [s]: residuals further apart than that are taken to be independent
 VAGUE = 0.5  # relative half width of an interval beyond which a value is not determined
+APART = 2.0  # of the logarithm of the likelihood: below it two cycles are as likely as one another
 HIDDEN = 0.8  # share of the usual deviation that is left: the record has not told it
 
 

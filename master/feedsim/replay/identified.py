@@ -13,7 +13,7 @@ from feedsim.identify import Recorded
 from feedsim.owned import TemporaryFolder
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.compare import Comparison, replayed
-from feedsim.replay.drive import DriveFound, identify_drive
+from feedsim.replay.drive import APART, DriveFound, identify_drive
 from feedsim.replay.machine_files import (
     RigidAxis,
     control_cycle,
@@ -60,33 +60,39 @@ def identify_drives(
         read, records: axis -> all of its record, and the stretch that is fitted.
         machine: whose structure and friction are known; None: the axes are taken to be rigid.
         head: comment at the top of the files. name, note: of the machine that is written. fmus: folder of the archives.
-        position_cycle: of rigid axes [s]; None: the control cycle.
+        position_cycle: of rigid axes [s]; None: the control cycle, or that of the record's rows where the record speaks
+            for it.
 
     Raises InputError: of an axis, what :func:`identify_drive` refuses; neither a torque nor a machine.
     """
-    found: dict[str, DriveFound] = {}
     files: dict[str, str] = {}
     rigid: dict[str, RigidAxis] = {}
+    begins = {axis: _begin(each) if machine is None else {} for axis, each in records.items()}
     interval = next(iter(records.values())).record.interval
-    # A drive that closes the position loop itself (DSC) does so in its own cycle.
-    position_cycle = position_cycle or control_cycle(interval)
-    for axis, each in records.items():
-        if machine is None and not each.record.driven:
-            raise InputError(
-                f"{each.record.name}, axis {axis}: no torque, current or force is recorded; without it neither inertia "
-                "nor friction is told: give a machine that has them (--machine)"
-            )
-        begin = start_values(each) if machine is None else {}
 
-        def tell(what: str, done: int, total: int, axis: str = axis) -> None:
-            progress(f"{axis}: {what}", done, total)
+    def drives(cycle: float) -> dict[str, DriveFound]:
+        found = {}
+        for axis, each in records.items():
 
-        axes = {axis: rigid_axis(each, begin)} if begin else {}
-        with _begun(machine, name, note, axes, interval, position_cycle) as own:
-            found[axis] = one = identify_drive(
-                own, each, read[axis].records, structure_known=machine is not None, start=begin,
-                other_cycle=_other(position_cycle, interval) if machine is None else None, progress=tell, fmus=fmus,
-            )  # fmt: skip
+            def tell(what: str, done: int, total: int, axis: str = axis) -> None:
+                progress(f"{axis}: {what}", done, total)
+
+            axes = {axis: rigid_axis(each, begins[axis])} if machine is None else {}
+            with _begun(machine, name, note, axes, interval, cycle) as own:
+                found[axis] = identify_drive(
+                    own, each, read[axis].records, structure_known=machine is not None, start=begins[axis],
+                    other_cycle=_other(cycle, interval) if machine is None else None, progress=tell, fmus=fmus,
+                )  # fmt: skip
+        return found
+
+    # A drive that closes the position loop itself (DSC) does so in its own cycle; a control, in that of its rows.
+    cycle = position_cycle or control_cycle(interval)
+    found = drives(cycle)
+    if position_cycle is None and sum(sum(one.other_cycles.values()) for one in found.values()) > APART:
+        cycle = _other(cycle, interval)
+        found = drives(cycle)
+    for axis, one in found.items():
+        each, begin = records[axis], begins[axis]
         drive, friction = one.machine.shipped_drive(axis, "a drive file"), friction_of(one, axis)
         if machine is not None:
             files[drive_file(axis)] = drive_text(drive, one.estimates, OF_MACHINE, head)
@@ -97,11 +103,21 @@ def identify_drives(
                 rigid_axis(each, begin), drive=drive, values=values, estimates=one.estimates, head=head
             )  # fmt: skip
     if rigid:
-        files = machine_files(name, note, rigid, interval, position_cycle)
+        files = machine_files(name, note, rigid, interval, cycle)
     with _folder(files if rigid else {}) as folder:
         made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
         comparisons = [replayed(made[axis], {axis: each}, fmus)[axis] for axis, each in records.items()]
     return DrivesFound(found, comparisons, files)
+
+
+def _begin(each: AxisRecord) -> Mapping[str, float]:
+    """What the record alone says of an axis. InputError: it has no torque, or does not accelerate."""
+    if not each.record.driven:
+        raise InputError(
+            f"{each.record.name}, axis {each.axis}: no torque, current or force is recorded; without it neither "
+            "inertia nor friction is told: give a machine that has them (--machine)"
+        )
+    return start_values(each)
 
 
 def _other(position_cycle: float, interval: float) -> float:

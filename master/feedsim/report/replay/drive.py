@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import Figure
+from feedsim.findings import Note
 from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
 from feedsim.replay.compare import Comparison
-from feedsim.replay.drive import DriveFound
+from feedsim.replay.drive import APART, DriveFound
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
 from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
@@ -30,9 +31,6 @@ PARTS = (
     "A part is taken where the record predicts stretches and kinds of its motion better with it that the fit has not "
     "seen (cross-validation): gain of the logarithm of the likelihood."
 )
-
-
-APART = 2.0  # of the logarithm of the likelihood: below it two cycles are as likely as one another
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +76,8 @@ class DriveReport:
                     told[f"axis {axis}: of {cycles} the record speaks for the latter"] = None
                 elif likelier > -APART:
                     told[f"axis {axis}: {cycles} fit alike"] = None
+                else:
+                    told[Note(f"axis {axis}: of {cycles} the record speaks for the former")] = None
         return list(told)
 
 

@@ -137,12 +137,16 @@ def shortest(values: Array) -> list[str]:
     """Every number in its shortest form that reads back the same, as repr() writes it, whole ones without ".0"."""
     if not values.size:
         return []
+    if (values.view(np.uint64) == values[:1].view(np.uint64)).all():  # of an axis that stands: many columns
+        return [repr(float(values[0])).removesuffix(".0")] * len(values)
     numbers, size = values.tolist(), np.abs(values)
     # The digits are those of repr, which takes five times as long. The form is another one where repr has an exponent.
     text = to_json(numbers).decode()[1:-1].split(",")
     for i in np.flatnonzero(~((size >= 1e-4) & (size < 1e16) | (size == 0))).tolist():
         text[i] = repr(numbers[i])
-    return [cell.removesuffix(".0") for cell in text]
+    for i in np.flatnonzero(values == np.trunc(values)).tolist():
+        text[i] = text[i].removesuffix(".0")
+    return text
 
 
 def quoted(cell: str) -> str:

@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drawn_circles import Causes, driven
+from scipy import stats
 
 from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, answer, diagnose, sentence, swinging
+from feedsim.analysis.circle.model import _student
 
 BALLBAR = CircleUnderTest(("X", "Z"), radius=0.1, speed=0.05, pitch={"X": 0.01, "Z": 0.02})
 SAMPLES = 3000
@@ -284,3 +286,10 @@ def test_errors_that_no_term_describes_are_not_called_causes() -> None:
         assert max(term.size for term in found.terms if term.key not in ("rest", "peaks")) < 3 * found.G
         words = answer(found)
         assert "no single cause stands out" in words or "explains less than half of G" in words, words
+
+
+@pytest.mark.parametrize("free", [2, 5, 19, 20, 21, 30, 90, 1000, 10**6])
+def test_quantiles_of_intervals_are_those_of_student(free: int) -> None:
+    assert _student(free) == pytest.approx(
+        stats.t.ppf(0.975, free), rel=2e-7
+    )  # the term of the series that is left out

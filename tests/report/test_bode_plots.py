@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from feedsim.analysis.linear import Bandwidth, Extreme, GainCrossing, Margins, P
 from feedsim.analysis.responses import Overlay
 from feedsim.analysis.truncation import deviations, structure_responses
 from feedsim.report import chart
-from feedsim.report.chart import Panel, printed
+from feedsim.report.chart import Panel
 from feedsim.report.chart.scales import ranges, ticks
 from feedsim.report.frf.bode import Column, Curve, Ordinate, at, bode_chart, phases
 from feedsim.report.frf.bode_plots import (
@@ -28,7 +27,6 @@ from feedsim.report.frf.bode_plots import (
 )
 from feedsim.report.frf.truncation_plots import truncation_pictures
 from feedsim.report.picture import Picture
-from feedsim.report.style import finish
 from feedsim.structure import Modes, checked_modes
 from feedsim.trace.response import FrequencyResponse
 from frf_helpers import responses
@@ -125,22 +123,6 @@ def test_phase_ticks_are_round_angles_and_few(delay: float) -> None:
 
 
 # -- marks -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """Figures that charts are drawn as, once everything in them has its place."""
-    found: list[Any] = []
-
-    def look(figure: Any, *rest: str, then: Callable[[], object], **options: Any) -> Any:
-        def after() -> None:
-            then()
-            found.append(figure)
-
-        return finish(figure, *rest, then=after, **options)
-
-    monkeypatch.setattr(printed, "finish", look)
-    return found
 
 
 def test_first_and_last_crossing_are_marked_and_told() -> None:

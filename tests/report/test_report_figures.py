@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import combinations
 from typing import Any
@@ -14,36 +14,20 @@ import pytest
 from feedsim.analysis import Figure, PositioningTask, evaluate, tasks
 from feedsim.motions import Circle, Dwell, Move
 from feedsim.report import chart
-from feedsim.report.chart import Band, Chart, Curve, Grid, Level, Mark, Panel, Polar, printed
+from feedsim.report.chart import Band, Chart, Curve, Grid, Level, Mark, Panel, Polar
 from feedsim.report.chart.placing import Ground
 from feedsim.report.chart.scales import bent, ranges, ticks, unbent
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import ring_step
 from feedsim.report.run.report import draw
-from feedsim.report.style import LARGEST_SVG, drawing, finish
+from feedsim.report.style import LARGEST_SVG, drawing
 from feedsim.scenario import Axis, CircleTest, Positioning
 from report_helpers import FakeRun, circle_run, positioning_run, run_of, small_run
 from scenario_helpers import default_machine, scenario
 
 TIME, HEIGHT = chart.Axis("time", "s"), chart.Axis("height", "m")
 X = np.linspace(0.0, 1.0, 400)
-
-
-@pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """Figures that charts are drawn as, once everything in them has its place."""
-    found: list[Any] = []
-
-    def looked_at(figure: Any, *rest: str, then: Callable[[], object], **options: Any) -> Any:
-        def after() -> None:
-            then()
-            found.append(figure)
-
-        return finish(figure, *rest, then=after, **options)
-
-    monkeypatch.setattr(printed, "finish", looked_at)
-    return found
 
 
 def placed(figure: Any, axes: Any) -> list[Any]:

@@ -13,6 +13,7 @@ from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Mark, Panel, P
 from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import TIME, TOOL, reversed_note, torque_axis
+from feedsim.report.run.diagnosis import direction
 from feedsim.report.style import BLUE, GREEN, ORANGE, VERMILLION, Array
 from feedsim.trace import Trace
 
@@ -44,11 +45,13 @@ def contour_picture(trace: Trace, turn: Turn, stem: str, back: Turn | None = Non
     over = ""
     if back is not None:
         other = contour(trace, back)
-        curves.append(turned(f"linear scales, {way(back)}", GREEN, other.angle, other.deviation, "dotted", 1.2))
-        over = f" Dotted: {way(back)}, from {back.begin:.4f} to {back.end:.4f} s."
+        curves.append(
+            turned(f"linear scales, {direction(back.sense)}", GREEN, other.angle, other.deviation, "dotted", 1.2)
+        )
+        over = f" Dotted: {direction(back.sense)}, from {back.begin:.4f} to {back.end:.4f} s."
     title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
     caption = (
-        f"Radius {turn.radius * 1e3:.6g} mm, {way(turn)} from {turn.axes[0]} to {turn.axes[1]}, turn from "
+        f"Radius {turn.radius * 1e3:.6g} mm, {direction(turn.sense)} from {turn.axes[0]} to {turn.axes[1]}, turn from "
         f"{turn.begin:.4f} to {turn.end:.4f} s.{over} Radius deviation magnified {on.magnification:,.0f} times; rings "
         f"at ±{on.ring:g} µm about the programmed circle. The markers show the quadrant glitches: the largest "
         "deviation within ±45° of an axis crossing, less the median of the turn."
@@ -61,11 +64,6 @@ def contour_picture(trace: Trace, turn: Turn, stem: str, back: Turn | None = Non
     sense = turn.sense if back is None else 0
     chart = circle_chart(on, curves, marks, (median,), sense, "quadrant glitches\n(less the median)")
     return Picture(stem, title, caption, chart)
-
-
-def way(turn: Turn) -> str:
-    """The sense of a turn in words."""
-    return "counterclockwise" if turn.sense > 0 else "clockwise"
 
 
 def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str) -> Picture | None:

@@ -35,7 +35,7 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     if words := swinging(diagnosis):
         note += f"\n{typeset(words)}"
     heads = ("Cause", "Amount", "Alone [µm]", "Share of G [%]", "What it means, where to look")
-    peaks = [(minus(peak.name), _direction(peak.sense), *_peak(peak)) for peak in diagnosis.peaks]
+    peaks = [(minus(peak.name), direction(peak.sense), *_peak(peak)) for peak in diagnosis.peaks]
     peak_heads = ("Reversal at", "Direction", "Peak [µm]", "±", "Width at half the height [ms]", "Falls to 1/e in [ms]")
     peak_note = "Peaks stand over the fitted rest of the circle; 0: nothing stands out of the noise."
     return Section(
@@ -44,7 +44,8 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     )
 
 
-def _direction(sense: int) -> str:
+def direction(sense: int) -> str:
+    """The sense of a turn (+1, -1) in words."""
     return "counterclockwise" if sense > 0 else "clockwise"
 
 
@@ -52,7 +53,7 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
     """The diagnosis in summary.json, in SI."""
     return {
         "answer": answer(diagnosis),
-        "directions": [_direction(sense) for sense in diagnosis.senses],
+        "directions": [direction(sense) for sense in diagnosis.senses],
         "G": quantity(diagnosis.G, "m"),
         "causes": [
             {
@@ -69,7 +70,7 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
         "peaks": [
             {
                 "at": peak.name,
-                "direction": _direction(peak.sense),
+                "direction": direction(peak.sense),
                 "height": quantity(peak.height, "m"),
                 "half_interval": finite(peak.half),
                 "width": quantity(peak.width, "s"),

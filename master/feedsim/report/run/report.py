@@ -38,7 +38,7 @@ from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_
 from feedsim.report.run.accuracy import accuracy_picture, accuracy_section
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
-from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
+from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section, direction
 from feedsim.report.run.pose import pose_part, pose_section
 from feedsim.report.run.words import accuracy_words, stop_words
 from feedsim.scenario import Level, Logging
@@ -350,7 +350,7 @@ def _circles(run: Run, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
                 "axes": list(turn.axes),
                 "centre": quantity(list(turn.centre), "m"),
                 "radius": quantity(turn.radius, "m"),
-                "direction": "counterclockwise" if turn.sense > 0 else "clockwise",
+                "direction": direction(turn.sense),
                 "begin": quantity(turn.begin, "s"),
                 "end": quantity(turn.end, "s"),
             }

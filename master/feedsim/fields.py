@@ -58,7 +58,10 @@ def _without_examples(schema: dict[str, Any]) -> None:
 class Model(BaseModel):
     """Base of all scenario models: values that do not change, no unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=False, json_schema_extra=_without_examples)
+    # Built on first use: most models are only read as part of another one, which needs no validator of theirs.
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", validate_default=False, defer_build=True, json_schema_extra=_without_examples
+    )
 
     IN_FOLDER: ClassVar[str] = ""  # name of the file, where its folder may be named in its place
     TOLD_BY: ClassVar[str | None] = None  # the key that tells it from another model that may stand at its place

@@ -140,9 +140,10 @@ def shortest(values: Array) -> list[str]:
     if (values.view(np.uint64) == values[:1].view(np.uint64)).all():  # of an axis that stands: many columns
         return [repr(float(values[0])).removesuffix(".0")] * len(values)
     numbers, size = values.tolist(), np.abs(values)
-    # The digits are those of repr, which takes five times as long. The form is another one where repr has an exponent.
-    text = to_json(numbers).decode()[1:-1].split(",")
-    for i in np.flatnonzero(~((size >= 1e-4) & (size < 1e16) | (size == 0))).tolist():
+    # The digits are those of repr, which takes five times as long. Its exponents have two digits, and begin below 1e-4.
+    text = to_json(numbers).decode()[1:-1].replace("e-", "e-0").split(",")
+    same = (size >= 1e-9) & (size < 1e-5) | (size >= 1e-4) & (size < 1e16) | (size == 0)
+    for i in np.flatnonzero(~same).tolist():
         text[i] = repr(numbers[i])
     for i in np.flatnonzero(values == np.trunc(values)).tolist():
         text[i] = text[i].removesuffix(".0")

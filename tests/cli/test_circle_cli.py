@@ -168,7 +168,7 @@ REFUSED = {
     "one axis": (lambda words: [*words, "--axes", "X"], "two different axes of the plane are needed"),
     "another axis' pitch": (lambda words: [*words, "--pitch", "Z=10 mm"], "Z is no axis of the plane"),
     "half a centre": (lambda words: [*words, "--centre", "X=1 mm"], "give it of X and Y"),
-    "a radius of nothing": (lambda words: [*words[:2], "0 mm"], "must be above 0"),
+    "a radius of nothing": (lambda words: [*words[:2], "0 mm"], "--radius 0 mm: more than zero is needed, e.g. 150 mm"),
 }
 
 

@@ -118,7 +118,7 @@ def test_build_from_any_source(source: Path, tmp_path: Path, capsys: Capture) ->
         (["--at", "X=5m"], 2, ["X at 5 m is outside its travel, 0 to 0.6 m"]),
         (["--at", "X=5kg"], 2, ["--at X=5kg: '5kg' is a mass"]),
         (["--at", "X:5mm"], 2, ["--at X:5mm: AXIS=POSITION is needed"]),
-        (["--at", "X=5mm", "X=6mm"], 2, ["axis X is given twice"]),
+        (["--at", "X=5mm", "X=6mm"], 2, ["--at X=6mm: X is given twice"]),
         (["--at", "U=5mm"], 2, ["'U'", "X"]),
         (["--cutoff", "250"], 2, ["--cutoff 250: 250 has no unit"]),
         (["--cutoff", "0Hz"], 2, ["--cutoff 0Hz: more than zero is needed"]),

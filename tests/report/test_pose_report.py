@@ -197,7 +197,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
         (["Z"], "--poses Z: Z=20mm or Z=0mm..400mm/20mm is the form"),
         (["Z=20"], "20 has no unit"),
         (["A=20mm"], "no axis 'A'; axes are X, Y, Z"),
-        (["Z=20mm", "Z=30mm"], "axis Z is given twice"),
+        (["Z=20mm", "Z=30mm"], "--poses Z=30mm: Z is given twice"),
         (["Z=0mm..900mm/20mm"], "outside of the travel of Z, 0 m to 0.685 m"),
         (["Z=0mm..300mm"], "the size of the cells is missing"),
         (["Z=300mm..200mm/20mm"], "the first must be less"),

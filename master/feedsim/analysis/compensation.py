@@ -119,12 +119,12 @@ def moving_axes(program: Program) -> tuple[str, ...]:
     return tuple(axis for axis, x in program.x_s.items() if np.ptp(x) > RESTING)
 
 
-def check_moves(what: str, axis: str, program: Program) -> None:
+def check_moves(axis: str, program: Program, what: str = "") -> None:
     """Raise InputError, which begins with `what`, unless the program moves `axis`."""
     axes = moving_axes(program)
     if axis not in axes:
         known = f"no axis {axis!r}" if axis not in program.n_ffw else f"axis {axis} rests"
-        raise InputError(f"{what}: {known}; the axes that move are {', '.join(axes)}")
+        raise InputError(f"{what}{known}; the axes that move are {', '.join(axes)}")
 
 
 def compensate(
@@ -156,7 +156,7 @@ def compensate(
     axes = moving_axes(program)
     for what, named in (("friction", frictions), ("delay", delays)):
         for axis in named or ():
-            check_moves(f"{what} of axis {axis}", axis, program)
+            check_moves(axis, program, f"{what} of axis {axis}: ")
     machine = scenario.machine
     used = {
         axis: (frictions or {}).get(axis) or machine.shipped_friction(axis, "compensation without friction of its own")

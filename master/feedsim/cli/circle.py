@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, QUIET, Command, Option, halves, names, out, quantity
+from feedsim.cli.options import FIGURES, QUIET, Command, Option, lengths, names, out, quantity
 from feedsim.cli.terminal import finish, results_in
 from feedsim.errors import InputError
 
@@ -30,12 +30,15 @@ def circle(options: Namespace) -> None:
     if len(axes) != 2 or axes[0] == axes[1]:
         raise InputError(f"--axes {','.join(axes)}: two different axes of the plane are needed, for example --axes X,Z")
     directory: Path = options.out or Path("results") / f"circle_{options.records[0].stem}"
-    radius = None if options.radius is None else _positive("radius", options.radius, "m", "150 mm")
-    feed = None if options.feed is None else _positive("feed", options.feed, "m/s", "1000 mm/min")
-    centre = _by_axis("centre", options.centre, axes)
+    radius = None if options.radius is None else quantity("radius", options.radius, "m", "150 mm", positive=True)
+    feed = None if options.feed is None else quantity("feed", options.feed, "m/s", "1000 mm/min", positive=True)
+    centre = lengths("centre", options.centre, "POSITION", "10mm")
+    pitch = lengths("pitch", options.pitch, "LENGTH", "10mm", positive=True)
+    for option, named in (("centre", centre), ("pitch", pitch)):
+        if other := [axis for axis in named if axis not in axes]:
+            raise InputError(f"--{option}: {other[0]} is no axis of the plane; --axes says {', '.join(axes)}")
     if centre and len(centre) != 2:
         raise InputError(f"--centre: is given of {' and '.join(centre)} alone; give it of {axes[0]} and {axes[1]}")
-    pitch = _by_axis("pitch", options.pitch, axes, positive=True)
     with results_in(directory, report.check_writable, options.records):
         recorded = read_circle(
             options.records,
@@ -48,24 +51,6 @@ def circle(options: Namespace) -> None:
         diagnosis = diagnose(recorded.circle, [turn.path for turn in recorded.turns], centred=recorded.centred)
         report.write(recorded, diagnosis, options.records, directory, drawn=options.figures)
     finish(options.quiet, (), *report.lines(diagnosis, recorded), f"-> {directory / 'report.html'}")
-
-
-def _positive(option: str, text: str, unit: str, example: str, whole: str = "") -> float:
-    value = quantity(option, text, unit, example, whole=whole)
-    if value <= 0:
-        raise InputError(f"--{option} {whole or text}: must be above 0")
-    return value
-
-
-def _by_axis(option: str, texts: list[str], axes: tuple[str, ...], *, positive: bool = False) -> dict[str, float]:
-    found = {}
-    for text in texts:
-        axis, value = halves(option, text, 'AXIS=VALUE is needed, for example X="10 mm"')
-        if axis not in axes:
-            raise InputError(f"--{option} {text}: {axis} is no axis of the plane; --axes says {', '.join(axes)}")
-        read = _positive if positive else quantity
-        found[axis] = read(option, value, "m", "10 mm", whole=text)
-    return found
 
 
 COMMAND = Command(

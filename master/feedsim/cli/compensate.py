@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, halves, out, quantity, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, amount, by_name, out, settings
 from feedsim.cli.terminal import announce, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
@@ -57,34 +57,28 @@ def compensate(options: Namespace) -> None:
 def _frictions(texts: Sequence[str], program: Program) -> tuple[Mapping[str, Path], Mapping[str, Friction]]:
     """Axis -> file, and axis -> what is in it."""
     from feedsim.analysis.compensation import check_moves
-    from feedsim.errors import InputError
     from feedsim.scenario.load import read_friction
 
-    files: dict[str, Path] = {}
-    for text in texts:
-        axis, file = halves("friction", text, "AXIS=FILE.yaml is needed, such as Z=friction_z.yaml")
-        check_moves(f"--friction {text}", axis, program)
-        if axis in files:
-            raise InputError(f"--friction {text}: {axis} is given twice")
-        files[axis] = Path(file)
+    def file_of(axis: str, text: str) -> Path:
+        check_moves(axis, program)
+        return Path(text)
+
+    files = by_name("friction", texts, "AXIS=FILE.yaml is needed, such as Z=friction_z.yaml", file_of)
     return files, {axis: read_friction(file) for axis, file in files.items()}
 
 
 def _delays(texts: Sequence[str], program: Program) -> Mapping[str, float]:
     """Axis -> delay [s]; one without an axis is that of all, and one with it counts more."""
     from feedsim.analysis.compensation import check_moves, moving_axes
-    from feedsim.errors import InputError
 
-    given: dict[str, float] = {}  # "" is for all axes
-    for text in texts:
-        axis, equals, value = text.rpartition("=")
-        if equals:
-            check_moves(f"--delay {text}", axis, program)
-        if axis in given:
-            raise InputError(f"--delay {text}: {f'that of {axis}' if equals else 'that of all axes'} is given twice")
-        given[axis] = quantity("delay", value, "s", "4.2 ms", whole=text)
-    common = dict.fromkeys(moving_axes(program), given.pop("")) if "" in given else {}
-    return common | given
+    def delay_of(axis: str, text: str) -> float:
+        if axis:
+            check_moves(axis, program)
+        return amount(text, "s", "4.2 ms")
+
+    told = by_name("delay", texts, "[AXIS=]VALUE is needed, such as Z='4.2 ms'", delay_of, common=True)
+    common = dict.fromkeys(moving_axes(program), told.pop("")) if "" in told else {}
+    return common | told
 
 
 def _check_lags(scenario: Scenario, axes: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FIGURES, FMUS, Command, Group, Option, names, out, quantity
+from feedsim.cli.options import FIGURES, FMUS, Command, Group, Option, amount, by_name, names, out, quantity
 from feedsim.cli.terminal import announce_archive, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
@@ -102,18 +102,15 @@ def _hold(texts: Sequence[str]) -> dict[str, float]:
     from feedsim.errors import InputError
     from feedsim.identify.parameters import KINDS
 
-    held: dict[str, float] = {}
-    for text in (part for whole in texts for part in names(whole)):
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"--hold {text}: NAME=VALUE is needed, for example beta=1 or v_log='3 rad/s'")
-        if name not in KINDS or name in ("J", "delay"):
-            known = ", ".join(name for name in KINDS if name not in ("J", "delay"))
-            raise InputError(f"--hold {text}: no parameter {name!r}; there are {known}")
-        if name in held:
-            raise InputError(f"--hold {text}: {name} is given twice; a parameter keeps one value")
-        held[name] = quantity("hold", value, KINDS[name].unit, whole=text)
-    return held
+    known = [name for name in KINDS if name not in ("J", "delay")]
+
+    def value_of(name: str, text: str) -> float:
+        if name not in known:
+            raise InputError(f"no parameter {name!r}; there are {', '.join(known)}")
+        return amount(text, KINDS[name].unit)
+
+    parts = [part for whole in texts for part in names(whole)]
+    return by_name("hold", parts, "NAME=VALUE is needed, for example beta=1 or v_log='3 rad/s'", value_of)
 
 
 def _settings(options: Namespace) -> Mapping[str, str]:

@@ -8,9 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from feedsim.errors import InputError
+
+T = TypeVar("T")
 
 
 class Option:
@@ -135,12 +137,20 @@ def given(option: str, text: str) -> Iterator[None]:
         raise InputError(f"--{option} {text}: {error}") from None
 
 
-def quantity(option: str, text: str, unit: str, example: str = "", *, whole: str = "") -> float:
-    """The value of a text in `unit`; whole: what was typed, where the text is a part of it. Raises InputError."""
+def quantity(option: str, text: str, unit: str, example: str = "", *, positive: bool = False) -> float:
+    """The value of a text in `unit`; positive: above 0. Raises InputError."""
+    with given(option, text):
+        return amount(text, unit, example, positive=positive)
+
+
+def amount(text: str, unit: str, example: str = "", *, positive: bool = False) -> float:
+    """As :func:`quantity`, of a text that is a part of what was typed."""
     from feedsim import units
 
-    with given(option, whole or text):
-        return units.parse(text, unit, example)
+    value = units.parse(text, unit, example)
+    if positive and value <= 0:
+        raise InputError(f"more than zero is needed, e.g. {example}")
+    return value
 
 
 def halves(option: str, text: str, needed: str) -> tuple[str, str]:
@@ -149,6 +159,30 @@ def halves(option: str, text: str, needed: str) -> tuple[str, str]:
     if not (left and equals and right):
         raise InputError(f"--{option} {text}: {needed}")
     return left, right
+
+
+def by_name(
+    option: str, texts: Sequence[str], needed: str, read: Callable[[str, str], T], *, common: bool = False
+) -> dict[str, T]:
+    """Name -> what `read` makes of name and value, of texts NAME=VALUE, such as AXIS=POSITION.
+
+    needed: as for :func:`halves`. common: a value without a name is allowed, and stands under "".
+    Raises InputError, which names the option and the text: no such form, a name twice, what `read` finds.
+    """
+    found: dict[str, T] = {}
+    for text in texts:
+        name, value = ("", text) if common and "=" not in text else halves(option, text, needed)
+        with given(option, text):
+            if name in found:
+                raise InputError(f"{name or 'that of all axes'} is given twice")
+            found[name] = read(name, value)
+    return found
+
+
+def lengths(option: str, texts: Sequence[str], value: str, example: str, *, positive: bool = False) -> dict[str, float]:
+    """Axis -> length [m] of texts such as X=800mm; value: what it is called. Raises InputError as :func:`by_name`."""
+    needed = f"AXIS={value} is needed, e.g. X={example}"
+    return by_name(option, texts, needed, lambda _, text: amount(text, "m", example, positive=positive))
 
 
 def names(text: str) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import Command, Option, halves, quantity
+from feedsim.cli.options import Command, Option, lengths, quantity
 from feedsim.cli.terminal import finish, results_in, warn
 from feedsim.errors import InputError
 
@@ -101,7 +101,9 @@ def figures(options: Namespace, described: Described, *, quiet: bool = False) ->
 
     machine = described.machine
     step = getattr(options, "step", None)
-    h = _positive("step", step, "s", "125 us") if step is not None else machine.cycles.T_c if machine else USUAL_STEP
+    h = machine.cycles.T_c if machine else USUAL_STEP
+    if step is not None:
+        h = quantity("step", step, "s", "125 us", positive=True)
     friction = machine.shipped_frictions if machine else None
     if described.structure is None:
         assert machine is not None
@@ -124,7 +126,8 @@ def _info_of_structure(options: Namespace, described: Described, h: float, quiet
     from feedsim.structure.table_check import stale
 
     assert described.structure is not None
-    cutoff = _positive("cutoff", options.cutoff, "rad/s", "1500 Hz") if options.cutoff is not None else None
+    wanted = options.cutoff
+    cutoff = None if wanted is None else quantity("cutoff", wanted, "rad/s", "1500 Hz", positive=True)
     shown = sys.stderr.isatty() and not quiet
 
     def progress(text: str) -> None:
@@ -170,26 +173,8 @@ def _check_complete(structure: Structure, pose: Mapping[str, float]) -> None:
 
 
 def positions(texts: Sequence[str]) -> dict[str, float]:
-    """Axis -> position [m] of texts AXIS=POSITION.
-
-    Raises:
-        InputError: no such form, no length, or an axis that is named twice.
-    """
-    pose: dict[str, float] = {}
-    for text in texts:
-        axis, position = halves("at", text, "AXIS=POSITION is needed, e.g. X=800mm")
-        if axis in pose:
-            raise InputError(f"--at {text}: axis {axis} is given twice")
-        pose[axis] = quantity("at", position, "m", "800 mm", whole=text)
-    return pose
-
-
-def _positive(option: str, text: str, unit: str, example: str) -> float:
-    """A quantity above zero that was given as an option."""
-    value = quantity(option, text, unit, example)
-    if value <= 0:
-        raise InputError(f"--{option} {text}: more than zero is needed, e.g. {example}")
-    return value
+    """Axis -> position [m] of texts AXIS=POSITION. Raises InputError."""
+    return lengths("at", texts, "POSITION", "800mm")
 
 
 AT = Option("--at", "AXIS=POSITION",

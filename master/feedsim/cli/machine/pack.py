@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feedsim.cli.machine.figures import AT, positions
-from feedsim.cli.options import Command, Option, given
+from feedsim.cli.options import Command, Option, by_name
 from feedsim.cli.terminal import announce_archive, progress_bar
 from feedsim.errors import InputError, OutputError
 from feedsim.owned import TemporaryFolder
@@ -172,36 +172,30 @@ def grid_axes(machine: Machine, texts: Sequence[str]) -> list[GridAxis]:
     from feedsim import units
     from feedsim.structure.poses import grid_axis
 
-    found: list[GridAxis] = []
-    for text in texts:
-        name, equals, rest = text.partition("=")
-        if not equals or not rest:
-            raise InputError(f"--poses {text}: {EXAMPLE} is the form")
+    def axis_of(name: str, rest: str) -> GridAxis:
         if name not in machine.axes:
-            raise InputError(f"--poses {text}: the machine has no axis {name!r}; axes are {', '.join(machine.axes)}")
-        if any(axis.axis == name for axis in found):
-            raise InputError(f"--poses {text}: axis {name} is given twice")
+            raise InputError(f"the machine has no axis {name!r}; axes are {', '.join(machine.axes)}")
         low, high = travel = machine.axes[name].travel
         limits, slash, cell = rest.rpartition("/") if ".." in rest else ("", "", rest)
         if ".." in rest and not slash:
-            raise InputError(f"--poses {text}: the size of the cells is missing; {EXAMPLE} is the form")
-        with given("poses", text):
-            width = units.parse(cell, "m", "20 mm")
-            if slash:
-                first, _, last = limits.partition("..")
-                low, high = units.parse(first, "m", "0 mm"), units.parse(last, "m", "400 mm")
-            if not travel[0] <= low <= travel[1] or not travel[0] <= high <= travel[1]:
-                raise InputError(
-                    f"outside of the travel of {name}, {units.show(travel[0], 'm')} to {units.show(travel[1], 'm')}"
-                )
-            axis = grid_axis(name, low, high, width)
-            if len(axis.centres) == 1:
-                raise InputError(
-                    f"as wide as the {'range' if slash else 'travel'}, {units.show(high - low, 'm')}, or wider: 1 cell "
-                    "does not follow; leave the axis out, or give smaller cells"
-                )
-            found.append(axis)
-    return found
+            raise InputError(f"the size of the cells is missing; {EXAMPLE} is the form")
+        width = units.parse(cell, "m", "20 mm")
+        if slash:
+            first, _, last = limits.partition("..")
+            low, high = units.parse(first, "m", "0 mm"), units.parse(last, "m", "400 mm")
+        if not travel[0] <= low <= travel[1] or not travel[0] <= high <= travel[1]:
+            raise InputError(
+                f"outside of the travel of {name}, {units.show(travel[0], 'm')} to {units.show(travel[1], 'm')}"
+            )
+        axis = grid_axis(name, low, high, width)
+        if len(axis.centres) == 1:
+            raise InputError(
+                f"as wide as the {'range' if slash else 'travel'}, {units.show(high - low, 'm')}, or wider: 1 cell "
+                "does not follow; leave the axis out, or give smaller cells"
+            )
+        return axis
+
+    return [*by_name("poses", texts, f"{EXAMPLE} is the form", axis_of).values()]
 
 
 PACK = Command(

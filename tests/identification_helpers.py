@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.identify import Identified
+from feedsim.identify import Identified, parameters
 from feedsim.identify.read import Provenance
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import (
@@ -47,6 +47,7 @@ def estimates() -> dict[str, Estimate]:
     }
     for name, reason in (("beta", "usual value"), ("v_log", "only the ratio to F_log would be seen")):
         found[name] = replace(found[name], status="held", reason=reason)
+    found |= {name: parameters.estimate(name, parameters.NO_EFFECT[name], status="held") for name in parameters.FIXED}
     found["J"] = replace(found["J"], status="given", reason="of the machine's modes")
     return found
 

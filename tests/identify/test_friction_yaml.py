@@ -11,7 +11,7 @@ import pytest
 from feedsim.identify.friction_file import constant_load_hint, friction_yaml, interval_text, relative_text, value_text
 from feedsim.identify.result import NORMAL_95, Estimate
 from feedsim.scenario.load import read_friction
-from identification_helpers import TRUE, identified
+from identification_helpers import estimates, identified
 
 VERSIONS = {"feedsim": "1.2", "python": "3.4", "numpy": "5.6", "scipy": "7.8"}
 
@@ -21,7 +21,7 @@ def test_friction_file_is_a_friction(tmp_path: Path) -> None:
     (tmp_path / "friction.yaml").write_text(text, encoding="utf-8")
     friction = read_friction(tmp_path / "friction.yaml")
     for name, value in friction.parameters().items():
-        assert value == pytest.approx(TRUE[name][0], rel=1e-7)
+        assert value == pytest.approx(estimates()[name].value, rel=1e-7)
     group = friction.identified
     assert group["axis"] == "Z"
     assert group["constant_load"]["value"] == "0.25 N.m"

@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError, SimulationError
 from feedsim.identify.open_loop import NEEDED, balanced, first_deflection, first_speed, substeps
+from feedsim.identify.parameters import NO_EFFECT
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Balance, Estimate
 
 Array = NDArray[np.float64]
 
-# Synthetic, near the default machine's Z axis, without its engaging zone.
+# Synthetic, near the default machine's Z axis, without its engaging zone. What is not named has no effect.
 TRUE = {
+    **NO_EFFECT,
     "sigma_0": 300.0, "sigma_1": 0.8, "sigma_2": 0.006, "F_C": 1.6, "F_S": 2.1, "v_s": 0.6, "beta": 1.0, "F_log": 0.4,
     "v_log": 3.0, "asymmetry": 0.05, "W": 0.0, "gamma": 1.0, "M_0": 0.3, "J": 0.0164,
 }  # fmt: skip

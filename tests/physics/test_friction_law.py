@@ -14,8 +14,10 @@ import pytest
 from friction_reference import X_AXIS, Z_AXIS, level, line, sine, solved, torque
 from scipy.integrate import solve_ivp
 
+from feedsim import variables
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError, SimulationError
+from feedsim.identify.parameters import torque as constant_speed_torque
 from fmi_helpers import Archive, Floats
 
 H = 2.0**-13  # s, near the control cycle; a power of two, see `exact`
@@ -45,6 +47,18 @@ def speeds(count: int = 6000, amplitude: float = 2.0) -> Floats:
     n[count // 2 : count // 2 + 50] = 0.0
     n[-200:] = 120.0
     return exact(n)
+
+
+@pytest.mark.parametrize("name", variables.parameters("friction"))
+def test_identification_knows_what_acts_at_constant_speed(law: FrictionLaw, name: str) -> None:
+    """Its curve over speed is Eq. 7 a second time: whichever parameter differs, the law settles at it."""
+    start = law.start_values
+    parameters = start | {name: 1.1 * start[name] or 0.1}
+    for n in (-120.0, -0.5, 0.5, 3.0, 120.0):
+        # 2 rad: the zone of 0.04 rad is left behind, and bristles bent by 0.01 rad forget where they began
+        steps = math.ceil(2 / abs(n) / H)
+        settled = law(parameters, np.full(steps + 1, n), H)[-1]
+        assert constant_speed_torque({**parameters, "M_0": 0.0}, np.array([n]))[0] == pytest.approx(settled, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -79,8 +93,10 @@ def test_each_parameter_is_taken_for_what_it_is(law: FrictionLaw, archive: Archi
 
 
 def test_start_values_are_the_units(law: FrictionLaw) -> None:
-    assert dict(law.start_values) == Z_AXIS
-    assert law.names == tuple(law.start_values)
+    rows = variables.parameters("friction")
+    assert [*law.start_values.items()] == [(name, row.start) for name, row in rows.items()]
+    assert law.start_values.items() >= Z_AXIS.items()
+    assert law.names == tuple(rows)
 
 
 SETS = [Z_AXIS, X_AXIS | {"asymmetry": 0.2, "beta": 2.0}, Z_AXIS | {"W": 0.0}]

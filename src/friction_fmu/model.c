@@ -1,11 +1,6 @@
 /* friction: the friction torque of one feed axis, seen from the motor shaft.
  *
- *   M_fr   = k sigma_0 z + sigma_1 dz/dt + sigma_2 n                                   (1)   lugre.h
- *   dz/dt  = n - |n| / g(n) z                                                          (6)
- *   g(n)   = (1 + a sgn n) (F_C + (F_S - F_C) exp(-(|n|/v_s)^beta) + F_log ln(|n|/v_log + 1)) / sigma_0   (7)
- *   k      = gamma + lambda (1 - gamma)                                                (2)   tem.h
- *   lambda = (W/2 + c)/W for z >= 0,  (W/2 - c)/W for z < 0                            (3)
- *   c      = clip(c + travelled angle, -W/2, +W/2)                                     (4)
+ * Equations: lugre.h (1, 6, 7), tem.h (2 to 4), contact.h (the step, over which n is linear in time).
  *
  *   n = n_fr  speed at the contact [rad/s]         M_fr   friction torque, sign of n [N.m]
  *   z         mean bristle deflection [rad]        c      position in the engaging zone [rad]
@@ -14,8 +9,7 @@
  *
  * Source: M. Wiesauer, F. Bleicher, "Parameterization method for non-linear friction models of machine tool feed
  * drives", 18th CIRP Conference on Modeling of Machining Operations (2021). What its print has wrong: README.md.
- *
- * A step takes n as linear in time: contact.h. */
+ */
 #include <math.h>
 
 #include "contact.h"

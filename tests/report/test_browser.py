@@ -343,6 +343,23 @@ def test_on_paper_panels_stand_side_by_side(pages: dict[str, Any]) -> None:
     page.set_viewport_size(size)
 
 
+def test_on_grey_paper_lines_of_different_colours_are_told_apart(pages: dict[str, Any]) -> None:
+    page = pages["stop"]
+
+    def dashes() -> list[str]:
+        found: list[str] = page.locator("#overview svg.chart > g:nth-of-type(1) g[clip-path] path").evaluate_all(
+            "all => all.map(each => getComputedStyle(each).strokeDasharray)"
+        )
+        return found
+
+    assert dashes() == ["none", "none", "none"]
+    page.emulate_media(media="print")
+    assert len(set(dashes())) == 3
+    legend = page.locator("#overview .legend line")
+    assert legend.evaluate_all("all => all.map(each => getComputedStyle(each).strokeDasharray)") == dashes()
+    page.emulate_media(media="screen")
+
+
 def test_other_units_at_the_other_side_and_axes_that_are_logarithmic_both_ways(browser: Any, tmp_path: Path) -> None:
     x = np.linspace(0.0, 10.0, 200)
     across = Axis("v", "rad/s", span=(0.0, 10.0), also=("feed", "mm/min", 60.0))

@@ -130,6 +130,14 @@ def number(value: float, digits: int = 4) -> str:
     return minus(powers(f"{value:.{digits}g}")) if np.isfinite(value) else "–"
 
 
+def three(value: float) -> str:
+    """Three digits that count, zeros at the end among them; a dash where there is no number."""
+    if not np.isfinite(value):
+        return "–"
+    whole = abs(value) >= 100 or 0 < abs(value) < SMALL
+    return minus(powers(f"{value:.3g}" if whole else f"{value:#.3g}".rstrip(".")))
+
+
 def plain(text: str) -> str:
     """A name of the user's as text of a picture, in which a $ would begin a formula."""
     return text.replace("$", r"\$")

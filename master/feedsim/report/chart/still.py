@@ -10,7 +10,7 @@ import numpy as np
 
 from feedsim.report.chart.model import Axis, Chart, Curve, Grid, Panel, Polar, extremes
 from feedsim.report.chart.scales import bent, ranges, ticks
-from feedsim.report.formatting import minus, powers
+from feedsim.report.formatting import minus, three
 from feedsim.report.style import INK, MUTED, Array, named
 
 WIDTH, HEIGHT, ROUND = 960.0, 250.0, 430.0
@@ -243,7 +243,7 @@ def share_of(value: float, grid: Grid) -> tuple[float, bool]:
 
 def cell_text(value: float, grid: Grid) -> str:
     """The number of a cell."""
-    return minus(powers(f"{value:.3g}") if grid.decimals is None else f"{value:.{grid.decimals}f}")
+    return three(value) if grid.decimals is None else minus(f"{value:.{grid.decimals}f}")
 
 
 def _over(grid: Grid) -> float:

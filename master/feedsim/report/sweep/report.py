@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feedsim.report.content import Paragraph, Part, Report, Section, Table, Text, Tile, code
-from feedsim.report.formatting import counted, minus, number
+from feedsim.report.formatting import counted, minus, number, three
 from feedsim.report.picture import Picture
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.sections import parameters_section, provenance_section
@@ -133,9 +133,9 @@ def answers(account: Account) -> list[str]:
     lines = []
     for output in drawn(account)[:MOST_ANSWERS]:
         told, unit = output.statistics, output.scale.shown_unit
-        low, high = (number(told[key], 3) for key in (("min", "max") if grid else ("q5", "q95")))
+        low, high = (three(told[key]) for key in (("min", "max") if grid else ("q5", "q95")))
         spread = f"{low} to {high} {unit}".rstrip() + (" over the grid" if grid else " in nine of ten runs")
-        middle = "" if grid else f"{number(told['q50'], 3)} {unit}".rstrip() + " in the median, "
+        middle = "" if grid else f"{three(told['q50'])} {unit}".rstrip() + " in the median, "
         lines.append(f"{output.name}: {middle}{spread}; {_strongest(account, found[output.name])}.")
     return lines
 
@@ -177,7 +177,7 @@ def _statistics(account: Account) -> Section | None:
     rows: list[tuple[Text, ...]] = []
     for each in account.outputs:
         statistics = each.statistics
-        cells = [number(each.nominal, 3)] if nominal else []
+        cells = [three(each.nominal)] if nominal else []
         mean, std = statistics["mean"], statistics["std"]
         cells += [number(mean) if grid else rounded(mean, std / math.sqrt(max(len(each.known), 1)))]
         cells.append(number(std, 4 if grid else 3))

@@ -25,6 +25,9 @@ function written(value) {
 }
 const fixed = (value, decimals) => value.toFixed(decimals).replace(/^-(?=0(\.0*)?$)/, "").replace("-", "−");
 
+// Three digits that count, alike in all cells.
+const three = value => Math.abs(value) >= 100 || (value && Math.abs(value) < 1e-4) ? number(value, 3) : value.toPrecision(3).replace("-", "−");
+
 const unit_of = axis => axis.unit ? ` ${axis.unit}` : "";
 // Words over curves.
 const HALO = { "fill": "var(--ink)", "font-size": 11, "paint-order": "stroke", stroke: "var(--ground)", "stroke-width": 3, "stroke-linejoin": "round" };
@@ -123,7 +126,7 @@ function finer(step, turns) {
 
 const styled = curve => ({
   fill: "none", stroke: colour(curve.colour), "stroke-width": curve.width, "stroke-linejoin": "round",
-  ...(curve.dash ? { "stroke-dasharray": DASHES[curve.dash] } : {}), ...(curve.faint ? { "stroke-opacity": 0.4 } : {}),
+  ...(curve.dash ? { "stroke-dasharray": DASHES[curve.dash] } : {}), ...(curve.grey ? { class: `grey-${curve.grey}` } : {}), ...(curve.faint ? { "stroke-opacity": 0.4 } : {}),
 });
 
 // Least and largest ordinate of the curves that are seen, with room about them.
@@ -152,6 +155,12 @@ function whole_span(panel, values) {
     if (Number.isFinite(each) && (!panel.x.log || each > 0)) { low = Math.min(low, each); high = Math.max(high, each); }
   if (low > high) return [0, 1];
   return high > low ? [low, high] : [low - 0.5, low + 0.5];
+}
+
+// The title of a panel, as small as its room makes it.
+function headed(text, x, room, parent) {
+  const size = Math.min(12, 12 * room / (7.2 * text.length || 1));
+  make("text", { x, y: 15, "font-weight": 600, "font-size": size.toFixed(1), fill: colour("ink") }, parent, text);
 }
 
 const width_of = text => Math.max(...text.split("\n").map(line => 6.3 * line.length)) + 2;
@@ -216,7 +225,7 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   const up = scale(height[0], height[1], inner.y + inner.height, inner.y, panel.y);
   const bottom = inner.y + inner.height, right = inner.x + inner.width;
   const title = panel.y.names.length ? 0 : Math.max(0, Math.min(inner.x, box.width - 7.4 * panel.title.length));
-  make("text", { x: title, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
+  headed(panel.title, title, box.width - title, part);
   const widest = Math.max(74, widest_of(panel.x.names, 7, 14));
   for (const tick of ticks(panel.x, span[0], span[1], Math.max(2, Math.floor(inner.width / widest)))) {
     const at = across(tick.at).toFixed(1);
@@ -294,7 +303,7 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   for (const [mark, x, y] of marks) {
     if (!mark.text) continue;
     const wide = width_of(mark.text), places = [];
-    for (let k = -9; k <= 9; k++) for (const [from, far] of [[x + 7, 0], [x - 7 - wide, 2], [x - wide / 2, 4]])
+    for (let k = -9; k <= 9; k++) for (const [from, far] of [[x + 7, 0], [x - 7 - wide, 2], [x - wide / 2, 4], [x - 1.6 * wide, 40], [x + 0.6 * wide, 40]])
       places.push({ x: Math.min(Math.max(from, inner.x + 3), right - wide - 3), y: y - 6 + 13 * k, far: far + Math.abs(13 * k) });
     const place = label(mark.text, places, part);
     const to = [Math.min(Math.max(x, place.x), place.x + wide), place.y < y ? place.y + 3 : place.y - 10];
@@ -303,8 +312,11 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   for (const [level, at] of labelled) {
     const wide = width_of(level.text), places = [];
     if (level.upright) for (let y = inner.y + 12; y < bottom - 4; y += 13) places.push({ x: at + 4, y, far: y - inner.y }, { x: at - 4 - wide, y, far: y - inner.y + 3 });
-    else for (let x = right - 4 - wide; x > inner.x + 4; x -= 12) for (const k of [0, 1, 2])
-      places.push({ x, y: at - 4 - 12 * k, far: 0.2 * (right - x) + 12 * k }, { x, y: at + 12 + 12 * k, far: 0.2 * (right - x) + 12 * k + 3 });
+    else {
+      const ends = level.ends ? level.ends.map(across) : [inner.x, right], last = Math.max(Math.min(ends[1], right) - 4 - wide, inner.x + 4);
+      for (let x = last; x >= Math.min(ends[0] + 4, last); x -= 12) for (const k of [0, 1, 2])
+        places.push({ x, y: at - 4 - 12 * k, far: 0.2 * (last - x) + 12 * k }, { x, y: at + 12 + 12 * k, far: 0.2 * (last - x) + 12 * k + 3 });
+    }
     label(level.text, places, top, { fill: colour("muted") });
   }
   if (panel.note) {
@@ -378,7 +390,7 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
 
 function draw_grid(panel, box, parent, values) {
   const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent), cells = values(panel.values);
-  make("text", { x: 4, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
+  headed(panel.title, 4, box.width - 4, part);
   const left = grid_left(panel), top = grid_top(panel), columns = panel.columns.length;
   const slanted = 4.8 * panel.columns[columns - 1].length; // the last name leans over the edge
   const width = Math.min(64, (box.width - left - 8 - slanted) / (columns - 0.5)), height = 24, numbers = width >= 30;
@@ -393,7 +405,7 @@ function draw_grid(panel, box, parent, values) {
     const share = about_zero ? Math.abs(value) / Math.max(-low, high) : (value - low) / (high - low || 1);
     const cell = make("rect", { ...box, fill: colour(about_zero && value < 0 ? "vermillion" : "blue"), "fill-opacity": (0.75 * Math.min(1, Math.max(0, share))).toFixed(3) }, part);
     make("title", {}, cell, `${row}, ${column}: ${number(value)}`);
-    if (numbers) make("text", { x: box.x + width / 2, y: box.y + height / 2 + 4, "text-anchor": "middle", fill: colour("ink"), "font-size": 11, "font-weight": bold.has(i * columns + j) ? 700 : 400 }, part, panel.decimals === null ? number(value, 3) : fixed(value, panel.decimals));
+    if (numbers) make("text", { x: box.x + width / 2, y: box.y + height / 2 + 4, "text-anchor": "middle", fill: colour("ink"), "font-size": 11, "font-weight": bold.has(i * columns + j) ? 700 : 400 }, part, panel.decimals === null ? three(value) : fixed(value, panel.decimals));
   }));
   return { panel, part };
 }

@@ -13,7 +13,7 @@ import pytest
 
 from feedsim.analysis import evaluate
 from feedsim.report import run as report
-from feedsim.report.chart import Axis, Chart, Curve, Panel
+from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
 from feedsim.report.content import Report
 from feedsim.report.page import html
 from feedsim.report.picture import Picture
@@ -105,8 +105,9 @@ def told(page: Any, stem: str) -> list[str]:
 
 
 def value(text: str) -> float:
-    """ "axis Z: 12.5 mm" -> 12.5."""
-    return float(text.rpartition(": ")[2].split()[0])
+    """ "axis Z: 12.5 mm" -> 12.5; "1.2×10⁻⁵ mm" -> 1.2e-5."""
+    mantissa, _, power = text.rpartition(": ")[2].split()[0].partition("×10")
+    return float(mantissa) * 10.0 ** int(power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or "0")
 
 
 def test_pages_open_at_once_and_complain_of_nothing(
@@ -225,7 +226,7 @@ def test_what_is_saved_is_what_is_shown(
 def test_a_long_path_in_a_warning_does_not_widen_a_phone(browser: Any) -> None:
     long = "/home/" + 20 * "somebody_"
     page = browser.new_page(viewport={"width": 360, "height": 800})
-    page.set_content(html(Report("title", "subtitle", [], "", warnings=[long], notes=[long], answer=[long])))
+    page.set_content(html(Report(long, long, [], "", warnings=[long], notes=[long], answer=[long])))
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
     page.close()
 
@@ -241,6 +242,74 @@ def test_nothing_has_to_be_scrolled_sideways(pages: dict[str, Any], width: int) 
                 chart.evaluate("each => each.parentNode.clientWidth"), abs=1
             )
         page.set_viewport_size({"width": 1200, "height": 900})
+
+
+@pytest.mark.parametrize("width", [390, 820, 1400])
+def test_no_axis_has_a_single_tick(pages: dict[str, Any], width: int) -> None:
+    """One value makes no scale; ticks are told from other words by where they stand."""
+    for page in pages.values():
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(100)
+        counts = page.evaluate(
+            """() => {
+            const number = (each, name) => Number(each.getAttribute(name)), counts = [];
+            for (const panel of document.querySelectorAll("svg.chart > g")) {
+                const room = panel.querySelector("clipPath rect");
+                if (!room) continue;
+                const foot = number(room, "y") + number(room, "height") + 16;
+                const words = [...panel.querySelectorAll(":scope > text")];
+                const ticks = words.filter(each => /^[−0-9]/.test(each.textContent));
+                counts.push([ticks.filter(each => number(each, "y") === foot).length,
+                             ticks.filter(each => each.getAttribute("text-anchor") === "end").length]);
+            }
+            return counts;
+        }"""
+        )
+        assert len(counts) > 3
+        assert min(min(each) for each in counts) >= 2
+    for page in pages.values():
+        page.set_viewport_size({"width": 1200, "height": 900})
+
+
+def test_every_picture_has_its_heading_above_it(pages: dict[str, Any]) -> None:
+    for page in pages.values():
+        for figure in page.locator("figure").all():
+            order = figure.evaluate("each => [...each.children].map(child => child.tagName)")
+            assert order[0] in ("H2", "H3", "H4")
+            assert order[-1] == "FIGCAPTION"
+
+
+def test_words_cover_neither_curves_nor_each_other(browser: Any, tmp_path: Path) -> None:
+    x = np.linspace(0.0, 10.0, 800)
+    y = 1.0 / (1.0 + 40.0 * (x - 5.0) ** 2)  # a narrow peak: the right of its top is taken by nothing else
+    marks = [Mark(5.0, 1.0, "the top of it"), Mark(5.06, 0.87, "a little below"), Mark(10.0, float(y[-1]), "the end")]
+    levels = [Level(4.0, "5 %", upright=True), Level(4.2, "50 %", upright=True), Level(0.02, "median of the curve")]
+    note = "two lines\nof a note"
+    panel = Panel("", Axis("t", "s"), Axis("d", "µm"), [Curve("", x, y)], levels, marks=marks, note=note)
+    (tmp_path / "report.html").write_text(
+        html(Report("t", "", [Picture("one", "t", "", Chart([panel]))], "")), encoding="utf-8"
+    )
+    page = browser.new_page(viewport={"width": 390, "height": 900})
+    page.goto((tmp_path / "report.html").as_uri())
+    page.wait_for_selector(".still", state="detached")
+    boxes, points = page.evaluate(
+        """() => {
+        const svg = document.querySelector("#one svg.chart"), curve = svg.querySelector("g[clip-path] path");
+        const own = curve.getScreenCTM(), long = curve.getTotalLength();
+        const points = [...Array(2000).keys()].map(k => curve.getPointAtLength(k / 1999 * long).matrixTransform(own));
+        const boxes = [...svg.querySelectorAll("text[paint-order]")].map(each => each.getBoundingClientRect());
+        return [boxes.map(each => [each.left, each.top, each.right, each.bottom]),
+                points.map(each => [each.x, each.y])];
+    }"""
+    )
+    page.close()
+    assert len(boxes) == 8
+    a, b = np.array(points).T
+    for k, (left, top, right, bottom) in enumerate(boxes):
+        assert not np.any((a > left + 1) & (a < right - 1) & (b > top + 3) & (b < bottom - 3)), k
+        for other in boxes[:k]:
+            apart = left >= other[2] - 2 or right <= other[0] + 2 or top >= other[3] - 4 or bottom <= other[1] + 4
+            assert apart, (k, other)
 
 
 def test_palettes_of_dark_screens_and_of_paper(pages: dict[str, Any]) -> None:
@@ -272,6 +341,23 @@ def test_on_paper_panels_stand_side_by_side(pages: dict[str, Any]) -> None:
     assert max(across) > 720  # of the one with three columns
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     page.set_viewport_size(size)
+
+
+def test_on_grey_paper_lines_of_different_colours_are_told_apart(pages: dict[str, Any]) -> None:
+    page = pages["stop"]
+
+    def dashes() -> list[str]:
+        found: list[str] = page.locator("#overview svg.chart > g:nth-of-type(1) g[clip-path] path").evaluate_all(
+            "all => all.map(each => getComputedStyle(each).strokeDasharray)"
+        )
+        return found
+
+    assert dashes() == ["none", "none", "none"]
+    page.emulate_media(media="print")
+    assert len(set(dashes())) == 3
+    legend = page.locator("#overview .legend line")
+    assert legend.evaluate_all("all => all.map(each => getComputedStyle(each).strokeDasharray)") == dashes()
+    page.emulate_media(media="screen")
 
 
 def test_other_units_at_the_other_side_and_axes_that_are_logarithmic_both_ways(browser: Any, tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def test_whose_curve_it_is() -> None:
     assert "Identified set" in picture.caption
     assert "of stage 1 alone" in picture.caption
     assert "stage 1 alone, known to" in stribeck_title(apart, stage)
-    assert "error of the curve (95 %), stage 1 alone" in tiles(apart)
+    assert "error of the curve (95\u00a0%), stage 1 alone" in tiles(apart)
     drawn = delivered(picture)
     assert [each.name for each in drawn] == ["identified set, +", "identified set, −"]
     lean, viscous = TRUE["asymmetry"][0], TRUE["sigma_2"][0]

@@ -27,11 +27,12 @@ from feedsim.motions import Arc, Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.chart.embedded import embedded
-from feedsim.report.content import Tile
-from feedsim.report.formatting import duration
+from feedsim.report.content import Report, Tile
+from feedsim.report.formatting import display_unit, duration, minus, shown, typeset
 from feedsim.report.page import html, script
 from feedsim.report.provenance import archives, input_files
 from feedsim.report.run.report import HEADER, real_time_factor, report_of, summary, tile
+from feedsim.report.run.words import moved_words
 from feedsim.report.style import PALETTE
 from feedsim.scenario import load
 from feedsim.trace import Trace, read_csv
@@ -254,7 +255,7 @@ def test_coupling_is_one_table_with_the_share(tmp_path: Path) -> None:
     coupling = {"Z.residual": -2e-5, "Z.residual_peak": 3e-5, "Z.friction_work": 80.0, "X.residual": 0.0}
     report.write(replace(positioning_run(), coupling=coupling), {}, tmp_path)
     words = " ".join(Page((tmp_path / "report.html").read_text(encoding="utf-8")).words)
-    assert "Z 80 −2e−05 2.5e−07" in words
+    assert "Z 80 −2×10⁻⁵ 2.5×10⁻⁷" in words
     assert "X – 0 –" in words
 
 
@@ -427,3 +428,39 @@ def test_what_cannot_be_written_to_is_said(tmp_path: Path) -> None:
     if Path("/proc/self").is_dir():  # where even an administrator cannot write
         with pytest.raises(OutputError, match="/proc/self/out: cannot be written"):
             report.check_writable("/proc/self/out")
+
+
+@pytest.mark.parametrize(
+    ("said", "printed"),
+    [
+        ("3 um +-1 um at -3 dB, (-2 %)", "3 µm ±1 µm at −3 dB, (−2 %)"),
+        ("1.2 N.m, 0.8 N.m.s/rad, 45 deg, mass x lead^2", "1.2 N·m, 0.8 N·m·s/rad, 45°, mass x lead²"),
+        ("off by 4.5e-07 m", "off by 4.5×10⁻⁷ m"),
+        ("record 2026-11-24 of ISO 230-2, --tol 840d", "record 2026-11-24 of ISO 230-2, --tol 840d"),
+        ('set it with load="-0.002 N.m"', 'set it with load="-0.002 N.m"'),
+    ],
+)
+def test_words_are_printed_with_signs_of_their_own(said: str, printed: str) -> None:
+    assert typeset(said) == printed
+    text = html(Report("t", "s", [], "", answer=[said], warnings=[said], notes=[said]))
+    assert [word.strip() for word in Page(text).words].count(printed) == 3
+
+
+def test_a_zero_has_no_sign() -> None:
+    assert [minus(text) for text in ("-0.00", "-0", "-0.01", "-5")] == ["0.00", "0", "−0.01", "−5"]
+
+
+def test_units_to_a_power() -> None:
+    assert [display_unit(unit) for unit in ("m/s^3", "m/s2", "kg.m2", "deg")] == ["m/s³", "m/s²", "kg·m²", "°"]
+
+
+def test_a_delay_is_told_in_microseconds() -> None:
+    assert [shown(Figure(value, "ms", ""))[0] for value in (0.3519, -3.94217, 99.02)] == ["0.352", "−3.942", "99.0"]
+
+
+def test_a_run_without_figures_says_so_and_how_it_moved() -> None:
+    run = positioning_run()
+    *moved, last = moved_words(run.trace)
+    travel, lag = 1e3 * np.ptp(run.trace["Z.x_a"]), 1e6 * np.abs(run.trace["Z.x_e"]).max()
+    assert f"Z moves within {travel:.4g} mm, following error up to {lag:.3g} um." in moved
+    assert "nothing that is evaluated" in last

@@ -18,9 +18,10 @@ def test_a_stop_is_told_with_what_it_waits_for() -> None:
     told = stop_words(figures(overshoot=3.131, settling_time=99.02, ringing_frequency=20.75), 1e-6)
     assert told == (
         "3.13 um past its target, within +-1 um for good 99.0 ms after the end of the NC motion; "
-        "what it waits for rings at 20.8 Hz."
+        "until then it rings at 20.8 Hz, which less jerk would excite less."
     )
-    assert "rings" not in stop_words(figures(overshoot=0.2, settling_time=0.0, ringing_frequency=20.75), 1e-6)
+    at_once = stop_words(figures(overshoot=0.2, settling_time=0.0, ringing_frequency=20.75), 1e-6)
+    assert at_once == "0.20 um past its target, within +-1 um from the end of the NC motion on."
     assert "add a dwell" in stop_words(figures(overshoot=math.nan, settling_time=math.nan), 1e-6)
 
 

@@ -269,7 +269,7 @@ def test_the_laws_numbers_and_the_nominal_value_are_told(tmp_path: Path) -> None
         "lognormal, mean 15, deviation 1",
         "one of 2 values",
     ]
-    assert cells(text, "XZ.G")[2] == "9.6"
+    assert cells(text, "XZ.G")[2] == "9.60"
     assert ">Nominal<" in text
     assert summary(account, [])["figures"]["XZ.G"]["nominal"] == pytest.approx(9.6e-6)
 

@@ -30,6 +30,7 @@ class Source:
     Attributes:
         name: short, and of no other one. recording: its curves. time: (N,) [s], as recorded.
         figures: name -> value and unit. parameters: dotted name -> value as text. circles: prefix -> turns.
+        answer: what it says of itself. notes: what its numbers are worth.
         shift: of its first row on the first source's time [s], None where none fits. aligned: how that was found.
     """
 
@@ -41,6 +42,7 @@ class Source:
     parameters: Mapping[str, str] = field(default_factory=dict)
     circles: Mapping[str, tuple[Turn, ...]] = field(default_factory=dict)
     answer: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     shift: float | None = 0.0
     aligned: str = ""
 
@@ -122,6 +124,7 @@ def _read(path: Path, name: str) -> Source:
             parameters=_parameters(told),
             circles={prefix: tuple(map(_turn, turns)) for prefix, turns in told.get("circles", {}).items()},
             answer=tuple(map(str, told.get("answer", ()))),
+            notes=tuple(str(told.get(part, {}).get("note") or "") for part in ("machine", "scenario")),
         )  # fmt: skip
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{summary}: is no summary of `feedsim run`: {type(error).__name__}: {error}") from None

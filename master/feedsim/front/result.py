@@ -14,6 +14,7 @@ from feedsim.analysis import Figure
 from feedsim.cosim import Run
 from feedsim.findings import ranked, severity
 from feedsim.report import run as report
+from feedsim.report.formatting import shown, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.run.report import HEADER, draw, is_leading
 from feedsim.report.run.signals import signals_picture
@@ -45,6 +46,11 @@ class Result(Run):
         return analysis.evaluate(self)
 
     @cached_property
+    def causes(self) -> Mapping[str, analysis.Diagnosis]:
+        """Prefix of a circle's figures -> why it is not round."""
+        return analysis.diagnoses(self)
+
+    @cached_property
     def pictures(self) -> tuple[Picture, ...]:
         """All pictures of the report."""
         return tuple(draw(self, self.figures))
@@ -72,30 +78,33 @@ class Result(Run):
         return report.write(self, self.figures, directory)
 
     def __repr__(self) -> str:
-        shown = [f"{name} {figure}" for name, figure in self._leading().items()][:4]
+        figures = [f"{name} {figure}" for name, figure in self._leading().items()][:4]
         wrong = [each for each in self.warnings if severity(each) != "note"]
         told = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .warnings"] if wrong else []
         return "; ".join(
             [
                 f"Result of {self.scenario.name!r}: {self.program.duration:.4g} s, {len(self.trace)} rows, "
                 f"{len(self.trace.names)} columns",
-                *([", ".join(shown)] if shown else []),
+                *([", ".join(figures)] if figures else []),
                 *told,
             ]
         )
 
     def _repr_html_(self) -> str:
         rows = "".join(
-            f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(str(figure))}</td>"
-            f"<td style='text-align:left'>{escape(figure.meaning)}</td></tr>"
+            f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(' '.join(shown(figure)))}</td>"
+            f"<td style='text-align:left'>{escape(typeset(figure.meaning))}</td></tr>"
             for name, figure in self._leading().items()
         )
-        said = "".join(f"<li>{escape(each)}</li>" for each in ranked(self.warnings))
-        picture = f"<img alt='' style='max-width:100%' src='data:image/png;base64,{_text(self.plot().png)}'>"
+        said = "".join(f"<li>{escape(typeset(each))}</li>" for each in ranked(self.warnings))
+        answer = "".join(f"<p>{escape(typeset(each))}</p>" for each in report.answers(self, self.figures, self.causes))
+        plot = self.plot()
+        alt = escape(f"{plot.title}. {plot.caption}", quote=True)
+        picture = f"<img alt='{alt}' style='max-width:100%' src='data:image/png;base64,{_text(plot.png)}'>"
         machine = self.scenario.machine
         note = f"<p><small>{escape(machine.note)}</small></p>" if machine.note else ""
         return (
-            f"<b>{escape(self.scenario.name)}</b> · {escape(machine.name)}, {self.program.duration:.4g} s"
+            f"<b>{escape(self.scenario.name)}</b> · {escape(machine.name)}, {self.program.duration:.4g} s{answer}"
             f"<table>{rows}</table>{f'<ul>{said}</ul>' if said else ''}{picture}{note}"
         )
 

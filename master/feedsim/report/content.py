@@ -58,7 +58,7 @@ class Table:
     """A table, which scrolls where the screen is narrow.
 
     Attributes:
-        columns: a letter each: l text, r numbers, p text that needs room, h what a row is called.
+        columns: a letter each: l text, r numbers, t some words, p text that needs room, h what a row is called.
         heads: of the columns; none where the rows explain themselves.
         rows: cells; of a row with fewer than there are columns the last one takes the rest.
         note: below, in muted print.

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SMALL = Decimal("1e-4")  # below which a number is written with a power of ten
-DISPLAY_UNITS = {"um": "µm", "1": ""}
+DISPLAY_UNITS = {"um": "µm", "1": "", "deg": "°"}
 NOT_DETERMINED = "not determined"
+SHORT = 10.0  # [ms] a delay, of which microseconds are told
 # SI unit -> (largest magnitude up to which the unit is taken, factor, unit), from small to large.
 _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "m": ((0.999e-3, 1e6, "um"), (10.0, 1e3, "mm")),
@@ -34,19 +35,24 @@ def shown(figure: Figure) -> tuple[str, str]:
     """Value and unit for display; "not determined" and no unit where there is no value."""
     if not math.isfinite(figure.value):
         return NOT_DETERMINED, ""
-    digits = {"um": 2, "ms": 1, "Hz": 2, "N.m": 3, "s": 4}.get(figure.unit)
+    digits = {"um": 2, "um/m": 2, "ms": 1, "Hz": 2, "N.m": 3, "s": 4}.get(figure.unit)
+    if figure.unit == "ms" and abs(figure.value) < SHORT:
+        digits = 3
     text = f"{figure.value:.{digits}f}" if digits is not None else f"{figure.value:.5g}"
     return minus(text), display_unit(figure.unit)
 
 
 def display_unit(unit: str) -> str:
     """A unit as it is printed: µm, N·m, kg·m²; nothing for a plain number."""
-    return DISPLAY_UNITS.get(unit, typeset(re.sub(r"(?<=[a-z])\^?2\b", "²", unit.replace(".", "·"))))
+    if unit in DISPLAY_UNITS:
+        return DISPLAY_UNITS[unit]
+    raised = re.sub(r"(?<=[a-z])\^?([23])\b", lambda found: found[1].translate(SUPERSCRIPTS), unit.replace(".", "·"))
+    return typeset(raised)
 
 
 def minus(text: str) -> str:
-    """A number with a minus sign in place of the hyphen."""
-    return text.replace("-", "−")
+    """A number with a minus sign in place of the hyphen; a zero has none."""
+    return re.sub(r"^-(?=0(\.0*)?$)", "", text).replace("-", "−")
 
 
 def powers(text: str) -> str:
@@ -68,8 +74,26 @@ def counted(number: int, one: str, many: str = "") -> str:
 
 
 def typeset(text: str) -> str:
-    """A meaning as the analyses word it (ASCII), with µ and ±."""
-    return re.sub(r"\bum\b", "µm", text.replace("+-", "±"))
+    """Words as the analyses write them (ASCII) with the signs of print: 3 µm, ±, −3 dB, N·m, 45°, n², 4.5×10⁻⁷.
+
+    What stands in quotation marks is to be typed, and stays as it is.
+    """
+    said = text.split('"')
+    return '"'.join(part if k % 2 else _signs(part) for k, part in enumerate(said))
+
+
+def _signs(text: str) -> str:
+    text = re.sub(r"\bum\b", "µm", text.replace("+-", "±"))
+    text = re.sub(r"\bN\.m\b(\.s\b)?", lambda found: found[0].replace(".", "·"), text)
+    text = re.sub(r"(?<=\d) deg\b", "°", text)
+    text = re.sub(r"(?<=[a-z])\^([23])\b", lambda found: found[1].translate(SUPERSCRIPTS), text)
+    text = re.sub(r"(?<![\w.])\d+(\.\d+)?e[-+]\d+\b", _with_power, text)
+    return re.sub(r"(?:(?<=[\s(])|^)-(?=\d)", "−", text)
+
+
+def _with_power(found: re.Match[str]) -> str:
+    mantissa, _, exponent = found[0].partition("e")
+    return f"{mantissa}×10{str(int(exponent)).translate(SUPERSCRIPTS)}"
 
 
 def duration(seconds: float) -> str:
@@ -103,7 +127,15 @@ def scale(unit: str, values: Array) -> Scale:
 
 def number(value: float, digits: int = 4) -> str:
     """A number of a table; a dash where there is none."""
-    return minus(f"{value:.{digits}g}") if np.isfinite(value) else "–"
+    return minus(powers(f"{value:.{digits}g}")) if np.isfinite(value) else "–"
+
+
+def three(value: float) -> str:
+    """Three digits that count, zeros at the end among them; a dash where there is no number."""
+    if not np.isfinite(value):
+        return "–"
+    whole = abs(value) >= 100 or 0 < abs(value) < SMALL
+    return minus(powers(f"{value:.3g}" if whole else f"{value:#.3g}".rstrip(".")))
 
 
 def plain(text: str) -> str:

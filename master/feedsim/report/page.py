@@ -10,6 +10,7 @@ from importlib import resources
 from feedsim.report.chart.embedded import embedded
 from feedsim.report.chart.still import still
 from feedsim.report.content import Report
+from feedsim.report.formatting import typeset
 from feedsim.report.style import PALETTE
 
 # What draws the charts and what a reader does with them, in their order.
@@ -29,6 +30,7 @@ def html(report: Report) -> str:
         keep_trailing_newline=True,
     )
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
+    environment.filters["typeset"] = typeset
     environment.filters["kind"] = lambda part: type(part).__name__
     environment.filters["still"] = lambda picture: still(picture.chart, picture.stem, picture.title)
     charts = {picture.stem: picture.chart for picture in report.pictures if picture.chart is not None}

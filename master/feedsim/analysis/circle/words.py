@@ -19,7 +19,7 @@ CONTRADICT = 0.5
 def answer(diagnosis: Diagnosis) -> str:
     """Why the circle is not round, in a sentence or two: what it means, whether it can be trusted, what to do next."""
     told = worth_telling(diagnosis)
-    G = f"G {_um(diagnosis.G)}"
+    G = f"circular deviation G {_um(diagnosis.G)}"
     if diagnosis.apart > CONTRADICT * diagnosis.G:
         return (
             f"{G}: turns that were read as one direction contradict each other by {_um(diagnosis.apart)}, so no cause "
@@ -29,8 +29,8 @@ def answer(diagnosis: Diagnosis) -> str:
     if not told:
         return f"{G}: no single cause stands out; what remains is {_um(_rest(diagnosis).size)}."
     first = f"{G}, {'mostly: ' if told[0].share > 0.5 else 'first: '}{sentence(diagnosis, told[0])}"
-    more = [f"then {sentence(diagnosis, term)}" for term in told[1:3]]
-    return "; ".join([first, *more]) + "." + _trust(diagnosis)
+    more = [f"Then {sentence(diagnosis, term)}" for term in told[1:3]]
+    return ". ".join([first, *more]) + "." + _trust(diagnosis)
 
 
 def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
@@ -54,7 +54,7 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
     value, axis = term.value, term.axis
     amount = abs(value)
     if not term.told and term.key not in ("rest", "peaks"):
-        return f"{name(term)}: not told from zero"
+        return f"{name(term)}: cannot be told from zero"
     match term.key:
         case "offset":
             return f"the centre lies {_um(amount)} off: set-up of the measurement, or drift since the centre was set"
@@ -86,7 +86,7 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
             )
         case "lost_motion":
             what = (
-                "backlash or wind-up; backlash compensation"
+                "backlash or wind-up, which backlash compensation takes away"
                 if value > 0
                 else "too much backlash compensation, or friction at rest"
             )
@@ -95,7 +95,7 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
             return _peaks(diagnosis, term)
         case "pitch":
             return f"{axis} errs by {_um(amount)} (amplitude) with every pitch of its drive: screw, or motor encoder"
-    form = ", ".join(f"{n}. order {_um(a)}" for n, a in diagnosis.form.items())
+    form = ", ".join(f"order {n}: {_um(a)}" for n, a in diagnosis.form.items())
     return f"what no cause explains: {_um(term.size)} from peak to valley ({form})"
 
 
@@ -121,7 +121,8 @@ def _peaks(diagnosis: Diagnosis, term: Term) -> str:
         return f"where {term.axis} reverses nothing stands out" + (f" (above {_um(limit)})" if limit > 1e-8 else "")
     where = "stays behind for a moment" if largest.height > 0 else "jumps ahead for a moment"
     wide = f", {largest.width * 1e3:.3g} ms wide" if math.isfinite(largest.width) else ""
-    remedy = "friction; friction compensation" if largest.height > 0 else "too much friction compensation"
+    behind, ahead = "friction, which friction compensation takes away", "too much friction compensation"
+    remedy = behind if largest.height > 0 else ahead
     return f"{term.axis} {where} where it reverses, {_um(abs(largest.height))}{wide}: {remedy}"
 
 

@@ -49,8 +49,8 @@ class Ground:
             for each in getattr(segments, "get_segments", list)():
                 self.take(np.asarray(each, dtype=float))
 
-    def take(self, points: Array, *, lines: bool = True) -> None:
-        """Squares of points (N, 2) in the panel's coordinates, and of the lines between them."""
+    def take(self, points: Array, *, lines: bool = True, about: int = 0) -> None:
+        """Squares of points (N, 2) in the panel's coordinates, of the lines between them, and so many about them."""
         if not len(points):
             return
         with np.errstate(all="ignore"):
@@ -64,7 +64,9 @@ class Ground:
             share = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)) / np.repeat(count, count)
             at = at[first] + share[:, None] * (at[first + 1] - at[first])
             at = at[np.isfinite(at).all(axis=1)]
-        cells = np.floor(at).astype(int)
+        beside = np.arange(-about, about + 1)
+        offsets = np.stack(np.meshgrid(beside, beside), axis=-1).reshape(-1, 2)
+        cells = (np.floor(at).astype(int)[:, None] + offsets).reshape(-1, 2)
         inside = ((cells >= 0) & (cells < self.taken.shape)).all(axis=1)
         self.taken[tuple(cells[inside].T)] = True
 

@@ -253,7 +253,7 @@ def _words(axes: Axes, panel: Panel, across: Range, up: Range) -> None:
     """What is said of marks and levels, and the note, each where no curve is."""
     ground = Ground(axes)
     dots = [(mark.x, mark.y) for mark in panel.marks]
-    ground.take(np.array(dots).reshape(-1, 2), lines=False)
+    ground.take(np.array(dots).reshape(-1, 2), lines=False, about=1)
     for mark in panel.marks:
         if mark.text and across[0] <= mark.x <= across[1]:
             ground.beside(mark.x, mark.y, _text(mark.text), INK)

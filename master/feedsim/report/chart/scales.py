@@ -13,6 +13,7 @@ from feedsim.report.style import Array
 
 Range = tuple[float, float]
 ROOM = 0.07  # of their range, above and below the curves
+FEW = 3  # ticks
 PHASES = (15, 30, 45, 90, 180, 360, 720, 1440)
 
 
@@ -73,7 +74,7 @@ def ticks(axis: Axis, span: Range, most: float) -> Iterator[tuple[float, str]]:
         return
     if axis.log and high / low > 8:
         decades = math.log10(high / low)
-        every = math.ceil(decades / most)
+        every = max(1, round(decades / most))
         for k in range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1):
             for part in (1, 2, 5) if decades < 2.2 else (1,) if k % every == 0 else ():
                 if low * 0.9999 <= part * 10.0**k <= high * 1.0001:
@@ -85,5 +86,22 @@ def ticks(axis: Axis, span: Range, most: float) -> Iterator[tuple[float, str]]:
     else:
         decade = 10.0 ** math.floor(math.log10(rough)) if rough > 0 else 1.0
         step = decade * next((each for each in (1, 2, 5, 10) if each * decade >= 0.999 * rough), 10)
+    while (fewer := _marked(span, step)) < FEW:  # one or two ticks are no scale
+        finer = _finer(axis, step)
+        if not finer or (fewer > 1 and _marked(span, finer) > most + 2):
+            break
+        step = finer
     for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1):
         yield k * step, minus(powers(f"{k * step:.6g}"))
+
+
+def _marked(span: Range, step: float) -> int:
+    return math.floor(span[1] / step + 1e-9) - math.ceil(span[0] / step - 1e-9) + 1
+
+
+def _finer(axis: Axis, step: float) -> float:
+    """The next smaller round step; 0 without one."""
+    if axis.unit == "°" and step in PHASES:
+        return float(max((each for each in PHASES if each < step), default=0))
+    decade = 10.0 ** math.floor(math.log10(step) + 1e-9)
+    return decade * {1: 0.5, 2: 1, 5: 2}[round(step / decade)]

@@ -10,12 +10,13 @@ import numpy as np
 
 from feedsim.report.chart.model import Axis, Chart, Curve, Grid, Panel, Polar, extremes
 from feedsim.report.chart.scales import bent, ranges, ticks
-from feedsim.report.formatting import minus, powers
+from feedsim.report.formatting import minus, three
 from feedsim.report.style import INK, MUTED, Array, named
 
 WIDTH, HEIGHT, ROUND = 960.0, 250.0, 430.0
 LEFT, RIGHT, TOP, BOTTOM = 62.0, 12.0, 26.0, 42.0
 MOST_ROWS = 400  # of a curve: two for a pixel or so
+SLANTED = 4.8  # that a letter of a slanted name takes across
 DASHES = {"": "", "dashed": ' stroke-dasharray="6 3"', "dotted": ' stroke-dasharray="2 3"'}
 Scaled = Callable[[Array | float], Array]  # values to pixels
 
@@ -109,7 +110,7 @@ def _panel(panel: Panel, width: float, height: float, name: str) -> str:
         way = (f"M{float(across(level.at)):.1f} {float(up(first)):.1f}V{float(up(last)):.1f}" if level.upright
                else f"M{float(across(first)):.1f} {float(up(level.at)):.1f}H{float(across(last)):.1f}")  # fmt: skip
         inside.append(f'<path d="{way}" stroke="var(--{named(level.colour)})"{DASHES[level.dash]}/>')
-    for curve in curves:
+    for curve in sorted(curves, key=lambda each: not each.dots):  # a line through its points, not below them
         inside.append(
             _curve(curve, across_span, across, up, float(up(max(0.0, up_span[0]) if not panel.y.log else up_span[0])))
         )
@@ -204,7 +205,7 @@ def _polar(panel: Polar, width: float, height: float) -> str:
 
 def _grid(grid: Grid, width: float) -> str:
     left, top = min(260.0, 16 + 6.4 * max(map(len, grid.rows))), _over(grid)
-    cell = min(64.0, (width - left - 8) / len(grid.columns))
+    cell = min(64.0, (width - left - 8 - SLANTED * len(grid.columns[-1])) / (len(grid.columns) - 0.5))
     parts = [_text(4, 15, grid.title, "font-weight='600'")]
     for j, name in enumerate(grid.columns):
         parts.append(
@@ -242,7 +243,7 @@ def share_of(value: float, grid: Grid) -> tuple[float, bool]:
 
 def cell_text(value: float, grid: Grid) -> str:
     """The number of a cell."""
-    return minus(powers(f"{value:.3g}") if grid.decimals is None else f"{value:.{grid.decimals}f}")
+    return three(value) if grid.decimals is None else minus(f"{value:.{grid.decimals}f}")
 
 
 def _over(grid: Grid) -> float:

@@ -17,7 +17,7 @@ from feedsim.analysis.circle_figures import about, both_directions, cause_figure
 from feedsim.analysis.circularity import axis_letters
 from feedsim.report import sections
 from feedsim.report.content import Bullets, Report, Section, Tile, tile_value
-from feedsim.report.formatting import typeset
+from feedsim.report.formatting import counted, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
@@ -104,8 +104,8 @@ def report_of(
     ]
     return Report(
         f"Recorded circle {prefix}",
-        f"{', '.join(file.name for file in files)} · {len(recorded.turns)} turn(s)",
-        answer=[typeset(f"{prefix}: {answer(diagnosis)}")],
+        f"{', '.join(file.name for file in files)} · {counted(len(recorded.turns), 'turn')}",
+        answer=[f"{prefix}: {answer(diagnosis)}"],
         tiles=tiles,
         main=[
             picture(circle, recorded, diagnosis),

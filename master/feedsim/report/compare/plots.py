@@ -32,9 +32,9 @@ def picture_of(comparison: Comparison, number: int) -> Picture | None:
     shown = f"the {len(variables)} worst of {outside} variables outside" if outside > len(variables) else ""
     title = f"{comparison.result} against {comparison.reference}"
     caption = (
-        "Left the compared time; right, around the worst instant, what is left of result and band when the "
-        "reference is taken off. The band is the tolerance around the reference; where the result leaves it, the "
-        "ground is shaded." + (f" Drawn are {shown}." if shown else "")
+        "A pair of panels per variable: the compared time; around the worst instant, what is left of result and band "
+        "when the reference is taken off. The band is the tolerance around the reference; where the result leaves it, "
+        "the ground is shaded." + (f" Drawn are {shown}." if shown else "")
     )
     panels = [panel for variable in variables for panel in _panels(variable)]
     return Picture(f"comparison-{number}", title, caption, Chart(panels, (1.5, 1.0)))
@@ -88,8 +88,8 @@ def _around(variable: Variable, curves: Curves) -> slice:
 
 
 def _worst(variable: Variable) -> str:
-    off = f"{variable.deviation:.3g} of {variable.allowed:.3g} {display_unit(variable.unit)}".strip()
-    return (minus(powers(off)) if np.isfinite(variable.deviation) else "no number") + f" at {variable.time:.6g} s"
+    off = f"off by {variable.deviation:.3g}, allowed {variable.allowed:.3g} {display_unit(variable.unit)}".strip()
+    return minus(powers(off)) if np.isfinite(variable.deviation) else "no number"
 
 
 def _spans(curves: Curves, part: slice) -> list[tuple[float, float]]:

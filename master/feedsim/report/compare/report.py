@@ -92,12 +92,31 @@ def report_of(comparisons: Sequence[Comparison]) -> Report:
         f"{one.result} against {one.reference}"
         if one
         else ", ".join(f"{number} {kind}" for kind, number in counts.items() if number),
+        answer=_answer(comparisons),
         warnings=[*([one.problem] if one and one.problem else []), *_not_seen(comparisons)],
         tiles=_tiles(comparisons, counts),
         main=list(_single(one, 1, draw=True, alone=True)) if one else [_pairs(comparisons), *_sections(comparisons)],
         footer="Deviation: distance of the result from the reference, less what the tolerance in time forgives. "
         "How results are compared: docs/comparing.md.",
     )
+
+
+def _answer(comparisons: Sequence[Comparison]) -> list[str]:
+    """What came out, where it is worst, and what to do next."""
+    if len(comparisons) > 1:
+        return []  # the head says how many differ, the table of all pairs which
+    one = comparisons[0]
+    outside, compared = one.those("different"), one.those("same", "different")
+    if not compared or one.worst is None:
+        return []
+    if not outside:
+        return [f"All {counted(len(compared), 'variable')} that were compared stay within their tolerance."]
+    return [
+        f"{len(outside)} of {counted(len(compared), 'variable')} leave their tolerance, {one.worst.name} the furthest: "
+        f"{one.worst.line}.",
+        "The picture shows whether it is a matter of value or of time; which differences are allowed is yours to say "
+        "(--tol).",
+    ]
 
 
 def _not_seen(comparisons: Sequence[Comparison]) -> list[str]:
@@ -149,7 +168,7 @@ def _tiles(comparisons: Sequence[Comparison], counts: dict[str, int]) -> list[Ti
         tiles.append(Tile(worst.name, "worst variable", worst.line))
         tiles.append(Tile(_number(worst.deviation, worst.unit), "off by", worst.line))
         tiles.append(Tile(_number(worst.allowed, worst.unit), "allowed", worst.line))
-        tiles.append(Tile(f"{worst.time:.6g} s", "at", worst.line))
+        tiles.append(Tile(f"{worst.time:.6g} s", "worst instant", worst.line))
     if len(comparisons) > 1:
         tiles += [Tile(str(number), kind, f"pairs that are {kind}") for kind, number in counts.items() if number]
     return tiles
@@ -176,7 +195,7 @@ def _anchor(number: int) -> str:
 def _variables(comparison: Comparison) -> Table:
     ranked = sorted(comparison.variables, key=lambda each: -each.ratio if each.verdict != "same" else 1.0)
     heads = (
-        "Variable", "Verdict", "Off by", "Allowed", "Unit", "In time", "Worst at [s]", "Result", "Reference",
+        "Variable", "Verdict", "Off by", "Allowed", "Unit", "Allowed in time", "Worst at [s]", "Result", "Reference",
         "Rows outside",
     )  # fmt: skip
     return Table("llrrlrrrrr", heads, [_row(each) for each in ranked])
@@ -192,7 +211,8 @@ def _row(each: Variable) -> tuple[Text, ...]:
         name += (f"\n{each.reason}",)
     return (
         name, _verdict(each.verdict), _number(each.deviation, ""), _number(each.allowed, ""), display_unit(each.unit),
-        reach_text(each), f"{each.time:.9g}", minus(f"{each.value:.9g}"), minus(f"{each.expected:.9g}"),
+        reach_text(each), f"{each.time:.9g}", minus(powers(f"{each.value:.9g}")),
+        minus(powers(f"{each.expected:.9g}")),
         f"{each.outside} of {each.rows}",
     )  # fmt: skip
 

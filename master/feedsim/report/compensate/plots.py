@@ -67,7 +67,7 @@ def _reversals_picture(turn: Turn, before: Contour, after: Contour, plane: str) 
         more = 0.07 * (high - low) or 1.0
         up = Axis("radius deviation", "µm", span=(low - more, high + more))
         for glitch, curves in zip(before.glitches, row, strict=True):
-            heads = f"{minus(glitch.name)}: {glitch.axis} reverses" if len(both) > 1 else "compensated alone"
+            heads = f"{minus(glitch.name)}: {f'{glitch.axis} reverses' if len(both) > 1 else 'compensated alone'}"
             panels.append(Panel(heads, across, up, curves, [Level(0.0, dash="")]))
     return Picture("compensation-reversals", title, caption, Chart(panels, (1.0,) * 4))
 

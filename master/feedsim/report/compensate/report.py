@@ -65,6 +65,7 @@ def report_of(compensation: Compensation, files: Mapping[str, Path], pictures: S
     return Report(
         f"Friction compensation: {scenario.name}",
         f"{scenario.machine.name} · torque feedforward on {', '.join(compensation.frictions)}",
+        answer=answers(compensation),
         warnings=compensation.warnings,
         notes=(scenario.machine.note, scenario.note),
         tiles=list(_tiles(compensation)),
@@ -81,6 +82,22 @@ def report_of(compensation: Compensation, files: Mapping[str, Path], pictures: S
             "docs/figures.md, docs/compensation.md",
         ),
     )
+
+
+def answers(compensation: Compensation) -> list[str]:
+    """What the compensation takes away, and what its errors would leave of that."""
+    figures = compensation.figures
+    named = [("G", "the circular deviation G")]
+    named += [(f"glitch_{axis}", f"the quadrant glitch of {axis}") for axis in compensation.turn.axes]
+    told = [f"{what} from {_um(figures[f'before.{key}'])} to {_um(figures[f'after.{key}'])} um" for key, what in named]
+    lines = [f"Friction compensation takes {', '.join(told[:-1])} and {told[-1]}."]
+    if compensation.table:
+        worst = max(compensation.table, key=lambda each: each.quality.G)
+        lines.append(
+            f"It is as good as its model: {worst.what} wrong by {worst.change:+.3g} {worst.unit} leaves G at "
+            f"{1e6 * worst.quality.G:.2f} um."
+        )
+    return lines
 
 
 def _tiles(compensation: Compensation) -> Iterable[Tile]:

@@ -268,7 +268,7 @@ def _styled(curve: Curve, column: Column, x: Array, y: Array, faint: bool = Fals
     overlaid = [each for each in column.curves if each.kind == "overlaid"]
     if curve.kind == "measured":
         name = f"{curve.label}, low coherence" if faint else curve.label
-        return chart.Curve(name, x, y, COLOURS["measured"], width=1.6, dots=True, faint=faint)
+        return chart.Curve(name, x, y, COLOURS["measured"], width=2.2, dots=True, faint=faint)
     colour = OTHERS[overlaid.index(curve) % len(OTHERS)] if curve in overlaid else COLOURS["closed form"]
     return chart.Curve(curve.label, x, y, colour, "dashed" if curve in overlaid else "", 1.4, faint=faint)
 

@@ -37,9 +37,11 @@ MOST_COLUMNS = 3
 LOWEST_GAIN_DB = -40.0  # of a loop: what is below says nothing about it
 LOWEST_CLOSED_DB = -45.0  # of a closed loop
 
-KINDS = (
-    "Lines: closed form. Points: measured on the units, faded where the coherence is below 0.99. Dashed: laid over. "
-)
+KINDS = {
+    "closed form": "Lines: closed form. ",
+    "measured": "Points: measured on the units, faded where the coherence is below 0.99. ",
+    "overlaid": "Dashed curves: laid over. ",
+}
 
 MOST_PAIRS = 3  # annotated per axis, besides the first one
 APART = 0.24  # of the logarithm of their frequencies: labels of two resonances do not touch
@@ -187,7 +189,7 @@ def _axes(part: Mapping[str, object]) -> str:
 def _kinds(part: Columns) -> str:
     """What the styles mean, where there is more than one."""
     there = {curve.kind for curves in part.values() for curve in curves}
-    return KINDS if len(there) > 1 else ""
+    return "".join(KINDS[kind] for kind in KINDS if kind in there) if len(there) > 1 else ""
 
 
 def pictures_of(responses: Responses) -> list[Picture]:

@@ -82,7 +82,7 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
         f"{responses.machine.name} · axes {', '.join(responses.axes)} · {low:g} to {high:g} Hz · {measured}",
         warnings=responses.warnings,
         notes=subject.notes,
-        answer=[typeset(line) for line in answers(responses)],
+        answer=answers(responses),
         tiles=list(_tiles(responses)),
         main=[*pictures, _resonances(responses), _agreement(responses), sections.figures_section(responses.figures)],
         provenance=_provenance(subject, responses),

@@ -10,6 +10,8 @@ from feedsim.analysis.linear import Margins
 from feedsim.analysis.responses import Responses
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN
 
+# Below these a difference of two responses means nothing to anybody.
+LEAST_DB, LEAST_DEG = 0.001, 0.01
 USUAL = f"the usual {20 * math.log10(GAIN_MARGIN):.0f} dB and {PHASE_MARGIN:g} deg"
 
 
@@ -80,6 +82,11 @@ def _of_axis(figures: Mapping[str, Figure], axis: str) -> str:
         figure = figures.get(f"{axis}.{name}")
         return f"{figure.value:.{digits}g}" if figure is not None and math.isfinite(figure.value) else "-"
 
+    def within(name: str, least: float) -> str:
+        figure = figures.get(f"{axis}.{name}")
+        known = figure is not None and math.isfinite(figure.value)
+        return f"{max(figure.value, least):.2g}" if known and figure is not None else "-"
+
     def gain(loop: str) -> str:
         figure = figures.get(f"{axis}.{loop}.gain_margin")
         known = figure is not None and math.isfinite(figure.value)
@@ -98,6 +105,7 @@ def _of_axis(figures: Mapping[str, Figure], axis: str) -> str:
         )
     if f"{axis}.n_M.measured_magnitude" in figures:
         parts.append(
-            f"measured n/M within {number('n_M.measured_magnitude', 2)} dB, {number('n_M.measured_phase', 2)} deg"
+            f"measured n/M within {within('n_M.measured_magnitude', LEAST_DB)} dB, "
+            f"{within('n_M.measured_phase', LEAST_DEG)} deg"
         )
     return "; ".join(parts) or "no loop closed"

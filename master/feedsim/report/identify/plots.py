@@ -58,7 +58,7 @@ def loops_picture(found: Identification, stage: Dynamic, over: Over) -> Picture 
     for stretch in shown:
         x, axis = _abscissa(stretch, found.I_P, over)
         curves = [
-            Curve("measured", x, stretch.measured, BLUE, width=1.0, dots=True, most=2000),
+            Curve("measured", x, stretch.measured, BLUE, width=1.9, dots=True, most=2000),
             Curve("model", x, stretch.model, VERMILLION, width=1.2, most=2000),
         ]
         panels.append(Panel(describe(stretch, found.I_P), axis, FRICTION, curves, ZEROS))

@@ -72,6 +72,7 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
     return Report(
         f"Friction of axis {found.axis}",
         f"{machine}identified from {', '.join(identified.traces)} · {identified.date}",
+        answer=answers(found),
         warnings=identified.warnings,
         notes=identified.notes,
         tiles=list(_tiles(identified)),
@@ -91,6 +92,28 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
     )
 
 
+def answers(found: Identification) -> list[str]:
+    """How well friction is known, what the records leave open, and what to do next."""
+    lines = []
+    if (stage := found.stationary) is not None and quantities.is_curve(stage):
+        alone = "" if found.prior else " by stage 1 alone"
+        lines.append(
+            f"Friction over speed is known to +-{100 * quantities.curve_error(stage):.2g} % (95 %){alone}; "
+            f"no plateau is further from the curve than {100 * stage.worst_curve:.2g} %."
+        )
+    if found.dynamic is not None:
+        lines.append(f"The model leaves {found.dynamic.rms:.3g} N.m rms of the recorded friction torque.")
+    open_ones = [name for name, each in found.estimates.items() if each.status == "undetermined"]
+    if open_ones:
+        lines.append(
+            f"The records do not tell {', '.join(open_ones)}"
+            + ("; which moves would is said below." if found.advice else ".")
+        )
+    elif found.dynamic is None:
+        lines.append("Plateaus tell the curve alone: stiffness and damping of the bristles need sines.")
+    return lines
+
+
 def _tiles(identified: Identified) -> Iterator[Tile]:
     found = identified.found
     if (stage := found.stationary) is not None:
@@ -103,7 +126,7 @@ def _tiles(identified: Identified) -> Iterator[Tile]:
             count = counted(quantities.speeds_of(stage), "speed")
             yield Tile("no curve", f"{count}, three make a curve", "distinct speeds of the plateaus")
         meaning = "largest relative deviation of a plateau's friction from the curve"
-        yield Tile(f"{100 * stage.worst_curve:.2g} %", f"worst plateau{alone}", meaning)
+        yield Tile(f"{powers(f'{100 * stage.worst_curve:.2g}')} %", f"largest deviation of a plateau{alone}", meaning)
     for name in LEADING:
         estimate = found.estimates.get(name)
         if estimate is None or estimate.status not in ("estimated", "given"):
@@ -136,7 +159,7 @@ def _parameters(found: Identification) -> Section:
         "the model linearised at the optimum; they know scatter, not a wrong model."
     )
     rows = [_row(estimate, found.I_P) for estimate in found.estimates.values()]
-    return Section("Parameters", [Table("llrlrrrll", HEADS, rows, note)], "parameters")
+    return Section("Parameters", [Table("ltrlrrrlt", HEADS, rows, note)], "parameters")
 
 
 def _stage_1(found: Identification) -> Section | None:
@@ -192,7 +215,7 @@ def _rigid(found: Identification) -> Section | None:
         "moves: a check of inertia, torque constant and signs. No friction model but the sign of the speed: its F_C "
         "and σ₂ are other quantities than those above."
     )
-    return Section("Rigid axis with simple friction", [Table("llrlrrrll", HEADS, rows, note)]) if rows else None
+    return Section("Rigid axis with simple friction", [Table("ltrlrrrlt", HEADS, rows, note)]) if rows else None
 
 
 def _row(estimate: Estimate, I_P: float) -> tuple[Text, ...]:

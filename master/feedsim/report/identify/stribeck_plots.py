@@ -11,7 +11,7 @@ from feedsim.identify.parameters import torque as motor_torque
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Identification, Plateau, Stationary
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
-from feedsim.report.formatting import counted
+from feedsim.report.formatting import counted, powers
 from feedsim.report.identify.quantities import MM_PER_MIN, curve_error, is_curve, speeds_of
 from feedsim.report.picture import Picture
 from feedsim.report.style import BLUE, GREEN, ORANGE, PURPLE, VERMILLION, Array
@@ -41,7 +41,7 @@ def stribeck_picture(found: Identification, stage: Stationary) -> Picture:
         "mean's scatter. Below: deviation from the curve"
         + (" of its direction (dashed), which the direction dependence shifts" if asymmetry else "")
         + (f"; shaded: 95 % band of the curve{alone}" if curve else "")
-        + f". Largest deviation of a plateau {100 * stage.worst_curve:.2g} %."
+        + f". Largest deviation of a plateau {powers(f'{100 * stage.worst_curve:.2g}')} %."
         + ("" if found.prior else delivered)
     )
     return Picture("stribeck", "Stribeck curve", caption, _curves(found, stage))

@@ -20,6 +20,8 @@ from feedsim.report.sections import provenance_section
 from feedsim.scenario.structure import Structure
 from feedsim.structure.info import MachineInfo
 
+FAR_BELOW = 0.1  # share of the limit of the exchange, up to which it is stable by far
+
 
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless the pictures can be written to ``directory`` without one of ``inputs`` being lost.
@@ -79,6 +81,7 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
     return Report(
         f"Structure: {info.name}",
         f"{info.title} · {solution.shapes.shape[0]} degrees of freedom · modes up to {cutoff}",
+        answer=answers(info),
         warnings=info.warnings,
         notes=[info.note],
         tiles=list(_tiles(info)),
@@ -86,6 +89,19 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
         provenance=provenance_section(rows, hashed(list(files))),
         footer="Values in full precision: summary.json. Pictures: figures/.",
     )
+
+
+def answers(info: MachineInfo) -> list[str]:
+    """The lowest mode and what moves in it, and whether the exchange with friction is stable."""
+    lines = []
+    if elastic := [k for k, f in enumerate(info.modes.frequency.tolist()) if f > 0]:
+        k = elastic[0]
+        lines.append(f"The lowest elastic mode is at {info.modes.frequency[k]:.2f} Hz: {moves(info, k)}.")
+    shares = [each.friction_slope / each.coupling_limit for each in info.axes if math.isfinite(each.friction_slope)]
+    if shares and max(shares) <= USUAL_EXCHANGE.stable_share:
+        lines.append("The exchange of plant and friction is stable by far (table Axes)." if max(shares) < FAR_BELOW
+                     else "The exchange of plant and friction is stable (table Axes).")  # fmt: skip
+    return lines
 
 
 def _tiles(info: MachineInfo) -> Iterator[Tile]:
@@ -111,11 +127,11 @@ def _axes(info: MachineInfo) -> Section | None:
     )
     heads = ("Figure", "Unit", *(axis.name for axis in info.axes))
     parts = [Paragraph(typeset(line), "muted") for line in exchange(info)]
-    return Section("Axes", [Table("ll" + "r" * len(info.axes), heads, rows, note), *parts]) if info.axes else None
+    return Section("Axes", [Table("tl" + "r" * len(info.axes), heads, rows, note), *parts]) if info.axes else None
 
 
 def _modes(info: MachineInfo) -> Section:
     pairs = zip(info.modes.frequency.tolist(), info.modes.damping.tolist(), strict=True)
     rows = [(str(k), f"{f:.3f}", f"{100 * d:.3g}", moves(info, k)) for k, (f, d) in enumerate(pairs)]
     heads = ("Mode", "Frequency [Hz]", "Damping [%]", "What moves")
-    return Section("Modes", [Table("rrrl", heads, rows, "Shares of the kinetic energy.")])
+    return Section("Modes", [Table("rrrp", heads, rows, "Shares of the kinetic energy.")])

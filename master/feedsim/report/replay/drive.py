@@ -124,7 +124,7 @@ def report_of(report: DriveReport) -> Report:
         f"identified from {report.sources[0].file.name}",
         warnings=report.warnings,
         notes=report.notes,
-        answer=[typeset(line) for line in answers(report)],
+        answer=answers(report),
         tiles=[
             Tile(tile_value(figure), f"{name.partition('.')[0]}: {LEADING[key]}", typeset(figure.meaning))
             for name, figure in report.figures.items()
@@ -154,7 +154,7 @@ def _parameters(axis: str, one: DriveFound) -> Section:
         rows.append((code(name), typeset(each.meaning), minus(powers(value_text(each))), display_unit(each.unit),
                      interval, remark))  # fmt: skip
     heads = ("Parameter", "Meaning", "Value", "SI unit", "95 % interval", "Remark")
-    return Section(f"Axis {axis}", [Table("lprllp", heads, rows)])
+    return Section(f"Axis {axis}", [Table("ltrlrt", heads, rows)])
 
 
 def _parts(axis: str, one: DriveFound) -> Section:

@@ -10,7 +10,7 @@ import numpy as np
 from feedsim.replay.compare import TO_RPM, Comparison
 from feedsim.report.chart import Axis, Chart, Curve, Level, Panel
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, MUTED, ORANGE, VERMILLION, Array
+from feedsim.report.style import BLUE, MUTED, PURPLE, VERMILLION, Array
 from feedsim.trace import Mark
 
 SHOWN = {"m": (1e6, "µm"), "rad/s": (TO_RPM, "rpm"), "N.m": (1.0, "N·m")}
@@ -37,7 +37,7 @@ def _over_time(found: Comparison, marks: Sequence[Mark]) -> Picture:
     caption = "The recorded setpoints through the simulated axis, in closed loop, beside what was recorded." + (
         " Dotted: begin of a block of the program." if within else ""
     )
-    blocks = [Level(mark.time, upright=True, colour=ORANGE, dash="dotted") for mark in within]
+    blocks = [Level(mark.time, upright=True, dash="dotted") for mark in within]
     panels = [_panel(what, ordinate, "µm", time, recorded=lag,
                      simulated=lag - 1e6 * channels["position"].error[rows])]  # fmt: skip
     for name, channel in channels.items():
@@ -76,7 +76,8 @@ def _left(found: Comparison) -> Picture:
         centre, forwards, backwards = found.over_position(name)
         panels.append(
             Panel(f"What is left of the {name}: spectrum", Axis("frequency", "Hz", log=True),
-                  Axis("amplitude", unit, log=True), [Curve("amplitude", frequency[1:], factor * amplitude[1:])])
+                  Axis("amplitude", unit, log=True),
+                  [Curve("amplitude", frequency[1:], factor * amplitude[1:], PURPLE)])
         )  # fmt: skip
         seen = np.isfinite(forwards) | np.isfinite(backwards)
         over = [
@@ -86,7 +87,7 @@ def _left(found: Comparison) -> Picture:
         ]
         panels.append(
             Panel(
-                "over the position, mean",
+                f"What is left of the {name}: mean over the position",
                 Axis("position", "mm"),
                 Axis(f"{name} left", unit),
                 over,

@@ -22,7 +22,10 @@ from feedsim.scenario import Subject
 from feedsim.trace import Mark, Trace, write_csv
 
 REPLAY = "replay.csv"
-LEADING = {"position_rms": "position error, rms", "torque_rms": "torque error, rms", "share_of_lag": "of the lag"}
+LEADING = {
+    "position_rms": "position error, rms", "torque_rms": "torque error, rms",
+    "share_of_lag": "position error, share of the lag",
+}  # fmt: skip
 MOST_MARKS = 200
 
 
@@ -86,7 +89,7 @@ def report_of(replayed: Replayed) -> Report:
         f"{machine.name} · axes {', '.join(each.axis for each in replayed.comparisons)}",
         warnings=replayed.warnings,
         notes=[note for note in (*replayed.subject.notes, *(source.note for source in replayed.sources)) if note],
-        answer=[typeset(line) for line in answers(replayed)],
+        answer=answers(replayed),
         tiles=list(_tiles(replayed.figures)),
         main=[*pictures, figures_section(replayed.figures), _events(replayed), parameters_section(machine)],
         provenance=provenance_section(rows, hashed(_files(replayed))),

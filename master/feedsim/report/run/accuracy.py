@@ -39,7 +39,7 @@ def accuracy_picture(prefix: str, found: Accuracy, stem: str) -> Picture:
     ]
     curves = [Curve(name, x, middle, colour) for (name, colour), middle in zip(SIDES, mean, strict=True)]
     curves += [
-        Curve(name, np.repeat(x, runs), own.ravel(), colour, dots=True)
+        Curve(name, np.repeat(x, runs), own.ravel(), colour, width=2.4, dots=True)
         for (name, colour), own in zip(SIDES, readings, strict=True)
     ]
     reach = 0.03 * float(np.ptp(x))
@@ -47,7 +47,7 @@ def accuracy_picture(prefix: str, found: Accuracy, stem: str) -> Picture:
     high = max(float(np.max(mean + 2 * s)), float(np.max(readings)))
     across = Axis("target", "mm", span=(float(x[0]) - reach, float(x[-1]) + reach))
     up = Axis("deviation", "µm", span=(low - 0.05 * (high - low), high + 0.05 * (high - low)))
-    panel = Panel(title, across, up, curves, [Level(0.0, dash="")], bands, height=1.6)
+    panel = Panel("Deviation at the targets", across, up, curves, [Level(0.0, dash="")], bands, height=1.6)
     return Picture(stem, title, caption, Chart([panel]))
 
 

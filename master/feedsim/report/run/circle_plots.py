@@ -74,7 +74,8 @@ def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str
     axes = [axis for axis in turn.axes if f"{axis}.M_a" in trace.columns and f"{axis}.n_a" in trace.columns]
     if not axes:
         return None
-    part = trace.between(turn.begin, turn.end)
+    row = (trace.time[-1] - trace.time[0]) / (len(trace) - 1)
+    part = trace.between(turn.begin, turn.end + row)  # the next row closes the loops
     title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: driving torque and friction torque"
     caption = (
         f"Turn from {turn.begin:.4f} to {turn.end:.4f} s: over time, over the motor speed, and the friction torque "

@@ -130,7 +130,12 @@ def _distances(change: PoseChange) -> list[Part]:
 def _largest(axis: AxisChange) -> str:
     if axis.largest is None:
         return "below 0.1 %" if axis.distance <= NEAR else "not known"
-    return minus(f"{100 * axis.largest.change:+.2g} %")
+    return f"{_percent(axis.largest.change)} %"
+
+
+def _percent(share: float) -> str:
+    text = f"{100 * share:+.1f}"
+    return minus(text) if float(text) else "0.0"
 
 
 def _unknown(change: PoseChange) -> Paragraph | None:
@@ -145,7 +150,7 @@ def _unknown(change: PoseChange) -> Paragraph | None:
 def _axis(axis: AxisChange) -> Section:
     lowest, highest = (f"{axis.axis} {at * 1e3:.5g} mm" for at in (axis.low, axis.high))
     modes = [
-        (*(f"{f:.4g}" for f in (mode.frequency, *mode.ends)), minus(f"{100 * mode.change:+.2g}"), f"{mode.mac:.2f}",
+        (*(f"{f:.4g}" for f in (mode.frequency, *mode.ends)), _percent(mode.change), f"{mode.mac:.2f}",
          mode.moving)
         for mode in axis.modes
     ]  # fmt: skip
@@ -161,7 +166,7 @@ def _axis(axis: AxisChange) -> Section:
     return Section(
         f"Modes over the positions of {axis.axis}",
         [
-            Table("rrrrrl", heads, modes, note),
-            Table("lrrrl", ("Static compliance", lowest, "At the pose", highest, "Unit"), compliances),
+            Table("rrrrrp", heads, modes, note),
+            Table("trrrl", ("Static compliance", lowest, "At the pose", highest, "Unit"), compliances),
         ],
     )

@@ -22,7 +22,7 @@ from feedsim.analysis import (
 from feedsim.cosim import Run
 from feedsim.report import sections
 from feedsim.report.content import Report, Section, Table, Tile, tile_value
-from feedsim.report.formatting import duration, number, typeset
+from feedsim.report.formatting import counted, duration, number, typeset
 from feedsim.report.partial import PARTIAL, Partial
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import (
@@ -40,7 +40,7 @@ from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section, direction
 from feedsim.report.run.pose import pose_part, pose_section
-from feedsim.report.run.words import accuracy_words, stop_words
+from feedsim.report.run.words import accuracy_words, moved_words, stop_words
 from feedsim.scenario import Level, Logging
 from feedsim.trace import Trace, write_csv
 from feedsim.units import show
@@ -135,8 +135,8 @@ def report_of(
     )
     return Report(
         scenario.name,
-        f"{machine.name} · {len(scenario.motions)} motion(s), {run.program.duration:.4g} s",
-        answer=[typeset(line) for line in answers(run, figures, causes)],
+        f"{machine.name} · {counted(len(scenario.motions), 'motion')}, {run.program.duration:.4g} s",
+        answer=answers(run, figures, causes),
         warnings=(*run.warnings, *doubts(figures, causes)),
         notes=(machine.note, scenario.note),
         tiles=[tile(name, figure) for name, figure in figures.items() if is_leading(name, HEADER)],
@@ -174,7 +174,7 @@ def answers(run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagno
         if own and not isinstance(task, CircleTask):
             words = stop_words(own, task.band) if isinstance(task, PositioningTask) else accuracy_words(own)
             found.append(f"{task.prefix}: {words}")
-    return found
+    return found or moved_words(run.trace)
 
 
 def tile(name: str, figure: Figure) -> Tile:
@@ -256,7 +256,7 @@ def provenance(run: Run) -> Section:
         *([("Log", log_text(scenario.logging, run.log))] if scenario.logging is not None else []),
         (
             "Coupling",
-            f"{coupling.scheme}, {coupling.substeps} exchange step(s) per control cycle"
+            f"{coupling.scheme}, {counted(coupling.substeps, 'exchange step')} per control cycle"
             + (", inside one unit" if coupling.units == "one" else ""),
         ),
     ]

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from feedsim.analysis import Figures
+from feedsim.trace import Trace
 
 # Of A, what repeats is worth compensating from this share of it on.
 SYSTEMATIC = 0.5
+AT_REST = 1e-6  # [m] of travel, up to which an axis is not told to have moved
 
 
 def stop_words(figures: Figures, band: float) -> str:
@@ -16,11 +20,15 @@ def stop_words(figures: Figures, band: float) -> str:
     within = f"+-{band * 1e6:g} um"
     if not math.isfinite(overshoot.value) or not math.isfinite(settled.value):
         return f"whether it stays within {within} is not known, too little of the rest is recorded: add a dwell."
-    said = f"{overshoot.value:.2f} um past its target"
-    said += f", within {within} for good {settled.value:.1f} ms after the end of the NC motion"
+    said = f"{overshoot.value:.2f} um past its target, "
+    said += (
+        f"within {within} for good {settled.value:.1f} ms after the end of the NC motion"
+        if settled.value > 0
+        else f"within {within} from the end of the NC motion on"
+    )
     ringing = figures.get("ringing_frequency")
     if settled.value > 0 and ringing is not None and math.isfinite(ringing.value):
-        said += f"; what it waits for rings at {ringing.value:.1f} Hz"
+        said += f"; until then it rings at {ringing.value:.1f} Hz, which less jerk would excite less"
     return f"{said}."
 
 
@@ -35,3 +43,15 @@ def accuracy_words(figures: Figures) -> str:
     if B > SYSTEMATIC * E:
         return f"{first}: most of it repeats and changes with the direction: backlash, reversal value B {B:.2f} um."
     return f"{first}: most of it repeats at each target: compensation of the pitch can take it away."
+
+
+def moved_words(trace: Trace) -> list[str]:
+    """Of a run without figures: how far each axis has moved and was behind, and that nothing is evaluated."""
+    found = []
+    for axis in dict.fromkeys(name.partition(".")[0] for name in trace.columns if name.endswith(".x_a")):
+        travel = float(np.ptp(trace[f"{axis}.x_a"]))
+        if travel > AT_REST:
+            lag = trace.columns.get(f"{axis}.x_e")
+            behind = "" if lag is None else f", following error up to {1e6 * float(np.abs(lag).max()):.3g} um"
+            found.append(f"{axis} moves within {1e3 * travel:.4g} mm{behind}.")
+    return [*found, "The scenario has nothing that is evaluated (a stop, a circle, a positioning cycle): no figures."]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -17,12 +17,14 @@ from feedsim.analysis.side_by_side import SUMMARY as OF_RESULT
 from feedsim.analysis.side_by_side import Source, differing
 from feedsim.report import sections
 from feedsim.report.content import Bullets, Report, Section, Table, Text, code
-from feedsim.report.formatting import display_unit, scale, shown
+from feedsim.report.formatting import counted, display_unit, minus, scale, shown
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.show.pictures import Stop, pictures_of, stop_seen, stops_of
 
 FORMAT = 1
+MOST_LEADING = 5  # figures that are told first
+LEAST_CHANGE = 0.05  # [%] of a figure, below which it has not changed
 BAND = 1e-6  # [m] about the target, within which an axis has settled
 # Figures whose change is told first, by what stands behind the last dot.
 FIRST = ("G", "G_b", "peak_", "servo_mismatch", "overshoot", "settling_time")
@@ -63,6 +65,29 @@ def lines(sources: Sequence[Source]) -> list[str]:
     return said or ["the sources have neither figures nor parameters to compare; the pictures do"]
 
 
+def _answer(sources: Sequence[Source]) -> list[str]:
+    """The same in the words of the page: what differs, and how far the leading figures are from the first source's."""
+    names = [source.name for source in sources]
+    rows = differing(sources)
+    said = [f"{name}: {_each(names, map(_readable, values))}." for name, values in rows[:3]]
+    if len(rows) > 3:
+        said.append(f"{counted(len(rows) - 3, 'parameter')} more that differ are listed below.")
+    for name in _leading(sources)[:MOST_LEADING]:
+        values = [source.figures.get(name) for source in sources]
+        text = ["–" if v is None else " ".join(shown(Figure(*v, ""))) for v in values]
+        first, last = values[0], values[-1]
+        change = ""
+        if len(sources) == 2 and first is not None and last is not None and first[1] == last[1] and first[0]:
+            share = 100 * (last[0] / first[0] - 1)
+            change = f" ({share:+.1f} %)" if abs(share) >= LEAST_CHANGE else " (unchanged)"
+        said.append(f"{name}: {_each(names, text)}{minus(change)}.")
+    return said or lines(sources)
+
+
+def _each(names: Sequence[str], values: Iterable[str]) -> str:
+    return ", ".join(f"{value} in {name}" for name, value in zip(names, values, strict=True))
+
+
 def _readable(value: str) -> str:
     """A parameter as a person reads it, 4 (m/min)/mm for 66.6666667 1/s; a dash where a source has none."""
     number, _, unit = value.partition(" ")
@@ -85,8 +110,9 @@ def report_of(sources: Sequence[Source]) -> Report:
     rows = [(f"Source {k}", f"{source.name}: {len(source.time)} rows") for k, source in enumerate(sources, 1)]
     return Report(
         " against ".join(names) if len(names) <= 3 else f"{len(names)} results side by side",
-        f"{len(sources)} source(s)",
-        answer=lines(sources)[:6],
+        counted(len(sources), "source"),
+        answer=_answer(sources),
+        notes=tuple(note for source in sources for note in source.notes),
         main=[
             *pictures_of(sources),
             _stops(sources),

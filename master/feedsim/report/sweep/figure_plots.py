@@ -8,7 +8,7 @@ import numpy as np
 
 from feedsim.report.chart import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, GREEN, GRID, INK, MUTED, ORANGE, PURPLE, SKY, VERMILLION, Array
+from feedsim.report.style import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILLION, Array
 from feedsim.report.sweep.account import QUANTILES, RANK, TOTAL, Account, Input, Measure, Output
 
 MOST_BARS = 14
@@ -43,12 +43,10 @@ def distribution_picture(
         return None
     telling = measure.telling()[:MOST_BARS]
     bars = len(telling)
-    caption = "Left the runs' values with 5 %, 50 % and 95 % quantile" if bars else "The runs' values with "
-    caption += "" if bars else "5 %, 50 % and 95 % quantile"
-    caption += ", and the share of the runs that lie above a value (vermillion)" if exceedance else ""
-    caption += "; " if bars else "."
+    caption = "The runs' values with 5 %, 50 % and 95 % quantile"
+    caption += ", and the share of the runs that lie above a value." if exceedance else "."
     if bars:
-        caption += _right(measure, len(inputs) - bars)
+        caption += f" What moves it: {_moving(measure, len(inputs) - bars)}"
     chart = _distribution(output, inputs, measure, telling, exceedance)
     return Picture(f"distribution-{stem}", f"Distribution of {output.name}", caption, chart, worded=True)
 
@@ -111,7 +109,7 @@ def _bars(inputs: Sequence[Input], measure: Measure, ranked: Sequence[int]) -> P
         *_bar("positive" if measure.kind == RANK else "", rows[values >= 0], values[values >= 0], None, BLUE),
         *_bar("negative", rows[values < 0], values[values < 0], None, VERMILLION),
     ]
-    chance = [Band("chance", -0.6, len(ranked) - 0.4, np.array([-measure.noise, measure.noise]), GRID)]
+    chance = [Band("chance", -0.6, len(ranked) - 0.4, np.array([-measure.noise, measure.noise]), MUTED)]
     span = (-1.0, 1.0) if measure.kind == RANK else (0.0, 1.0)
     return Panel("What moves it", Axis(measure.kind, span=span), names, curves, [Level(0.0, upright=True, dash="")],
                  chance if measure.kind == RANK else [])  # fmt: skip
@@ -130,12 +128,12 @@ def _bar(name: str, rows: Array, values: Array, interval: Array | None, colour: 
     return found
 
 
-def _right(measure: Measure, left_out: int) -> str:
+def _moving(measure: Measure, left_out: int) -> str:
     text = {
-        TOTAL: "right the share of its scatter that each parameter makes alone (first order) and with all its joint "
+        TOTAL: "the share of its scatter that each parameter makes alone (first order) and with all its joint "
         "effects (total), with 95 % intervals. Where both are alike, the parameter acts on its own.",
-        RANK: "right Spearman's rank correlation with each parameter; within the grey band it can be chance.",
-    }.get(measure.kind, "right the share of its scatter that lies between the values of each parameter.")
+        RANK: "Spearman's rank correlation with each parameter; within the grey band it can be chance.",
+    }.get(measure.kind, "the share of its scatter that lies between the values of each parameter.")
     return text + (f" {left_out} more parameters, which move it less, are not drawn." if left_out else "")
 
 
@@ -224,8 +222,9 @@ def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
         ]
         chart = _lines(output, along, own)
         return Picture(f"grid-{stem}", title, f"A line for each {lines.name}.", chart, worded=True)
-    empty = "Empty: the run failed, or the figure could not be determined."
-    return Picture(f"grid-{stem}", title, empty, _map(output, first, second), worded=True)
+    cells = "A cell per run, its colour the deeper the larger the figure."
+    empty = "" if np.isfinite(output.values).all() else " Empty: the run failed, or the figure could not be determined."
+    return Picture(f"grid-{stem}", title, cells + empty, _map(output, first, second), worded=True)
 
 
 def _lines(output: Output, along: Input, lines: Sequence[tuple[str, Array, Array, str]]) -> Chart:

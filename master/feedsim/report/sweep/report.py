@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feedsim.report.content import Paragraph, Part, Report, Section, Table, Text, Tile, code
-from feedsim.report.formatting import counted, minus, number
+from feedsim.report.formatting import counted, minus, number, three
 from feedsim.report.picture import Picture
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.sections import parameters_section, provenance_section
 from feedsim.report.style import Array, remarked
-from feedsim.report.sweep.account import QUANTILES, Account, Input
+from feedsim.report.sweep.account import QUANTILES, SHARE, Account, Input, Measure, measures
 from feedsim.report.sweep.plots import drawn, pictures_of, varying
 from feedsim.report.sweep.summary import study_files, summary
 from feedsim.sweep.sensitivity import Indices, Trends
@@ -34,6 +34,8 @@ METHODS = {
     "sensitivity": "samples for Sobol indices",
 }
 MOST_FAILURES = 50  # kinds
+MOST_ANSWERS = 4  # figures that are told first
+WORTH = 0.05  # share of the scatter, from which a parameter is told to move a figure
 MOST_RUNS = 12  # numbers of a kind
 SOBOL_NOTE = (
     "First order: the share of the scatter that would be gone if the parameter were known. Total: the share that would "
@@ -99,6 +101,7 @@ def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Pictu
     return Report(
         study.name,
         f"{scenario.name} · {scenario.machine.name} · {counted(len(study.parameters), 'parameter')} · {method}",
+        answer=answers(account),
         warnings=account.warnings,
         notes=(scenario.machine.note, scenario.note, study.note),
         tiles=list(_tiles(account)),
@@ -121,14 +124,45 @@ def _tiles(account: Account) -> Iterator[Tile]:
     yield Tile(str(rows), "runs" if rows == asked else f"of {asked} runs", "rows of the table")
     yield Tile(str(account.failed), "failed", "runs that have no figures; their messages stand below")
     if (wall := account.wall_time) is not None:
-        yield Tile(f"{wall:.4g} s", "time", "from the beginning to the end of all runs")
-        yield Tile(f"{rows / wall:.3g} 1/s", "runs per second", "rows over time")
+        yield Tile(f"{wall:.4g} s", "time of all runs", "from the beginning to the end of all runs")
+
+
+def answers(account: Account) -> list[str]:
+    """How far the leading figures scatter, and what moves them most: a line each."""
+    found, grid = measures(account), account.study.sampling.method == "grid"
+    lines = []
+    for output in drawn(account)[:MOST_ANSWERS]:
+        told, unit = output.statistics, output.scale.shown_unit
+        low, high = (three(told[key]) for key in (("min", "max") if grid else ("q5", "q95")))
+        spread = f"{low} to {high} {unit}".rstrip() + (" over the grid" if grid else " in nine of ten runs")
+        middle = "" if grid else f"{three(told['q50'])} {unit}".rstrip() + " in the median, "
+        lines.append(f"{output.name}: {middle}{spread}; {_strongest(account, found[output.name])}.")
+    return lines
+
+
+def _strongest(account: Account, measure: Measure) -> str:
+    """The parameters that move a figure most, with their measure."""
+    leading = [k for k in measure.ranked() if measure.told(k) or (measure.kind == SHARE and measure.size(k) > WORTH)]
+    if not leading:
+        return "no parameter moves it by more than chance"
+    first, *further = (f"{account.inputs[k].name} ({_two(float(measure.values[k]))})" for k in leading[:3])
+    more = f", then {' and '.join(further)}" if further else ""
+    return f"{first} moves it most{more} ({measure.kind})"
+
+
+def _speed(account: Account) -> Iterator[tuple[str, str]]:
+    """How fast the runs were made."""
+    rows, told = len(account.table), []
+    if (wall := account.wall_time) is not None:
+        told.append(f"{rows / wall:.3g} runs per second")
     if rows:
-        yield Tile(f"{1e3 * account.busy / rows:.3g} ms", "per run", "mean time of a run on its worker")
+        told.append(f"{1e3 * account.busy / rows:.3g} ms per run")
     if (processes := account.processes) is not None:
-        yield Tile(str(processes), "process" if processes == 1 else "processes", "that made the runs")
+        told.append(counted(processes, "process", "processes"))
     if (efficiency := account.efficiency) is not None:
-        yield Tile(f"{100 * efficiency:.0f} %", "efficiency", "share of the workers' time that went into runs")
+        told.append(f"{100 * efficiency:.0f} % of their time went into runs")
+    if told:
+        yield "Speed", ", ".join(told)
 
 
 def _not_drawn(account: Account) -> Paragraph | None:
@@ -143,7 +177,7 @@ def _statistics(account: Account) -> Section | None:
     rows: list[tuple[Text, ...]] = []
     for each in account.outputs:
         statistics = each.statistics
-        cells = [number(each.nominal, 3)] if nominal else []
+        cells = [three(each.nominal)] if nominal else []
         mean, std = statistics["mean"], statistics["std"]
         cells += [number(mean) if grid else rounded(mean, std / math.sqrt(max(len(each.known), 1)))]
         cells.append(number(std, 4 if grid else 3))
@@ -302,6 +336,7 @@ def _provenance(account: Account) -> Section:
         ("Sampling", f"{study.sampling.method}, {account.design.runs} runs, seed {study.sampling.seed}"),
         ("Machine", scenario.machine.name),
         *_recorded(account.record),
+        *_speed(account),
     ]
     note = Paragraph("The parameters are the scenario's; each run changes those above.", "muted")
     parameters = parameters_section(scenario.machine)

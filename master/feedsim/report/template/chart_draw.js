@@ -2,7 +2,7 @@
 // one drawing serves light, dark and paper. chart_use.js has what a reader does with them.
 const SPACE = "http://www.w3.org/2000/svg";
 const EDGE = { left: 62, right: 14, top: 28, bottom: 44 };
-const HEIGHT = 235, NARROW = 640, COLUMN = 280, GAP = 18, ROUND = 520;
+const HEIGHT = 235, NARROW = 640, COLUMN = 250, GAP = 18, ROUND = 520, FEW = 3;
 const DASHES = { dashed: "6 3", dotted: "2 3" };
 const FONT = 'system-ui, "Segoe UI", Arial, sans-serif';
 const RING_GAPS = { 1: 0.36, 2: 0.24 };
@@ -19,9 +19,14 @@ const colour = name => `var(--${name})`;
 const number = (value, digits = 6) => Number.isFinite(value) ? written(Number(value.toPrecision(digits))) : "–";
 
 function written(value) {
-  const size = Math.abs(value);
-  return String(size && (size < 1e-4 || size >= 1e7) ? value.toExponential() : value).replaceAll("-", "−");
+  const size = Math.abs(value), [mantissa, power] = value.toExponential().replace("+", "").split("e");
+  const text = size && (size < 1e-4 || size >= 1e7) ? `${mantissa}×10${[...power].map(each => each === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[each]).join("")}` : String(value);
+  return text.replaceAll("-", "−");
 }
+const fixed = (value, decimals) => value.toFixed(decimals).replace(/^-(?=0(\.0*)?$)/, "").replace("-", "−");
+
+// Three digits that count, alike in all cells.
+const three = value => Math.abs(value) >= 100 || (value && Math.abs(value) < 1e-4) ? number(value, 3) : value.toPrecision(3).replace("-", "−");
 
 const unit_of = axis => axis.unit ? ` ${axis.unit}` : "";
 // Words over curves.
@@ -54,7 +59,7 @@ function ticks(axis, low, high, most) {
     return [...decades.map(at => -at).reverse(), 0, ...decades].filter(at => at >= low && at <= high).map(at => ({ at, text: number(at) }));
   }
   if (axis.log && high / low > 8) {
-    const found = [], decades = Math.log10(high / low), few = decades < 2.2, every = Math.ceil(decades / most);
+    const found = [], decades = Math.log10(high / low), few = decades < 2.2, every = Math.max(1, Math.round(decades / most));
     for (let k = Math.floor(Math.log10(low)); k <= Math.log10(high); k++)
       for (const part of [1, 2, 3, 4, 5, 6, 7, 8, 9]) {
         const at = part * 10 ** k;
@@ -64,8 +69,12 @@ function ticks(axis, low, high, most) {
     return found;
   }
   const turns = axis.unit === "°" && high - low > 60;
-  const step = turns ? [15, 30, 45, 90, 180, 360, 720, 1440].find(each => (high - low) / each <= most) || 3600
-    : step_of((high - low) / most);
+  let step = turns ? PHASES.find(each => (high - low) / each <= most) || 3600 : step_of((high - low) / most);
+  const marked = each => Math.floor(high / each + 1e-9) - Math.ceil(low / each - 1e-9) + 1;
+  for (let less; marked(step) < FEW; step = less) { // one or two ticks are no scale
+    less = finer(step, turns);
+    if (!less || (marked(step) > 1 && marked(less) > most + 2)) break;
+  }
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push({ at: k * step, text: number(k * step) });
   return found;
@@ -107,9 +116,17 @@ function path_of(x, y, across, up, range, columns) {
   return parts.join("");
 }
 
+const PHASES = [15, 30, 45, 90, 180, 360, 720, 1440];
+
+function finer(step, turns) {
+  if (turns) return PHASES.filter(each => each < step).pop();
+  const decade = 10 ** Math.floor(Math.log10(step) + 1e-9);
+  return decade * { 1: 0.5, 2: 1, 5: 2 }[Math.round(step / decade)];
+}
+
 const styled = curve => ({
   fill: "none", stroke: colour(curve.colour), "stroke-width": curve.width, "stroke-linejoin": "round",
-  ...(curve.dash ? { "stroke-dasharray": DASHES[curve.dash] } : {}), ...(curve.faint ? { "stroke-opacity": 0.4 } : {}),
+  ...(curve.dash ? { "stroke-dasharray": DASHES[curve.dash] } : {}), ...(curve.grey ? { class: `grey-${curve.grey}` } : {}), ...(curve.faint ? { "stroke-opacity": 0.4 } : {}),
 });
 
 // Least and largest ordinate of the curves that are seen, with room about them.
@@ -140,6 +157,58 @@ function whole_span(panel, values) {
   return high > low ? [low, high] : [low - 0.5, low + 0.5];
 }
 
+// The title of a panel, as small as its room makes it.
+function headed(text, x, room, parent) {
+  const size = Math.min(12, 12 * room / (7.2 * text.length || 1));
+  make("text", { x, y: 15, "font-weight": 600, "font-size": size.toFixed(1), fill: colour("ink") }, parent, text);
+}
+
+const width_of = text => Math.max(...text.split("\n").map(line => 6.3 * line.length)) + 2;
+
+// What the curves and labels of a panel cover, in cells: words are put where nothing is.
+class Taken {
+  constructor(inner) {
+    this.inner = inner;
+    this.across = Math.ceil(inner.width / 4);
+    this.cells = new Uint8Array(this.across * Math.ceil(inner.height / 4));
+  }
+
+  box(x, y, wide, tall) {
+    for (let b = y; b < y + tall + 4; b += 4) for (let a = x; a < x + wide + 4; a += 4) this.dot(Math.min(a, x + wide), Math.min(b, y + tall));
+  }
+
+  dot(x, y) {
+    const { inner } = this;
+    if (x < inner.x || x >= inner.x + inner.width || y < inner.y || y >= inner.y + inner.height) return;
+    this.cells[Math.floor((y - inner.y) / 4) * this.across + Math.floor((x - inner.x) / 4)] = 1;
+  }
+
+  path(d, dots) {
+    let last = null;
+    for (const [, pen, a, b] of d.matchAll(/([ML])(\S+) ([^ML]+)/g)) {
+      const point = [Number(a), Number(b)];
+      const steps = pen === "L" && last && !dots ? Math.min(500, Math.ceil(Math.hypot(point[0] - last[0], point[1] - last[1]) / 3)) : 1;
+      for (let k = 1; k <= steps; k++) this.dot(...(steps > 1 ? point.map((each, j) => last[j] + (each - last[j]) * k / steps) : point));
+      last = point;
+    }
+  }
+
+  // The place {x, y of the first line's foot, far} that covers least and is least far; it is taken then.
+  put(text, places) {
+    const { inner } = this, wide = width_of(text), tall = 12 + 15 * (text.split("\n").length - 1);
+    const cost = ({ x, y, far }) => {
+      if (y - 10 < inner.y || y - 10 + tall > inner.y + inner.height || x < inner.x || x + wide > inner.x + inner.width + 1) return 1e6 + far;
+      let covered = 0;
+      for (let b = y - 10; b <= y - 10 + tall; b += 4) for (let a = x; a <= x + wide; a += 4)
+        covered += this.cells[Math.floor((b - inner.y) / 4) * this.across + Math.floor((a - inner.x) / 4)] || 0;
+      return far + (covered ? 120 + 10 * covered : 0);
+    };
+    const costs = places.map(cost), best = places[costs.indexOf(Math.min(...costs))] || { x: inner.x + 4, y: inner.y + 12 };
+    this.box(best.x, best.y - 10, wide, tall);
+    return best;
+  }
+}
+
 // One panel into box = {x, y, width, height}; returns its scales and ranges.
 function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent);
@@ -156,7 +225,7 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   const up = scale(height[0], height[1], inner.y + inner.height, inner.y, panel.y);
   const bottom = inner.y + inner.height, right = inner.x + inner.width;
   const title = panel.y.names.length ? 0 : Math.max(0, Math.min(inner.x, box.width - 7.4 * panel.title.length));
-  make("text", { x: title, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
+  headed(panel.title, title, box.width - title, part);
   const widest = Math.max(74, widest_of(panel.x.names, 7, 14));
   for (const tick of ticks(panel.x, span[0], span[1], Math.max(2, Math.floor(inner.width / widest)))) {
     const at = across(tick.at).toFixed(1);
@@ -187,7 +256,7 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   const clip = make("clipPath", { id }, part);
   make("rect", { x: inner.x, y: inner.y, width: inner.width, height: inner.height }, clip);
   const field = make("g", { "clip-path": `url(#${id})` }, part);
-  const top = make("g", { "clip-path": `url(#${id})` });
+  const top = make("g", { "clip-path": `url(#${id})` }), labelled = [];
   for (const band of panel.bands) {
     if (band.name && hidden.has(band.name)) continue;
     const x = band.x === null ? span : values(band.x);
@@ -204,17 +273,15 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
     if (!Number.isFinite(at)) continue;
     const ends = level.ends ? level.ends.map(level.upright ? up : across) : level.upright ? [inner.y, bottom] : [inner.x, right];
     make("line", level.upright ? { x1: at, x2: at, y1: ends[0], y2: ends[1], ...look } : { x1: ends[0], x2: ends[1], y1: at, y2: at, ...look }, field);
-    if (level.text) {
-      const far = at > right - 7 * level.text.length;
-      make("text", level.upright ? { x: at + (far ? -4 : 4), y: inner.y + 12, "text-anchor": far ? "end" : "start", ...HALO, fill: colour("muted") }
-        : { x: right - 4, y: at - 4, "text-anchor": "end", ...HALO, fill: colour("muted") }, top, level.text);
-    }
+    if (level.text) labelled.push([level, at]);
   }
   make("rect", { x: inner.x, y: inner.y, width: inner.width, height: inner.height, fill: "none", stroke: colour("muted"), "stroke-width": 0.8 }, part);
-  for (const curve of shown) {
+  const words = labelled.length || panel.note || panel.marks.some(mark => mark.text), taken = words ? new Taken(inner) : null;
+  for (const curve of [...shown].sort((a, b) => b.dots - a.dots)) { // a line through its points, not below them
     const x = values(curve.x), y = values(curve.y);
     let d = path_of(x, y, across, up, curve.ascending && !curve.filled && !curve.dots ? span : null, inner.width);
     if (!d) continue;
+    if (taken) taken.path(d, curve.dots);
     if (curve.dots) make("path", { ...styled(curve), d: d.replace(/[LM]/g, "h0M").slice(2) + "h0", "stroke-width": 2 * curve.width, "stroke-linecap": "round" }, field);
     else if (curve.filled) {
       const zero = Math.min(bottom, up(panel.y.log ? height[0] : 0)).toFixed(1);
@@ -222,25 +289,44 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
     } else make("path", { ...styled(curve), d }, field);
   }
   part.append(top);
-  const placed = []; // boxes of labels: one that would cover another moves up, or down where there is no room
-  for (const mark of panel.marks) {
-    const x = across(mark.x), y = up(mark.y);
-    if (!(x >= inner.x - 1 && x <= right + 1)) continue;
+  const marks = panel.marks.map(mark => [mark, across(mark.x), up(mark.y)]).filter(([, x]) => x >= inner.x - 1 && x <= right + 1);
+  for (const [mark, x, y] of marks) {
     make("circle", { cx: x, cy: y, r: 3.6, fill: mark.hollow ? "none" : colour(mark.colour), stroke: colour(mark.colour), "stroke-width": 1.4 }, field);
-    if (mark.text) {
-      const wide = 6.3 * mark.text.length + 6, far = x > right - wide - 4, from = far ? x - 7 - wide : x + 7;
-      const covered = at => placed.some(([left, low]) => left < from + wide && from < left + placed.wide && Math.abs(low - at) < 13);
-      placed.wide = Math.max(placed.wide || 0, wide);
-      let at = Math.min(Math.max(y - 6, inner.y + 12), bottom - 4);
-      const places = [...Array(8)].flatMap((_, k) => [at - 13 * k, at + 13 * k]).filter(each => each >= inner.y + 11 && each <= bottom - 3);
-      at = places.find(each => !covered(each)) ?? at;
-      placed.push([from, at]);
-      make("text", { x: x + (far ? -7 : 7), y: at, "text-anchor": far ? "end" : "start", ...HALO }, field, mark.text);
-    }
+    if (taken) taken.box(x - 4, y - 4, 8, 8);
   }
-  panel.note.split("\n").reverse().forEach((line, k) => {
-    if (line) make("text", { x: inner.x + 8, y: bottom - 8 - 15 * k, ...HALO }, part, line);
-  });
+  const label = (text, places, parent, look = {}) => {
+    const place = taken.put(text, places);
+    make("text", { x: place.x, y: place.y, ...HALO, ...look }, parent, text);
+    return place;
+  };
+  if (taken) for (const level of panel.levels) if (!level.upright && !level.text) taken.box(inner.x, up(level.at), inner.width, 0);
+  for (const [mark, x, y] of marks) {
+    if (!mark.text) continue;
+    const wide = width_of(mark.text), places = [];
+    for (let k = -9; k <= 9; k++) for (const [from, far] of [[x + 7, 0], [x - 7 - wide, 2], [x - wide / 2, 4], [x - 1.6 * wide, 40], [x + 0.6 * wide, 40]])
+      places.push({ x: Math.min(Math.max(from, inner.x + 3), right - wide - 3), y: y - 6 + 13 * k, far: far + Math.abs(13 * k) });
+    const place = label(mark.text, places, part);
+    const to = [Math.min(Math.max(x, place.x), place.x + wide), place.y < y ? place.y + 3 : place.y - 10];
+    if (Math.hypot(to[0] - x, to[1] - y) > 24) make("line", { x1: x, y1: y, x2: to[0], y2: to[1], stroke: colour("muted"), "stroke-width": 0.7 }, field);
+  }
+  for (const [level, at] of labelled) {
+    const wide = width_of(level.text), places = [];
+    if (level.upright) for (let y = inner.y + 12; y < bottom - 4; y += 13) places.push({ x: at + 4, y, far: y - inner.y }, { x: at - 4 - wide, y, far: y - inner.y + 3 });
+    else {
+      const ends = level.ends ? level.ends.map(across) : [inner.x, right], last = Math.max(Math.min(ends[1], right) - 4 - wide, inner.x + 4);
+      for (let x = last; x >= Math.min(ends[0] + 4, last); x -= 12) for (const k of [0, 1, 2])
+        places.push({ x, y: at - 4 - 12 * k, far: 0.2 * (last - x) + 12 * k }, { x, y: at + 12 + 12 * k, far: 0.2 * (last - x) + 12 * k + 3 });
+    }
+    label(level.text, places, top, { fill: colour("muted") });
+  }
+  if (panel.note) {
+    const lines = panel.note.split("\n"), wide = Math.max(...lines.map(width_of)), low = bottom - 8 - 15 * (lines.length - 1), high = inner.y + 16;
+    const places = []; // the lower left, another corner, else somewhere between
+    for (let y = high; y <= low; y += 15) for (const [x, far] of [[inner.x + 8, 0], [right - 8 - wide, 1]]) places.push({ x, y, far: far + 3 + Math.min(low - y, y - high) });
+    places.push({ x: inner.x + 8, y: low, far: 0 }, { x: right - 8 - wide, y: low, far: 1 });
+    const place = taken.put(panel.note, places);
+    lines.forEach((line, k) => make("text", { x: place.x, y: place.y + 15 * k, ...HALO }, part, line));
+  }
   return { panel, box, inner, across, up, span, height, shown, part };
 }
 
@@ -268,6 +354,7 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
   const words = make("g", { ...HALO, fill: colour("muted"), "font-size": 10.5 });
   for (let k = -count; k <= count; k++) {
     const at = radius(k * step) * Math.SQRT1_2;
+    if (k && k < count && half < 190) continue; // on a phone the labels of points need the room
     make("text", { x: centre[0] + at, y: centre[1] - at + 4, "text-anchor": "middle" }, words, (k > 0 ? "+" : "") + number(k * step) + (k ? " µm" : ""));
   }
   const clip = make("clipPath", { id }, part);
@@ -290,7 +377,7 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
     const side = Math.round(Math.cos(mark.x)), lower = Math.round(Math.sin(mark.x));
     make("text", { x: to[0] - 3 * side, y: to[1] + 4 + 9 * lower, "text-anchor": ["start", "middle", "end"][side + 1], ...HALO }, part, mark.text);
   }
-  if (half > 150) panel.note.split("\n").forEach((line, k) => make("text", { x: centre[0], y: centre[1] - 0.3 * one + 14 * k, "text-anchor": "middle", fill: colour("muted"), "font-size": 11 }, part, line));
+  if (half > 190) panel.note.split("\n").forEach((line, k) => make("text", { x: centre[0], y: centre[1] - 0.3 * one + 14 * k, "text-anchor": "middle", fill: colour("muted"), "font-size": 11 }, part, line));
   if (panel.sense) {
     const arc = [50, 130].map(each => each * Math.PI / 180).sort((a, b) => panel.sense * (a - b)), r = 0.16 * one, low = centre[1] + 0.36 * one;
     const [from, to] = arc.map(each => [centre[0] + r * Math.cos(each), low - r * Math.sin(each)]);
@@ -303,9 +390,10 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
 
 function draw_grid(panel, box, parent, values) {
   const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent), cells = values(panel.values);
-  make("text", { x: 4, y: 15, "font-weight": 600, fill: colour("ink") }, part, panel.title);
+  headed(panel.title, 4, box.width - 4, part);
   const left = grid_left(panel), top = grid_top(panel), columns = panel.columns.length;
-  const width = Math.min(64, (box.width - left - 8) / columns), height = 24, numbers = width >= 30;
+  const slanted = 4.8 * panel.columns[columns - 1].length; // the last name leans over the edge
+  const width = Math.min(64, (box.width - left - 8 - slanted) / (columns - 0.5)), height = 24, numbers = width >= 30;
   const [low, high] = panel.span, about_zero = low < 0 && high > 0;
   panel.columns.forEach((name, j) => make("text", { transform: `translate(${left + (j + 0.5) * width} ${top - 6}) rotate(-40)`, fill: colour("ink"), "font-size": 11 }, part, name));
   panel.rows.forEach((name, i) => make("text", { x: left - 8, y: top + (i + 0.5) * height + 4, "text-anchor": "end", fill: colour("ink"), "font-size": 11 }, part, name));
@@ -317,7 +405,7 @@ function draw_grid(panel, box, parent, values) {
     const share = about_zero ? Math.abs(value) / Math.max(-low, high) : (value - low) / (high - low || 1);
     const cell = make("rect", { ...box, fill: colour(about_zero && value < 0 ? "vermillion" : "blue"), "fill-opacity": (0.75 * Math.min(1, Math.max(0, share))).toFixed(3) }, part);
     make("title", {}, cell, `${row}, ${column}: ${number(value)}`);
-    if (numbers) make("text", { x: box.x + width / 2, y: box.y + height / 2 + 4, "text-anchor": "middle", fill: colour("ink"), "font-size": 11, "font-weight": bold.has(i * columns + j) ? 700 : 400 }, part, panel.decimals === null ? number(value, 3) : value.toFixed(panel.decimals).replace("-", "−"));
+    if (numbers) make("text", { x: box.x + width / 2, y: box.y + height / 2 + 4, "text-anchor": "middle", fill: colour("ink"), "font-size": 11, "font-weight": bold.has(i * columns + j) ? 700 : 400 }, part, panel.decimals === null ? three(value) : fixed(value, panel.decimals));
   }));
   return { panel, part };
 }
@@ -326,9 +414,16 @@ const grid_top = panel => 36 + 4.3 * panel.columns.reduce((most, each) => Math.m
 
 const top_of = panel => EDGE.top + (panel.x.also ? 34 : 0);
 
+// As many columns as have room; of more than two that are alike half of them, before they stand below one another.
+function columns_of(widths, width) {
+  if (width >= Math.max(NARROW, COLUMN * widths.length)) return widths;
+  const half = widths.length / 2, alike = widths.every(each => each === widths[0]);
+  return half > 1 && Number.isInteger(half) && alike ? columns_of(widths.slice(half), width) : [1];
+}
+
 // Where every panel goes: boxes, and the height of all.
 function placed(chart, width) {
-  const columns = width < Math.max(NARROW, COLUMN * chart.widths.length) ? [1] : chart.widths, total = columns.reduce((a, b) => a + b, 0), boxes = [];
+  const columns = columns_of(chart.widths, width), total = columns.reduce((a, b) => a + b, 0), boxes = [];
   const aside = chart.panels.some(panel => panel.y && panel.y.also) ? EDGE.left : EDGE.right; // panels below one another end alike
   let y = 4;
   for (let k = 0; k < chart.panels.length; k += columns.length) {

@@ -29,6 +29,7 @@ class Live {
     this.stem = figure.id;
     this.chart = DATA.charts[this.stem];
     this.hidden = new Set();
+    this.told_apart();
     this.zooms = this.chart.panels.map(() => ({ x: null, y: null }));
     this.reaches = this.chart.panels.map(panel => panel.kind === "polar" ? panel.ring * panel.rings : 0);
     this.cursor = null; // panel and abscissa of the keyboard's cursor
@@ -40,6 +41,15 @@ class Live {
     this.spoken = element("div", { class: "spoken", role: "status", "aria-live": "polite" }, this.room);
     this.buttons();
     figure.querySelector(".still").replaceWith(this.room);
+  }
+
+  // On grey paper lines that differ in colour alone are told apart by dashes (style.css.j2).
+  told_apart() {
+    const seen = [], lines = this.chart.panels.flatMap(panel => panel.curves || []).filter(each => !each.dots && !each.filled && !each.dash && each.width < 5);
+    for (const curve of lines) {
+      if (!seen.includes(curve.colour)) seen.push(curve.colour);
+      curve.grey = seen.indexOf(curve.colour);
+    }
   }
 
   buttons() {

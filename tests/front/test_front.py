@@ -92,8 +92,9 @@ def test_the_front_door_offers_public_names_and_has_them_all() -> None:
 @pytest.mark.parametrize("room", ["compare", "identify", "sweep"])
 def test_rooms_that_are_called_are_rooms_as_well(room: str) -> None:
     """In a process of its own: whichever is first, the import or the call."""
+    file = "comparison" if room == "compare" else "calls"
     code = (
-        f"import feedsim as fs, inspect; import feedsim.{room}; from feedsim.front import {room} as meant\n"
+        f"import feedsim as fs, inspect; import feedsim.{room}; from feedsim.front.{file} import {room} as meant\n"
         f"assert inspect.ismodule(fs.{room}) and fs.{room}.__all__\n"
         f"assert inspect.signature(fs.{room}) == inspect.signature(meant)\n"
         f"assert inspect.getdoc(fs.{room}) == inspect.getdoc(meant)\n"
@@ -178,7 +179,8 @@ def test_saved_is_what_the_command_leaves(circle: fs.Result, folder: Path, tmp_p
 
 def test_pandas_is_asked_for_only_where_it_is_used(circle: fs.Result, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)  # type: ignore[arg-type]
-    with pytest.raises(extras.MissingPackage, match=r"a DataFrame needs the package pandas, .*: pip install pandas"):
+    said = r'a DataFrame needs .* pandas is not installed: pip install "feedsim\[pandas\]"'
+    with pytest.raises(extras.MissingPackage, match=said):
         circle.to_pandas()
 
 

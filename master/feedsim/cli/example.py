@@ -39,4 +39,5 @@ COMMAND = Command(
     "yours to begin with. The machines are synthetic, but for emps and sinumerik_840d, which were measured. Nothing is "
     "overwritten.",
     epilog="example:\n  feedsim example xz_circle && feedsim run xz_circle.yaml",
+    needs=(),
 )

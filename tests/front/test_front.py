@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import doctest
-import os
 import subprocess
 import sys
 from importlib import import_module
@@ -191,21 +190,3 @@ def test_a_data_frame_has_signals_over_time_with_their_units(circle: fs.Result) 
     assert np.array_equal(frame["Z.x_a"].to_numpy(), circle["Z.x_a"])
     assert np.array_equal(frame.index.to_numpy(), circle.trace.time)
     assert frame.attrs["units"]["Z.x_a"] == "m"
-
-
-def test_user_code_is_typed(tmp_path: Path) -> None:
-    code = tmp_path / "use.py"
-    code.write_text(
-        "import feedsim as fs\n"
-        'result = fs.run("xz_circle.yaml", set={"motions.0.radius": "20 mm"})\n'
-        "reveal_type(result)\nreveal_type(fs.compare(result, result).same)\nreveal_type(fs.load('a.yaml'))\n"
-        "fs.run(3)\n"
-    )
-    environment = os.environ | {"MYPYPATH": f"{ROOT / 'master'}{os.pathsep}{ROOT / 'src' / 'packager'}"}
-    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(ROOT / "pyproject.toml"), str(code)]
-    said = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False).stdout
-    revealed = [line.partition('"')[2].rstrip('"') for line in said.splitlines() if "Revealed type" in line]
-    assert revealed == ["feedsim.front.result.Result", "bool", "feedsim.scenario.model.Scenario"] or [
-        each.removeprefix("builtins.") for each in revealed
-    ] == ["feedsim.front.result.Result", "bool", "feedsim.scenario.model.Scenario"], said
-    assert 'has incompatible type "int"' in said

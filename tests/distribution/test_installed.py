@@ -181,6 +181,18 @@ def test_programs_around_it_are_checked_by_its_types(installed: Installation, tm
     assert 'has incompatible type "int"' in errors[0]
 
 
+@pytest.mark.parametrize("command", [["build", "plant"], ["exchange", "--out", "."], ["variables", "--out", "v.json"]])
+def test_what_needs_c_sources_says_so(command: list[str], installed: Installation) -> None:
+    done = subprocess.run(
+        [str(installed.python), "-m", "feedsim_packager", *command],
+        cwd=installed.folder, env=installed.environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    line = "which an installed feedsim does not have; a checkout or the source archive has them"
+    assert done.stderr.startswith(f"error: {command[0]} is of C sources, {line}")
+    assert not (installed.folder / "v.json").exists()
+
+
 def test_results_say_nothing_of_where_it_is_installed(installed: Installation) -> None:
     places = [str(path).encode() for path in (installed.home, ROOT)]
     results = [path for path in installed.folder.rglob("*") if path.is_file()]

@@ -13,7 +13,8 @@ from feedsim.cli.options import Command
 from feedsim.errors import InputError, OutputError
 from feedsim.scenario.study import load_study
 
-SCENARIOS = Path(__file__).resolve().parents[1] / "scenarios"
+ROOT = Path(__file__).resolve().parents[1]
+SCENARIOS = ROOT / "scenarios"
 # The setpoints of EMPS are of a record that is not part of the product.
 LOADABLE = sorted({each.name for each in examples.examples() if each.kind in ("scenario", "study")} - {"emps"})
 
@@ -83,6 +84,19 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     assert capsys.readouterr().out == "all there already\n"
     (tmp_path / "there" / "xz_circle.yaml").write_text("")
     assert cli.main(["example", "xz_circle", "--to", "there"]) == 4
+
+
+def test_without_a_name_all_are_copied_to_where_the_documents_have_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where a document names a file that its command writes or that is written by hand, such as a recording."""
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["example", "--to", "scenarios"]) == 0
+    documents = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    named = {name for each in documents for name in re.findall(r"scenarios/[\w./]*\w", each.read_text("utf-8"))}
+    shipped = {name for name in named if (ROOT / name).exists()}
+    assert {"scenarios/xz_circle.yaml", "scenarios/machines/test_centre"} < shipped
+    assert not {name for name in shipped if not Path(name).exists()}
 
 
 def test_the_list_has_one_column_of_texts(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""Packages that only some commands need: a comparison does without, other commands say what to install."""
+"""Packages that only some commands need: each command is begun with what it needs, and says what installs the rest."""
 
 from __future__ import annotations
 
@@ -6,86 +6,154 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from feedsim import extras
+from feedsim.cli import COMMANDS
+from feedsim.cli.options import Command
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+EVERY = sorted({module for modules in extras.EXTRAS.values() for module in modules})
 # Runs the command line with packages missing, those that argv[1] names.
-WITHOUT = """
+BLOCK = """
 import sys
 class Missing:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in sys.argv[1].split(","):
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 sys.meta_path.insert(0, Missing())
-import feedsim.cli
-sys.exit(feedsim.cli.main(sys.argv[2:]))
 """
+WITHOUT = f"{BLOCK}import feedsim.cli, feedsim.extras\nsys.exit(feedsim.cli.main(sys.argv[2:]))\n"
+# A stretch of every command's work; {scenarios} is where those that come along are.
+EXAMPLES = {
+    "example": ["xz_circle", "--to", "copied"],
+    "run": ["{scenarios}/z_positioning.yaml", "--set=motions=[{{kind: dwell, duration: 20 ms}}]", "--set=evaluate=[]"],
+    "validate": ["{scenarios}/xz_circle.yaml"],
+    "machine build": ["{scenarios}/machines/test_centre", "--out", "built"],
+    "machine info": ["{scenarios}/machines/test_centre"],
+    "machine show": ["{scenarios}/machines/test_centre", "--out", "shown"],
+    "machine pack": ["{scenarios}/machines/test_centre", "--out", "plant.fmu"],
+    "ssp": ["{scenarios}/z_positioning.yaml", "--out", "z.ssp"],
+    "compare": ["a.csv", "a.csv", "--report", "a.html", "--junit", "a.xml", "--json", "a.json"],
+    "convert": ["a.csv", "--column", "time=time:s", "--column", "x=Z.x_a:m", "--out", "b.csv"],
+    "schema": ["scenario"],
+    "sweep": ["{scenarios}/studies/z_stop.yaml", "--dry-run"],
+}
 
 
-def without(packages: str, *command: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", WITHOUT, packages, *command], cwd=cwd, capture_output=True, text=True, check=False
+def packages(extra: str) -> Iterator[str]:
+    """Those of pyproject.toml, of the extras that an extra names as well."""
+    for text in PROJECT["optional-dependencies"][extra]:
+        if inner := re.match(r"feedsim\[([\w,]+)\]", text):
+            for name in inner[1].split(","):
+                yield from packages(name)
+        else:
+            yield re.split(r"[\[>=]", text)[0]
+
+
+def python(code: str, packages: list[str], *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", code, ",".join(packages), *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def without(packages: list[str], *command: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return python(WITHOUT, packages, *command, cwd=cwd)
+
+
+def leaves(commands: tuple[Command, ...] = COMMANDS, ahead: str = "") -> Iterator[tuple[str, Command]]:
+    for command in commands:
+        if command.commands:
+            yield from leaves(tuple(command.commands), f"{ahead}{command.name} ")
+        else:
+            yield ahead + command.name, command
+
+
+LEAVES = dict(leaves())
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "a.csv").write_text("time [s],x [m]\n0,1.0\n1,2.0\n")
+    return tmp_path
+
+
+def example(name: str) -> list[str]:
+    return [*name.split(), *(each.format(scenarios=ROOT / "scenarios") for each in EXAMPLES[name])]
+
+
+@pytest.mark.parametrize("extra", extras.EXTRAS)
+def test_every_extra_brings_its_modules(extra: str) -> None:
+    assert set(packages(extra)) == set(extras.EXTRAS[extra])
+
+
+def test_all_brings_what_commands_need() -> None:
+    needed = {module for command in LEAVES.values() for extra in command.needs for module in extras.EXTRAS[extra]}
+    assert needed | {"pyuff"} == set(packages("all"))
+
+
+@pytest.mark.parametrize("name", LEAVES)
+def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: str, folder: Path) -> None:
+    """What is said is before the command looks at its arguments, or they are the example's."""
+    needs = LEAVES[name].needs
+    arguments = {"identify": ["a.csv"], "circle": ["a.csv"], "frf": ["a"], "show": ["a"], "compensate": ["a"]}
+    record = {"replay": ["a", "--machine", "a"], "identify-drive": ["a"], "pack": ["a", "--out", "b.fmu"]}
+    given = example(name) if name in EXAMPLES else [*name.split(), *(arguments | record)[name]]
+    done = without(EVERY, *given, cwd=folder)
+    if not needs:
+        assert (done.returncode, done.stderr) == (0, "")
+        return
+    (extra,) = needs
+    *others, last = extras.EXTRAS[extra]
+    lacking = f"{', '.join(others)} and {last} are not installed"
+    said = f'feedsim: feedsim {name} needs feedsim[{extra}], of which {lacking}: pip install "feedsim[{extra}]"\n'
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
+    assert [path.name for path in folder.iterdir()] == ["a.csv"], "nothing is half-written"
+
+
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if LEAVES[name].needs])
+def test_a_command_does_with_its_extra(name: str, folder: Path) -> None:
+    brought = {module for extra in LEAVES[name].needs for module in extras.EXTRAS[extra]}
+    done = without([module for module in EVERY if module not in brought], *example(name), cwd=folder)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("module", extras.EXTRAS["run"])
+def test_a_check_does_with_nothing_less(module: str, folder: Path) -> None:
+    """Each package of `run` is asked for because a check imports it, not because the command says so."""
+    done = python(
+        WITHOUT.replace("sys.exit", "feedsim.extras.EXTRAS['run'] = ()\nsys.exit"),
+        [module],
+        *example("validate"),
+        cwd=folder,
     )
-
-
-def test_every_module_is_brought_by_its_extra() -> None:
-    brought = {"dask": "distributed"}  # by which package, where the name is another one
-    for module, extra in extras.EXTRAS.items():
-        names = [re.split(r"[\[>=]", each)[0] for each in PROJECT["optional-dependencies"][extra]]
-        assert brought.get(module, module) in names
-
-
-def test_all_brings_what_runs_studies_and_universal_files_need() -> None:
-    assert PROJECT["optional-dependencies"]["all"] == ["feedsim[run,sweep,uff]"]
-    assert {"fmpy", "scipy", "ruckig", "matplotlib", "distributed", "pyuff"} <= set(extras.packages("all"))
-
-
-def test_a_comparison_needs_none_of_them(tmp_path: Path) -> None:
-    for name, last in (("a.csv", "2.0"), ("b.csv", "2.5")):
-        (tmp_path / name).write_text(f"time [s],x [m]\n0,1.0\n1,{last}\n")
-    every = ",".join(extras.EXTRAS)
-    same = without(every, "compare", "a.csv", "a.csv", cwd=tmp_path)
-    assert (same.returncode, same.stderr) == (0, "")
-    different = without(every, "compare", "a.csv", "b.csv", "--junit", "j.xml", cwd=tmp_path)
-    assert different.returncode == 1, different.stderr
-    assert "<failure" in (tmp_path / "j.xml").read_text()
-
-
-@pytest.mark.parametrize("missing", ["ruckig", "fmpy", "scipy", "ruckig,fmpy,scipy,matplotlib,jinja2"])
-def test_a_run_says_what_installs_what_it_lacks(missing: str, tmp_path: Path) -> None:
-    done = without(missing, "run", str(ROOT / "scenarios" / "z_positioning.yaml"), cwd=tmp_path)
     assert done.returncode == 2
-    line = (
-        r"feedsim: feedsim run needs the package \w+, which is not installed: pip install fmpy scipy ruckig matplotlib"
-    )
-    assert re.match(line, done.stderr), done.stderr
-    assert "Traceback" not in done.stderr
-    assert not list(tmp_path.rglob("*.csv")), "nothing is half-written"
+    assert f"of which {module} is not installed" in done.stderr
+
+
+def test_a_shift_that_is_estimated_names_what_it_needs(folder: Path) -> None:
+    done = without(EVERY, "compare", "a.csv", "a.csv", "--shift", "estimate", "--max-shift", "1 s", cwd=folder)
+    assert (done.returncode, done.stderr) == (2, "")
+    assert re.search(r'an estimated shift in time needs .*scipy.*: pip install "feedsim\[run\]"\n', done.stdout)
+
+
+def test_what_is_drawn_is_asked_for_ahead_of_a_run(folder: Path) -> None:
+    done = without(["matplotlib"], *example("run"), "--figures", "png", cwd=folder)
+    assert done.returncode == 2
+    line = "feedsim run needs feedsim[run,figures], of which matplotlib is not installed: pip install"
+    assert done.stderr == f'feedsim: {line} "feedsim[run,figures]"\n'
+    assert not (folder / "results").exists()
 
 
 @pytest.mark.parametrize("module", ["scipy", "distributed"])
-@pytest.mark.parametrize("what", ["feedsim sweep", "feedsim.sweep"])
-def test_a_study_asks_for_all_at_once(module: str, what: str) -> None:
-    told = extras.missing(ModuleNotFoundError("x", name=module), what)
-    asked = str(told).partition("pip install ")[2].split()
-    extra = PROJECT["optional-dependencies"]["run"] + PROJECT["optional-dependencies"]["sweep"][1:]
-    assert asked == [re.split(r"[\[>=]", each)[0] for each in extra]
-    run = str(extras.missing(ModuleNotFoundError("x", name="scipy"), "feedsim run"))
-    assert "distributed" not in run
-    assert "distributed" not in str(extras.missing(ModuleNotFoundError("x", name="pyarrow"), what))
-
-
-def test_the_command_of_studies_asks_for_all_at_once(tmp_path: Path) -> None:
-    done = without("scipy,distributed", "sweep", str(ROOT / "scenarios" / "studies" / "z_stop.yaml"), cwd=tmp_path)
-    assert done.returncode == 2
-    assert re.search(
-        r"^feedsim: feedsim sweep needs the package \w+, .* pip install fmpy .* distributed$", done.stderr, re.M
-    )
+def test_a_study_asks_for_all_at_once(module: str) -> None:
+    told = extras.missing(ModuleNotFoundError("x", name=module), "feedsim.sweep")
+    assert str(told).endswith(f'of which {module} is not installed: pip install "feedsim[sweep]"')
+    run = str(extras.missing(ModuleNotFoundError("x", name="scipy"), "feedsim.frf"))
+    assert run.endswith('pip install "feedsim[run]"')
 
 
 def test_what_is_no_extra_is_an_error_of_its_own() -> None:
@@ -94,8 +162,18 @@ def test_what_is_no_extra_is_an_error_of_its_own() -> None:
 
 
 def test_the_front_door_says_it_too(tmp_path: Path) -> None:
-    code = WITHOUT.replace(
-        "import feedsim.cli\nsys.exit(feedsim.cli.main(sys.argv[2:]))", "import feedsim as fs\nfs.run"
-    )
-    done = subprocess.run([sys.executable, "-c", code, "ruckig"], capture_output=True, text=True, check=False)
-    assert "MissingPackage: feedsim.run needs the package ruckig, which is not installed: pip install" in done.stderr
+    scenario = ROOT / "scenarios" / "z_positioning.yaml"
+    code = f"{BLOCK}import feedsim as fs\nfs.run({str(scenario)!r})\n"
+    for module, what in (("fmpy", "feedsim.run"), ("ruckig", "planning a motion")):
+        done = python(code, [module], cwd=tmp_path)
+        line = f'{what} needs feedsim[run], of which {module} is not installed: pip install "feedsim[run]"\n'
+        assert done.stderr.endswith(line)
+    study = ROOT / "scenarios" / "studies" / "z_stop.yaml"
+    done = python(f"{BLOCK}import feedsim as fs\nfs.sweep({str(study)!r}, 'study')\n", ["distributed"], cwd=tmp_path)
+    assert 'of which distributed is not installed: pip install "feedsim[sweep]"' in done.stderr
+
+
+def test_the_front_door_compares_without_them(folder: Path) -> None:
+    code = f"{BLOCK}import feedsim as fs\nprint(fs.compare('a.csv', 'a.csv').verdict, fs.compare.__name__)\n"
+    done = python(code, EVERY, cwd=folder)
+    assert done.stdout == "same feedsim.compare\n", done.stderr

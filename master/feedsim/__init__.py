@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from feedsim.cosim import Run
     from feedsim.errors import FeedsimError, InputError, OutputError, SimulationError
     from feedsim.examples import copy as example
-    from feedsim.front import Overlay, Result, compare, frf, identify, load, run, show, sweep
+    from feedsim.front.calls import frf, identify, load, run, sweep
+    from feedsim.front.comparison import compare
+    from feedsim.front.overlay import Overlay, show
+    from feedsim.front.result import Result
     from feedsim.scenario import Machine, Scenario, load_machine
     from feedsim.scenario.load import load as load_scenario
     from feedsim.trace import Trace
@@ -35,24 +38,24 @@ _HOMES = {
     "InputError": "errors",
     "Machine": "scenario",
     "OutputError": "errors",
-    "Overlay": "front",
-    "Result": "front",
+    "Overlay": "front.overlay",
+    "Result": "front.result",
     "Run": "cosim",
     "Scenario": "scenario",
     "SimulationError": "errors",
     "Trace": "trace",
-    "compare": "front",
+    "compare": "front.comparison",
     "evaluate": "analysis",
     "example": "examples:copy",
-    "frf": "front",
-    "identify": "front",
-    "load": "front",
+    "frf": "front.calls",
+    "identify": "front.calls",
+    "load": "front.calls",
     "load_machine": "scenario",
     "load_scenario": "scenario:load",
     "read_trace": "trace:read_csv",
-    "run": "front",
-    "show": "front",
-    "sweep": "front",
+    "run": "front.calls",
+    "show": "front.overlay",
+    "sweep": "front.calls",
 }
 
 __all__ = [

@@ -1,7 +1,7 @@
 """Rooms that share their name with what a person calls: ``feedsim.compare(...)`` beside ``feedsim.compare.Options``.
 
 Once such a room is loaded, Python binds its name in the package, and what the front door has under that name cannot be
-reached any more; so the room itself is called, and passes the call on. May use: extras.
+reached any more; so the room itself is called, and passes the call on. May use: errors.
 Start reading at called().
 """
 
@@ -15,7 +15,6 @@ from types import ModuleType
 from typing import Any
 
 from feedsim.errors import InputError
-from feedsim.extras import missing
 
 
 class _CalledRoom(ModuleType):
@@ -32,10 +31,8 @@ class _CalledRoom(ModuleType):
 
     @property
     def _call(self) -> Callable[..., Any]:
-        try:
-            found: Callable[..., Any] = getattr(import_module("feedsim.front"), self.__name__.rpartition(".")[2])
-        except ModuleNotFoundError as error:
-            raise missing(error, self.__name__) or error from None
+        package, _, name = self.__name__.rpartition(".")
+        found: Callable[..., Any] = import_module(package).__getattr__(name)
         return found
 
     @property

@@ -1,60 +1,55 @@
 """Packages that only some of the work needs: what is said where one is missing.
 
-A command imports them where it uses them. Whoever meets the person (the command line, the front door) asks
-:func:`missing` what to say of an import that failed. May use: errors.
+A command says which extra it needs (:class:`feedsim.cli.options.Command`), and is not begun without; work that finds
+out later, such as drawing, calls :func:`ask` ahead of its imports. Whoever meets the person asks :func:`missing` what
+to say of an import that failed all the same. May use: errors.
 """
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterable
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, requires
+from importlib.util import find_spec
 from typing import Any
 
 from feedsim.errors import InputError
 
-# Module -> the extra of pyproject.toml that brings it.
+# Extra of pyproject.toml -> the modules that it brings, smaller extras first.
+_RUN = ("fmpy", "scipy", "ruckig")
 EXTRAS = {
-    "fmpy": "run", "scipy": "run", "ruckig": "run", "matplotlib": "run", "jinja2": "run", "tqdm": "run",
-    "distributed": "sweep", "dask": "sweep", "pyuff": "uff", "pyarrow": "parquet", "pandas": "pandas",
+    "run": _RUN, "figures": (*_RUN, "matplotlib"), "sweep": (*_RUN, "distributed"), "uff": (*_RUN, "pyuff"),
+    "parquet": ("pyarrow",), "pandas": ("pandas",),
 }  # fmt: skip
-# Work -> the extra that it takes whole: nobody is to install those of `run` and be told of the next one then.
-WHOLE = {"feedsim sweep": "sweep", "feedsim.sweep": "sweep"}
 
 
 class MissingPackage(InputError):
-    """A package that this work needs is not installed; the message has the line that installs it."""
+    """Packages that this work needs are not installed; the message has the line that installs them."""
+
+
+def ask(what: str, *extras: str) -> None:
+    """Raise MissingPackage where packages of the extras are missing that `what` (such as "feedsim run") needs.
+
+    >>> ask("a comparison")
+    """
+    lacking = [module for extra in extras for module in EXTRAS[extra] if not _is_there(module)]
+    if lacking:
+        raise _told(what, lacking, extras)
 
 
 def missing(error: ImportError, what: str = "this") -> MissingPackage | None:
-    """What to say where `what` (such as "feedsim run") needs a package that is missing; None: it is not that."""
-    module = (error.name or "").partition(".")[0]
-    if not isinstance(error, ModuleNotFoundError) or module not in EXTRAS:
-        return None
-    extra = EXTRAS[module]
-    extra = WHOLE.get(what, extra) if extra == "run" else extra
-    names = " ".join(dict.fromkeys(packages(extra))) or module
-    return MissingPackage(f"{what} needs the package {module}, which is not installed: pip install {names}")
+    """What to say of an import that failed; None: it was of no package of an extra.
 
-
-def packages(extra: str) -> list[str]:
-    """Names of the packages of an extra, those of the extras that it names included.
-
-    >>> packages("uff")[-1]
-    'pyuff'
+    All is asked for that the work's extra lacks: the one of its name ("feedsim.sweep"), else the smallest that has the
+    package.
     """
-    try:
-        asked = requires("feedsim") or []
-    except PackageNotFoundError:  # run from its sources, not installed
-        return []
-    own = [each.partition(";")[0] for each in asked if re.search(rf"extra == ['\"]{extra}['\"]", each)]
-    found: list[str] = []
-    for text in own:
-        if inner := re.match(r"feedsim\[([\w,]+)\]", text):
-            found += [name for part in inner[1].split(",") for name in packages(part)]
-        elif name := re.match(r"[\w.-]+", text):
-            found.append(name[0])
-    return found
+    module = (error.name or "").partition(".")[0]
+    work = what.rpartition(".")[2]
+    if isinstance(error, ModuleNotFoundError):
+        for extra in (work, *EXTRAS):
+            if module in EXTRAS.get(extra, ()):
+                lacking = (each for each in EXTRAS[extra] if each == module or not _is_there(each))
+                return _told(what, lacking, [extra])
+    return None
 
 
 def need(module: str, what: str) -> Any:
@@ -67,3 +62,17 @@ def need(module: str, what: str) -> Any:
         return import_module(module)
     except ImportError as error:
         raise missing(error, what) or error from None
+
+
+def _is_there(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def _told(what: str, lacking: Iterable[str], extras: Iterable[str]) -> MissingPackage:
+    *others, last = dict.fromkeys(lacking)
+    names, verb = (f"{', '.join(others)} and {last}", "are") if others else (last, "is")
+    asked = f"feedsim[{','.join(dict.fromkeys(extras))}]"
+    return MissingPackage(f'{what} needs {asked}, of which {names} {verb} not installed: pip install "{asked}"')

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from feedsim import cosim, nc, scenario
-from feedsim.cosim import Run
+from feedsim.cosim import Run, unpacked
 from feedsim.cosim.operations import Interpreter, do_step
 from feedsim.cosim.system import System
 from feedsim.cosim.unpacked import STORE
@@ -124,8 +124,11 @@ def test_failed_step_names_unit_time_and_reason(short: Path, fmus: Path) -> None
         run(short, fmus, *huge, "machine.axes.Z.drive.ideal_current_loop=true")
 
 
-def test_missing_archives_say_how_to_get_them(tmp_path: Path, short: Path) -> None:
-    with pytest.raises(InputError, match=r"plant\.fmu: no such file; `make fmus`"):
+def test_missing_archives_say_how_to_get_them(tmp_path: Path, short: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match=r"plant\.fmu: no such file; FEEDSIM_FMUS or --fmus names their folder"):
+        run(short, tmp_path)
+    monkeypatch.setattr(unpacked, "shipped", lambda name: tmp_path)
+    with pytest.raises(InputError, match=r"plant\.fmu: no such file; `make fmus` builds the archives"):
         run(short, tmp_path)
 
 

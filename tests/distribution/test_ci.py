@@ -157,10 +157,47 @@ def wheel(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         return folder / backend.build_wheel(str(folder), {"platform": "any", "archives": str(fmus)})
 
 
-def test_a_wheel_that_is_named_is_installed(wheel: Path, job: Path) -> None:
-    done = script(job, FEEDSIM=str(wheel), PYTHON=sys.executable, **BORROWED)
-    assert done.returncode == 0, done.stderr
-    assert told(job) == (0, 0)
+@pytest.mark.parametrize("way", WAYS[1:])
+def test_a_wheel_that_is_named_is_installed(way: Any, wheel: Path, job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no feedsim is on the search path."""
+    for name, value in (BORROWED | {"PYTHON": sys.executable}).items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys, "executable", str(job / "nowhere" / "python"))
+    different(job)
+    done = way(job, RESULTS="results", REFERENCES="references", FEEDSIM=str(wheel), OPTIONS="--quiet")
+    assert done.returncode == 1, done.stderr
+    assert told(job) == (1, 0)
+
+
+def test_the_job_of_the_documents(wheel: Path, job: Path, fmus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its steps in their order: what a runner's own actions bring is there, what is run is run by bash."""
+    text = (ROOT / "docs" / "comparing.md").read_text("utf-8")
+    (block,) = (each for each in re.findall(r"^```yaml\n(.*?)^```", text, re.M | re.S) if "runs-on:" in each)
+    work = yaml.safe_load(block)["jobs"]["compare"]["steps"]
+    shutil.copytree(CI, job / "ci")
+    shutil.copytree(fmus, job / "fmus")
+    for folder in ("references", "results"):
+        shutil.rmtree(job / folder)
+    used = []
+    for step in work:
+        if "run" in step:
+            if step["run"] == "pip install fmpy":
+                continue
+            assert steps(step["run"], job, {}, ("bash", "-e", "-c")).returncode == 0
+        used.append(step.get("uses", "run"))
+        if used[-1] == "./ci":
+            given = {name.upper(): value for name, value in step["with"].items() if name != "feedsim"}
+            assert github(job, **given).returncode == 0
+            assert told(job) == (0, 0)
+            changed = next((job / "results" / "friction").rglob("stick_ref.csv"))
+            rows = changed.read_text().splitlines()
+            at = len(rows) // 2
+            time, first, *others = rows[at].split(",")
+            rows[at] = ",".join([time, str(float(first) + 1.0), *others])
+            changed.write_text("\n".join(rows))
+            assert github(job, **given).returncode == 1
+            assert told(job) == (1, 0)
+    assert used == ["actions/checkout@v4", "actions/setup-python@v5", "run", "./ci", "actions/upload-artifact@v4"]
 
 
 def test_a_container_runs_feedsim(wheel: Path, job: Path) -> None:

@@ -159,6 +159,40 @@ def test_without_the_native_loop_a_run_says_so_and_gives_the_same(
     assert results[0] == results[1]
 
 
+def test_programs_around_it_are_checked_by_its_types(installed: Installation, tmp_path: Path) -> None:
+    """By mypy, which looks into the environment as it does into a user's, and knows no checkout."""
+    code = tmp_path / "use.py"
+    code.write_text(
+        "import feedsim as fs\n"
+        'result = fs.run("xz_circle.yaml", set={"motions.0.radius": "20 mm"})\n'
+        "reveal_type(result)\nreveal_type(fs.compare(result, result).same)\nreveal_type(fs.load('a.yaml'))\n"
+        "fs.run(3)\n"
+    )
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file=", "--python-executable", str(installed.python)]
+    environment = {name: value for name, value in installed.environment.items() if name != "MYPYPATH"}
+    done = subprocess.run(
+        [*command, str(code)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    revealed = [line.partition('"')[2].rstrip('"') for line in done.stdout.splitlines() if "Revealed type" in line]
+    expected = ["feedsim.front.result.Result", "bool", "feedsim.scenario.model.Scenario"]
+    assert [each.removeprefix("builtins.") for each in revealed] == expected, done.stdout + done.stderr
+    errors = [line for line in done.stdout.splitlines() if ": error: " in line]
+    assert len(errors) == 1
+    assert 'has incompatible type "int"' in errors[0]
+
+
+@pytest.mark.parametrize("command", [["build", "plant"], ["exchange", "--out", "."], ["variables", "--out", "v.json"]])
+def test_what_needs_c_sources_says_so(command: list[str], installed: Installation) -> None:
+    done = subprocess.run(
+        [str(installed.python), "-m", "feedsim_packager", *command],
+        cwd=installed.folder, env=installed.environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    line = "which an installed feedsim does not have; a checkout or the source archive has them"
+    assert done.stderr.startswith(f"error: {command[0]} is of C sources, {line}")
+    assert not (installed.folder / "v.json").exists()
+
+
 def test_results_say_nothing_of_where_it_is_installed(installed: Installation) -> None:
     places = [str(path).encode() for path in (installed.home, ROOT)]
     results = [path for path in installed.folder.rglob("*") if path.is_file()]

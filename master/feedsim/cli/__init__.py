@@ -102,12 +102,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     from feedsim.errors import FeedsimError
-    from feedsim.extras import missing
+    from feedsim.extras import ask, missing
 
     # Where no home folder can be written to, matplotlib tells at length that its cache is a temporary one.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     _end_cleanly_on_signals()
     try:
+        drawn = ["figures"] if getattr(options, "figures", ()) else []
+        ask(options.called, *options.needs, *drawn)
         code = options.action(options)
         if sys.stdout is not None:  # closed by a reader that has gone
             sys.stdout.flush()
@@ -115,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"feedsim: {error}", file=sys.stderr)
         return error.exit_code
     except ModuleNotFoundError as error:
-        if (told := missing(error, f"feedsim {options.command}")) is None:
+        if (told := missing(error, options.called)) is None:
             raise
         print(f"feedsim: {told}", file=sys.stderr)
         return told.exit_code

@@ -365,4 +365,5 @@ COMMAND = Command(
     ),
     DESCRIPTION,
     EPILOG,
+    needs=(),
 )  # fmt: skip

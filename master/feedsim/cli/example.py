@@ -12,12 +12,12 @@ def example(options: Namespace) -> None:
     """feedsim example."""
     from feedsim import examples
 
-    if options.names:
-        written = examples.copy(options.names, options.to)
+    there = examples.examples()
+    if options.names or options.to:
+        written = examples.copy(options.names or [each.name for each in there], options.to or Path())
         print("\n".join(map(str, written)) or "all there already")
         return
     kind = ""
-    there = examples.examples()
     width = max(len(each.name) for each in there)
     for each in there:
         if each.kind != kind:
@@ -25,6 +25,7 @@ def example(options: Namespace) -> None:
             print(f"{kind}:")
         print(f"  {each.name:{width}}  {each.about}")
     print("\nfeedsim example NAME copies one into the working folder, with the files that it names")
+    print("feedsim example --to scenarios copies all, to where the commands of the documentation have them")
 
 
 COMMAND = Command(
@@ -33,10 +34,11 @@ COMMAND = Command(
     example,
     (
         Option("names", "NAME", "what to copy, with the files that it names; without a name all are listed", nargs="*"),
-        Option("--to", "DIR", "folder to copy into (default: the working folder)", type=folder, default=Path()),
+        Option("--to", "DIR", "folder to copy into (default: the working folder); all, without a name", type=folder),
     ),
     description="List the scenarios, studies, machines and structures that come along, or copy some into a folder of "
     "yours to begin with. The machines are synthetic, but for emps and sinumerik_840d, which were measured. Nothing is "
     "overwritten.",
     epilog="example:\n  feedsim example xz_circle && feedsim run xz_circle.yaml",
+    needs=(),
 )

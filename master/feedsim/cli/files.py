@@ -40,6 +40,7 @@ SCHEMA = Command(
     "print the JSON Schema of scenario, machine, structure, mapping, tolerance or study files, for editors",
     schema,
     [Option("kind", "", "", nargs="?", choices=KINDS, default="scenario")],
+    needs=(),
 )
 CONVERT = Command(
     "convert",
@@ -52,6 +53,7 @@ CONVERT = Command(
         ),
         Option("--out", "FILE.csv", "", type=Path, required=True),
     ),
+    needs=(),
     description="Turn a recording into a CSV trace with units in its header: all signals of a control's capture, or "
     "variables of a MAT file, e.g. the recorded position reference of an axis: "
     "feedsim convert record.mat --column t=time:s --column qg=Z.x_s:m --out reference.csv",

@@ -56,6 +56,7 @@ class Command:
     """A command of the command line, or a group of commands.
 
     action: takes the parsed options, returns an exit code or None for 0. epilog: of a description whose lines are kept.
+    needs: the extras without which it is not begun.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Command:
     description: str | None = None
     epilog: str | None = None
     commands: Sequence[Command] = ()
+    needs: Sequence[str] = ("run",)
 
     def add_to(self, commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         """Add it to a command line."""
@@ -79,7 +81,7 @@ class Command:
             for command in self.commands:
                 command.add_to(own)
         else:
-            parser.set_defaults(action=self.action)
+            parser.set_defaults(action=self.action, needs=self.needs, called=parser.prog)
 
 
 def folder(text: str) -> Path:

@@ -189,4 +189,5 @@ COMMAND = Command(
     ),
     DESCRIPTION,
     EPILOG,
+    needs=("sweep",),
 )  # fmt: skip

@@ -13,6 +13,7 @@ from feedsim.compare.options import LISTED, Options, chosen, factor, sources, wi
 from feedsim.compare.tolerance import Tolerances
 from feedsim.compare.tube import Rows, usual_step
 from feedsim.errors import InputError, few
+from feedsim.extras import need
 from feedsim.trace import Array, Series
 
 # Positions tried over the whole range before the best is refined, at most.
@@ -96,9 +97,8 @@ def estimated_shift(
     best = _best(misfit, tried)
     if best is None or best in (0, len(tried) - 1):
         raise InputError(f"the shift in time cannot be found within +-{most:.6g} s; allow a larger one")
-    from scipy.optimize import minimize_scalar  # a comparison without an estimate does without scipy
-
-    refined = minimize_scalar(
+    # A comparison without an estimate does without scipy.
+    refined = need("scipy.optimize", "an estimated shift in time").minimize_scalar(
         misfit.of, bounds=(tried[best - 1], tried[best + 1]), method="bounded", options={"xatol": 1e-6 * step}
     )
     # No more digits than it was found with.

@@ -19,7 +19,7 @@ from typing import IO, Any
 
 from feedsim.cosim import untrusted
 from feedsim.errors import InputError
-from feedsim.installation import mend
+from feedsim.installation import mend, shipped
 from feedsim.owned import TemporaryFolder
 
 KEPT = 8  # contents that no archive uses: the three units', and those of some machines or SSP files
@@ -193,4 +193,7 @@ if hasattr(os, "register_at_fork"):  # Windows has none, and no fork either
 def check_there(path: Path) -> None:
     """InputError where there is no file `path`."""
     if not path.is_file():
-        raise InputError(f"{path}: no such file; {mend('the archives')}, FEEDSIM_FMUS names their folder")
+        ours = path.parent == shipped("fmus")
+        raise InputError(
+            f"{path}: no such file; {mend('the archives') if ours else 'FEEDSIM_FMUS or --fmus names their folder'}"
+        )

@@ -10,12 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from feedsim import cosim
 from feedsim.analysis import linear, responses
-from feedsim.compare.compare import compare as compared
-from feedsim.compare.files import compare_files, tolerances_of
-from feedsim.compare.options import Options
-from feedsim.compare.tolerance import Tolerances
-from feedsim.compare.verdict import Comparison
-from feedsim.cosim import Progress, Run
+from feedsim.cosim import Progress
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.cosim.plant import plant_modes
 from feedsim.errors import InputError
@@ -27,7 +22,6 @@ from feedsim.scenario import load as load_scenario
 from feedsim.scenario.study import load_study
 from feedsim.sweep.study import run as run_study
 from feedsim.sweep.table import Table
-from feedsim.trace import Trace, read_csv
 from feedsim.trace.response import FrequencyResponse
 
 if TYPE_CHECKING:
@@ -74,33 +68,6 @@ def run(scenario: File | Scenario, *, set: Changes = None, progress: Progress | 
 
 def _run(scenario: Scenario, progress: Progress | None, options: Mapping[str, Any]) -> Result:
     return Result.of(cosim.run(scenario, progress=progress, **options))
-
-
-def compare(
-    result: File | Trace | Run,
-    reference: File | Trace | Run,
-    tol: str | Sequence[str] | Tolerances = (),
-    options: Options | None = None,
-) -> Comparison:
-    """A result against a reference, within tolerances such as ``["1e-6", "*.x_a=2 nm"]``; files, traces or runs.
-
-    >>> import feedsim as fs
-    >>> result = fs.run("z_positioning.yaml")
-    >>> fs.compare(result, result).verdict
-    'same'
-    """
-    texts = [tol] if isinstance(tol, str) else tol
-    allowed = texts if isinstance(texts, Tolerances) else Tolerances.parse(texts)
-    if isinstance(result, str | Path) and isinstance(reference, str | Path):
-        beside = allowed if isinstance(texts, Tolerances) else tolerances_of(Path(reference), None, texts)
-        return compare_files(Path(result), Path(reference), beside, options)
-    return compared(_trace(result), _trace(reference), allowed, options)
-
-
-def _trace(given: File | Trace | Run) -> Trace:
-    if isinstance(given, Run):
-        return given.trace
-    return given if isinstance(given, Trace) else read_csv(Path(given))
 
 
 def identify(

@@ -8,19 +8,23 @@ move of 1 nm is then as accurate as one of 1 km. Units outside: m, s.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from feedsim.errors import InputError
+from feedsim.extras import need
 from feedsim.motions.kind import Array
 
+if TYPE_CHECKING:  # files are read, and schemas printed, without it
+    from ruckig import Trajectory
+
 _REASON = {
-    Result.Error: "an unclassified error",
-    Result.ErrorInvalidInput: "invalid limits",
-    Result.ErrorPositionalLimits: "positional limits cannot be kept",
-    Result.ErrorExecutionTimeCalculation: "no time-optimal profile was found",
-    Result.ErrorSynchronizationCalculation: "no synchronised profile was found",
+    "Error": "an unclassified error",
+    "ErrorInvalidInput": "invalid limits",
+    "ErrorPositionalLimits": "positional limits cannot be kept",
+    "ErrorExecutionTimeCalculation": "no time-optimal profile was found",
+    "ErrorSynchronizationCalculation": "no synchronised profile was found",
 }
 
 # What is smaller than this share of its peak value is rounding of the profile calculation.
@@ -125,21 +129,15 @@ def rest_to_rest(length: float, speed: float, acceleration: float, jerk: float) 
         return Profile(np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(1))
 
     unit_time = float(np.cbrt(length / jerk))
-    task = InputParameter(1)
-    task.current_position = [0.0]
-    task.target_position = [1.0]
-    task.max_velocity = [speed * unit_time / length]
-    task.max_acceleration = [acceleration * unit_time**2 / length]
-    task.max_jerk = [1.0]
-    trajectory = Trajectory(1)
-    where = f"path profile over {length:g} m with {speed:g} m/s, {acceleration:g} m/s2, {jerk:g} m/s3"
-    try:
-        result = Ruckig(1).calculate(task, trajectory)
-    except RuckigError as error:
-        raise InputError(f"{where}: ruckig refuses it: {str(error).strip().splitlines()[0]}") from error
-    if result not in (Result.Working, Result.Finished):
-        raise InputError(f"{where}: {_REASON.get(result, f'ruckig result {result}')}")
-
+    trajectory = _calculated(
+        f"path profile over {length:g} m with {speed:g} m/s, {acceleration:g} m/s2, {jerk:g} m/s3",
+        "Position",
+        current_position=0.0,
+        target_position=1.0,
+        max_velocity=speed * unit_time / length,
+        max_acceleration=acceleration * unit_time**2 / length,
+        max_jerk=1.0,
+    )
     phases = trajectory.profiles[0][0] if isinstance(trajectory.profiles[0], list) else trajectory.profiles[0]
     position = np.array(phases.p) * length
     position[-1] = length  # its last digit is ruckig's rounding
@@ -180,13 +178,32 @@ def speed_change(speed: float, acceleration: float, jerk: float) -> SpeedChange:
     """
     if speed == 0:
         return SpeedChange(0.0, 0.0, 0.0, None)
-    task = InputParameter(1)
-    task.control_interface = ControlInterface.Velocity
-    task.target_velocity = [speed]
-    task.max_acceleration, task.max_jerk = [acceleration], [jerk]
-    trajectory = Trajectory(1)
-    result = Ruckig(1).calculate(task, trajectory)
-    if result not in (Result.Working, Result.Finished):
-        raise InputError(f"no way from rest to {speed:g} m/s with {acceleration:g} m/s2 and {jerk:g} m/s3: {result}")
+    trajectory = _calculated(
+        f"from rest to {speed:g} m/s with {acceleration:g} m/s2, {jerk:g} m/s3",
+        "Velocity",
+        target_velocity=speed,
+        max_acceleration=acceleration,
+        max_jerk=jerk,
+    )
     (distance,), _, _ = trajectory.at_time(trajectory.duration)
     return SpeedChange(speed, float(trajectory.duration), float(distance), trajectory)
+
+
+def _calculated(where: str, controlled: str, **task: float) -> Trajectory:
+    """ruckig's way in one degree of freedom to a position or a velocity; `task`: its input by ruckig's names.
+
+    Raises InputError, with `where` ahead, where ruckig finds none.
+    """
+    ruckig = need("ruckig", "planning a motion")
+    asked = ruckig.InputParameter(1)
+    asked.control_interface = getattr(ruckig.ControlInterface, controlled)
+    for name, value in task.items():
+        setattr(asked, name, [value])
+    trajectory: Trajectory = ruckig.Trajectory(1)
+    try:
+        result = ruckig.Ruckig(1).calculate(asked, trajectory)
+    except ruckig.RuckigError as error:
+        raise InputError(f"{where}: ruckig refuses it: {str(error).strip().splitlines()[0]}") from error
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise InputError(f"{where}: {_REASON.get(result.name, f'ruckig result {result}')}")
+    return trajectory

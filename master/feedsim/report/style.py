@@ -21,6 +21,8 @@ from warnings import catch_warnings, filterwarnings
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.extras import ask
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
     from matplotlib.text import Text
@@ -78,7 +80,8 @@ class Drawn:
 
 @contextmanager
 def drawing(width: float, height: float) -> Iterator[Drawing]:
-    """An empty figure of ``width`` x ``height`` inches in the house style."""
+    """An empty figure of ``width`` x ``height`` inches in the house style. Raises MissingPackage."""
+    ask("a drawing", "figures")
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Drawing

@@ -73,8 +73,8 @@ def local(workers: int) -> Iterator[Any]:
                 )
             except Exception as error:
                 raise InputError(
-                    f"{workers} worker processes cannot be started: {_cause(error)}; a script that runs a study needs "
-                    "its statements under:  if __name__ == '__main__':"
+                    f"{workers} worker processes cannot be started: {_cause(error)}; 0 workers make the runs in this "
+                    "process; a script that runs a study needs its statements under:  if __name__ == '__main__':"
                 ) from None
             stack.callback(_end, cluster)
             client = connected(cluster, set_as_default=False)

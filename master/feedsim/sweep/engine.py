@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from feedsim.errors import InputError, SimulationError
+from feedsim.extras import ask
 from feedsim.sweep import cluster, provenance
 from feedsim.sweep.batches import AIM, LONGEST, Batch, Batches
 from feedsim.sweep.bundle import Bundle, Workplace
@@ -80,6 +81,7 @@ def open_engine(
         finally:
             here.leave()
         return
+    ask("a study on several processes", "sweep")
     if scheduler is None:
         count = workers or _cores()
         opened, where = cluster.local(count), f"{count} local process{'es'[: 2 * (count != 1)]}"

@@ -208,13 +208,9 @@ def read_table(path: str | Path) -> Table:
 
 
 def parquet() -> Any:
-    """pyarrow. InputError where it is not installed."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise InputError('Parquet needs pyarrow: pip install "feedsim[parquet]"; or choose --format csv') from None
-    return pyarrow
+    """pyarrow. Raises MissingPackage."""
+    need("pyarrow.parquet", "Parquet (--format csv does without)")
+    return need("pyarrow", "Parquet")
 
 
 def _rows(table: Table) -> Iterator[list[str]]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from feedsim import units
 from feedsim.errors import InputError
+from feedsim.extras import need
 from feedsim.trace.response import FrequencyResponse, quotient_unit
 
 Floats = NDArray[np.float64]
@@ -81,8 +82,7 @@ def read_response_uff(path: str | Path) -> FrequencyResponse:
 
 def _sets(path: Path) -> list[Mapping[str, Any]]:
     """Functions of the file; other datasets are left alone."""
-    import pyuff
-
+    pyuff = need("pyuff", "a universal file")
     if not path.is_file():
         raise InputError(f"no such file: {path}")
     try:

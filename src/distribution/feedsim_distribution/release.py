@@ -35,7 +35,7 @@ Their start values are those of a synthetic machine, which runs, but describes n
 
 Through FMPy, with the wheel of this release, which compares; put your own importer in the place of `ci/simulate.py`:
 
-    pip install fmpy feedsim-{version}-*.whl
+    pip install fmpy feedsim-{version}-py3-none-any.whl
     python ci/simulate.py friction.fmu checked/references/friction checked/results/friction
     sh ci/compare.sh checked/results checked/references
 

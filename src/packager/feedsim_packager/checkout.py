@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from .errors import InputError
+
 PROJECT = Path(__file__).resolve().parents[3]
 SOURCES = PROJECT / "src"
 SHELL = SOURCES / "fmi2"
@@ -9,6 +11,15 @@ STANDARD = SHELL / "standard"  # the headers of FMI 2.0
 LOOP = SOURCES / "exchange"  # the native cycle loop
 REFERENCES = PROJECT / "tests" / "reference"
 DEFAULT_MODES = PROJECT / "scenarios" / "machines" / "test_centre" / "modes.csv"
+
+
+def check_there(command: str) -> None:
+    """Raise InputError where there are no sources, as in an installed package."""
+    if not SHELL.is_dir():
+        raise InputError(
+            f"{command} is of C sources, which an installed feedsim does not have; a checkout or the source archive has"
+            " them. repack puts other machines and motions into an archive without"
+        )
 
 
 def unit_folders() -> list[Path]:

@@ -28,7 +28,7 @@ _UNIT_HELP = "plant, controller, friction, setpoint, machine, or a unit's folder
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="packager",
+        prog="feedsim_packager",
         description="Packs a unit of src/ into an FMI 2.0 co-simulation archive.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -80,6 +80,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit code."""
     options = _parser().parse_args(arguments)
     try:
+        if options.command != "repack":
+            checkout.check_there(options.command)
         {"describe": _describe, "build": _build, "variables": _variables, "exchange": _exchange, "repack": _repack}[
             options.command
         ](options)

@@ -104,4 +104,5 @@ SHOW = Command(
     ),
     "Draw the structure of a machine and its first modes, or chosen ones: PNG and SVG in DIR/figures, with "
     "report.html around them. MACHINE may be a scenario too.",
+    needs=("figures",),
 )  # fmt: skip

@@ -92,7 +92,8 @@ class Result(Run):
 
     def _repr_html_(self) -> str:
         rows = "".join(
-            f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(' '.join(shown(figure)))}</td>"
+            f"<tr><th style='text-align:left'>{escape(name)}</th>"
+            f"<td style='white-space:nowrap'>{escape(' '.join(shown(figure)))}</td>"
             f"<td style='text-align:left'>{escape(typeset(figure.meaning))}</td></tr>"
             for name, figure in self._leading().items()
         )

@@ -38,7 +38,7 @@ def shown(figure: Figure) -> tuple[str, str]:
     digits = {"um": 2, "um/m": 2, "ms": 1, "Hz": 2, "N.m": 3, "s": 4}.get(figure.unit)
     if figure.unit == "ms" and abs(figure.value) < SHORT:
         digits = 3
-    text = f"{figure.value:.{digits}f}" if digits is not None else f"{figure.value:.5g}"
+    text = f"{figure.value:.{digits}f}" if digits is not None else powers(f"{figure.value:.5g}")
     return minus(text), display_unit(figure.unit)
 
 

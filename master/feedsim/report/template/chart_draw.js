@@ -159,7 +159,7 @@ function whole_span(panel, values) {
 
 // The title of a panel, as small as its room makes it.
 function headed(text, x, room, parent) {
-  const size = Math.min(12, 12 * room / (7.2 * text.length || 1));
+  const size = Math.min(12, 12 * room / (7.6 * text.length || 1));
   make("text", { x, y: 15, "font-weight": 600, "font-size": size.toFixed(1), fill: colour("ink") }, parent, text);
 }
 
@@ -421,8 +421,8 @@ function columns_of(widths, width) {
   return half > 1 && Number.isInteger(half) && alike ? columns_of(widths.slice(half), width) : [1];
 }
 
-// Where every panel goes: boxes, and the height of all.
-function placed(chart, width) {
+// Where every panel goes: boxes, and the height of all. tall: of the panels, against their usual height.
+function placed(chart, width, tall = 1) {
   const columns = columns_of(chart.widths, width), total = columns.reduce((a, b) => a + b, 0), boxes = [];
   const aside = chart.panels.some(panel => panel.y && panel.y.also) ? EDGE.left : EDGE.right; // panels below one another end alike
   let y = 4;
@@ -431,7 +431,7 @@ function placed(chart, width) {
     const widths = columns.map(each => (width - GAP * (columns.length - 1)) * each / total);
     const natural = row.map((panel, j) => panel.kind === "polar" ? Math.min(widths[j], ROUND) + 24
       : panel.kind === "grid" ? grid_top(panel) + 24 * panel.rows.length + 12
-      : panel.y.names.length ? EDGE.top + EDGE.bottom + 26 * panel.y.names.length : HEIGHT * panel.height + EDGE.bottom + top_of(panel) - EDGE.top);
+      : panel.y.names.length ? EDGE.top + EDGE.bottom + 26 * panel.y.names.length : HEIGHT * tall * panel.height + EDGE.bottom + top_of(panel) - EDGE.top);
     const height = Math.max(...natural);
     let x = 0;
     row.forEach((panel, j) => {

@@ -94,9 +94,9 @@ class Live {
     else make("line", { ...styled(curve), x1: x, x2: x + 20, y1: y, y2: y, "stroke-width": Math.max(1.6, curve.width) }, parent);
   }
 
-  draw(width = this.width || this.room.clientWidth || 960) {
+  draw(width = this.width || this.room.clientWidth || 960, tall = 1) {
     this.width = width = Math.max(width, 200);
-    const { boxes, height } = placed(this.chart, width), title = this.figure.dataset.title;
+    const { boxes, height } = placed(this.chart, width, tall), title = this.figure.dataset.title;
     const svg = make("svg", { class: "chart", viewBox: `0 0 ${width} ${Math.ceil(height)}`, role: "group", "aria-roledescription": "chart", tabindex: "0",
       "aria-label": `${title}. ${[...this.names.keys()].join(", ")}. ${KEYS}`, "font-family": FONT, "font-size": 12 });
     this.drawn = this.chart.panels.map((panel, k) => {
@@ -361,9 +361,14 @@ addEventListener("resize", () => {
   cancelAnimationFrame(frame);
   frame = requestAnimationFrame(() => { for (const live of lives) if (live.room.clientWidth !== live.width) live.draw(live.room.clientWidth || live.width); });
 });
-// On paper panels stand side by side, however narrow the sheet is: it is read from nearer than a screen.
+// On paper panels stand side by side, however narrow the sheet is: it is read from nearer than a screen. They are lower
+// where the chart would else leave the rest of a sheet empty.
+const SHEET = 0.9; // height of a chart against its width
 addEventListener("beforeprint", () => {
   while (waiting.length) begin(waiting.shift());
-  for (const live of lives) live.draw(Math.max(720, COLUMN * live.chart.widths.length));
+  for (const live of lives) {
+    const width = Math.max(720, COLUMN * live.chart.widths.length);
+    live.draw(width, [1, 0.85, 0.7].find(tall => placed(live.chart, width, tall).height < SHEET * width) || 0.6);
+  }
 });
 addEventListener("afterprint", () => { for (const live of lives) live.draw(live.room.clientWidth); });

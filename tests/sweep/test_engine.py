@@ -133,12 +133,13 @@ def test_exhausted_memory(crowd: tuple[Engine, Path], notes: Path) -> None:
 
 def test_an_interrupt_delivers_what_is_there(crowd: tuple[Engine, Path]) -> None:
     outcomes: list[Outcome] = []
-    timer = threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
+    timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):  # noqa: PT012
         for outcome in crowd[0].map(chore(i, data=0.02) for i in range(10_000)):
             outcomes.append(outcome)
-    assert 10 < len(squares(outcomes)) < 200
+            if len(outcomes) == 11:  # while further ones are waited for, however slow the machine is
+                timer.start()
+    assert 10 < len(squares(outcomes)) < 10_000
     # and the engine goes on working
     assert squares(list(crowd[0].map(chore(i) for i in range(5)))) == expected(5)
 

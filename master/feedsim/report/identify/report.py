@@ -246,7 +246,7 @@ def _stretches(found: Identification) -> Section | None:
         parts = [
             f"{name} ±{100 * NORMAL_95 * sigma / abs(stage.estimates[name].value):.2g} %"
             for name, sigma in stage.without_delay.items()
-            if name in stage.estimates and stage.estimates[name].value
+            if name in stage.estimates and NORMAL_95 * sigma < abs(stage.estimates[name].value)  # else no share of it
         ]
         known = f"Were the delay known, the intervals would be {', '.join(parts)}."
     return Section("Stretches of stage 2", [Table("llrrrr", heads, rows, known)])

@@ -136,7 +136,7 @@ def report_of(
     return Report(
         scenario.name,
         f"{machine.name} · {counted(len(scenario.motions), 'motion')}, {run.program.duration:.4g} s",
-        answer=answers(run, figures, causes),
+        answer=answers(run, figures, causes) or moved_words(run.trace),
         warnings=(*run.warnings, *doubts(figures, causes)),
         notes=(machine.note, scenario.note),
         tiles=[tile(name, figure) for name, figure in figures.items() if is_leading(name, HEADER)],
@@ -174,7 +174,7 @@ def answers(run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagno
         if own and not isinstance(task, CircleTask):
             words = stop_words(own, task.band) if isinstance(task, PositioningTask) else accuracy_words(own)
             found.append(f"{task.prefix}: {words}")
-    return found or moved_words(run.trace)
+    return found
 
 
 def tile(name: str, figure: Figure) -> Tile:

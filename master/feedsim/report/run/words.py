@@ -11,7 +11,7 @@ from feedsim.trace import Trace
 
 # Of A, what repeats is worth compensating from this share of it on.
 SYSTEMATIC = 0.5
-AT_REST = 1e-6  # [m] of travel, up to which an axis is not told to have moved
+STIRRED = 0.02  # share of the largest travel, up to which an axis has been stirred rather than moved
 
 
 def stop_words(figures: Figures, band: float) -> str:
@@ -48,9 +48,9 @@ def accuracy_words(figures: Figures) -> str:
 def moved_words(trace: Trace) -> list[str]:
     """Of a run without figures: how far each axis has moved and was behind, and that nothing is evaluated."""
     found = []
-    for axis in dict.fromkeys(name.partition(".")[0] for name in trace.columns if name.endswith(".x_a")):
-        travel = float(np.ptp(trace[f"{axis}.x_a"]))
-        if travel > AT_REST:
+    travels = {name.partition(".")[0]: float(np.ptp(y)) for name, y in trace.columns.items() if name.endswith(".x_a")}
+    for axis, travel in travels.items():
+        if travel > STIRRED * max(travels.values()):
             lag = trace.columns.get(f"{axis}.x_e")
             behind = "" if lag is None else f", following error up to {1e6 * float(np.abs(lag).max()):.3g} um"
             found.append(f"{axis} moves within {1e3 * travel:.4g} mm{behind}.")

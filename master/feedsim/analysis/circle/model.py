@@ -203,9 +203,9 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, to
         if number == 2:  # the ellipse is undone, so that the windows show the peaks alone
             usual = _usual([each.angle for each in undone], np.split(residual, ends), [free for free, _ in windows])
             tails = _tails(undone, paths, _left(residual, which, since, window, usual), window)
-        blocks = _blocks(undone)[kept]
-        whole = np.column_stack([matrix, tails.columns])
-        robust = _robust(whole[kept], deviation[kept], tails.spread, blocks)
+        fitted = (np.column_stack([matrix, tails.columns]) if len(tails.spread) else matrix)[kept]
+        blocks = _blocks(undone)[kept] if len(tails.spread) else np.empty(0)
+        robust = _robust(fitted, deviation[kept], tails.spread, blocks)
         step = robust.values[: len(names)]
         values = {name: values.get(name, 0.0) + float(d) for name, d in zip(names, step, strict=True)}
         residual = deviation - matrix @ step
@@ -213,7 +213,9 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, to
             break
     tail = tails.columns @ robust.values[len(names) :]
     rounded = _rounded(paths, np.split(residual - tail, ends), robust.noise)[kept]
-    covariance, quantile = _covariance(whole[kept], (residual - tail)[kept], robust, tails.spread, blocks, rounded)
+    covariance, quantile = _covariance(
+        fitted, (residual - tail)[kept], robust, tails.spread, _blocks(undone)[kept], rounded
+    )
     return Fit(
         names=names,
         values=np.array([values[name] for name in names]),

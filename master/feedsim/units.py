@@ -23,7 +23,7 @@ from feedsim_packager import units as algebra
 
 # What may be written, in the order of messages.
 SYMBOLS = (
-    "m", "km", "dm", "cm", "mm", "um", "nm", "s", "ms", "us", "ns", "min", "h", "kg", "g", "t", "A", "mA",
+    "m", "km", "dm", "cm", "mm", "um", "nm", "in", "s", "ms", "us", "ns", "min", "h", "kg", "g", "t", "A", "mA",
     "rad", "mrad", "urad", "rev", "deg", "arcsec", "rpm", "Hz", "kHz", "N", "mN", "kN", "Pa", "MPa", "GPa", "Nm",
     "V", "mV", "kV", "Ohm", "mOhm", "H", "mH", "uH", "Wb", "percent",
 )  # fmt: skip
@@ -32,7 +32,9 @@ ALIASES = {
     "ohm": "Ohm",
     "mohm": "mOhm",
     "revolution": "rev",
+    "micron": "um",
     "degree": "deg",
+    "degrees": "deg",
     "radian": "rad",
     "hertz": "Hz",
     "sec": "s",

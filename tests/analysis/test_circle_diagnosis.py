@@ -264,6 +264,74 @@ def test_no_cause_is_invented(drawn: tuple[Counter[str], Counter[str], list[tupl
     assert [found for found in absent if abs(found[1]) >= INVENTED] == []
 
 
+def recovered(found: Diagnosis, causes: Causes) -> dict[str, bool]:
+    """Whether each term of both directions is within its interval."""
+    true = {
+        "scale": causes.scale[0] - causes.scale[1],
+        "squareness": causes.squareness,
+        "servo": causes.delay[0] - causes.delay[1],
+        "lost_motion X": causes.lost[0],
+        "lost_motion Z": causes.lost[1],
+    }
+    return {key: abs(found[key].value - value) <= found[key].half for key, value in true.items()}
+
+
+def drawn_causes(rng: np.random.Generator) -> Causes:
+    """Every other axis loses motion; the rest superposed at random."""
+    lost = rng.uniform(-5e-6, 5e-6, 2) * (rng.random(2) < 0.5)
+    return Causes(
+        offset=tuple(rng.uniform(-20e-6, 20e-6, 2)), scale=tuple(rng.uniform(-30e-6, 30e-6, 2)),
+        delay=tuple(rng.uniform(-1e-3, 1e-3, 2)), squareness=rng.uniform(-50e-6, 50e-6), lost=tuple(lost), noise=0.2e-6,
+    )  # fmt: skip
+
+
+def test_the_slow_tail_of_a_peak_is_not_taken_for_lost_motion() -> None:
+    """Peaks that fall to 1/e in 40 to 80 ms, 8 to 15 deg of a circle of 15 mm: their tails reach behind the windows."""
+    circle = CircleUnderTest(("X", "Z"), radius=0.015, speed=0.05)
+    rng = np.random.default_rng(11)
+    within, invented = list[bool](), list[float]()
+    for _ in range(60):
+        causes = replace(drawn_causes(rng), peak=tuple(rng.uniform(2e-6, 8e-6, 2)), decay=rng.uniform(0.04, 0.08))
+        found = diagnose(circle, [driven(circle, causes, sense, rng, SAMPLES) for sense in (1, -1)])
+        within += recovered(found, causes).values()
+        terms = [found[f"lost_motion {axis}"] for axis in "XZ"]
+        invented += [abs(term.value) for term, lost in zip(terms, causes.lost, strict=True) if lost == 0 and term.told]
+    # 300 intervals of 95 %, of which those of one draw go together: three times sqrt(0.95 * 0.05 / 100)
+    assert sum(within) / len(within) > 0.95 - 0.065
+    assert max(invented, default=0.0) < 1e-6
+
+
+def test_intervals_hold_where_a_record_is_rounded() -> None:
+    """To 1 um, with noise of 0.05 um: what rounding adds stays the same for as long as the radius does."""
+    rng = np.random.default_rng(12)
+    circle = replace(BALLBAR, pitch={})
+    within = list[bool]()
+    for _ in range(60):
+        causes = replace(drawn_causes(rng), offset=(0.0, 0.0), noise=0.05e-6, delay=(0.0, 2e-5))
+        paths = [driven(circle, causes, sense, rng, SAMPLES) for sense in (1, -1)]
+        paths = [replace(path, deviation=np.round(path.deviation * 1e6) * 1e-6) for path in paths]
+        within += recovered(diagnose(circle, paths), causes).values()
+    assert sum(within) / len(within) > 0.95 - 0.065
+
+
+def test_a_record_of_programmed_angles_is_undone_as_one() -> None:
+    """On 15 mm a delay of 1 ms moves the machine 0.1 deg along the circle: 0.2 um in the radius, more than noise."""
+    circle = CircleUnderTest(("X", "Z"), radius=0.015, speed=0.05)
+    rng = np.random.default_rng(13)
+    within = list[bool]()
+    for draw in range(40):
+        causes = replace(drawn_causes(rng), delay=(1e-3, -1e-3), noise=0.1e-6)
+        paths = []
+        for sense in (1, -1):
+            path = driven(circle, causes, sense, rng, SAMPLES)
+            assert path.phase is not None
+            told = path.phase - math.pi / 8  # the mean delay of both axes is zero
+            angle = np.arctan2(sense * np.sin(told), np.cos(told)) if draw % 2 else path.angle
+            paths.append(TurnedPath(angle, path.deviation, sense))
+        within += recovered(diagnose(circle, paths), causes).values()
+    assert sum(within) / len(within) > 0.95 - 0.065
+
+
 def test_errors_that_no_term_describes_are_not_called_causes() -> None:
     """Pitches that were not told, and form of the third to the twenty-fourth order.
 

@@ -85,7 +85,38 @@ def scales_over_time(folder: Path) -> list[str]:
     return [str(folder / "scales.csv"), "--radius", "100 mm"]
 
 
-FORMS = (ballbar_in_one_file, lengths_in_two_files, columns_of_any_name, scales_over_time)
+def directions_beside_each_other(folder: Path) -> list[str]:
+    """A ballbar's table: both directions in inches over one angle, which rises for both."""
+    angle = np.linspace(0, 360, SAMPLES, endpoint=False)
+    columns = [angle]
+    for around, deviation, _ in turns():
+        degrees = np.degrees(around) % 360
+        order = np.argsort(degrees)
+        columns.append(np.interp(angle, degrees[order], deviation[order], period=360) / 25.4e-3)
+    table = np.column_stack(columns)
+    np.savetxt(folder / "both.csv", table, "%.8f", ",", header="Angle [deg],CCW [in],CW [in]", comments="")
+    return [str(folder / "both.csv"), "--radius", f"{RADIUS / 25.4e-3} in", "--feed", "3000 mm/min"]
+
+
+def axes_by_other_names(folder: Path) -> list[str]:
+    """A control's log in German: remarks, decimal commas, the axis somewhere in the name, a force besides."""
+    files = []
+    step = 2 * np.pi * RADIUS / SPEED / SAMPLES
+    for angle, deviation, sense in turns():
+        x, y = (100 + (RADIUS + deviation) * 1e3 * wave(angle) for wave in (np.cos, np.sin))
+        rows = zip(np.arange(SAMPLES) * step * 1e3, x, y, strict=True)
+        lines = ["Maschine;BAZ 3;;", "Datum;2.3.2024;;", "Zeit [ms];Achse X-Ist (mm);Y Ist-Position [mm];Kraft [N]"]
+        lines += [f"{t:.4f};{a:.6f};{b:.6f};1,5".replace(".", ",") for t, a, b in rows]
+        file = folder / ("hin.csv" if sense > 0 else "her.csv")
+        file.write_bytes("\r\n".join(lines).encode("cp1252"))
+        files.append(str(file))
+    return [*files, "--radius", "100 mm"]
+
+
+FORMS = (
+    ballbar_in_one_file, lengths_in_two_files, columns_of_any_name, scales_over_time, directions_beside_each_other,
+    axes_by_other_names,
+)  # fmt: skip
 FORMATS = {each.__name__: each for each in FORMS}
 
 

@@ -15,6 +15,7 @@ from feedsim import units
 from feedsim.analysis.circularity import Turn
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
+from feedsim.motions.circular import DIRECTIONS
 from feedsim.trace import Recording, read_recording
 
 RESULT, SUMMARY = "result.csv", "summary.json"
@@ -134,7 +135,7 @@ def _turn(told: Mapping[str, Any]) -> Turn:
     first, second = map(str, told["axes"])
     x, y = map(float, told["centre"]["value"])
     span = float(told["begin"]["value"]), float(told["end"]["value"])
-    sense = 1 if told["direction"] == "counterclockwise" else -1
+    sense = {word: sense for sense, word in DIRECTIONS.items()}[told["direction"]]
     return Turn((first, second), (x, y), float(told["radius"]["value"]), sense, *span)
 
 

@@ -20,6 +20,8 @@ from feedsim.motions.points import Held, Joined
 from feedsim.motions.profile import Profile
 
 Direction = Literal["counterclockwise", "clockwise"]
+# Sense of a turn -> its word: +1 from the first axis towards the second.
+DIRECTIONS: dict[int, Direction] = {1: "counterclockwise", -1: "clockwise"}
 
 # How far an arc's programmed end point may lie off the circle through its start [m]; it then ends on the circle.
 END_POINT_TOLERANCE = 1e-6
@@ -49,8 +51,7 @@ class PlaneMotion(PathMotion):
 
 
 def _sense(direction: Direction) -> int:
-    """+1 counterclockwise, -1 clockwise."""
-    return 1 if direction == "counterclockwise" else -1
+    return {word: sense for sense, word in DIRECTIONS.items()}[direction]
 
 
 class Arc(PlaneMotion):

@@ -74,6 +74,7 @@ _PLAIN = {
     "%": (Fraction(1, 100), 0, ""),
     "percent": (Fraction(1, 100), 0, ""),
     "t": (Fraction(1000), 0, "kg"),
+    "in": (Fraction(254, 10000), 0, "m"),
     "Nm": (Fraction(1), 0, "N.m"),
     "deg": (Fraction(1, 180), 1, "rad"),
     "arcsec": (Fraction(1, 180 * 3600), 1, "rad"),

@@ -11,7 +11,9 @@ their angle makes does not. Axis i that loses B where it reverses lags by B/2 al
 exactly, not to first order: 75 um of it on a radius of 15 mm have 0.4 um of second order, as much as is looked for.
 
 What friction makes where an axis reverses is no part of the model. A window behind every reversal is left out, and what
-else does not fit counts less (Tukey's biweight).
+else does not fit counts less (Tukey's biweight). Where a peak dies away slowly, what is left of it behind its window is
+fitted as an exponential whose size and decay the window shows, the size to within its own amount: so the tail is not
+taken for lost motion, and where the two are not told apart, the interval of the lost motion holds both.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +32,11 @@ from feedsim.analysis.figures import Array
 AHEAD, BEHIND = 2.0, (30.0, 45.0, 60.0)
 # Just behind the window the deviation is calm if it is below this share of the peak, or not larger than noise makes it.
 CALM, NEXT = 0.05, 4.0
+# What a peak leaves at the end of its window may be off by this multiple of what the window shows; less than the floor
+# [m] is not looked at. Angles in which it may fall to 1/e [deg].
+TAIL, TAIL_FLOOR = 2.0, 10e-9
+DECAYS = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 18.0, 21.0, 25.0, 30.0)
+FALLEN = 2.0  # angle of the means [deg] that say where a peak has fallen to half its height
 # Neighbouring samples share what disturbs them. Blocks of this angle [deg] do not, as far as intervals are concerned.
 BLOCK = 6.0
 BIWEIGHT = 4.685  # 95 % as efficient as least squares where the noise is normal
@@ -37,6 +45,10 @@ PASSES = 6
 PITCHES = 2.0
 # More samples of a turn tell nothing more of its shape.
 MOST = 8000
+# Harmonics of what rounding adds to a value, over where the value lies between two steps.
+HARMONICS = 3
+# The angle that is programmed and the one where the machine is are told apart from this deviation [m] on.
+UNSEEN = 5e-9
 SETTLED = 1e-13  # changes of a term below this [m] are rounding
 
 
@@ -83,6 +95,7 @@ class Fit:
         angle: of every path, undistorted (N,) [rad]; residual: (N,) [m]; reversal: within the window of which one a
             sample is, 0 to 3 from the half axis + of the first axis on, -1 in none (N,); since: the angle that the
             motion has turned since that reversal (N,) [rad].
+        tail: of every path, the part of the residual that the peaks leave behind their windows (N,) [m].
         columns: of every path, radial deviation for 1 m of each term, name -> (N,).
         window: how far behind a reversal is left out [rad].
         noise: standard deviation of a sample outside the windows [m].
@@ -97,6 +110,7 @@ class Fit:
     residual: tuple[Array, ...]
     reversal: tuple[NDArray[np.int64], ...]
     since: tuple[Array, ...]
+    tail: tuple[Array, ...]
     columns: tuple[Mapping[str, Array], ...]
     window: float
     noise: float
@@ -129,9 +143,23 @@ def enough_pitches(circle: CircleUnderTest, axis: str) -> bool:
 
 
 def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
-    """The model fitted to turns of one sense or of both; windows behind reversals are as wide as their peaks need."""
+    """The model fitted to turns of one sense or of both; windows behind reversals are as wide as their peaks need.
+
+    A path of angle and radius alone may have the programmed angle in place of the one where the machine was: that of
+    both which leaves less is taken.
+    """
+    found = _windowed(circle, paths, told=False)
+    moved = sum(math.hypot(found[a], found[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))
+    moved += abs(found["squareness"])
+    if all(path.phase is not None for path in paths) or moved**2 < circle.radius * UNSEEN:
+        return found
+    other = _windowed(circle, paths, told=True)
+    return other if other.noise < found.noise else found
+
+
+def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], told: bool) -> Fit:
     for degrees in BEHIND:
-        found = _fit(circle, paths, math.radians(degrees))
+        found = _fit(circle, paths, math.radians(degrees), told)
         if _calm(found):
             break
     return found
@@ -148,45 +176,136 @@ class _Undone:
     turned: tuple[float, float]
 
 
-def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float) -> Fit:
+@dataclass(frozen=True, eq=False)
+class _Tails:
+    """Columns of what peaks leave behind their windows, 1 m at the windows' end (N, T), and how large they may be (T,)
+    [m]."""
+
+    columns: Array
+    spread: Array
+
+
+def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, told: bool) -> Fit:
     both = len({path.sense for path in paths}) == 2
     values: dict[str, float] = {}
-    for _ in range(PASSES):
-        undone = [_undo(circle, path, values) for path in paths]
+    ends = np.cumsum([len(path.angle) for path in paths])[:-1]
+    tails = _Tails(np.empty((sum(len(path.angle) for path in paths), 0)), np.empty(0))
+    residual: Array = np.empty(0)
+    for number in range(PASSES):
+        undone = [_undo(circle, path, values, told) for path in paths]
         parts = [_columns(circle, each, path.sense, both) for each, path in zip(undone, paths, strict=True)]
         windows = [_windows(each, path.sense, window) for each, path in zip(undone, paths, strict=True)]
         names = tuple(parts[0])
         matrix = np.concatenate([np.column_stack([part[name] for name in names]) for part in parts])
         deviation: Array = np.concatenate([each.deviation for each in undone])
-        kept = np.concatenate([which < 0 for which, _ in windows])
-        step, weights, slopes, noise = _robust(matrix[kept], deviation[kept])
+        which, since = (np.concatenate(each) for each in zip(*windows, strict=True))
+        kept = which < 0
+        if number == 2:  # the ellipse is undone, so that the windows show the peaks alone
+            usual = _usual([each.angle for each in undone], np.split(residual, ends), [free for free, _ in windows])
+            tails = _tails(undone, paths, _left(residual, which, since, window, usual), window)
+        fitted = (np.column_stack([matrix, tails.columns]) if len(tails.spread) else matrix)[kept]
+        blocks = _blocks(undone)[kept] if len(tails.spread) else np.empty(0)
+        robust = _robust(fitted, deviation[kept], tails.spread, blocks)
+        step = robust.values[: len(names)]
         values = {name: values.get(name, 0.0) + float(d) for name, d in zip(names, step, strict=True)}
-        if float(np.abs(step).max()) < SETTLED:
+        residual = deviation - matrix @ step
+        if number > 1 and float(np.abs(step).max()) < SETTLED:
             break
-    residual = deviation - matrix @ step
-    blocks = np.concatenate([
-        1000 * k + np.floor(each.angle / math.radians(BLOCK)) for k, each in enumerate(undone)
-    ])  # fmt: skip
-    covariance, quantile = _covariance(matrix[kept], residual[kept], weights, slopes, blocks[kept])
-    ends = np.cumsum([len(path.angle) for path in paths])[:-1]
+    tail = tails.columns @ robust.values[len(names) :]
+    rounded = _rounded(paths, np.split(residual - tail, ends), robust.noise)[kept]
+    covariance, quantile = _covariance(
+        fitted, (residual - tail)[kept], robust, tails.spread, _blocks(undone)[kept], rounded
+    )
     return Fit(
         names=names,
         values=np.array([values[name] for name in names]),
-        covariance=covariance,
+        covariance=covariance[: len(names), : len(names)],
         quantile=quantile,
         angle=tuple(each.angle for each in undone),
         residual=tuple(np.split(residual, ends)),
         reversal=tuple(which for which, _ in windows),
         since=tuple(since for _, since in windows),
+        tail=tuple(np.split(tail, ends)),
         columns=tuple(parts),
         window=window,
-        noise=noise,
+        noise=robust.noise,
         left_out=tuple(axis for axis in circle.axes if axis in circle.pitch and not enough_pitches(circle, axis)),
     )
 
 
-def _undo(circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float]) -> _Undone:
-    """The path with what ``values`` say taken off: displacements of the axes first, then the ellipse."""
+def _blocks(undone: Sequence[_Undone]) -> Array:
+    """Which block of BLOCK each sample of all paths is in (N,)."""
+    return np.concatenate([1000 * k + np.floor(each.angle / math.radians(BLOCK)) for k, each in enumerate(undone)])
+
+
+def _left(
+    residual: Array, which: NDArray[np.int64], since: Array, window: float, usual: float
+) -> list[tuple[float, float]]:
+    """What the peak at each half axis leaves at the end of its window [m], and the angle in which that falls to 1/e
+    [rad], one for both sides of an axis; 0, 0: nothing.
+
+    An exponential over a constant, which lost motion that is not yet known is: of means of the axis' displacement, from
+    where the peak has fallen to half on. usual: of means elsewhere, above which a peak must stand [m]. A
+    tail is one that is more than what the exponential leaves of the means.
+    """
+    width = math.radians(FALLEN)
+    decays = np.radians(DECAYS)[:, None]
+    found = [(0.0, 0.0)] * 4
+    for axis in (0, 1):
+        sizes: dict[int, Array] = {}
+        errors: dict[int, Array] = {}
+        for k in (axis, axis + 2):
+            own = (which == k) & (since > 0)
+            part = np.floor(since[own] / width).astype(int)
+            means = np.bincount(part, residual[own] / np.cos(since[own])) / np.maximum(np.bincount(part), 1)
+            top = int(np.abs(means).argmax()) if len(means) else 0
+            if len(means) == 0 or abs(means[top]) <= NEXT * usual:
+                continue
+            means *= np.sign(means[top])
+            fallen = top + np.flatnonzero(means[top:] < 0.5 * means[top])
+            if len(fallen) == 0 or len(means) - fallen[0] < 3:
+                continue
+            left = means[fallen[0] :]
+            left = left - left.mean()
+            tail = np.exp((window - (np.arange(fallen[0], len(means)) + 0.5) * width) / decays)
+            tail -= tail.mean(axis=1, keepdims=True)
+            sizes[k] = tail @ left / (tail**2).sum(axis=1)
+            errors[k] = ((left - sizes[k][:, None] * tail) ** 2).mean(axis=1)
+        best = int(np.sum(list(errors.values()), axis=0).argmin()) if errors else 0
+        for k, size in sizes.items():
+            if size[best] > math.sqrt(errors[k][best]):
+                found[k] = (float(size[best]), float(decays[best, 0]))
+    return found
+
+
+def _tails(
+    undone: Sequence[_Undone], paths: Sequence[TurnedPath], left: Sequence[tuple[float, float]], window: float
+) -> _Tails:
+    """Tails of the peaks at the half axes; both senses share one: the axis reverses there from the same way.
+
+    left: what each peak leaves at the end of its window [m], and the angle in which that falls to 1/e [rad].
+    """
+    columns, spread = [], []
+    for k, (size, decay) in enumerate(left):
+        if size < TAIL_FLOOR:
+            continue
+        parts = []
+        for each, path in zip(undone, paths, strict=True):
+            at = each.turned[k % 2] + (math.pi if k > 1 else 0.0)
+            since = path.sense * (each.angle - at) % (2 * math.pi)
+            along = np.abs((np.cos if k % 2 == 0 else np.sin)(each.angle))
+            parts.append(np.where(since < math.pi, along * np.exp((window - since) / decay), 0.0))
+        columns.append(np.concatenate(parts))
+        spread.append(TAIL * size)
+    samples = sum(len(each.angle) for each in undone)
+    return _Tails(np.column_stack(columns) if columns else np.empty((samples, 0)), np.array(spread))
+
+
+def _undo(circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float], told: bool) -> _Undone:
+    """The path with what ``values`` say taken off: displacements of the axes first, then the ellipse.
+
+    told: its angles are the programmed ones, unless both axes' positions were measured.
+    """
 
     def of(name: str) -> float:
         return values.get(name, 0.0)
@@ -196,8 +315,18 @@ def _undo(circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float]
     distortion = np.array([[1 + r + k, q], [q, 1 + r - k]])
     # An axis is at its extreme where its row of the distortion points along u.
     turned = (math.atan2(q, 1 + r + k), math.atan2(1 + r - k, q))
-    positions = (circle.radius + path.deviation) * np.array([np.cos(path.angle), np.sin(path.angle)])
-    p = positions - np.array([[of("offset_0")], [of("offset_1")]])
+    centre = np.array([[of("offset_0")], [of("offset_1")]])
+    angle = path.angle
+    if told and path.phase is None:
+        programmed = circle.radius * np.array([np.cos(angle), np.sin(angle)])
+        p = centre + distortion @ programmed
+        for name, (axis, displacement) in _displacements(
+            circle, angle, programmed, path.sense, (0, math.pi / 2)
+        ).items():
+            p[axis] += of(name) * displacement
+        angle = np.arctan2(p[1], p[0])
+    positions = (circle.radius + path.deviation) * np.array([np.cos(angle), np.sin(angle)])
+    p = positions - centre
     angle = np.arctan2(p[1], p[0])
     for name, (axis, displacement) in _displacements(circle, angle, positions, path.sense, turned).items():
         p[axis] -= of(name) * displacement
@@ -243,43 +372,109 @@ def _windows(undone: _Undone, sense: int, window: float) -> tuple[NDArray[np.int
     return which, since
 
 
-def _robust(matrix: Array, deviation: Array) -> tuple[Array, Array, Array, float]:
+class _Robust(NamedTuple):
+    """Values (K,); of every sample its weight and how fast its influence grows with its deviation (N,); noise of a
+    sample [m], and what it is worth where neighbours share it [m]."""
+
+    values: Array
+    weights: Array
+    slopes: Array
+    noise: float
+    shared: float
+
+
+def _robust(matrix: Array, deviation: Array, spread: Array, blocks: Array) -> _Robust:
     """Values by least squares, each sample weighted by how well it fits.
 
-    Besides: the weights, how fast the influence of a sample grows with its deviation, and the noise of a sample.
+    spread: how large the last values may be (T,) [m], what is known of them beforehand; the others are free.
     """
     weights = slopes = np.ones(len(deviation))
+    known = _known(matrix, spread)
+    _, block = np.unique(blocks, return_inverse=True) if len(spread) else (0, np.empty(0, dtype=np.int64))
+    shared = 0.0
     for _ in range(PASSES):
-        normal = matrix.T @ (weights[:, None] * matrix)
+        normal = matrix.T @ (weights[:, None] * matrix) + shared**2 * known
         values = np.linalg.lstsq(normal, matrix.T @ (weights * deviation), rcond=None)[0]
         off = deviation - matrix @ values
         noise = float(np.median(np.abs(off))) / 0.6745
         if noise < SETTLED:
             break
+        if len(spread):
+            sums = np.bincount(block, np.clip(off, -BIWEIGHT * noise, BIWEIGHT * noise))
+            shared = max(noise, math.sqrt(float(sums @ sums) / len(off)))
         inner = np.clip(1 - (off / (BIWEIGHT * noise)) ** 2, 0.0, None)
         settled = float(np.abs(inner**2 - weights).max()) < 0.01
         weights, slopes = inner**2, inner * (5 * inner - 4)
         if settled:
             break
-    return np.asarray(values), np.asarray(weights), np.asarray(slopes), noise
+    return _Robust(np.asarray(values), np.asarray(weights), np.asarray(slopes), noise, shared)
 
 
-def _covariance(matrix: Array, residual: Array, weights: Array, slopes: Array, blocks: Array) -> tuple[Array, float]:
+def _known(matrix: Array, spread: Array) -> Array:
+    """What is known of the values beforehand, as an inverse covariance (K, K) [1/m2]."""
+    return np.diag(np.concatenate([np.zeros(matrix.shape[1] - len(spread)), 1 / spread**2]))
+
+
+def _resolution(values: Array) -> float:
+    """The step to whose multiples values are rounded, in their unit; 0 where they are not."""
+    apart = np.diff(np.unique(values))
+    if len(apart) == 0:
+        return 0.0
+    steps = apart / apart.min()
+    return float(apart.min()) if float(np.abs(steps - np.round(steps)).max()) < 0.01 else 0.0
+
+
+def _rounded(paths: Sequence[TurnedPath], off: Sequence[Array], noise: float) -> NDArray[np.complex128]:
+    """What rounding may have added to the samples of each path, a column for each harmonic (N, J) [m].
+
+    Between two steps a value that noise does not move errs by up to half a step, for as long as it stays there; noise
+    of more than half a step takes nearly all of it away. Where between two steps a path lies is taken to be unknown:
+    the effect of a column on a value is a variance of the value.
+    """
+    columns = []
+    for k, path in enumerate(paths):
+        if (step := _resolution(path.deviation)) == 0.0:
+            continue
+        turns = (path.deviation - off[k]) / step
+        own = math.sqrt(max(noise**2 - step**2 / 12, 0.0)) / step
+        for n in range(1, HARMONICS + 1):
+            amplitude = step / (math.pi * n) * math.exp(-2 * (math.pi * n * own) ** 2) / math.sqrt(2)
+            column = [np.zeros(len(each.angle), dtype=np.complex128) for each in paths]
+            column[k] = amplitude * np.exp(2j * math.pi * n * turns)
+            columns.append(np.concatenate(column))
+    samples = sum(len(path.angle) for path in paths)
+    return np.column_stack(columns) if columns else np.empty((samples, 0), dtype=np.complex128)
+
+
+def _covariance(
+    matrix: Array,
+    residual: Array,
+    robust: _Robust,
+    spread: Array,
+    blocks: Array,
+    rounded: NDArray[np.complex128],
+) -> tuple[Array, float]:
     """Covariance of the values and the quantile for intervals of 95 %.
 
-    The larger of two: as if every sample had noise of its own, and as if only blocks of samples had.
+    The larger of two: as if every sample had noise of its own, and as if only blocks of samples had. Besides, what
+    rounding adds, and what is not known of the tails.
     """
-    inverse = np.linalg.pinv(matrix.T @ (slopes[:, None] * matrix))
-    influence = weights * residual
+    known = robust.shared**2 * _known(matrix, spread)
+    inverse = np.linalg.pinv(matrix.T @ (robust.slopes[:, None] * matrix) + known)
+    influence = robust.weights * residual
     _, block = np.unique(blocks, return_inverse=True)
     count, terms = int(block.max()) + 1, matrix.shape[1]
     sums = np.zeros((count, terms))
     np.add.at(sums, block, influence[:, None] * matrix)
-    free = max(count - terms, 2)
+    free = max(count - terms + len(spread), 2)
     single = inverse @ (matrix.T @ ((influence**2)[:, None] * matrix)) @ inverse
     blockwise = inverse @ (sums.T @ sums) @ inverse * (count / free)
     scale = np.sqrt(np.maximum(np.diag(single) / np.maximum(np.diag(blockwise), 1e-300), 1.0))
-    return scale[:, None] * blockwise * scale, _student(free)
+    besides = robust.shared**2 * inverse @ known @ inverse
+    if rounded.shape[1]:
+        moved = inverse @ (matrix.T @ (robust.weights[:, None] * rounded))
+        besides += (moved @ moved.conj().T).real
+    return scale[:, None] * blockwise * scale + besides, _student(free)
 
 
 def _student(free: int) -> float:
@@ -303,16 +498,22 @@ def _student(free: int) -> float:
     return math.fsum(term / free**k for k, term in enumerate(series))
 
 
+def _usual(angles: Sequence[Array], residuals: Sequence[Array], reversals: Sequence[NDArray[np.int64]]) -> float:
+    """Standard deviation of the means over NEXT of what is left between the windows [m]."""
+    around = []
+    for angle, residual, which in zip(angles, residuals, reversals, strict=True):
+        _, block = np.unique(np.floor(angle[which < 0] / math.radians(NEXT)), return_inverse=True)
+        around.append(np.bincount(block, residual[which < 0]) / np.bincount(block))
+    return float(np.median(np.abs(np.concatenate(around)))) / 0.6745
+
+
 def _calm(found: Fit) -> bool:
     """Whether the peaks have died away where their windows end, as far as noise and what else is left let one see."""
     width = math.radians(NEXT)
-    around = []
-    for angle, residual, which in zip(found.angle, found.residual, found.reversal, strict=True):
-        _, block = np.unique(np.floor(angle[which < 0] / width), return_inverse=True)
-        around.append(np.bincount(block, residual[which < 0]) / np.bincount(block))
+    off = [residual - tail for residual, tail in zip(found.residual, found.tail, strict=True)]
     # What repeats all the way round, a pitch error or form, is no tail of a peak, however much a window leaves out.
-    usual = float(np.median(np.abs(np.concatenate(around)))) / 0.6745
-    for angle, residual, which, since in zip(found.angle, found.residual, found.reversal, found.since, strict=True):
+    usual = _usual(found.angle, off, found.reversal)
+    for angle, residual, which, since in zip(found.angle, off, found.reversal, found.since, strict=True):
         for k in range(4):
             own = which == k
             if not own.any():

@@ -1,15 +1,15 @@
 """Circles that were recorded: turns found in files of linear scales, of a ballbar, or of a control's log.
 
-A file has either positions of two axes, or angle and radius (or its deviation). Full turns are found in it by the angle
-itself: where it turns round, a new direction begins; of each stretch the middle turn is taken, so that run-in and
-run-out stay outside.
+A file has either positions of two axes, or angle and radius (or its deviation), of one turn after the other or of both
+directions beside each other. Full turns are found in it by the angle itself: where it turns round, a new direction
+begins; of each stretch the middle turn is taken, so that run-in and run-out stay outside.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,15 +20,22 @@ from feedsim.analysis.circle.model import CircleUnderTest, TurnedPath
 from feedsim.analysis.circularity import EVEN, PARTS, fitted_circle
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
+from feedsim.motions.circular import DIRECTIONS
 from feedsim.trace import Recording, read_recording
 
 ANGLES = ("angle", "phi", "theta", "winkel", "angular position")
 DEVIATIONS = (
     "deviation", "radial deviation", "radius deviation", "error", "radial error", "e", "dr", "delta r", "abweichung",
+    "radialabweichung", "radiale abweichung", "écart", "écart radial",
 )  # fmt: skip
-RADII = ("radius", "r", "length", "ballbar length", "radius length")
+# Columns of the two directions over one angle, by the sense of the turn.
+WAYS = {
+    1: ("ccw", "counterclockwise", "counter clockwise", "anticlockwise", "gegenuhrzeigersinn", "antihoraire"),
+    -1: ("cw", "clockwise", "uhrzeigersinn", "horaire"),
+}
+RADII = ("radius", "r", "length", "ballbar length", "radius length", "rayon")
 LEAST_RADIUS = 1e-3  # [m]; where a name does not tell, what is never less is a radius and no deviation
-TIMES = ("time", "t", "zeit")
+TIMES = ("time", "t", "zeit", "temps")
 # The angle has turned round where it goes back by this [rad]: less is noise at rest.
 TURNED_ROUND = math.radians(10)
 # A full turn may lack this share of it; files often end one sample ahead of the full turn.
@@ -80,8 +87,11 @@ def read_circle(
     radii: list[float] = []
     for file in files:
         recording = read_recording(file)
-        polar = _polar(recording, axes)
-        if polar is None:
+        both = _beside_each_other(recording)
+        polar = None if both else _polar(recording, axes)
+        if both:
+            found, mean = _of_both(recording, *both, radius)
+        elif polar is None:
             x, y = _positions(recording, axes)
             found, mean = _of_positions(recording, x, y, centre, radius)
         else:
@@ -127,7 +137,7 @@ def _one_feed(timed: Sequence[tuple[Path, RecordedTurn, float]], radius: float) 
 
 
 def _plain(name: str) -> str:
-    return " ".join(re.split(r"[\s_]+", name.strip().lower()))
+    return " ".join(re.split(r"[\s_-]+", name.strip().lower()))
 
 
 def _column(recording: Recording, names: Sequence[str], unit: str) -> str | None:
@@ -190,9 +200,13 @@ def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool]
 
 
 def _position(recording: Recording, axis: str) -> str | None:
-    names = (axis.lower(), f"{axis.lower()}.x a", f"{axis.lower()} position", f"position {axis.lower()}")
-    found = [name for name in recording.names if _plain(name) in names and _is(recording, name, "m")]
-    return found[0] if found else None
+    """The column of an axis' position: one that is called so, else the only length that has the axis as a word."""
+    letter = axis.lower()
+    names = (letter, f"{letter}.x a", f"{letter} position", f"position {letter}")
+    lengths = [name for name in recording.names if _is(recording, name, "m")]
+    called = [name for name in lengths if _plain(name) in names]
+    of_axis = [name for name in lengths if letter in re.findall(r"\w+", _plain(name))]
+    return called[0] if called else of_axis[0] if len(of_axis) == 1 else None
 
 
 def _positions(recording: Recording, axes: tuple[str, str]) -> tuple[Array, Array]:
@@ -220,7 +234,36 @@ def _of_positions(
 def _of_angles(
     recording: Recording, angle: str, column: str, is_radius: bool, radius: float | None
 ) -> tuple[list[RecordedTurn], float]:
-    phi, length = _values(recording, angle, "rad"), _values(recording, column, "m")
+    phi = _values(recording, angle, "rad")
+    deviation, mean = _deviation(recording, column, is_radius, radius)
+    return _named(recording, phi, deviation, _time(recording)), mean
+
+
+def _beside_each_other(recording: Recording) -> tuple[str, Mapping[int, str]] | None:
+    """The column of the angle, and those of the two directions by their sense; None where the file is another."""
+    found = {sense: _column(recording, names, "m") for sense, names in WAYS.items()}
+    angle = _column(recording, ANGLES, "rad") or _only(recording, "rad")
+    columns = {sense: name for sense, name in found.items() if name is not None}
+    return (angle, columns) if angle is not None and len(columns) == len(WAYS) else None
+
+
+def _of_both(
+    recording: Recording, angle: str, columns: Mapping[int, str], radius: float | None
+) -> tuple[list[RecordedTurn], float]:
+    """Turns of both senses over one angle, whose rows are in the order of one of them at most: no time is theirs."""
+    phi = np.unwrap(_values(recording, angle, "rad"))
+    turns: list[RecordedTurn] = []
+    for sense, name in columns.items():
+        is_radius = float(np.abs(_values(recording, name, "m")).min()) > LEAST_RADIUS
+        deviation, mean = _deviation(recording, name, is_radius, radius)
+        order = slice(None, None, 1 if sense * (phi[-1] - phi[0]) > 0 else -1)
+        turns += _named(recording, phi[order], deviation[order], None)
+    return turns, mean
+
+
+def _deviation(recording: Recording, column: str, is_radius: bool, radius: float | None) -> tuple[Array, float]:
+    """Deviation of the radius (N,) and the mean radius [m]."""
+    length = _values(recording, column, "m")
     if not is_radius and radius is None:
         raise InputError(
             f"{recording.header}: {column!r} is a deviation; give the radius, for example --radius '100 mm'"
@@ -233,7 +276,7 @@ def _of_angles(
             f"{recording.header}: {column!r} leaves the radius of {nominal * 1e3:.6g} mm by up to "
             f"{float(np.abs(deviation).max()) * 1e3:.4g} mm; allowed: 20 % of it"
         )
-    return _named(recording, phi, deviation, _time(recording)), mean
+    return deviation, mean
 
 
 def _named(
@@ -256,8 +299,9 @@ def _named(
             duration = float(time[rows][-1] - begin) * 2 * math.pi / float(turned[-1])
             phase = (time[rows] - begin) * (2 * math.pi / duration) if by_axes else None
         path = TurnedPath((angle[rows] + math.pi) % (2 * math.pi) - math.pi, deviation[rows], sense, phase)
-        way = "counterclockwise" if sense > 0 else "clockwise"
-        found.append(RecordedTurn(f"a turn {way}, {rows.stop - rows.start} samples", path, begin, duration))
+        found.append(
+            RecordedTurn(f"a turn {DIRECTIONS[sense]}, {rows.stop - rows.start} samples", path, begin, duration)
+        )
     return found
 
 

@@ -15,6 +15,7 @@ from feedsim.analysis.circle import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.records import RecordedCircle
 from feedsim.analysis.circle_figures import about, both_directions, cause_figures
 from feedsim.analysis.circularity import axis_letters
+from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
 from feedsim.report.content import Bullets, Report, Section, Tile, tile_value
 from feedsim.report.formatting import counted, typeset
@@ -26,7 +27,7 @@ from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
 from feedsim.report.style import BLUE, MUTED, VERMILLION, Array
 
 FORMAT = 1
-SENSES = {1: ("counterclockwise", BLUE), -1: ("clockwise", VERMILLION)}
+COLOURS = {1: BLUE, -1: VERMILLION}  # by the sense of the turn
 TILES = {"G": "circular deviation G", "G_b": "bidirectional deviation G(b)", "H": "circular hysteresis H"}
 
 
@@ -132,7 +133,9 @@ def picture(circle: CircleUnderTest, recorded: RecordedCircle, diagnosis: Diagno
         f"{on.magnification:,.0f} times; rings at ±{on.ring:g} µm about the "
         f"circle{', about its fitted centre' if recorded.centred else ''}. Dashed: the fitted model without peaks."
     )
-    curves = [circle_plots.turned(*SENSES[turn.sense], turn.angle, turn.deviation) for turn in turns]
+    curves = [
+        circle_plots.turned(DIRECTIONS[turn.sense], COLOURS[turn.sense], turn.angle, turn.deviation) for turn in turns
+    ]
     curves += [
         circle_plots.turned("model without peaks", MUTED, each.angle, each.deviation, "dashed", 0.9) for each in fitted
     ]

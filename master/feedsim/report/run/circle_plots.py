@@ -9,11 +9,11 @@ from typing import Protocol
 import numpy as np
 
 from feedsim.analysis import Turn, contour
+from feedsim.motions.circular import DIRECTIONS
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Mark, Panel, Polar
 from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import TIME, TOOL, reversed_note, torque_axis
-from feedsim.report.run.diagnosis import direction
 from feedsim.report.style import BLUE, GREEN, ORANGE, VERMILLION, Array
 from feedsim.trace import Trace
 
@@ -46,12 +46,12 @@ def contour_picture(trace: Trace, turn: Turn, stem: str, back: Turn | None = Non
     if back is not None:
         other = contour(trace, back)
         curves.append(
-            turned(f"linear scales, {direction(back.sense)}", GREEN, other.angle, other.deviation, "dotted", 1.2)
+            turned(f"linear scales, {DIRECTIONS[back.sense]}", GREEN, other.angle, other.deviation, "dotted", 1.2)
         )
-        over = f" Dotted: {direction(back.sense)}, from {back.begin:.4f} to {back.end:.4f} s."
+        over = f" Dotted: {DIRECTIONS[back.sense]}, from {back.begin:.4f} to {back.end:.4f} s."
     title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
     caption = (
-        f"Radius {turn.radius * 1e3:.6g} mm, {direction(turn.sense)} from {turn.axes[0]} to {turn.axes[1]}, turn from "
+        f"Radius {turn.radius * 1e3:.6g} mm, {DIRECTIONS[turn.sense]} from {turn.axes[0]} to {turn.axes[1]}, turn from "
         f"{turn.begin:.4f} to {turn.end:.4f} s.{over} Radius deviation magnified {on.magnification:,.0f} times; rings "
         f"at ±{on.ring:g} µm about the programmed circle. The markers show the quadrant glitches: the largest "
         "deviation within ±45° of an axis crossing, less the median of the turn."

@@ -7,6 +7,7 @@ from typing import Any
 
 from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, name, sentence, swinging
 from feedsim.analysis.circle_figures import UNITS
+from feedsim.motions.circular import DIRECTIONS
 from feedsim.report.content import Section, Table
 from feedsim.report.formatting import minus, number, typeset
 from feedsim.report.provenance import finite, quantity
@@ -35,7 +36,7 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     if words := swinging(diagnosis):
         note += f"\n{typeset(words)}"
     heads = ("Cause", "Amount", "Alone [µm]", "Share of G [%]", "What it means, where to look")
-    peaks = [(minus(peak.name), direction(peak.sense), *_peak(peak)) for peak in diagnosis.peaks]
+    peaks = [(minus(peak.name), DIRECTIONS[peak.sense], *_peak(peak)) for peak in diagnosis.peaks]
     peak_heads = ("Reversal at", "Direction", "Peak [µm]", "±", "Width at half the height [ms]", "Falls to 1/e in [ms]")
     peak_note = "Peaks stand over the fitted rest of the circle; 0: nothing stands out of the noise."
     return Section(
@@ -44,16 +45,11 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
     )
 
 
-def direction(sense: int) -> str:
-    """The sense of a turn (+1, -1) in words."""
-    return "counterclockwise" if sense > 0 else "clockwise"
-
-
 def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
     """The diagnosis in summary.json, in SI."""
     return {
         "answer": answer(diagnosis),
-        "directions": [direction(sense) for sense in diagnosis.senses],
+        "directions": [DIRECTIONS[sense] for sense in diagnosis.senses],
         "G": quantity(diagnosis.G, "m"),
         "causes": [
             {
@@ -70,7 +66,7 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
         "peaks": [
             {
                 "at": peak.name,
-                "direction": direction(peak.sense),
+                "direction": DIRECTIONS[peak.sense],
                 "height": quantity(peak.height, "m"),
                 "half_interval": finite(peak.half),
                 "width": quantity(peak.width, "s"),

@@ -20,6 +20,7 @@ from feedsim.analysis import (
     tasks,
 )
 from feedsim.cosim import Run
+from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
 from feedsim.report.content import Report, Section, Table, Tile, tile_value
 from feedsim.report.formatting import counted, duration, number, typeset
@@ -38,7 +39,7 @@ from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_
 from feedsim.report.run.accuracy import accuracy_picture, accuracy_section
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
-from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section, direction
+from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
 from feedsim.report.run.pose import pose_part, pose_section
 from feedsim.report.run.words import accuracy_words, moved_words, stop_words
 from feedsim.scenario import Level, Logging
@@ -350,7 +351,7 @@ def _circles(run: Run, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
                 "axes": list(turn.axes),
                 "centre": quantity(list(turn.centre), "m"),
                 "radius": quantity(turn.radius, "m"),
-                "direction": direction(turn.sense),
+                "direction": DIRECTIONS[turn.sense],
                 "begin": quantity(turn.begin, "s"),
                 "end": quantity(turn.end, "s"),
             }

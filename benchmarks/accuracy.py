@@ -21,7 +21,7 @@ import numpy as np
 from fits import exponent
 
 from feedsim import cosim, nc, scenario
-from feedsim.cosim.schedule import SCHEMES
+from feedsim.scenario.coupling import SCHEMES
 
 sys.path.insert(0, str(ROOT / "tests"))
 from reference import monolithic

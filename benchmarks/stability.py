@@ -16,7 +16,7 @@ from harness import ROOT, arguments, digits, progress, table
 import numpy as np
 
 from feedsim import cosim, scenario
-from feedsim.cosim.schedule import SCHEMES
+from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure import checked_modes
 
 MOTIONS = """

@@ -1,16 +1,21 @@
-"""Commands of feedsim as tests give them: in this process, or in one of their own where that is what is tested."""
+"""Commands of feedsim as tests give them: in this process, or in one of their own where that is what is tested; and
+what they have left."""
 
 from __future__ import annotations
 
 import contextlib
+import csv
+import json
 import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 from unittest import mock
+
+import pytest
 
 from feedsim.cli import main
 
@@ -38,6 +43,19 @@ def feedsim_process(*words: str | Path, fmus: Path, cwd: Path) -> Done:
     command = [sys.executable, "-c", "from feedsim.cli import entry; entry()", *map(str, words)]
     environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(MASTER), "PYTHONUTF8": "1"}
     return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, encoding="utf-8", check=False)
+
+
+def summary_of(folder: Path) -> dict[str, Any]:
+    """summary.json of a folder of results, which has no NaN: strict readers refuse that."""
+    text = (folder / "summary.json").read_text(encoding="utf-8")
+    content: dict[str, Any] = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    return content
+
+
+def rows_of(folder: Path) -> list[list[str]]:
+    """Cells of the table of a study, without those of the seconds."""
+    with (folder / "table.csv").open(newline="") as file:
+        return [row[:-1] for row in csv.reader(file)]
 
 
 def _file() -> contextlib.AbstractContextManager[TextIO]:

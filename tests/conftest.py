@@ -6,12 +6,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import settings
 
 if TYPE_CHECKING:
     from pint_registry import Registry
 
 ROOT = Path(__file__).resolve().parent.parent
 UNITS = ("plant", "controller", "friction", "setpoint", "machine")
+
+# How long an example takes is no verdict.
+settings.register_profile("feedsim", deadline=None)
+settings.load_profile("feedsim")
 
 # A shell's job in the background ignores Ctrl-C, and so would all that is started here.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

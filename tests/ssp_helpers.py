@@ -7,7 +7,8 @@ import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from feedsim import scenario, ssp
+from feedsim import cosim, scenario, ssp
+from feedsim.cosim import Run
 
 ROOT = Path(__file__).resolve().parents[1]
 STRUCTURE = "SystemStructure.ssd"
@@ -37,6 +38,12 @@ def export_short(folder: Path, fmus: Path) -> Path:
     out = file.with_suffix(".ssp")
     ssp.export(scenario.load(file), out, fmus=fmus)
     return out
+
+
+def run_ssp(file: Path, *overrides: str) -> Run:
+    """The scenario that an SSP file holds, run on the archives in it."""
+    with ssp.opened(file, overrides) as found:
+        return cosim.run(found.scenario, program=found.program, fmus=found.fmus)
 
 
 def contents(path: Path) -> dict[str, bytes]:

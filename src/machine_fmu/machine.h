@@ -10,8 +10,8 @@
 #include "part.h"
 #include "unit.h"
 
-/* How plant and friction see each other within an exchange step; the schemes of the master (feedsim/cosim/schedule.py),
- * where each of them is told. */
+/* How plant and friction see each other within an exchange step; the schemes of the master
+ * (feedsim/scenario/coupling.py), where each of them is told. */
 typedef enum Speed { SPEED_WITHIN, SPEED_AT_END, SPEED_AT_START, SPEED_EXTRAPOLATED } Speed;
 typedef struct Scheme {
     const char *name;

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from command_helpers import Done, feedsim
+from command_helpers import Done, feedsim, summary_of
 from feedsim.analysis import Figure, compensation
 from feedsim.cli import main
 from feedsim.errors import SimulationError
@@ -51,12 +51,6 @@ def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Done, Pa
     return feedsim("compensate", CIRCLE, "--out", "out", "--figures", "png", *words, fmus=fmus, cwd=folder), folder
 
 
-def summary_of(folder: Path) -> dict[str, Any]:
-    text = (folder / "out" / "summary.json").read_text(encoding="utf-8")
-    content: dict[str, Any] = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
-    return content
-
-
 def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
     process, folder = done
     assert (process.returncode, process.stderr) == (0, "")
@@ -71,11 +65,11 @@ def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
         *("result.csv", "uncompensated.csv", "feedforward.csv", "summary.json", "report.html"),
         *(f"figures/compensation-{stem}.png" for stem in ("contour", "reversals", "torque")),
     }
-    assert set(summary_of(folder)["files"]) == files
+    assert set(summary_of(folder / "out")["files"]) == files
 
 
 def test_summary_tells_what_was_compensated_with(done: tuple[Done, Path]) -> None:
-    summary = summary_of(done[1])
+    summary = summary_of(done[1] / "out")
     axes = summary["compensation"]["axes"]
     assert list(axes) == ["X", "Z"]
     assert axes["X"]["delay"] == {"value": 0.0039417, "unit": "s"}
@@ -108,7 +102,7 @@ def test_curves_can_be_read_back(done: tuple[Done, Path]) -> None:
     assert torque.time[1] == pytest.approx(125e-6)
     assert torque.time[-1] == pytest.approx(with_it.time[-1])
     assert np.abs(torque["Z.M_ff"]).max() == pytest.approx(
-        summary_of(done[1])["figures"]["Z.peak_feedforward"]["value"]
+        summary_of(done[1] / "out")["figures"]["Z.peak_feedforward"]["value"]
     )
 
 
@@ -126,7 +120,7 @@ def test_worse_than_without_is_the_first_thing_said(fmus: Path, tmp_path: Path) 
     assert "reversal Z+ 7.9 -> 10" in first
     assert "reversal X" not in first
     assert last.startswith("feedsim: note: axis X: model and machine have the same friction and delay")
-    findings = summary_of(tmp_path)["findings"]
+    findings = summary_of(tmp_path / "out")["findings"]
     assert [each["severity"] for each in findings] == ["wrong", "doubt", "note"]
     assert "dip_Z -0.288 -> -" in findings[1]["text"]
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -153,7 +147,7 @@ def test_without_the_table_there_is_none(done: tuple[Done, Path]) -> None:
     out = done[1] / "out"
     assert not (out / "compensation.csv").exists()
     assert "What errors cost" not in (out / "report.html").read_text(encoding="utf-8")
-    assert summary_of(done[1])["compensation"]["errors"] == []
+    assert summary_of(done[1] / "out")["compensation"]["errors"] == []
 
 
 def test_table_has_both_runs_and_the_errors() -> None:
@@ -203,7 +197,7 @@ def test_nothing_of_an_earlier_run_is_left(done: tuple[Done, Path], fmus: Path, 
         (tmp_path / "out" / name).write_bytes(data)
     run = feedsim("run", SCENARIOS / "z_positioning.yaml", "--out", "out", "--quiet", fmus=fmus, cwd=tmp_path)
     assert run.returncode == 0
-    assert set(contents(tmp_path / "out")) == set(summary_of(tmp_path)["files"])
+    assert set(contents(tmp_path / "out")) == set(summary_of(tmp_path / "out")["files"])
 
 
 @pytest.mark.parametrize(

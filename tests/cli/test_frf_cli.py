@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from command_helpers import Done, feedsim
+from command_helpers import Done, feedsim, summary_of
 from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Plan, signal_of
 from feedsim.analysis.responses import Responses, frequencies, read_overlays
@@ -58,12 +58,6 @@ def done(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Done, Pa
     return feedsim("frf", SCENARIO, "--out", "out", "--figures", "png", *words, *overlay, fmus=fmus, cwd=folder), folder
 
 
-def summary_of(folder: Path) -> dict[str, Any]:
-    text = (folder / "out" / "summary.json").read_text(encoding="utf-8")
-    content: dict[str, Any] = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
-    return content
-
-
 def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
     process, folder = done
     assert (process.returncode, process.stderr) == (0, "")
@@ -76,7 +70,7 @@ def test_everything_is_written_and_told(done: tuple[Done, Path]) -> None:
     assert of_axis.startswith("  Z: speed loop -3 dB first 71.7 Hz, last 208 Hz, margins 64 deg, ")
     files = set(contents(folder / "out"))
     assert {"frf.csv", "frf_measured.csv", "summary.json", "report.html", "figures/speed-reference.png"} <= files
-    assert set(summary_of(folder)["files"]) == files
+    assert set(summary_of(folder / "out")["files"]) == files
 
 
 def test_curves_can_be_read_back(done: tuple[Done, Path]) -> None:
@@ -98,7 +92,7 @@ def test_curves_can_be_read_back(done: tuple[Done, Path]) -> None:
 
 
 def test_summary_tells_figures_inputs_and_excitation(done: tuple[Done, Path]) -> None:
-    summary = summary_of(done[1])
+    summary = summary_of(done[1] / "out")
     figures = summary["figures"]
     assert figures["Z.speed.bandwidth_first"]["unit"] == "Hz"
     # exact against exact: what is left is rounding, seen through 60 dB of response
@@ -122,7 +116,7 @@ def test_summary_tells_figures_inputs_and_excitation(done: tuple[Done, Path]) ->
 
 
 def test_truncation_is_told_of_what_is_shown_alone(done: tuple[Done, Path]) -> None:
-    summary = summary_of(done[1])
+    summary = summary_of(done[1] / "out")
     told = {name for name in summary["figures"] if "truncation" in name}
     ends = ("truncation_below", "truncation", "truncation_below_corrected", "truncation_corrected")
     assert told == {f"Z.{quantity}.{end}" for quantity in ("n_M", "x_M") for end in ends}
@@ -151,7 +145,7 @@ def test_a_faulty_structure_costs_the_comparison_alone(fmus: Path, tmp_path: Pat
     process = feedsim("frf", folder, *words, fmus=fmus, cwd=tmp_path)
     assert process.returncode == 0, process.stderr
     assert "warning: no comparison with the full model: " in process.stderr
-    assert not any("truncation" in name for name in summary_of(tmp_path)["figures"])
+    assert not any("truncation" in name for name in summary_of(tmp_path / "out")["figures"])
 
 
 def test_a_plant_that_follows_the_pose_agrees_with_the_closed_form(fmus: Path, tmp_path: Path) -> None:
@@ -164,7 +158,7 @@ def test_a_plant_that_follows_the_pose_agrees_with_the_closed_form(fmus: Path, t
     process = feedsim("frf", folder, *words, fmus=fmus, cwd=tmp_path)
     assert process.returncode == 0, process.stderr
     assert "the modes are those of the archive's cell about Z 0.09 m; pose: Z 0.1 m" in process.stderr
-    figures = summary_of(tmp_path)["figures"]
+    figures = summary_of(tmp_path / "out")["figures"]
     # By the table of modes at 100 mm it would be 1.8 dB; what is left is what has not settled.
     assert figures["Z.n_M.measured_share"]["value"] == 100
     assert figures["Z.n_M.measured_magnitude"]["value"] < 1e-3
@@ -251,7 +245,7 @@ def test_unstable_loops_are_told_and_not_measured(fmus: Path, tmp_path: Path) ->
     assert "margins" not in process.stdout.splitlines()[2]
     assert "WRONG: axis Z: the position loop is unstable with K_v = 42 (m/min)/mm" in process.stderr
     assert ": The control loops are UNSTABLE (" in process.stdout.splitlines()[1]  # after the gain that is WRONG
-    assert summary_of(tmp_path)["answer"][0] in process.stdout
+    assert summary_of(tmp_path / "out")["answer"][0] in process.stdout
     assert not (tmp_path / "out" / "frf_measured.csv").exists()
 
 
@@ -260,7 +254,7 @@ def test_thin_margins_are_told_with_the_loop_and_the_gain_that_would_do(fmus: Pa
     process = feedsim("frf", MACHINE, *words, fmus=fmus, cwd=tmp_path)
     assert "axis Z: the position loop has thin margins with K_v = 18 (m/min)/mm" in process.stderr
     first, _, trust, _ = process.stdout.splitlines()
-    figures = summary_of(tmp_path)["figures"]
+    figures = summary_of(tmp_path / "out")["figures"]
     least = 20 * np.log10(figures["Z.position.gain_margin"]["value"])
     assert f"least gain margin {least:.1f} dB (position loop of Z, " in first
     assert "Less than the usual 6 dB and 30 deg: motions ring there." in first

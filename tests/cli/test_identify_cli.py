@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from command_helpers import Done, feedsim
+from command_helpers import Done, feedsim, summary_of
 from feedsim.cli import main
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
@@ -65,11 +65,6 @@ def traces(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def done(fmus: Path, traces: Path) -> Done:
     known = ["--axis", "Z", "--machine", MACHINE, "--inertia", f"{J} kg.m^2"]
     return feedsim("identify", "constant/log.csv", "sine/log.csv", *known, fmus=fmus, cwd=traces)
-
-
-def summary_of(folder: Path) -> dict[str, Any]:
-    content: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    return content
 
 
 def test_everything_is_written_and_told(done: Done, traces: Path) -> None:

@@ -39,7 +39,7 @@ steps = st.lists(st.sampled_from([0.0, 0.25, 0.5, 1.0, 3.0]), min_size=2, max_si
     reach=st.sampled_from([0.0, 0.1, 0.5, 1.0, 2.75, 50.0]),
     start=st.sampled_from([0.0, -7.0, 1000.0]),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_tube_is_that_of_brute_force(steps: list[float], seed: int, reach: float, start: float) -> None:
     """Rows at one instant included; times are binary fractions, so that both see the same instants."""
     rng = np.random.default_rng(seed)
@@ -55,7 +55,7 @@ def test_tube_is_that_of_brute_force(steps: list[float], seed: int, reach: float
 
 
 @given(seed=st.integers(0, 2**32 - 1), reach=st.sampled_from([1e-3, 0.03, 0.4]), amount=st.sampled_from([1e-3, 0.1]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_deviations_are_those_of_pyfunnel(
     seed: int, reach: float, amount: float, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -123,7 +123,7 @@ def test_eighty_thousand_rows_of_forty_variables() -> None:
 @given(
     amount=st.floats(1e-9, 1e-2), share=st.floats(0.0, 3.0), row=st.integers(0, 400), unit=st.sampled_from(["m", "mm"])
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_a_change_is_found_where_it_is(amount: float, share: float, row: int, unit: str) -> None:
     reference = wave().time, wave()["Z.x_a"]
     y = reference[1].copy()
@@ -139,7 +139,7 @@ def test_a_change_is_found_where_it_is(amount: float, share: float, row: int, un
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_wider_tolerances_never_make_it_worse(seed: int) -> None:
     rng = np.random.default_rng(seed)
     time = np.sort(rng.uniform(0, 1, 30))

@@ -21,12 +21,13 @@ from feedsim.cosim import Run, exchange
 from feedsim.cosim.excite import measure, usual_rms
 from feedsim.cosim.loop import REPORTED_EVERY, Loop, Progress
 from feedsim.cosim.operations import set_real
-from feedsim.cosim.schedule import SCHEMES, Cycle
+from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Port
 from feedsim.errors import InputError, SimulationError
 from feedsim.findings import severity
 from feedsim.nc.excitation import multisine
+from feedsim.scenario.coupling import SCHEMES
 from feedsim_packager import toolchain
 from feedsim_packager.exchange import build as build_loop
 from scenario_helpers import default_machine

@@ -11,8 +11,8 @@ import pytest
 from feedsim import load_scenario, nc
 from feedsim.cli import main
 from feedsim.cosim import Run, check, executed, run
-from feedsim.cosim.schedule import SCHEMES
 from feedsim.errors import InputError
+from feedsim.scenario.coupling import SCHEMES
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 SHORT = ("motions.0.by.Z=1 mm", "motions.1.duration=0.05 s", "recording.interval=125 us")

@@ -23,11 +23,12 @@ from fmpy.fmi2 import (
 from fmpy.model_description import ModelDescription
 
 from feedsim import load_scenario, run
-from feedsim.cosim import SCHEMES, Run
+from feedsim.cosim import Run
 from feedsim.cosim.one_unit import pack_whole
 from feedsim.errors import InputError
 from feedsim.nc import Program, plan
 from feedsim.scenario import Scenario
+from feedsim.scenario.coupling import SCHEMES
 
 ROOT = Path(__file__).resolve().parents[2]
 SIGNALS = ("x_a", "n_a", "M_a", "M_fr", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q")

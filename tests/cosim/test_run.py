@@ -15,6 +15,7 @@ from feedsim.cosim.operations import Interpreter, do_step
 from feedsim.cosim.system import System
 from feedsim.cosim.unpacked import STORE
 from feedsim.errors import InputError, SimulationError
+from feedsim.scenario.coupling import SCHEMES
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 # A short reversal of all axes at once: every unit works, every branch of the friction is passed.
@@ -77,7 +78,7 @@ def test_weight_on_an_axis_is_carried_by_the_drive(short: Path, fmus: Path) -> N
     assert abs(trace["Y.M_fr"][-1]) > 0.05, "the sag must have loaded the friction, or this test shows nothing"
 
 
-@pytest.mark.parametrize("scheme", sorted(cosim.SCHEMES))
+@pytest.mark.parametrize("scheme", sorted(SCHEMES))
 def test_every_scheme_runs_and_agrees_roughly(scheme: str, short: Path, fmus: Path) -> None:
     reference = run(short, fmus, "coupling.substeps=4").trace["X.x_a"]
     error = np.abs(run(short, fmus, f"coupling.scheme={scheme}").trace["X.x_a"] - reference).max()

@@ -15,7 +15,7 @@ from feedsim.errors import InputError
 from foreign import acme
 from foreign.conftest import Libraries
 from foreign.test_foreign_units import MOTION, mapped, other_name, renamed, settings_of
-from ssp_helpers import ROOT, STRUCTURE, altered, contents, edited, export_short, short_scenario, write
+from ssp_helpers import ROOT, STRUCTURE, altered, contents, edited, export_short, run_ssp, short_scenario, write
 
 
 @pytest.fixture(scope="module")
@@ -34,11 +34,6 @@ def acme_ssp(libraries: Libraries, fmus: Path, tmp_path_factory: pytest.TempPath
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
     return export_short(tmp_path_factory.mktemp("scenario"), fmus)
-
-
-def run_ssp(file: Path, *overrides: str) -> Run:
-    with ssp.opened(file, overrides) as found:
-        return cosim.run(found.scenario, program=found.program, fmus=found.fmus)
 
 
 def warnings_of(file: Path) -> str:

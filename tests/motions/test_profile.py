@@ -39,7 +39,7 @@ def test_default_z_move_lasts_as_long_as_the_closed_form() -> None:
     assert profile.steady == pytest.approx((2 * math.sqrt(5 / 60 / JERK), 0.1 / (5 / 60)), rel=1e-12)
 
 
-@settings(max_examples=200, derandomize=True, deadline=None)
+@settings(max_examples=200, derandomize=True)
 @given(
     length=st.floats(-9, 4), speed=st.floats(-6, 1), acceleration=st.floats(-3, 2.5), jerk=st.floats(-2, 5)
 )  # decimal exponents
@@ -84,7 +84,7 @@ def test_peaks_of_triangular_and_other_profiles(
     assert (profile.steady is not None) == (speed == limits[1])
 
 
-@settings(max_examples=200, derandomize=True, deadline=None)
+@settings(max_examples=200, derandomize=True)
 @given(
     length=st.floats(-6, 2), speed=st.floats(-4, 1), acceleration=st.floats(-2, 2.5), jerk=st.floats(-1, 5)
 )  # decimal exponents

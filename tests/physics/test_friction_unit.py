@@ -225,7 +225,7 @@ levels = st.fixed_dictionaries(
 paths = st.lists(st.floats(-200.0, 200.0), min_size=2, max_size=40)
 
 
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80, derandomize=True)
 @given(p=levels, speeds=paths, h=st.sampled_from([1e-5, 1.25e-4, 1e-3, 0.1]))
 def test_bounds_hold_for_any_motion(archive: Archive, p: dict[str, float], speeds: list[float], h: float) -> None:
     with archive.instance(p, inputs={"n_fr": speeds[0]}) as unit:
@@ -239,7 +239,7 @@ def test_bounds_hold_for_any_motion(archive: Archive, p: dict[str, float], speed
     assert k.max() <= 1.0
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, derandomize=True)
 @given(p=levels, speeds=paths)
 def test_pure_lugre_is_passive(archive: Archive, p: dict[str, float], speeds: list[float]) -> None:
     """From rest, friction never gives back more than its bristles store: integral of M_fr n dt >= sigma_0 z^2/2.

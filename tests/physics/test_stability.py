@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from feedsim import cosim, scenario
+from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure import checked_modes
 
 MACHINE = Path(__file__).resolve().parents[2] / "scenarios" / "machines" / "test_centre"
@@ -64,26 +65,26 @@ STEPS: dict[str, tuple[Callable[..., list[float]], int]] = {
 }
 
 
-@pytest.mark.parametrize("scheme", sorted(cosim.SCHEMES))
+@pytest.mark.parametrize("scheme", sorted(SCHEMES))
 def test_bound_of_mass_and_damper(scheme: str) -> None:
     """At a reversal the bristle is still bent to the other side, z = -g sgn(n): dz/dt = 2 n, and the slope is
     2 sigma_1. So a = 2 sigma_1 h/J_inf, which is 4 times the share of 2 J_inf/h that sigma_1 has."""
     step, states = STEPS[scheme]
     for of_bound, stable in ((0.999, True), (1.001, False)):
-        a = 4 * of_bound * cosim.SCHEMES[scheme].stable_share
+        a = 4 * of_bound * SCHEMES[scheme].stable_share
         matrix = np.array([step(a, *unit) for unit in np.eye(states)]).T
         assert (np.abs(np.linalg.eigvals(matrix)).max() < 1) == stable
 
 
 # The structure gives way a little where a step is long for its highest modes: what is derived for a mass holds to 20 %.
-@pytest.mark.parametrize("scheme", sorted(cosim.SCHEMES))
+@pytest.mark.parametrize("scheme", sorted(SCHEMES))
 @pytest.mark.parametrize(("of_bound", "chatters"), [(0.95, False), (1.2, True)])
 def test_bound_of_the_friction_slope(scheme: str, of_bound: float, chatters: bool, fmus: Path, tmp_path: Path) -> None:
     file = tmp_path / "scenario.yaml"
     file.write_text(THERE_AND_BACK, encoding="utf-8")
     machine = scenario.load(file).machine
     friction = machine.axes["Z"].friction
-    bound = cosim.SCHEMES[scheme].stable_share * 2 * checked_modes(machine).J_inf("Z") / machine.cycles.T_c
+    bound = SCHEMES[scheme].stable_share * 2 * checked_modes(machine).J_inf("Z") / machine.cycles.T_c
     sigma_1 = of_bound * bound - friction.sigma_2
     overrides = [f"coupling.scheme={scheme}", f"machine.axes.Z.friction.sigma_1={sigma_1!r} N.m.s/rad"]
     result = cosim.run(scenario.load(file, overrides), fmus=fmus)

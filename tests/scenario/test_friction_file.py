@@ -57,7 +57,7 @@ def test_a_person_reads_one_line_per_parameter() -> None:
     assert len({line.index("#") for line in lines[4:13]}) == 1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(1e-6, 1e9), st.floats(0, 1e4), st.floats(1e-9, 1e3), st.floats(0, 1), st.floats(0, 1))
 def test_values_keep_eight_digits(sigma_0: float, sigma_1: float, F_C: float, rise: float, gamma: float) -> None:
     values = VALUES | {"sigma_0": sigma_0, "sigma_1": sigma_1, "F_C": F_C, "F_S": F_C * (1 + rise), "gamma": gamma}

@@ -14,16 +14,11 @@ from feedsim.cosim import Run
 from feedsim.findings import Wrong
 from feedsim.scenario.structure.load import load_structure
 from feedsim.ssp.opened import Opened
-from ssp_helpers import ROOT, STRUCTURE, edited, short_scenario
+from ssp_helpers import ROOT, STRUCTURE, edited, run_ssp, short_scenario
 
 
 def run_scenario(file: Path, fmus: Path, *overrides: str) -> Run:
     return cosim.run(scenario.load(file, overrides), fmus=fmus)
-
-
-def run_ssp(file: Path, *overrides: str) -> Run:
-    with ssp.opened(file, overrides) as found:
-        return cosim.run(found.scenario, program=found.program, fmus=found.fmus)
 
 
 def assert_same(one: Run, other: Run) -> None:

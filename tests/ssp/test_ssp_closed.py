@@ -20,14 +20,9 @@ from feedsim.errors import InputError
 from feedsim.files.references import closed
 from feedsim.ssp import archive
 from feedsim.structure.matrices.calculix import _cards
-from ssp_helpers import STRUCTURE, contents, export_short
+from ssp_helpers import STRUCTURE, contents
 
 MARK = '<feedsim:Scenario version="1">'
-
-
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
-    return export_short(tmp_path_factory.mktemp("scenario"), fmus)
 
 
 @pytest.fixture(scope="module")

@@ -11,14 +11,9 @@ import pytest
 from feedsim import cli, scenario, ssp
 from feedsim.cosim import archive
 from feedsim.errors import InputError, OutputError
-from ssp_helpers import STRUCTURE, UNPACKED, altered, contents, edited, export_short, short_scenario, write
+from ssp_helpers import STRUCTURE, UNPACKED, altered, contents, edited, short_scenario, write
 
 M_A = '<ssd:Connection startElement="controller_Z" startConnector="M_a" endElement="plant" endConnector="Z.M_a" />'
-
-
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
-    return export_short(tmp_path_factory.mktemp("scenario"), fmus)
 
 
 def refusal(file: Path, *overrides: str) -> InputError:

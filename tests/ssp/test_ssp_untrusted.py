@@ -17,14 +17,9 @@ from feedsim.cosim import untrusted
 from feedsim.errors import InputError
 from feedsim.ssp import parameter_set, rebuilt
 from feedsim.ssp.opened import _load
-from ssp_helpers import STRUCTURE, UNPACKED, altered, contents, edited, export_short, write
+from ssp_helpers import STRUCTURE, UNPACKED, altered, contents, edited, write
 
 FRICTION = "resources/friction_Z.ssv"
-
-
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory: pytest.TempPathFactory, fmus: Path) -> Path:
-    return export_short(tmp_path_factory.mktemp("scenario"), fmus)
 
 
 def refusal(file: Path, capsys: pytest.CaptureFixture[str]) -> str:

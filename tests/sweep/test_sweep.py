@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import re
@@ -19,6 +18,7 @@ from random import Random
 
 import pytest
 
+from command_helpers import rows_of
 from feedsim import analysis, cosim, units
 from feedsim.cli import main
 from feedsim.errors import InputError, OutputError, SimulationError
@@ -28,12 +28,6 @@ from feedsim.sweep import read_table
 from feedsim.sweep.study import Progress, run
 
 Write = Callable[..., Path]
-
-
-def rows(folder: Path) -> list[list[str]]:
-    """Cells of the table without those of the seconds."""
-    with (folder / "table.csv").open(newline="") as file:
-        return [row[:-1] for row in csv.reader(file)]
 
 
 def test_table_and_record(study: Write, fmus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -130,7 +124,7 @@ def test_interrupted_and_continued(study: Write, fmus: Path, tmp_path: Path) -> 
         assert read_table(tmp_path / "parts").partial
     assert json.loads((tmp_path / "parts" / "study.json").read_text())["done"] == 15
     run(loaded, tmp_path / "parts", workers=0, fmus=fmus)
-    assert rows(tmp_path / "parts") == rows(tmp_path / "whole")
+    assert rows_of(tmp_path / "parts") == rows_of(tmp_path / "whole")
 
 
 @pytest.mark.parametrize("end", [SystemExit(143), SimulationError("the scheduler is lost")], ids=["SIGTERM", "lost"])
@@ -193,6 +187,6 @@ def test_killed_and_continued(study: Write, fmus: Path, tmp_path: Path) -> None:
         process.wait()
     assert killed
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    assert rows(tmp_path / "killed") == rows(tmp_path / "whole")
+    assert rows_of(tmp_path / "killed") == rows_of(tmp_path / "whole")
     lines = journal.read_bytes().splitlines()
     assert sorted(json.loads(line)["run"] for line in lines[2:]) == [*range(64)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from command_helpers import rows_of
 from feedsim.cli import main
 from feedsim.errors import InputError
 from feedsim.scenario.study import load_study
@@ -18,12 +18,6 @@ from feedsim.sweep.study import Progress, run
 
 Write = Callable[..., Path]
 SENSITIVITY = ("sobol, runs: 16", "sensitivity, runs: 4")
-
-
-def rows(folder: Path) -> list[list[str]]:
-    """Cells of the table without those of the seconds."""
-    with (folder / "table.csv").open(newline="") as file:
-        return [row[:-1] for row in csv.reader(file)]
 
 
 def stop_after(number: int) -> Callable[[Progress], None]:
@@ -53,7 +47,7 @@ def test_a_longer_study_goes_on_with_the_runs_of_a_shorter_one(
     told: list[Progress] = []
     run(load_study(file, runs=many), tmp_path / "out", workers=0, fmus=fmus, progress=told.append)
     assert told[0] == Progress(len(short), 0, len(whole), len(short))
-    assert rows(tmp_path / "out") == rows(tmp_path / "whole")
+    assert rows_of(tmp_path / "out") == rows_of(tmp_path / "whole")
     # Once more: the journal knows that the runs have become more.
     run(load_study(file, runs=many), tmp_path / "out", workers=0, fmus=fmus, progress=told.append)
     assert told[-1].resumed == len(whole)

@@ -1,13 +1,13 @@
 /* The rigid axis under a given torque (src/friction_fmu/free_axis.c) against closed forms and a fine solution. */
 #include "check.h"
 #include "free_axis.h"
+#include "friction_values.h"
 
-enum { STEPS = 400, PARAMETERS = 12 };
+enum { STEPS = 400 };
 
-/* in the order of variables.def: sigma_0 .. 2, F_C, F_S, v_s, beta, F_log, v_log, asymmetry, W, gamma */
-static const double VALUES[PARAMETERS] = {300, 0.8, 0.006, 1.6, 2.1, 0.6, 1.5, 0.4, 3, 0.1, 0.04, 0.35};
 /* Coulomb friction that is next to none, bristles of 1 mrad; viscous friction as the tests set it */
-static const double SMOOTH[PARAMETERS] = {1e-6, 0, 0, 1e-9, 1e-9, 1, 1, 0, 1, 0, 0, 1};
+static const double SMOOTH[PARAMETERS] = {[AT_sigma_0] = 1e-6, [AT_F_C] = 1e-9, [AT_F_S] = 1e-9, [AT_v_s] = 1,
+                                          [AT_beta] = 1,       [AT_v_log] = 1,  [AT_gamma] = 1};
 static const double J = 0.0164, H = 1e-3;
 
 static double torque[STEPS], angle[STEPS + 2], speed[STEPS + 2];
@@ -42,7 +42,7 @@ static void without_friction_it_falls_freely(void) {
 static double viscous_error(size_t substeps) {
     double values[PARAMETERS];
     memcpy(values, SMOOTH, sizeof values);
-    values[2] = 0.2;
+    values[AT_sigma_2] = 0.2;
     fill(0.5);
     CHECK(free_axis(values, J, 0, torque, STEPS, H, substeps, 0, 0, angle, speed) == STEPS + 1);
     double error = 0;
@@ -63,7 +63,9 @@ static void viscous_friction_lets_it_approach_a_speed(void) {
 static void below_break_away_it_sticks(void) {
     /* Constant g: dz = (1 - z/g) dx while it moves one way, so that a torque of F_C/2 moves it by g ln 2. Damped beyond
      * the critical 2 sqrt(sigma_0 J), that is without turning back. */
-    const double values[PARAMETERS] = {300, 0, 5, 1.6, 1.6, 1, 1, 0, 1, 0, 0, 1}, g = 1.6 / 300;
+    const double values[PARAMETERS] = {[AT_sigma_0] = 300, [AT_sigma_2] = 5, [AT_F_C] = 1.6, [AT_F_S] = 1.6,
+                                       [AT_v_s] = 1,       [AT_beta] = 1,    [AT_v_log] = 1, [AT_gamma] = 1};
+    const double g = 1.6 / 300;
     fill(0.8 + 0.1);
     double way[2];
     for (int i = 0; i < 2; i++) {
@@ -144,12 +146,12 @@ static size_t count_with(int parameter, double value) {
 }
 
 static void refusals(void) {
-    static const double below[PARAMETERS] = {0, -1e-9, -1, 0, 1.59, 0, 0.09, -1, 0, -0.91, -1, -0.01};
     staircase();
-    for (int i = 0; i < PARAMETERS; i++) {
+    for (int k = 0; k < REFUSED; k++) {
+        const int i = BELOW[k].at;
         CHECK(count_with(i, VALUES[i]) == STEPS + 1);
         mark(0);
-        CHECK(count_with(i, below[i]) == 0);
+        CHECK(count_with(i, BELOW[k].value) == 0);
         CHECK(count_with(i, NAN) == 0);
         check_mark(0);
     }

@@ -1,12 +1,11 @@
 /* The response in one call (src/friction_fmu/response.c) against the contact stepped by hand. */
 #include "check.h"
 #include "contact.h"
+#include "friction_values.h"
 #include "response.h"
 
-enum { STEPS = 240, PARAMETERS = 12 };
+enum { STEPS = 240 };
 
-/* in the order of variables.def: sigma_0 .. 2, F_C, F_S, v_s, beta, F_log, v_log, asymmetry, W, gamma */
-static const double VALUES[PARAMETERS] = {300, 0.8, 0.006, 1.6, 2.1, 0.6, 1.5, 0.4, 3, 0.1, 0.04, 0.35};
 static const Contact CONTACT = {.lugre = {.sigma_0 = 300,
                                           .sigma_1 = 0.8,
                                           .sigma_2 = 0.006,
@@ -108,20 +107,20 @@ static size_t count_with(int parameter, double value) {
 }
 
 static void refusals(void) {
-    static const double below[PARAMETERS] = {0, -1e-9, -1, 0, 1.59, 0, 0.09, -1, 0, -0.91, -1, -0.01};
-    for (int i = 0; i < PARAMETERS; i++) {
+    for (int k = 0; k < REFUSED; k++) {
+        const int i = BELOW[k].at;
         CHECK(count_with(i, VALUES[i]) == STEPS + 1);
         mark(0);
-        CHECK(count_with(i, below[i]) == 0);
+        CHECK(count_with(i, BELOW[k].value) == 0);
         CHECK(count_with(i, NAN) == 0);
         CHECK(count_with(i, INFINITY) == 0);
         check_mark(0);
     }
-    CHECK(count_with(3, 2.1) == STEPS + 1); /* F_C = F_S */
-    CHECK(count_with(3, 2.11) == 0);
-    CHECK(count_with(6, 10.1) == 0);
-    CHECK(count_with(9, 0.91) == 0);
-    CHECK(count_with(11, 1.01) == 0);
+    CHECK(count_with(AT_F_C, 2.1) == STEPS + 1); /* F_C = F_S */
+    CHECK(count_with(AT_F_C, 2.11) == 0);
+    CHECK(count_with(AT_beta, 10.1) == 0);
+    CHECK(count_with(AT_asymmetry, 0.91) == 0);
+    CHECK(count_with(AT_gamma, 1.01) == 0);
     CHECK(response(VALUES, speeds, STEPS, H, 0, 1, 0, 0, M_fr, z, c) == 0);
     CHECK(response(VALUES, speeds, STEPS, H, 1, 0, 0, 0, M_fr, z, c) == 0);
     CHECK(response(VALUES, speeds, STEPS, 0, 1, 1, 0, 0, M_fr, z, c) == 0);

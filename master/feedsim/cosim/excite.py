@@ -20,7 +20,7 @@ from feedsim.cosim.binaries import fmus_directory
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.operations import Operation, When, copy, get_row, set_real, set_slopes
-from feedsim.cosim.schedule import SCHEMES, Cycle
+from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.system import System
 from feedsim.cosim.trust import LOAD_TAKEN_UP
 from feedsim.cosim.unit import Floats, Log, Port
@@ -31,6 +31,7 @@ from feedsim.nc import Program
 from feedsim.nc.excitation import Excitation
 from feedsim.nc.program import violations
 from feedsim.scenario import Machine
+from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure import checked_modes
 from feedsim.trace import Trace
 from feedsim.trace.trace import suggest

@@ -9,12 +9,11 @@ from pathlib import Path
 
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.roles import controller_parameters
-from feedsim.cosim.schedule import SCHEMES
 from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Machine
+from feedsim.scenario.coupling import SCHEMES, Coupling
 from feedsim.scenario.machine import Parameter
-from feedsim.scenario.model import Coupling
 from feedsim.structure.pack import POSES_IN_ARCHIVE, Packed, packaging, packed, plant_tables, setpoint_table
 
 UNIT = "machine"  # its archive is machine.fmu

@@ -3,13 +3,12 @@
 It is written down here, once, as a list of operations, and executed elsewhere (feedsim.cosim.operations).
 
 The controllers sample at t_k and run first; they add no error. The stiff bond is plant <-> friction; a :class:`Scheme`
-says how the two see each other within a step.
+(feedsim.scenario.coupling) says how the two see each other within a step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,38 +18,7 @@ from feedsim.cosim.roles import RoleUnit, check_step
 from feedsim.cosim.system import System
 from feedsim.cosim.unit import Floats
 from feedsim.errors import InputError
-
-
-@dataclass(frozen=True)
-class Scheme:
-    """How the units see each other within a step."""
-
-    name: str
-    stable_share: float  # of 2 J_inf/h that the friction's slope sigma_1 + sigma_2 may reach; docs/theory.md derives it
-    speed: str  # friction: n_fr linear "within" the step, held at its "end" or its "start", or "extrapolated"
-    torque_ramp: bool = True  # plant: M_a runs linearly from M_a(t_k) to M_a(t_k+1); else M_a(t_k) is held
-    friction_ramp: bool = False  # plant: M_fr is extrapolated with the slope of its last step; else held
-    passes: int = 1  # plant and friction go back and take the step again, with the slope of M_fr that they have found
-    friction_first: bool = False  # friction steps ahead of the plant, which holds the torque found; else the plant does
-
-    @property
-    def speed_ramp(self) -> bool:
-        """Whether friction is told the slope of its speed."""
-        return self.speed in ("within", "extrapolated")
-
-
-SCHEMES = {
-    scheme.name: scheme
-    for scheme in (
-        Scheme("extrapolated", friction_ramp=True, stable_share=0.25, speed="within"),
-        Scheme("iterated", friction_ramp=True, stable_share=0.5, speed="within", passes=2),
-        Scheme("gauss_seidel", stable_share=0.5, speed="end"),
-        Scheme("gauss_seidel_friction_first", stable_share=0.5, speed="start", friction_first=True),
-        Scheme("jacobi", stable_share=0.25, speed="start"),
-        Scheme("jacobi_extrapolated", friction_ramp=True, stable_share=0.1, speed="extrapolated"),
-        Scheme("parallel", stable_share=0.25, speed="start", torque_ramp=False),
-    )
-}
+from feedsim.scenario.coupling import SCHEMES, Scheme
 
 
 def lacking(role: RoleUnit, scheme: Scheme) -> str:

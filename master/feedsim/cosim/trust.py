@@ -12,12 +12,13 @@ import numpy as np
 from feedsim import units
 from feedsim.cosim.loads import Acting, Work, at_motor
 from feedsim.cosim.recording import Recording
-from feedsim.cosim.schedule import SCHEMES, Cycle
+from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.system import System
 from feedsim.findings import Wrong
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop
 from feedsim.nc import Program
 from feedsim.scenario import Drive, ForeignUnit, Friction, Machine, Scenario
+from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure import Modes
 from feedsim.structure.pack import POSES_IN_ARCHIVE
 from feedsim.structure.pose_change import NEAR, PoseChange, pose_change, warnings

@@ -16,12 +16,13 @@ from feedsim.cosim.one_unit import UNIT, pack_tables, parameters
 from feedsim.cosim.operations import Operation
 from feedsim.cosim.plant import axes_of, open_own, packed_for
 from feedsim.cosim.roles import RoleUnit
-from feedsim.cosim.schedule import SCHEMES, Cycle
+from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.system import System, plant_parameters
 from feedsim.cosim.unit import Alias, Port, Unit
 from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Coupling, Machine
+from feedsim.scenario.coupling import SCHEMES
 from feedsim.scenario.roles import BOOLEAN, DRIVE, FRICTION, Role
 
 

@@ -5,10 +5,11 @@ Start with load.py: ``load``.
 """
 
 from feedsim.scenario.base import Base, Change
+from feedsim.scenario.coupling import Coupling
 from feedsim.scenario.load import Subject, load, load_machine, load_subject
 from feedsim.scenario.logging import Delay, Level, Logging, Noise, Quantisation
 from feedsim.scenario.machine import Axis, CurrentController, Cycles, Drive, Filter, Friction, Machine
-from feedsim.scenario.model import CircleTest, Coupling, Positioning, PositioningAccuracy, Recording, Scenario
+from feedsim.scenario.model import CircleTest, Positioning, PositioningAccuracy, Recording, Scenario
 from feedsim.scenario.roles import ForeignUnit
 
 __all__ = [

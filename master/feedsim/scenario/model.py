@@ -11,29 +11,10 @@ from pydantic import AfterValidator, Field, PrivateAttr, StrictInt, StrictStr, V
 from feedsim.fields import AxisName, Model, Quantity, Reading, fault, no_axis
 from feedsim.files.source import Place
 from feedsim.motions import Circle, MeasuredSetpoints, Motion, PositioningCycle
+from feedsim.scenario.coupling import Coupling
 from feedsim.scenario.loads import Load, MotionIndex
 from feedsim.scenario.logging import Logging, interval_fault, on_the_grid
 from feedsim.scenario.machine import Machine
-
-Scheme = Literal[
-    "extrapolated", "iterated", "gauss_seidel", "gauss_seidel_friction_first", "jacobi", "jacobi_extrapolated",
-    "parallel",
-]  # fmt: skip
-
-
-class Coupling(Model):
-    """How plant and friction are exchanged."""
-
-    scheme: Scheme = Field(
-        default="extrapolated", description="Order of the units and use of input slopes within an exchange step"
-    )
-    substeps: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(
-        default=1, description="Exchange steps of plant and friction per control cycle"
-    )
-    units: Literal["separate", "one"] = Field(
-        default="separate",
-        description="Structure, drives and friction as units of their own, or as one unit (machine.fmu), same results",
-    )
 
 
 class Recording(Model):

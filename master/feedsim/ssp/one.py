@@ -9,10 +9,10 @@ from typing import Any
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.one_unit import UNIT, pack_whole
 from feedsim.cosim.plant import axes_of
-from feedsim.cosim.schedule import SCHEMES
 from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Scenario
+from feedsim.scenario.coupling import SCHEMES
 from feedsim.ssp.parameter_set import Value
 from feedsim.ssp.roles import Roles, connector_faults
 from feedsim.ssp.system_structure import Structure

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from feedsim.scenario import Scenario, load
 from feedsim.scenario.study import load_study
 from feedsim.sweep import provenance
 from feedsim.sweep.design import design
-from feedsim.sweep.table import RECORD, read_table
+from feedsim.sweep.table import RECORD, read_table, record_of
 
 _CASE = re.compile(r"(?P<folder>.+):(?:(?P<run>\d+)|(?P<which>min|max)=(?P<figure>.+))")
 
@@ -71,9 +70,9 @@ def scenario_of(chosen: Case) -> tuple[Scenario, Path]:
     """
     again = f"`feedsim sweep STUDY --row {chosen.run}` prints the command that makes the run alone"
     try:
-        record = json.loads((chosen.folder / RECORD).read_text(encoding="utf-8"))
+        record = record_of(chosen.folder)
         parts, place = dict(record["parts"]), dict(record["place"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError):
         raise InputError(f"{chosen.folder / RECORD}: does not tell where its study file is; {again}") from None
     study = load_study(chosen.folder / place["file"], place["overrides"], runs=place["runs"])
     planned = design(study)

@@ -22,7 +22,7 @@ from feedsim.sweep.bundle import Bundle
 from feedsim.sweep.design import Task, design
 from feedsim.sweep.engine import Engine, open_engine
 from feedsim.sweep.journal import Journal
-from feedsim.sweep.table import RECORD, STEM, Format, Table, chosen, parquet, table_of, write_table
+from feedsim.sweep.table import RECORD, STEM, Format, Table, chosen, parquet, record_of, table_of, write_table
 from feedsim.trace.files import written_whole
 
 _log = logging.getLogger(__name__)
@@ -97,11 +97,14 @@ def run(
             if discard is not None:
                 discard()
         begun = provenance.now()
-        sessions = _sessions(directory / RECORD, record["fingerprint"], journal.resumed)
+        before = record_of(directory)
+        if before.get("fingerprint") != record["fingerprint"]:  # of another study
+            before = {}
+        sessions = _sessions(before, journal.resumed)
         where, processes = "", 0
         made_by: Engine | None = None
         checked = False
-        nominal = _nominal(directory / RECORD, record)
+        nominal = _nominal(before)
 
         def note(ended: str | None, **more: Any) -> None:
             made = len(journal.done) - journal.resumed
@@ -159,24 +162,22 @@ def run(
         return write()
 
 
-def _nominal(path: Path, record: Mapping[str, Any]) -> dict[str, float]:
+def _nominal(before: Mapping[str, Any]) -> dict[str, float]:
     """Figures of the scenario without changes that this same study left in a folder; empty where there are none."""
     try:
-        before = json.loads(path.read_text(encoding="utf-8"))
-        return dict(before["nominal"]) if before["fingerprint"] == record["fingerprint"] else {}
-    except (OSError, ValueError, KeyError, TypeError):
+        return dict(before["nominal"])
+    except (ValueError, KeyError, TypeError):
         return {}
 
 
-def _sessions(path: Path, fingerprint: str, resumed: int) -> list[dict[str, Any]]:
+def _sessions(before: Mapping[str, Any], resumed: int) -> list[dict[str, Any]]:
     """The sessions in which the `resumed` runs were made, as the record of the last one tells."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        told = [dict(each) for each in found["sessions"]] if resumed and found["fingerprint"] == fingerprint else []
+        told = [dict(each) for each in before["sessions"]] if resumed else []
         for each in told:
             if each["runs"] is None:  # it was killed
                 each["runs"] = resumed - sum(other["runs"] or 0 for other in told)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError):
         return []
     return told
 

@@ -207,6 +207,15 @@ def read_table(path: str | Path) -> Table:
     return _read_parquet(path) if path.suffix == ".parquet" else _read_csv(path)
 
 
+def record_of(directory: Path) -> dict[str, Any]:
+    """study.json of a folder: how its runs were made; empty where there is none, or none that can be read."""
+    try:
+        found = json.loads((directory / RECORD).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
 def parquet() -> Any:
     """pyarrow. Raises MissingPackage."""
     need("pyarrow.parquet", "Parquet (--format csv does without)")
@@ -256,7 +265,7 @@ def _read_csv(path: Path) -> Table:
                 columns[name] = np.array(cells, dtype=object)
         except (ValueError, OverflowError) as error:
             raise InputError(f"{path}: column {name!r}: {error}") from None
-    return _read_table(columns, dict(heads), _record(path.parent / RECORD))
+    return _read_table(columns, dict(heads), record_of(path.parent))
 
 
 def _head(text: str) -> tuple[str, str]:
@@ -275,14 +284,6 @@ def _read_table(columns: dict[str, NDArray[Any]], units: dict[str, str], record:
     figures = tuple(name for name in between if name not in known)
     runs = runs if isinstance(runs, int) else 0
     return Table(columns, units, known, figures, runs or len(columns["run"]), record)
-
-
-def _record(path: Path) -> Mapping[str, Any]:
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _write_parquet(table: Table, path: Path) -> None:

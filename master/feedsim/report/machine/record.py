@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from feedsim.cosim import SCHEMES
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
 from feedsim.scenario import Coupling
+from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure.info import MachineInfo
 
 FORMAT = 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -19,7 +18,7 @@ from feedsim.report.sweep.account import QUANTILES, SHARE, Account, Input, Measu
 from feedsim.report.sweep.plots import drawn, pictures_of, varying
 from feedsim.report.sweep.summary import study_files, summary
 from feedsim.sweep.sensitivity import Indices, Trends
-from feedsim.sweep.table import RECORD
+from feedsim.sweep.table import record_of
 
 if TYPE_CHECKING:
     from feedsim.scenario.study import Study
@@ -78,20 +77,11 @@ def write(
 
     The table may be that of an unfinished study. The table's own files are left as they are. Raises OutputError.
     """
-    account = Account(table, study, design, _record(Path(directory)))
+    account = Account(table, study, design, record_of(Path(directory)))
     machine = study.base.scenario.machine
     with remarked(f"{study.name}. {machine.name}. {machine.note}".strip(), REMARK_WIDTH, REMARK_LINES):
         whole, single = pictures_of(account)
     return write_report(directory, report_of(account, whole, single), partial(summary, account), {}, drawn)
-
-
-def _record(directory: Path) -> dict[str, Any]:
-    """study.json beside the table, as far as it can be read: without it the page tells less."""
-    try:
-        content = json.loads((directory / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) -> Report:

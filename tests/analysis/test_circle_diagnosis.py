@@ -12,7 +12,7 @@ from drawn_circles import Causes, driven
 from scipy import stats
 
 from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, answer, diagnose, sentence, swinging
-from feedsim.analysis.circle.model import _student
+from feedsim.analysis.circle.robust import student
 
 BALLBAR = CircleUnderTest(("X", "Z"), radius=0.1, speed=0.05, pitch={"X": 0.01, "Z": 0.02})
 SAMPLES = 3000
@@ -358,6 +358,4 @@ def test_errors_that_no_term_describes_are_not_called_causes() -> None:
 
 @pytest.mark.parametrize("free", [2, 5, 19, 20, 21, 30, 90, 1000, 10**6])
 def test_quantiles_of_intervals_are_those_of_student(free: int) -> None:
-    assert _student(free) == pytest.approx(
-        stats.t.ppf(0.975, free), rel=2e-7
-    )  # the term of the series that is left out
+    assert student(free) == pytest.approx(stats.t.ppf(0.975, free), rel=2e-7)  # the term of the series that is left out

@@ -14,7 +14,7 @@ from feedsim.identify import Options, stages
 from feedsim.identify.result import Estimate, Identification, Stationary
 from feedsim.report.chart import Curve, Panel
 from feedsim.report.content import Report, Tile
-from feedsim.report.formatting import counted, powers
+from feedsim.report.formatting import counted
 from feedsim.report.identify import headline
 from feedsim.report.identify.quantities import speeds_of
 from feedsim.report.identify.report import report_of
@@ -109,24 +109,6 @@ def delivered(picture: Picture) -> list[Curve]:
     above = picture.chart.panels[0]
     assert isinstance(above, Panel)
     return [each for each in above.curves if each.name.startswith("identified set")]
-
-
-@pytest.mark.parametrize(
-    ("text", "shown"),
-    [
-        ("0.0000147", "1.47×10⁻⁵"),
-        ("1.5057e-05", "1.5057×10⁻⁵"),
-        ("0.0000120 to 0.0000174", "1.20×10⁻⁵ to 1.74×10⁻⁵"),
-        ("-0.0000120 to 0.2", "-1.20×10⁻⁵ to 0.2"),
-        ("3e-12", "3×10⁻¹²"),
-        ("0.0001", "0.0001"),
-        ("0.0000", "0.0000"),
-        ("1.6000", "1.6000"),
-        ("1e+06", "1e+06"),
-    ],
-)
-def test_small_numbers_have_a_power_of_ten(text: str, shown: str) -> None:
-    assert powers(text) == shown
 
 
 def test_small_values_in_tiles_and_table() -> None:

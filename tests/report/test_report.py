@@ -27,8 +27,7 @@ from feedsim.motions import Arc, Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.chart.embedded import embedded
-from feedsim.report.content import Report, Tile
-from feedsim.report.formatting import display_unit, duration, minus, shown, typeset
+from feedsim.report.content import Tile
 from feedsim.report.page import html, script
 from feedsim.report.provenance import archives, input_files
 from feedsim.report.run.report import HEADER, real_time_factor, report_of, summary, tile
@@ -225,10 +224,6 @@ def test_motions_have_their_path_and_a_note_on_their_start(tmp_path: Path) -> No
     assert "next instant of the interpolator (T_ipo 2 ms)" in text
     circle = circle_run().program.segments[0].way
     assert circle == "R 15 mm, 1080° (3 full turns)"
-
-
-def test_durations_read_well() -> None:
-    assert [duration(t) for t in (125e-6, 1e-3, 1e-6, 0.25, 2.0)] == ["125 µs", "1 ms", "1 µs", "250 ms", "2 s"]
 
 
 # -- where the numbers come from --------------------------------------------------------------------------------------
@@ -428,34 +423,6 @@ def test_what_cannot_be_written_to_is_said(tmp_path: Path) -> None:
     if Path("/proc/self").is_dir():  # where even an administrator cannot write
         with pytest.raises(OutputError, match="/proc/self/out: cannot be written"):
             report.check_writable("/proc/self/out")
-
-
-@pytest.mark.parametrize(
-    ("said", "printed"),
-    [
-        ("3 um +-1 um at -3 dB, (-2 %)", "3 µm ±1 µm at −3 dB, (−2 %)"),
-        ("1.2 N.m, 0.8 N.m.s/rad, 45 deg, mass x lead^2", "1.2 N·m, 0.8 N·m·s/rad, 45°, mass x lead²"),
-        ("off by 4.5e-07 m", "off by 4.5×10⁻⁷ m"),
-        ("record 2026-11-24 of ISO 230-2, --tol 840d", "record 2026-11-24 of ISO 230-2, --tol 840d"),
-        ('set it with load="-0.002 N.m"', 'set it with load="-0.002 N.m"'),
-    ],
-)
-def test_words_are_printed_with_signs_of_their_own(said: str, printed: str) -> None:
-    assert typeset(said) == printed
-    text = html(Report("t", "s", [], "", answer=[said], warnings=[said], notes=[said]))
-    assert [word.strip() for word in Page(text).words].count(printed) == 3
-
-
-def test_a_zero_has_no_sign() -> None:
-    assert [minus(text) for text in ("-0.00", "-0", "-0.01", "-5")] == ["0.00", "0", "−0.01", "−5"]
-
-
-def test_units_to_a_power() -> None:
-    assert [display_unit(unit) for unit in ("m/s^3", "m/s2", "kg.m2", "deg")] == ["m/s³", "m/s²", "kg·m²", "°"]
-
-
-def test_a_delay_is_told_in_microseconds() -> None:
-    assert [shown(Figure(value, "ms", ""))[0] for value in (0.3519, -3.94217, 99.02)] == ["0.352", "−3.942", "99.0"]
 
 
 def test_a_run_without_figures_says_so_and_how_it_moved() -> None:

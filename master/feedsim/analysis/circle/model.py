@@ -21,11 +21,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.analysis.circle.robust import SETTLED, covariance_of, robust_fit, rounding
 from feedsim.analysis.figures import Array
 
 # Angle ahead of a reversal and behind it that is left out [deg]; the second grows while the peak has not died away.
@@ -39,17 +39,13 @@ DECAYS = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 18.0, 
 FALLEN = 2.0  # angle of the means [deg] that say where a peak has fallen to half its height
 # Neighbouring samples share what disturbs them. Blocks of this angle [deg] do not, as far as intervals are concerned.
 BLOCK = 6.0
-BIWEIGHT = 4.685  # 95 % as efficient as least squares where the noise is normal
 PASSES = 6
 # Travel in pitches from which an error that repeats with the pitch is told from the circle's own shape.
 PITCHES = 2.0
 # More samples of a turn tell nothing more of its shape.
 MOST = 8000
-# Harmonics of what rounding adds to a value, over where the value lies between two steps.
-HARMONICS = 3
 # The angle that is programmed and the one where the machine is are told apart from this deviation [m] on.
 UNSEEN = 5e-9
-SETTLED = 1e-13  # changes of a term below this [m] are rounding
 
 
 @dataclass(frozen=True)
@@ -205,15 +201,15 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, to
             tails = _tails(undone, paths, _left(residual, which, since, window, usual), window)
         fitted = (np.column_stack([matrix, tails.columns]) if len(tails.spread) else matrix)[kept]
         blocks = _blocks(undone)[kept] if len(tails.spread) else np.empty(0)
-        robust = _robust(fitted, deviation[kept], tails.spread, blocks)
+        robust = robust_fit(fitted, deviation[kept], tails.spread, blocks)
         step = robust.values[: len(names)]
         values = {name: values.get(name, 0.0) + float(d) for name, d in zip(names, step, strict=True)}
         residual = deviation - matrix @ step
         if number > 1 and float(np.abs(step).max()) < SETTLED:
             break
     tail = tails.columns @ robust.values[len(names) :]
-    rounded = _rounded(paths, np.split(residual - tail, ends), robust.noise)[kept]
-    covariance, quantile = _covariance(
+    rounded = rounding([path.deviation for path in paths], np.split(residual - tail, ends), robust.noise)[kept]
+    covariance, quantile = covariance_of(
         fitted, (residual - tail)[kept], robust, tails.spread, _blocks(undone)[kept], rounded
     )
     return Fit(
@@ -370,132 +366,6 @@ def _windows(undone: _Undone, sense: int, window: float) -> tuple[NDArray[np.int
         inside = (passed >= -math.radians(AHEAD)) & (passed < window)
         which[inside], since[inside] = k, passed[inside]
     return which, since
-
-
-class _Robust(NamedTuple):
-    """Values (K,); of every sample its weight and how fast its influence grows with its deviation (N,); noise of a
-    sample [m], and what it is worth where neighbours share it [m]."""
-
-    values: Array
-    weights: Array
-    slopes: Array
-    noise: float
-    shared: float
-
-
-def _robust(matrix: Array, deviation: Array, spread: Array, blocks: Array) -> _Robust:
-    """Values by least squares, each sample weighted by how well it fits.
-
-    spread: how large the last values may be (T,) [m], what is known of them beforehand; the others are free.
-    """
-    weights = slopes = np.ones(len(deviation))
-    known = _known(matrix, spread)
-    _, block = np.unique(blocks, return_inverse=True) if len(spread) else (0, np.empty(0, dtype=np.int64))
-    shared = 0.0
-    for _ in range(PASSES):
-        normal = matrix.T @ (weights[:, None] * matrix) + shared**2 * known
-        values = np.linalg.lstsq(normal, matrix.T @ (weights * deviation), rcond=None)[0]
-        off = deviation - matrix @ values
-        noise = float(np.median(np.abs(off))) / 0.6745
-        if noise < SETTLED:
-            break
-        if len(spread):
-            sums = np.bincount(block, np.clip(off, -BIWEIGHT * noise, BIWEIGHT * noise))
-            shared = max(noise, math.sqrt(float(sums @ sums) / len(off)))
-        inner = np.clip(1 - (off / (BIWEIGHT * noise)) ** 2, 0.0, None)
-        settled = float(np.abs(inner**2 - weights).max()) < 0.01
-        weights, slopes = inner**2, inner * (5 * inner - 4)
-        if settled:
-            break
-    return _Robust(np.asarray(values), np.asarray(weights), np.asarray(slopes), noise, shared)
-
-
-def _known(matrix: Array, spread: Array) -> Array:
-    """What is known of the values beforehand, as an inverse covariance (K, K) [1/m2]."""
-    return np.diag(np.concatenate([np.zeros(matrix.shape[1] - len(spread)), 1 / spread**2]))
-
-
-def _resolution(values: Array) -> float:
-    """The step to whose multiples values are rounded, in their unit; 0 where they are not."""
-    apart = np.diff(np.unique(values))
-    if len(apart) == 0:
-        return 0.0
-    steps = apart / apart.min()
-    return float(apart.min()) if float(np.abs(steps - np.round(steps)).max()) < 0.01 else 0.0
-
-
-def _rounded(paths: Sequence[TurnedPath], off: Sequence[Array], noise: float) -> NDArray[np.complex128]:
-    """What rounding may have added to the samples of each path, a column for each harmonic (N, J) [m].
-
-    Between two steps a value that noise does not move errs by up to half a step, for as long as it stays there; noise
-    of more than half a step takes nearly all of it away. Where between two steps a path lies is taken to be unknown:
-    the effect of a column on a value is a variance of the value.
-    """
-    columns = []
-    for k, path in enumerate(paths):
-        if (step := _resolution(path.deviation)) == 0.0:
-            continue
-        turns = (path.deviation - off[k]) / step
-        own = math.sqrt(max(noise**2 - step**2 / 12, 0.0)) / step
-        for n in range(1, HARMONICS + 1):
-            amplitude = step / (math.pi * n) * math.exp(-2 * (math.pi * n * own) ** 2) / math.sqrt(2)
-            column = [np.zeros(len(each.angle), dtype=np.complex128) for each in paths]
-            column[k] = amplitude * np.exp(2j * math.pi * n * turns)
-            columns.append(np.concatenate(column))
-    samples = sum(len(path.angle) for path in paths)
-    return np.column_stack(columns) if columns else np.empty((samples, 0), dtype=np.complex128)
-
-
-def _covariance(
-    matrix: Array,
-    residual: Array,
-    robust: _Robust,
-    spread: Array,
-    blocks: Array,
-    rounded: NDArray[np.complex128],
-) -> tuple[Array, float]:
-    """Covariance of the values and the quantile for intervals of 95 %.
-
-    The larger of two: as if every sample had noise of its own, and as if only blocks of samples had. Besides, what
-    rounding adds, and what is not known of the tails.
-    """
-    known = robust.shared**2 * _known(matrix, spread)
-    inverse = np.linalg.pinv(matrix.T @ (robust.slopes[:, None] * matrix) + known)
-    influence = robust.weights * residual
-    _, block = np.unique(blocks, return_inverse=True)
-    count, terms = int(block.max()) + 1, matrix.shape[1]
-    sums = np.zeros((count, terms))
-    np.add.at(sums, block, influence[:, None] * matrix)
-    free = max(count - terms + len(spread), 2)
-    single = inverse @ (matrix.T @ ((influence**2)[:, None] * matrix)) @ inverse
-    blockwise = inverse @ (sums.T @ sums) @ inverse * (count / free)
-    scale = np.sqrt(np.maximum(np.diag(single) / np.maximum(np.diag(blockwise), 1e-300), 1.0))
-    besides = robust.shared**2 * inverse @ known @ inverse
-    if rounded.shape[1]:
-        moved = inverse @ (matrix.T @ (robust.weights[:, None] * rounded))
-        besides += (moved @ moved.conj().T).real
-    return scale[:, None] * blockwise * scale + besides, _student(free)
-
-
-def _student(free: int) -> float:
-    """Quantile 0.975 of Student's distribution of so many degrees of freedom, to 2e-7 of its value.
-
-    Many: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 1964, 26.7.5. Few: SciPy, whose special
-    functions take a fiftieth of a run to load.
-    """
-    if free < 20:
-        from scipy.special import stdtrit
-
-        return float(stdtrit(free, 0.975))
-    z = 1.959963984540054  # of the normal distribution
-    series = (
-        z,
-        (z**3 + z) / 4,
-        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
-        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
-        (79 * z**9 + 776 * z**7 + 1482 * z**5 - 1920 * z**3 - 945 * z) / 92160,
-    )
-    return math.fsum(term / free**k for k, term in enumerate(series))
 
 
 def _usual(angles: Sequence[Array], residuals: Sequence[Array], reversals: Sequence[NDArray[np.int64]]) -> float:

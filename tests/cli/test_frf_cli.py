@@ -387,3 +387,19 @@ def test_figures_that_are_not_determined_are_null_and_said(tmp_path: Path) -> No
     assert summary["figures"]["Z.speed.bandwidth_first"]["value"] is None
     assert "not determined" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "-3 dB first - Hz" in report.answers(found)[1]
+
+
+@pytest.mark.parametrize("machine", ["sinumerik_840d", "emps", "one_axis"])
+def test_every_shipped_machine_is_taken(fmus: Path, tmp_path: Path, machine: str) -> None:
+    """Rigid axes have no compliance at the tool, and a slow cycle no response at 1 kHz."""
+    place = ROOT / "scenarios" / "machines" / machine
+    result = feedsim("frf", place, "--no-measure", "--out", tmp_path / "frf", fmus=fmus, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    notes = [each["text"] for each in summary_of(tmp_path / "frf")["findings"] if each["severity"] == "note"]
+    rigid = machine == "sinumerik_840d"
+    assert (
+        any(note.endswith("zero at all frequencies in this machine; there is nothing to draw") for note in notes)
+        is rigid
+    )
+    page = (tmp_path / "frf" / "report.html").read_text(encoding="utf-8")
+    assert page.count("Bode") >= 1 and "nan" not in page.lower().split("<script")[0]

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feedsim.errors import InputError, OutputError
+from feedsim.findings import Note, Wrong
 from feedsim.identify.friction_file import Line, friction_text
 from feedsim.scenario import Friction, load, load_machine
 from feedsim.scenario.load import read_friction
@@ -55,6 +56,13 @@ def test_a_person_reads_one_line_per_parameter() -> None:
     assert f"{'gamma: 0.352':<29}# 95 %: remark on gamma" in lines
     assert "sigma_2: 0.0059 N.m.s/rad" in [line.split("#")[0].rstrip() for line in lines]
     assert len({line.index("#") for line in lines[4:13]}) == 1
+
+
+@pytest.mark.parametrize("finding", [Note, Wrong])
+def test_findings_are_written_as_text(finding: type[str]) -> None:
+    """They carry their severity as a class of text, and 1.5 stays a text."""
+    written = text_of(LINES, {"warnings": [finding("'i_q' is not used"), finding("1.5")], "one": finding("line")})
+    assert yaml.safe_load(written)["identified"] == {"warnings": ["'i_q' is not used", "1.5"], "one": "line"}
 
 
 @settings(max_examples=60)

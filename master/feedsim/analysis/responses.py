@@ -16,6 +16,7 @@ from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.figures import Figure
 from feedsim.analysis.truncation import Truncation
 from feedsim.errors import InputError
+from feedsim.findings import Note
 from feedsim.linear.loops import figure_key, response, unit_of
 from feedsim.linear.plant import Floats
 from feedsim.scenario import Machine
@@ -68,9 +69,14 @@ class Responses:
     warnings: tuple[str, ...] = ()
 
 
+def highest_frequency(machine: Machine) -> float:
+    """The highest frequency [Hz] at which a response of the sampled drives is defined: below half their rate."""
+    return 0.5 / machine.cycles.T_c * BELOW_MIRROR
+
+
 def frequencies(machine: Machine, modes: Modes, band: tuple[float, float], beyond: float = 1.0) -> Floats:
     """Frequencies of the closed form [Hz]: fine enough for every resonance, up to `beyond` times the band's end."""
-    highest = 0.5 / machine.cycles.T_c * BELOW_MIRROR
+    highest = highest_frequency(machine)
     if not 0 < band[0] < band[1] <= highest:
         raise InputError(
             f"band {band[0]:.6g} to {band[1]:.6g} Hz: above 0, the first below the second, and up to {highest:.6g} Hz "
@@ -85,6 +91,14 @@ def closed_form(system: linear.LinearSystem, wanted: Sequence[str], frequency: F
         frequency,
         {name: response(system, name, frequency) for name in wanted},
         {name: unit_of(name) for name in wanted},
+    )
+
+
+def zero_notes(closed: FrequencyResponse) -> list[Note]:
+    """Which responses are zero at all frequencies: a machine of rigid axes, for one, has no compliance at the tool."""
+    zero = [name for name in closed.names if not np.any(closed[name])]
+    return (
+        [Note(f"{', '.join(zero)}: zero at all frequencies in this machine; there is nothing to draw")] if zero else []
     )
 
 

@@ -20,6 +20,7 @@ DESCRIPTION = """Frequency responses of a machine's feed drives: speed-controlle
 response of the speed controller, position loop, loop gains with their margins, x/M, and the compliance at the tool. In
 closed form and, friction off, measured on the units with a multisine or a binary sequence."""
 REALISATIONS_WITH_FRICTION = 4
+LOWEST, HIGHEST = 1.0, 1000.0  # Hz; the band where none is given
 ONE_REALISATION = (
     "measured with friction and one realisation: every period is alike, so that the coherence says nothing of what is "
     "not linear; take more realisations"
@@ -71,6 +72,7 @@ def frf(options: Namespace) -> None:
         system = linear.LinearSystem(machine, modes)
         result = linear.evaluate(system, axes)
         closed = responses.closed_form(system, wanted, frequency)
+        warnings += responses.zero_notes(closed)
         progress("closed form", 1, 1)
         if not doubts and (doubt := table_mismatch(machine)) is not None:
             warnings.append(doubt)
@@ -151,11 +153,16 @@ def _axes(chosen: Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
 def _plan(options: Namespace, machine: Machine) -> Plan:
     """What the options say about the measurement."""
     from feedsim.analysis.campaign import Plan
+    from feedsim.analysis.responses import highest_frequency
     from feedsim.errors import InputError
 
-    low, dots, high = options.band.partition("..")
-    if not dots:
-        raise InputError(f"--band {options.band}: LOW..HIGH is needed, such as 1Hz..1000Hz")
+    if options.band is None:
+        band = (LOWEST, min(HIGHEST, highest_frequency(machine)))
+    else:
+        low, dots, high = options.band.partition("..")
+        if not dots:
+            raise InputError(f"--band {options.band}: LOW..HIGH is needed, such as 1Hz..1000Hz")
+        band = (quantity("band", low, "Hz", "1 Hz"), quantity("band", high, "Hz", "1000 Hz"))
     realisations = options.realisations
     if realisations is None:
         realisations = REALISATIONS_WITH_FRICTION if options.friction else 1
@@ -168,7 +175,7 @@ def _plan(options: Namespace, machine: Machine) -> Plan:
         signal=options.excitation,
         inject=options.inject,
         rms=None if amplitude is None else quantity("amplitude", amplitude, unit, example),
-        band=(quantity("band", low, "Hz", "1 Hz"), quantity("band", high, "Hz", "1000 Hz")),
+        band=band,
         periods=options.periods,
         settle=options.settle,
         realisations=realisations,
@@ -201,7 +208,8 @@ COMMAND = Command(
         Option("--axes", "X,Z", "axes to look at (default: all)", type=_names),
         settings("machine.axes.Z.drive.K_p='4 N.m.s/rad'"),
         FMUS,
-        Option("--band", "LOW..HIGH", "frequencies looked at (default: 1Hz..1000Hz)", default="1Hz..1000Hz"),
+        Option("--band", "LOW..HIGH",
+               "frequencies looked at (default: 1Hz..1000Hz, at most to half the sampling rate of the control cycle)"),
         Option("--tool", "", "with the compliance at the tool (default: yes)",
                action=BooleanOptionalAction, default=True),
         Option("--overlay", "FILE[:RESPONSE[=NAME]]",

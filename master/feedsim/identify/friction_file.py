@@ -286,6 +286,7 @@ def _list(dumper: _Dumper, values: list[Any]) -> yaml.SequenceNode:
 
 
 _Dumper.add_representer(str, _text)
+_Dumper.add_multi_representer(str, _text)  # findings carry their severity as a class of text
 _Dumper.add_representer(list, _list)
 
 

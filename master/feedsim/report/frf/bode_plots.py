@@ -228,7 +228,10 @@ def pictures_of(responses: Responses) -> list[Picture]:
 
 
 def curves_of(responses: Responses, name: str) -> list[Curve]:
-    """The curves of a response: closed form, measured, laid over; empty where there is none."""
+    """The curves of a response: closed form, measured, laid over; empty where there is none.
+
+    A response that is zero throughout (the tool's on rigid axes) is none: no logarithmic scale shows it.
+    """
     closed = responses.closed
     curves = [Curve("closed form", "closed form", closed.frequency, closed[name])] if name in closed else []
     if responses.campaign is not None and name in responses.campaign.response:
@@ -238,7 +241,7 @@ def curves_of(responses: Responses, name: str) -> list[Curve]:
         if overlay.name == name:
             found = overlay.response
             curves.append(Curve("overlaid", overlay.file.name, found.frequency, found[name], found.coherence.get(name)))
-    return curves
+    return [curve for curve in curves if np.any(curve.value)]
 
 
 def most_marked(pairs: Sequence[linear.Pair], band: tuple[float, float]) -> list[linear.Pair]:

@@ -74,6 +74,7 @@ FRICTION = _numbered(
     Variable("Viscous", "parameter", "N.mm/rpm", "0.003"),
     Variable("Knee", "parameter", "rpm", "20"),
 )
+ROWS = {"drive": DRIVE, "friction": FRICTION}
 MAPPED_DRIVE = {
     "inputs": {
         "x_s": "PosSetpoint", "x_a": "PosActual", "n_ffw": "SpeedForward", "n_a": "SpeedActual", "release": "Enable",

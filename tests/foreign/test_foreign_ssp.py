@@ -3,7 +3,9 @@ around the plant, whatever they and their variables are called."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -196,3 +198,26 @@ def test_an_annotation_cannot_point_outside(acme_ssp: Path, tmp_path: Path) -> N
         return text.replace('"drive": {', '"drive": {"fmu": "../../evil.fmu",', 1)
 
     assert same(run_ssp(altered(acme_ssp, tmp_path / "evil.ssp", STRUCTURE, evil)), run_ssp(acme_ssp))
+
+
+def test_units_that_declare_no_units_of_measurement(libraries: Libraries, fmus: Path, tmp_path: Path) -> None:
+    """As those of pythonfmu: the file names none either, and the run is that of the scenario, to the last bit."""
+    bare = {what: tuple(replace(each, unit=None) for each in rows) for what, rows in acme.ROWS.items()}
+    acme.archive(tmp_path / "acme_drive.fmu", "drive", libraries.drive, bare["drive"])
+    acme.archive(tmp_path / "acme_friction.fmu", "friction", libraries.friction, bare["friction"])
+    drive = {
+        "fmu": "acme_drive.fmu",
+        **acme.MAPPED_DRIVE,
+        "parameters": {"Kv": 38, "Kp": 1e-3, "Lead": 0.5, "Limit": 20},
+    }
+    friction = {"fmu": "acme_friction.fmu", **acme.MAPPED_FRICTION, "parameters": {"Coulomb": 0.01, "Viscous": 1e-5}}
+    text = MOTION.format(machine=ROOT / "scenarios" / "machines" / "emps")
+    text += f"set:\n  machine.axes.X.drive: {json.dumps(drive)}\n  machine.axes.X.friction: {json.dumps(friction)}\n"
+    (tmp_path / "s.yaml").write_text(text, encoding="utf-8")
+    plan = scenario.load(tmp_path / "s.yaml")
+    ssp.export(plan, tmp_path / "s.ssp", fmus=fmus)
+    written = b"".join(
+        content for name, content in contents(tmp_path / "s.ssp").items() if name.endswith((".ssd", ".ssv"))
+    )
+    assert b'unit="1"' not in written
+    assert same(run_ssp(tmp_path / "s.ssp"), cosim.run(plan, fmus=fmus))

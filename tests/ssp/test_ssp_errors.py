@@ -47,7 +47,7 @@ def refusal(file: Path, *overrides: str) -> InputError:
             "controller_Z.release is connected to setpoint.X.release; setpoint.Z.release belongs there",
         ),
         ('startConnector="Z.release"', 'startConnector="finished"', "setpoint.Z.release belongs there"),
-        ('startConnector="Z.release"', 'startConnector="Z.x_s"', "controller_Z.release is in 1, but setpoint.Z.x_s is"),
+        ('startConnector="Z.release"', 'startConnector="Z.x_s"', "controller_Z.release is connected to setpoint.Z.x_s"),
         ('source="resources/friction.fmu"', 'source="resources/plant.fmu"', "one component made from plant.fmu"),
         ('source="resources/friction.fmu"', 'source="../friction.fmu"', "'../friction.fmu' is not in the file"),
         ('name="friction_X"', 'name="friction_Y"', "component friction_Y is there 2 times"),

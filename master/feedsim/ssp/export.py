@@ -203,18 +203,21 @@ def _identifier(name: str) -> str:
 def _connectors(unit: Archive, connected: set[str]) -> tuple[Connector, ...]:
     """Connectors of a unit: every Real output, and whatever is connected; FMPy fails at inputs that are not."""
     return tuple(
-        Connector(name, variable.causality, variable.type, unit.unit_of(name) if variable.type == "Real" else None)
+        Connector(name, variable.causality, variable.type, _unit_of(unit, name))
         for name, variable in unit.variables.items()
         if name in connected or (variable.type == "Real" and variable.causality == "output")
     )
 
 
+def _unit_of(unit: Archive, name: str) -> str | None:
+    """The unit of a Real variable; None where it declares none: simulators refuse "1" against m."""
+    return unit.declared_unit(name) if unit.variables[name].type == "Real" else None
+
+
 def _parameters(unit: Archive, values: Mapping[str, Value], note: str) -> bytes:
     """A parameter set in the order of the unit's variables, with the machine's note: where the numbers come from."""
     found = tuple(
-        parameter_set.parameter(
-            name, variable.type, values[name], unit.unit_of(name) if variable.type == "Real" else None
-        )
+        parameter_set.parameter(name, variable.type, values[name], _unit_of(unit, name))
         for name, variable in unit.variables.items()
         if name in values
     )

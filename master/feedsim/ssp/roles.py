@@ -132,15 +132,17 @@ def _drive(
         return
     driven[target] = source
     (unit, bases), (given, others) = (_unit(archives[name], variable) for name, variable in (target, source))
+    if None in (unit, given):
+        return  # an end that declares none is in SI units, as the shipped units are
     if unit != given and (bases is None or bases != others or link.unconverted):
         kept = ", and the connection forbids to convert" if bases is not None and bases == others else ""
         problems.append(f"{where}: {'.'.join(target)} is in {unit}, but {'.'.join(source)} is in {given}{kept}")
 
 
-def _unit(archive: Archive, variable: str) -> tuple[str, Mapping[str, int] | None]:
-    """The unit of a variable and its base units, where the archive defines it. Without a unit it is SI."""
-    unit = archive.unit_of(variable)
-    definition = archive.unit_definitions.get(unit)
+def _unit(archive: Archive, variable: str) -> tuple[str | None, Mapping[str, int] | None]:
+    """The unit of a variable, None where it declares none, and its base units, where the archive defines it."""
+    unit = archive.declared_unit(variable)
+    definition = archive.unit_definitions.get(unit) if unit is not None else None
     return unit, None if definition is None else definition.exponents
 
 

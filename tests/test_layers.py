@@ -35,6 +35,7 @@ ORDER = [
     "variables",
     "units",
     "findings",
+    "outputs",
     "owned",
     "called",
     "extras",

@@ -190,12 +190,14 @@ def test_report_shows_what_counts(done: tuple[Done, Path]) -> None:
 
 
 def test_nothing_of_an_earlier_run_is_left(done: tuple[Done, Path], fmus: Path, tmp_path: Path) -> None:
-    """Another command in the same folder takes the files away that it does not write itself."""
+    """Another command that is forced into the same folder takes the files away that it does not write itself."""
     (tmp_path / "out").mkdir()
     for name, data in contents(done[1] / "out").items():
         (tmp_path / "out" / name).parent.mkdir(exist_ok=True)
         (tmp_path / "out" / name).write_bytes(data)
-    run = feedsim("run", SCENARIOS / "z_positioning.yaml", "--out", "out", "--quiet", fmus=fmus, cwd=tmp_path)
+    run = feedsim(
+        "run", SCENARIOS / "z_positioning.yaml", "--out", "out", "--quiet", "--force", fmus=fmus, cwd=tmp_path
+    )
     assert run.returncode == 0
     assert set(contents(tmp_path / "out")) == set(summary_of(tmp_path / "out")["files"])
 
@@ -250,7 +252,7 @@ def test_inputs_are_not_lost(words: list[str], lost: str, tmp_path: Path, monkey
         (out / name).write_bytes((SCENARIOS / "machines" / "test_centre" / "modes.csv").read_bytes())
     # YAML as much as JSON: the summary of an identification, which an earlier residuals.csv is of
     values = yaml.safe_load(FRICTION_Z) | {"identified": {"axis": "Z"}}
-    listed = values if "summary.json" in lost else {"files": ["residuals.csv"]}
+    listed = values if "summary.json" in lost else {"files": ["residuals.csv", "feedforward.csv"]}
     (out / "summary.json").write_text(json.dumps(listed), encoding="utf-8")
     before = contents(out)
     started: list[str] = []

@@ -189,7 +189,11 @@ def test_inputs_are_not_lost(
         shutil.copyfile(traces / "sine" / "log.csv", tmp_path / name)
     (tmp_path / "linked.csv").symlink_to(tmp_path / "out" / "residuals.csv")
     (tmp_path / "out" / "open_loop.csv").write_text("axis: Z\ncurrent: {column: Z.i_q}\nposition: {column: Z.x_a}\n")
-    (tmp_path / "out" / "summary.json").write_text(json.dumps({"files": ["log.csv", "result.csv"]}))
+    (tmp_path / "out" / "summary.json").write_text(
+        json.dumps(
+            {"files": ["log.csv", "result.csv", "friction.yaml", "residuals.csv", "plateaus.csv", "open_loop.csv"]}
+        )
+    )
     friction = load_machine(MACHINE).axes["Z"].friction
     lines = {name: Line(value) for name, value in friction.parameters().items()}
     (tmp_path / "out" / "friction.yaml").write_text(friction_text(lines, {}, [], name="friction.yaml"))

@@ -207,7 +207,7 @@ def test_a_move_that_was_cut_short_is_brought_to_its_end(tmp_path: Path) -> None
         (scratch / "fresh" / name).write_text("new")
     moves = {name: f".feedsim-x/fresh/{name}" for name in ("result.csv", "figures/a.png", "summary.json")}
     (scratch / MOVES).write_text(json.dumps(moves | {"log.csv": None, "../outside": None}))
-    check_place(tmp_path, ())
+    check_place(tmp_path, (), kind="run")
     found = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
     assert found == {"result.csv", "summary.json", "figures/a.png"}
     assert {(tmp_path / name).read_text() for name in found} == {"new"}

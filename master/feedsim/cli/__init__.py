@@ -103,6 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     from feedsim.errors import FeedsimError
     from feedsim.extras import ask, missing
+    from feedsim.outputs import replacing
 
     # Where no home folder can be written to, matplotlib tells at length that its cache is a temporary one.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
@@ -110,7 +111,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         drawn = ["figures"] if getattr(options, "figures", ()) else []
         ask(options.called, *options.needs, *drawn)
-        code = options.action(options)
+        with replacing(getattr(options, "force", False)):
+            code = options.action(options)
         if sys.stdout is not None:  # closed by a reader that has gone
             sys.stdout.flush()
     except FeedsimError as error:

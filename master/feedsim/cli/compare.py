@@ -80,7 +80,7 @@ def _compared(options: Namespace) -> tuple[list[Comparison], list[float]]:
     pairs = pairs_of(options.files)
     inputs = [path for pair in pairs for path in pair]
     inputs += [path for path in (options.tolerances, options.columns, options.reference_columns) if path is not None]
-    report.check_writable([path for path in (options.report, options.junit, options.json) if path is not None], inputs)
+    report.check_writable({"html": options.report, "xml": options.junit, "json": options.json}, inputs)
     choice = _options(options)
     found, durations = [], []
     for result, reference in pairs:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from feedsim.cli.options import Command, Option
 from feedsim.errors import InputError
+from feedsim.outputs import check_file, unchanged
+from feedsim.owned import TemporaryFolder
 
 
 def schema(options: Namespace) -> None:
@@ -30,7 +32,13 @@ def convert(options: Namespace) -> None:
         if not (equals and colon and variable and name and unit):
             raise InputError(f"--column {text}: VARIABLE=NAME:UNIT is needed, e.g. qg=Z.x_s:m")
         columns.append((variable, name, unit))
-    written = trace.convert(options.file, columns, options.out)
+    check_file(options.out, [options.file], ours=lambda path: True)  # an input is refused before it is read
+    with TemporaryFolder() as folder:
+        written = trace.convert(options.file, columns, folder / "converted.csv")
+        content = (folder / "converted.csv").read_bytes()
+    check_file(options.out, [options.file], ours=unchanged(content), what="table")
+    with trace.written_whole(options.out) as file:
+        file.write(content)
     print(f"{options.out}: {len(written.columns) + 1} columns from {options.file}")
 
 

@@ -51,6 +51,15 @@ class Group:
             option.add_to(group)
 
 
+def _flat(options: Sequence[Option | Group]) -> Iterator[Option]:
+    for option in options:
+        yield from _flat(option.options) if isinstance(option, Group) else (option,)
+
+
+WRITES = ("--out", "--report")  # options that name what a command writes
+FORCE = Option("--force", "", "replace files that feedsim did not write, and results of another kind; never an input")
+
+
 @dataclass(frozen=True)
 class Command:
     """A command of the command line, or a group of commands.
@@ -76,6 +85,8 @@ class Command:
         )
         for option in self.options:
             option.add_to(parser)
+        if any(option.typed in WRITES for option in _flat(self.options)):
+            FORCE.add_to(parser)
         if self.commands:
             own = parser.add_subparsers(dest=f"{self.name}_command", metavar="COMMAND", required=True)
             for command in self.commands:

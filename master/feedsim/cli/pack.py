@@ -8,8 +8,10 @@ from pathlib import Path
 from feedsim.cli.options import FMUS, Command, Option, settings
 from feedsim.cli.terminal import announce_archive, warn
 from feedsim.errors import InputError, OutputError
+from feedsim.outputs import archive_with, check_file
 from feedsim.owned import TemporaryFolder
 
+PACKED = archive_with("modelDescription.xml", b'generationTool="feedsim')
 TEXT = """Pack structure, drives and friction of all axes, coupled at the control cycle, into one FMI 2.0 co-simulation
 unit; no compiler is needed. Of a scenario the motion is inside, so that the unit needs no inputs; of a machine, and
 with --inputs, setpoints are inputs. Any importer gets at steps of any length what feedsim run gets
@@ -29,11 +31,11 @@ def pack(options: Namespace) -> None:
     from feedsim.structure import checked_modes
     from feedsim.trace.files import written_whole
 
-    if options.out.is_dir():
-        raise OutputError(f"cannot write {options.out}: Is a directory; name the archive, e.g. --out machine.fmu")
     if not options.out.absolute().parent.is_dir():
         raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
     subject = scenario.load_subject(options.subject, options.overrides)
+    inputs = [options.subject, *(file for _, file in subject.files), *filter(None, [options.base])]
+    check_file(options.out, inputs, ours=PACKED, what="unit")
     plan, machine = subject.scenario, subject.machine
     announce_archive(options.base, "the packed unit's trial")
     fmus = options.fmus or cosim.fmus_directory()

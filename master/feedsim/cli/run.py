@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, out, settings
 from feedsim.cli.terminal import announce, finish, progress_bar, results_in, warn
 from feedsim.errors import InputError, OutputError
+from feedsim.outputs import archive_with, check_file
 
 if TYPE_CHECKING:
     from feedsim.nc import Program
@@ -103,6 +104,8 @@ def write_ssp(options: Namespace) -> None:
     """feedsim ssp."""
     from feedsim import scenario, ssp
     from feedsim.files.source import is_ssp
+    from feedsim.report.provenance import input_paths
+    from feedsim.ssp.archive import STRUCTURE as SSD
 
     if not is_ssp(options.out):
         raise InputError(f"--out {options.out}: an SSP file ends in .ssp; simulators tell it by that")
@@ -111,6 +114,10 @@ def write_ssp(options: Namespace) -> None:
     if not options.out.absolute().parent.is_dir():
         raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
     plan = scenario.load(options.scenario, [*options.overrides, *(["coupling.units=one"] if options.one else [])])
+    check_file(
+        options.out, [options.scenario, *input_paths(plan)], what="SSP file",
+        ours=archive_with(SSD, b'generationTool="feedsim'),
+    )  # fmt: skip
     done = ssp.export(plan, options.out, fmus=options.fmus)
     warn(done.warnings)
     print(

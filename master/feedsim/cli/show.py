@@ -29,8 +29,8 @@ def show(options: Namespace) -> None:
     from feedsim.report import show as report
 
     directory: Path = options.out or Path("results") / "show"
-    with results_in(directory, report.check_writable, ()):
-        over = overlay.show(*options.results)
+    over = overlay.show(*options.results)
+    with results_in(directory, report.check_writable, over.files):
         over.save(directory, drawn=options.figures)
     finish(options.quiet, (), *over.lines, f"-> {directory / 'report.html'}")
 

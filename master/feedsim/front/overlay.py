@@ -70,9 +70,14 @@ class Overlay:
         """What ``feedsim show`` says: parameters that differ, leading figures, how all was aligned."""
         return report.lines(self._sources)
 
+    @property
+    def files(self) -> list[Path]:
+        """The files that the results are read from."""
+        return files_of(self._sources)
+
     def save(self, directory: str | Path, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
         """Write what ``feedsim show`` leaves; drawn: kinds of its figures, png and svg. Returns the paths."""
-        report.check_writable(Path(directory), files_of(self._sources))
+        report.check_writable(Path(directory), self.files)
         return report.write(self._sources, directory, drawn=drawn)
 
     def __repr__(self) -> str:

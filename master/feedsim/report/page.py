@@ -17,8 +17,8 @@ from feedsim.report.style import PALETTE
 SCRIPTS = ("chart_draw.js", "chart_use.js")
 
 
-def html(report: Report) -> str:
-    """HTML text; all text of the report is escaped."""
+def html(report: Report, kind: str = "") -> str:
+    """HTML text; all text of the report is escaped. kind: of the result, which the page names as its generator."""
     from jinja2 import Environment, PackageLoader, StrictUndefined  # on first use: most commands write no report
 
     environment = Environment(
@@ -36,7 +36,7 @@ def html(report: Report) -> str:
     charts = {picture.stem: picture.chart for picture in report.pictures if picture.chart is not None}
     return environment.get_template("report.html.j2").render(
         report=report, palette=PALETTE, data=embedded(charts) if charts else "", script=script() if charts else "",
-        policy=policy(script() if charts else ""),
+        policy=policy(script() if charts else ""), kind=kind,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.errors import OutputError
+from feedsim.outputs import forced, same
 from feedsim.owned import claimed
 from feedsim.report.content import Report
 from feedsim.report.page import html
@@ -30,12 +31,16 @@ _OWN_FILE = re.compile(
 )
 
 
-def check_place(directory: Path | str, files: Sequence[str], inputs: Sequence[Path] = ()) -> None:
+def check_place(
+    directory: Path | str, files: Sequence[str], inputs: Sequence[Path] = (), *, kind: str, own: Sequence[str] = ()
+) -> None:
     """Raise OutputError unless ``directory`` can be created, or can be written to where it is there already.
 
     files: names of the files that may be written besides the figures. inputs: files that are read; none of them may be
-    among those, nor among the files of an earlier result that would be removed. Leaves nothing behind. Meant to be
-    called before a simulation, whose result would else be lost.
+    among those, nor among the files of an earlier result that would be removed. kind: of the result; one of another
+    kind stays, and so does a file that no earlier result lists (``outputs.replacing`` allows both to be replaced). own:
+    names of files that only results of this kind have, listed or not. Leaves nothing behind. Meant to be called before
+    a simulation, whose result would else be lost.
     """
     directory = Path(directory)
     with claimed(directory), _as_output_error(directory):
@@ -47,8 +52,27 @@ def check_place(directory: Path | str, files: Sequence[str], inputs: Sequence[Pa
                 )
         for fate, names in (("replaced", files), ("removed", _stale(directory, files))):
             for name in names:
-                if any(_same(directory / name, path) for path in inputs):
+                if (directory / name).exists() and any(same(directory / name, path) for path in inputs):
                     raise OutputError(f"{directory / name}: is an input and would be {fate}; take another directory")
+        if not forced():
+            _check_owner(directory, files, kind, own)
+
+
+def _check_owner(directory: Path, files: Sequence[str], kind: str, own: Sequence[str]) -> None:
+    """OutputError where a result of another kind would be replaced, or a file that no result of feedsim lists."""
+    before = _summary(directory).get("kind", kind)  # results of feedsim 0.1 do not say
+    if before != kind and _listed(directory):
+        raise OutputError(
+            f"{directory}: holds a result of kind {before}, and a result of kind {kind} would replace it; take another "
+            "directory, or replace it with --force"
+        )
+    listed = {*(_listed(directory) or ()), *own, *([SUMMARY] if _listed(directory) is not None else ())}
+    for name in files:
+        if name not in listed and os.path.lexists(directory / name) and not (directory / name).is_dir():
+            raise OutputError(
+                f"{directory / name}: exists already, and no result of feedsim in that folder lists it; take another "
+                "directory, or replace it with --force"
+            )
 
 
 def replaced(directory: Path, inputs: Sequence[Path], asked: Sequence[str]) -> str:
@@ -77,6 +101,9 @@ def write_results(
     fill: Callable[[Path, Sequence[str]], None],
     grown: Mapping[str, Path] | None = None,
     drawn: Sequence[str] = ("png",),
+    *,
+    kind: str,
+    own: Sequence[str] = (),
 ) -> tuple[Path, ...]:
     """Write the figures and whatever ``fill`` writes; returns the paths.
 
@@ -90,7 +117,7 @@ def write_results(
     """
     directory = Path(directory)
     with claimed(directory), _as_output_error(directory):
-        check_place(directory, files)
+        check_place(directory, files, kind=kind, own=own)
         with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=directory) as scratch:
             fresh = Path(scratch) / "fresh"
             (fresh / FIGURES).mkdir(parents=True)
@@ -115,12 +142,15 @@ def write_report(
     summary: Callable[[Sequence[str]], Mapping[str, Any]],
     files: Mapping[str, Content],
     drawn: Sequence[str] = (),
+    *,
+    kind: str,
+    own: Sequence[str] = (),
 ) -> tuple[Path, ...]:
     """Write a report of any kind: report.html, summary.json, ``files``, and its pictures as figures/*.
 
-    summary: content of summary.json, a function of the names of all files. drawn: kinds of files that the pictures are
-    drawn as; the page holds what they show in any case. Whole or not at all, as :func:`write_results` does it. Returns
-    the paths. Raises OutputError.
+    kind, own: as for :func:`check_place`. summary: content of summary.json, a function of the names of all files.
+    drawn: kinds of files that the pictures are drawn as; the page holds what they show in any case. Whole or not at
+    all, as :func:`write_results` does it. Returns the paths. Raises OutputError.
     """
     grown: dict[str, Path] = {}
 
@@ -132,10 +162,10 @@ def write_report(
                 (fresh / name).write_bytes(content)
             elif (already := content(fresh / name)) is not None:
                 grown[name] = already
-        write_text(fresh / REPORT, html(report))
-        write_text(fresh / SUMMARY, to_json({**summary(names), **_found(report)}))
+        write_text(fresh / REPORT, html(report, kind))
+        write_text(fresh / SUMMARY, to_json({**summary(names), "kind": kind, **_found(report)}))
 
-    return write_results(directory, (*files, REPORT, SUMMARY), report.pictures, fill, grown, drawn)
+    return write_results(directory, (*files, REPORT, SUMMARY), report.pictures, fill, grown, drawn, kind=kind, own=own)
 
 
 def _found(report: Report) -> dict[str, Any]:
@@ -189,13 +219,6 @@ def _settle(directory: Path) -> None:
 
 def _inside(name: str) -> bool:
     return not Path(name).is_absolute() and ".." not in Path(name).parts
-
-
-def _same(one: Path, other: Path) -> bool:
-    try:
-        return one.samefile(other)
-    except OSError:
-        return False  # one of them is not there
 
 
 def _stale(directory: Path, names: Sequence[str]) -> list[str]:

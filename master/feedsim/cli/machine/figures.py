@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from feedsim.cli.options import Command, Option, lengths, quantity
 from feedsim.cli.terminal import finish, results_in, warn
 from feedsim.errors import InputError
+from feedsim.outputs import begins_with
 
 if TYPE_CHECKING:
     from feedsim.scenario.described import Described
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 # Exchange step where no machine file says what the control cycle is [s].
 USUAL_STEP = 125e-6
 USUAL_MODES = 20  # that are listed
-MODES, RECORD = "modes.csv", "build.json"
+MODES, RECORD, KIND = "modes.csv", "build.json", "machine build"
 
 
 def build(options: Namespace) -> None:
@@ -36,7 +37,13 @@ def build(options: Namespace) -> None:
         raise InputError(
             f"{options.machine}: has no key structure; modes are computed from a structure file (docs/structure.md)"
         )
-    with results_in(options.out, lambda out, _: results.check_place(out, (MODES, RECORD))):
+    own = (MODES, RECORD) if begins_with(b'"format"')(options.out / RECORD) else ()  # of an earlier build
+    inputs = [file for _, file in described.files]
+
+    def check(out: Path, inputs: Sequence[Path]) -> None:
+        results.check_place(out, (MODES, RECORD), inputs, kind=KIND, own=own)
+
+    with results_in(options.out, check, inputs):
         found = figures(options, described, quiet=options.quiet)
         content = machine_record.record(found, described.files)
 
@@ -44,7 +51,7 @@ def build(options: Namespace) -> None:
             write_modes(folder / MODES, found.modes)
             results.write_text(folder / RECORD, to_json(content))
 
-        results.write_results(options.out, (MODES, RECORD), (), fill)
+        results.write_results(options.out, (MODES, RECORD), (), fill, kind=KIND, own=own)
     finish(options.quiet, (), f"{_built(found)} -> {options.out / MODES}")
 
 
@@ -151,8 +158,8 @@ def _info_of_structure(options: Namespace, described: Described, h: float, quiet
     ):
         warnings.append(
             f"{described.modes} is not what {machine.structure} gives at the machine's pose: {how}. Shown is the "
-            "structure; runs take the table. Build it anew (feedsim machine build), or name the structure that it "
-            "belongs to"
+            "structure; runs take the table. Build it anew (feedsim machine build --force), or name the structure that "
+            "it belongs to"
         )
     friction = machine.shipped_frictions if machine else None
     return info_of_model(described.name, described.note, built, h, friction, warnings)

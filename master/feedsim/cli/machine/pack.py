@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 
 from feedsim.cli.machine.figures import AT, positions
 from feedsim.cli.options import Command, Option, by_name
+from feedsim.cli.pack import PACKED
 from feedsim.cli.terminal import announce_archive, progress_bar
-from feedsim.errors import InputError, OutputError
+from feedsim.errors import InputError
+from feedsim.outputs import check_file
 from feedsim.owned import TemporaryFolder
 
 if TYPE_CHECKING:
@@ -30,12 +32,14 @@ EXAMPLE = "Z=20mm or Z=0mm..400mm/20mm"
 def pack(options: Namespace) -> None:
     """feedsim machine pack: the machine at its pose with its own modes, or at another pose with those there."""
     from feedsim import cosim, scenario
+    from feedsim.scenario.described import load_described
     from feedsim.structure import checked_modes
     from feedsim.structure import pack as archive
     from feedsim.structure.table_check import table_mismatch
 
-    if options.out.is_dir():
-        raise OutputError(f"cannot write {options.out}: Is a directory; name the archive, e.g. --out machine.fmu")
+    described = load_described(options.machine)
+    inputs = [options.machine, *(file for _, file in described.files), *filter(None, [options.base])]
+    check_file(options.out, inputs, ours=PACKED, what="unit")
     machine = scenario.load_machine(options.machine)
     announce_archive(options.base, "the packed plant's trial")
     base = options.base or cosim.fmus_directory() / "plant.fmu"

@@ -42,7 +42,7 @@ class _Centred:
 
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless the report can be written to ``directory`` without one of ``inputs`` being lost."""
-    check_place(directory, (REPORT, SUMMARY), inputs)
+    check_place(directory, (REPORT, SUMMARY), inputs, kind="circle")
 
 
 def write(
@@ -56,7 +56,9 @@ def write(
     """Write summary.json, report.html and figures; returns the paths. Raises OutputError."""
     figures = figures_of(recorded, diagnosis)
     report = report_of(recorded, diagnosis, figures, files)
-    return write_report(directory, report, partial(summary, recorded, diagnosis, figures, files), {}, drawn)
+    return write_report(
+        directory, report, partial(summary, recorded, diagnosis, figures, files), {}, drawn, kind="circle"
+    )
 
 
 def lines(diagnosis: Diagnosis, recorded: RecordedCircle) -> list[str]:

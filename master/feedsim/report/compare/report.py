@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
 from math import isfinite
@@ -17,6 +17,7 @@ from xml.etree import ElementTree
 
 from feedsim.compare import Comparison, Variable, percent
 from feedsim.errors import OutputError
+from feedsim.outputs import begins_with, check_file
 from feedsim.owned import claimed
 from feedsim.report.compare.plots import picture_of, reach_text
 from feedsim.report.content import Paragraph, Part, Report, Section, Span, Table, Text, Tile, code
@@ -26,6 +27,12 @@ from feedsim.report.picture import Picture
 from feedsim.trace.files import is_stream, written_whole
 
 MOST_PICTURES = 12
+# What the beginning of a file holds that a comparison wrote.
+MARKS = {
+    "html": (b'<meta name="generator" content="feedsim compare">',),
+    "xml": (b'<testsuites name="feedsim compare"',),
+    "json": (b'"comparisons":',),
+}
 LOCK = ".feedsim-compare.lock"
 WAIT = 60.0  # s for others to write theirs, which takes none
 
@@ -33,15 +40,17 @@ WAIT = 60.0  # s for others to write theirs, which takes none
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def check_writable(outputs: Sequence[Path], inputs: Sequence[Path]) -> None:
-    """OutputError where an output would replace an input or another output."""
+def check_writable(outputs: Mapping[str, Path | None], inputs: Sequence[Path]) -> None:
+    """OutputError where an output would replace an input, another output, or a file that no comparison wrote.
+
+    outputs: kind of the file ("html", "xml", "json") -> its path, None where it is not asked for.
+    """
     seen: list[Path] = []
-    for path in outputs:
+    for kind, path in outputs.items():
+        if path is None:
+            continue
+        check_file(path, inputs, ours=begins_with(*MARKS[kind]), what=f"{kind.upper()} of a comparison")
         whole = path.resolve()
-        if path.is_dir():
-            raise OutputError(f"{path}: is a directory; a file name is needed")
-        if any(whole == given.resolve() for given in inputs):
-            raise OutputError(f"{path}: is an input and would be replaced; take another name")
         if whole in seen:
             raise OutputError(f"{path}: is given for two outputs")
         seen.append(whole)
@@ -60,7 +69,7 @@ def write(
     They are of one comparison also where several processes write the same files: these wait for one another.
     """
     contents: list[tuple[Path | None, Callable[[], bytes]]] = [
-        (html, lambda: as_html(report_of(comparisons)).encode("utf-8", "backslashreplace")),
+        (html, lambda: as_html(report_of(comparisons), "compare").encode("utf-8", "backslashreplace")),
         (xml, lambda: junit(comparisons, durations)),
         (json, lambda: to_json(comparisons).encode("utf-8", "backslashreplace")),
     ]

@@ -33,7 +33,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, REPORT, SUMMARY), inputs)
+    check_place(directory, (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, REPORT, SUMMARY), inputs, kind="compensate")
 
 
 def write(
@@ -56,7 +56,7 @@ def write(
     with remarked(f"{machine.name}. {machine.note}"):
         pictures = pictures_of(compensation)
     report = report_of(compensation, files, pictures)
-    return write_report(directory, report, partial(summary, compensation, files), curves, drawn)
+    return write_report(directory, report, partial(summary, compensation, files), curves, drawn, kind="compensate")
 
 
 def report_of(compensation: Compensation, files: Mapping[str, Path], pictures: Sequence[Picture]) -> Report:

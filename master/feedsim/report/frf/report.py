@@ -45,7 +45,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (CURVES, MEASURED, REPORT, SUMMARY), inputs)
+    check_place(directory, (CURVES, MEASURED, REPORT, SUMMARY), inputs, kind="frf")
 
 
 def write(
@@ -59,7 +59,7 @@ def write(
     if responses.campaign is not None:
         files[MEASURED] = partial(write_response, response=responses.campaign.response)
     report = report_of(subject, responses, draw(responses))
-    return write_report(directory, report, partial(summary, subject, responses), files, drawn)
+    return write_report(directory, report, partial(summary, subject, responses), files, drawn, kind="frf")
 
 
 def draw(responses: Responses) -> list[Picture]:

@@ -41,7 +41,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs)
+    check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs, kind="identify")
 
 
 def write(identified: Identified, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
@@ -60,7 +60,9 @@ def write(identified: Identified, directory: Path | str, *, drawn: Sequence[str]
         files[OPEN_LOOP] = open_loop_csv(found.balance)
     with remarked(quantities.remark(identified), REMARK_WIDTH, REMARK_LINES):
         pictures = pictures_of(identified)
-    return write_report(directory, report_of(identified, pictures), partial(summary, identified), files, drawn)
+    return write_report(
+        directory, report_of(identified, pictures), partial(summary, identified), files, drawn, kind="identify"
+    )
 
 
 def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:

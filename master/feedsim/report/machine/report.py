@@ -28,7 +28,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
     Leaves nothing behind.
     """
-    check_place(directory, (REPORT, SUMMARY), inputs)
+    check_place(directory, (REPORT, SUMMARY), inputs, kind="machine")
 
 
 def write(
@@ -65,7 +65,9 @@ def write(
 
     caption = "One period, slowed down and exaggerated."
     moving = [Animation(mode_title(info, k), caption, gif) for k, gif in gifs.items()]
-    return write_report(directory, report_of(info, files, [*pictures, *moving]), summary, animated, KINDS)
+    return write_report(
+        directory, report_of(info, files, [*pictures, *moving]), summary, animated, KINDS, kind="machine"
+    )
 
 
 def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Sequence[Picture | Animation]) -> Report:

@@ -86,7 +86,7 @@ def check_writable(axes: Sequence[str]) -> Callable[..., None]:
     own = [file for axis in axes for file in (drive_file(axis), friction_file(axis))]
 
     def check(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-        check_place(directory, (MACHINE, MODES, *own, REPORT, SUMMARY), inputs)
+        check_place(directory, (MACHINE, MODES, *own, REPORT, SUMMARY), inputs, kind="identify-drive")
 
     return check
 
@@ -105,7 +105,14 @@ def note(record: Path) -> str:
 
 def write(report: DriveReport, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
     """Write the files that were made, summary.json, report.html and figures; returns the paths. Raises OutputError."""
-    return write_report(directory, report_of(report), lambda names: summary(report, names), report.found.files, drawn)
+    return write_report(
+        directory,
+        report_of(report),
+        lambda names: summary(report, names),
+        report.found.files,
+        drawn,
+        kind="identify-drive",
+    )
 
 
 def report_of(report: DriveReport) -> Report:

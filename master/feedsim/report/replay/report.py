@@ -52,13 +52,13 @@ class Replayed:
 
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
-    check_place(directory, (REPLAY, REPORT, SUMMARY), inputs)
+    check_place(directory, (REPLAY, REPORT, SUMMARY), inputs, kind="replay")
 
 
 def write(replayed: Replayed, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
     """Write replay.csv, summary.json, report.html and figures; returns the paths. Raises OutputError."""
     files: dict[str, Content] = {REPLAY: partial(write_csv, trace=trace_of(replayed.comparisons))}
-    return write_report(directory, report_of(replayed), partial(summary, replayed), files, drawn)
+    return write_report(directory, report_of(replayed), partial(summary, replayed), files, drawn, kind="replay")
 
 
 def trace_of(comparisons: Sequence[Comparison]) -> Trace:

@@ -82,7 +82,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (RESULT, REPORT, SUMMARY, LOG, PARTIAL), inputs)
+    check_place(directory, (RESULT, REPORT, SUMMARY, LOG, PARTIAL), inputs, kind="run", own=(PARTIAL,))
 
 
 def growing(directory: Path | str) -> Partial:
@@ -119,7 +119,9 @@ def write(
         files[LOG] = partial(write_csv, trace=run.log)
     causes = diagnoses(run) if causes is None else causes
     report = report_of(run, figures, draw(run, figures), causes)
-    return write_report(directory, report, partial(summary, run, figures, causes=causes), files, drawn)
+    return write_report(
+        directory, report, partial(summary, run, figures, causes=causes), files, drawn, kind="run", own=(PARTIAL,)
+    )
 
 
 def report_of(

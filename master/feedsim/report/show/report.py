@@ -32,7 +32,7 @@ FIRST = ("G", "G_b", "peak_", "servo_mismatch", "overshoot", "settling_time")
 
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless the report can be written to ``directory`` without one of ``inputs`` being lost."""
-    check_place(directory, (REPORT, SUMMARY), inputs)
+    check_place(directory, (REPORT, SUMMARY), inputs, kind="show")
 
 
 def files_of(sources: Sequence[Source]) -> list[Path]:
@@ -47,7 +47,7 @@ def files_of(sources: Sequence[Source]) -> list[Path]:
 
 def write(sources: Sequence[Source], directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
     """Write summary.json, report.html and figures; returns the paths. Raises OutputError."""
-    return write_report(directory, report_of(sources), partial(summary, sources), {}, drawn)
+    return write_report(directory, report_of(sources), partial(summary, sources), {}, drawn, kind="show")
 
 
 def lines(sources: Sequence[Source]) -> list[str]:

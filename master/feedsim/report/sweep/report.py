@@ -67,7 +67,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (REPORT, SUMMARY), inputs)
+    check_place(directory, (REPORT, SUMMARY), inputs, kind="sweep")
 
 
 def write(
@@ -81,7 +81,9 @@ def write(
     machine = study.base.scenario.machine
     with remarked(f"{study.name}. {machine.name}. {machine.note}".strip(), REMARK_WIDTH, REMARK_LINES):
         whole, single = pictures_of(account)
-    return write_report(directory, report_of(account, whole, single), partial(summary, account), {}, drawn)
+    return write_report(
+        directory, report_of(account, whole, single), partial(summary, account), {}, drawn, kind="sweep"
+    )
 
 
 def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) -> Report:

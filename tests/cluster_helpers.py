@@ -48,7 +48,7 @@ class Cluster:
 
     def wait_for(self, workers: int) -> None:
         with Client(self.address, set_as_default=False) as client:
-            client.wait_for_workers(workers, timeout=30)
+            client.wait_for_workers(workers, timeout=120)
 
     def close(self) -> None:
         for process in self.processes:
@@ -69,7 +69,7 @@ def scheduler(folder: Path) -> Iterator[Cluster]:
             "scheduler", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard",
             "--no-show", "--dashboard-address", "127.0.0.1:0",
         )  # fmt: skip
-        end = time.monotonic() + 20
+        end = time.monotonic() + 120
         while time.monotonic() < end:
             try:
                 socket.create_connection(("127.0.0.1", port), timeout=1).close()

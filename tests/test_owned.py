@@ -38,10 +38,10 @@ def another_process(code: str, folder: Path, *, kill: bool = False) -> Iterator[
         assert process.stdout.readline() == "there\n"
         if kill:
             process.kill()
-            process.wait(30)
+            process.wait(120)
         yield process
     finally:
-        process.communicate("\n", timeout=30)
+        process.communicate("\n", timeout=120)
 
 
 CLAIM = "claim = claimed(Path('out/below'))\nclaim.__enter__()"

@@ -99,7 +99,7 @@ def test_a_second_one_is_refused_before_it_begins(
         )
         assert [path.name for path in (place / "claimed").iterdir()] == begun
     finally:
-        owner.communicate("\n", timeout=30)
+        owner.communicate("\n", timeout=120)
     assert not (place / "claimed").exists()
 
 

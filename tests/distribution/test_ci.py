@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -47,7 +48,7 @@ def broken(job: Path) -> None:
 
 
 def script(job: Path, **variables: str) -> subprocess.CompletedProcess[str]:
-    return steps('sh "$CI_FOLDER/compare.sh" "$RESULTS" "$REFERENCES" $OPTIONS', job, variables, ("sh", "-euc"))
+    return steps('sh "$CI_FOLDER/compare.sh" $OPTIONS -- "$RESULTS" "$REFERENCES"', job, variables, ("sh", "-euc"))
 
 
 def github(job: Path, **variables: str) -> subprocess.CompletedProcess[str]:
@@ -126,6 +127,38 @@ def test_options_reach_the_command(way: Any, job: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.parametrize("name", ["--report=x", "-r", "--quiet"])
+@pytest.mark.parametrize("way", WAYS)
+def test_a_name_is_no_option(way: Any, name: str, job: Path) -> None:
+    """Of a folder of results, whoever has named it."""
+    (job / "results").rename(job / name)
+    done = way(job, RESULTS=name, REFERENCES="references")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert told(job) == (0, 0)
+    assert {path.name for path in job.iterdir()} == {name, "references", "feedsim.xml"}
+
+
+def test_one_image_is_pinned_everywhere() -> None:
+    template = yaml.safe_load((CI / "gitlab.yml").read_text())[".feedsim-compare"]
+    (line,) = re.findall(r"^FROM (.*)$", (CI / "Containerfile").read_text(), re.M)
+    assert template["image"] == line
+    assert re.fullmatch(r"python:3\.12-slim@sha256:[0-9a-f]{64}", line)
+
+
+def test_packages_of_a_comparison_are_those_of_the_lock() -> None:
+    """The same versions with the same hashes as everywhere else, and none that a comparison does not need."""
+    whole, part = (
+        {block.partition(" \\")[0]: block for block in re.split(r"\n(?=\w)", path.read_text())}
+        for path in (ROOT / "requirements.lock", CI / "requirements.lock")
+    )
+    hashes = re.compile(r"--hash=sha256:[0-9a-f]{64}")
+    assert "numpy" in str(part)
+    for name, block in part.items():
+        assert hashes.findall(block) == hashes.findall(whole[name]), name
+        assert hashes.findall(block)
+    assert not {"scipy", "fmpy", "matplotlib"} & {name.partition("==")[0] for name in part}
+
+
 def test_without_feedsim_it_says_what_to_set(job: Path) -> None:
     done = subprocess.run(
         ["/bin/sh", str(CI / "compare.sh"), "results", "references"],
@@ -167,6 +200,18 @@ def test_a_wheel_that_is_named_is_installed(way: Any, wheel: Path, job: Path, mo
     done = way(job, RESULTS="results", REFERENCES="references", FEEDSIM=str(wheel), OPTIONS="--quiet")
     assert done.returncode == 1, done.stderr
     assert told(job) == (1, 0)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_wheel_is_held_to_its_sum(way: Any, wheel: Path, job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (BORROWED | {"PYTHON": sys.executable}).items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys, "executable", str(job / "nowhere" / "python"))
+    shutil.copy(wheel, job)
+    sums = hashlib.sha256(wheel.read_bytes()).hexdigest(), "0" * 64
+    for digest, code in zip(sums, (0, 2), strict=True):
+        given = {"FEEDSIM": wheel.name, "FEEDSIM_SHA256": digest, "SHA256": digest, "OPTIONS": "--quiet"}
+        assert way(job, RESULTS="results", REFERENCES="references", **given).returncode == code
 
 
 def test_the_job_of_the_documents(wheel: Path, job: Path, fmus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -223,9 +268,10 @@ def test_a_container_runs_feedsim(wheel: Path, job: Path) -> None:
         if instruction == "ARG":
             assert rest in given
         elif instruction == "COPY":
-            source, place = inside(rest).split()
+            *sources, place = inside(rest).split()
             Path(place).mkdir(parents=True)
-            shutil.copy(wheel.parent / source, place)
+            for source in sources:
+                shutil.copy(ROOT / source if source == "requirements.lock" else wheel.parent / source, place)
         elif instruction == "RUN":
             subprocess.run(["/bin/sh", "-c", inside(rest)], env=environment, check=True, cwd=folder)
         elif instruction == "WORKDIR":

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from feedsim_distribution import release, shipped
+from feedsim_distribution import metadata, release, shipped
 from feedsim_distribution.project import table
-from feedsim_packager import toolchain
+from feedsim_packager import checkout, toolchain
 from feedsim_packager.errors import InputError
 from feedsim_packager.targets import host_target
 
@@ -43,7 +43,8 @@ def sums_of(text: str) -> dict[str, str]:
 def test_the_same_again(made: Path) -> None:
     first = {path.name: path.read_bytes() for path in (made / "first").iterdir()}
     assert first == {path.name: path.read_bytes() for path in (made / "second").iterdir()}
-    assert len(first) == 7
+    assert len(first) == 8
+    assert first["requirements.lock"] == (ROOT / "requirements.lock").read_bytes()
 
 
 def test_sums_are_of_every_file(made: Path) -> None:
@@ -107,3 +108,33 @@ def test_archives_that_are_missing_are_told(tmp_path: Path) -> None:
         shipped.for_platform("any", ("cc",), tmp_path)
     with pytest.raises(InputError, match="platform amiga: no wheel is made for it"):
         shipped.for_platform("amiga", ("cc",), tmp_path)
+
+
+def test_the_page_of_an_index_has_no_link_that_leads_nowhere() -> None:
+    """Beside it lies none of the files that the README links to."""
+    target = re.compile(r"\]\((?!\w+:)")
+    page = metadata.describe()
+    assert target.search((ROOT / "README.md").read_text(encoding="utf-8"))
+    assert not target.search(page)
+    assert "](" not in page.replace("](https://", "")
+    assert "synthetic; three axes" in page  # words stay
+    addressed = table() | {"urls": {"Repository": "https://repository.example/feedsim/"}}
+    page = metadata.readable_anywhere((ROOT / "README.md").read_text(encoding="utf-8"), addressed)
+    assert not target.search(page)
+    assert f"(https://repository.example/feedsim/blob/v{VERSION}/docs/user-guide.md#python)" in page
+    assert f"](https://repository.example/feedsim/raw/v{VERSION}/docs/images/contour-XZ.png)" in page
+
+
+def test_an_index_learns_whose_and_what_for_it_is() -> None:
+    lines = metadata.describe().partition("\n\n")[0].splitlines()
+    assert "Author: The feedsim authors" in lines
+    assert any(line.startswith("Keywords: machine tool,feed drive,friction") for line in lines)
+    assert {"Classifier: Programming Language :: Python :: 3.11", "Classifier: Typing :: Typed"} <= set(lines)
+    assert not [line for line in lines if line.startswith("Classifier: License")]  # the licence has its own field
+    assert not [line for line in lines if "example" in line or "OWNER" in line]
+
+
+def test_every_unit_is_in_the_readme() -> None:
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    for folder in checkout.unit_folders():
+        assert f"\n| `{folder.name.removesuffix('_fmu')}.fmu` |" in page

@@ -1,7 +1,8 @@
 """Everything that is handed out of a version: ``python -m feedsim_distribution.release`` (make release).
 
 Wheels for all platforms, the source archive, the archives for other simulators in one file, the section of the
-changelog, a bill of materials, and SHA-256 sums over all of them. The same sources give the same bytes.
+changelog, a bill of materials, the packages that a wheel needs with their hashes, and SHA-256 sums over all of them.
+The same sources give the same bytes.
 """
 
 import argparse
@@ -18,7 +19,7 @@ from feedsim_packager.errors import InputError, PackagerError
 from . import sbom, sdist, shipped, wheel
 from .project import PROJECT, files, table
 
-SUMS = "SHA256SUMS"
+SUMS, LOCK = "SHA256SUMS", "requirements.lock"
 _ABOUT = """# The feed drive units of feedsim {version}
 
 FMI 2.0 co-simulation archives with binaries for Linux (x86-64, ARM 64 bit), Windows (x86-64) and macOS (Intel, Apple),
@@ -37,7 +38,7 @@ Through FMPy, with the wheel of this release, which compares; put your own impor
 
     pip install fmpy feedsim-{version}-py3-none-any.whl
     python ci/simulate.py friction.fmu checked/references/friction checked/results/friction
-    sh ci/compare.sh checked/results checked/references
+    sh ci/compare.sh -- checked/results checked/references
 
 An FMU is a program: to run it is to run its library with your rights. Licence: MIT (LICENSE).
 """
@@ -54,6 +55,7 @@ def write(folder: Path, archives: Path) -> list[Path]:
         f"feedsim-fmus-{version}.zip": _units(archives, version),
         f"feedsim-{version}.cdx.json": sbom.describe(),
         f"feedsim-{version}-changes.md": notes.encode(),
+        LOCK: (PROJECT / LOCK).read_bytes(),
     }
     for name, content in made.items():
         archive.write(folder / name, content)

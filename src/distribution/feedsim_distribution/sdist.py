@@ -12,7 +12,7 @@ from .project import PROJECT, files, table
 from .shipped import SCENARIOS
 from .wheel import PACKAGES
 
-_PAGES = ("pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md")
+_PAGES = ("pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "SECURITY.md")
 
 
 def write(folder: Path) -> str:

@@ -22,6 +22,8 @@ COMMANDS = {
     "run": ["run", "Länge.yaml", "--out", "out", "--set", "name=Länge"],
     "validate": ["validate", "Länge.yaml", "--set", "name=Länge"],
     "schema": ["schema", "study"],
+    "ssp": ["ssp", "Länge.yaml", "--out", "out/x.ssp"],
+    "pack": ["pack", "Länge.yaml", "--out", "out/x.fmu"],
     "compare": ["compare", "a.csv", "a.csv", "--report", "out/a.html", "--json", "out/a.json"],
 }
 
@@ -42,7 +44,11 @@ class Row:
 
 
 # In a name space of its own a folder can be made tiny or read-only also for those who may write everywhere.
-APART = 'unshare -rm bash -c \'mount -t tmpfs -o {} none {} && "$@"\' - "$@"'
+# What is in there in the end is written down, as nobody outside can see it.
+APART = (
+    "unshare -rm bash -c 'mount -t tmpfs -o {0} none {1} || exit 9; "
+    '"$@"; code=$?; ls -A {1} >listed.txt; exit $code\' - "$@"'
+)
 ROWS = {
     "ascii": Row(environment={"PYTHONIOENCODING": "ascii"}, commands="run"),
     "C locale": Row(environment={"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}, commands="run compare"),
@@ -60,6 +66,10 @@ ROWS = {
     "file sizes": Row(
         'ulimit -f 8; "$@"', codes={"run": 4, "compare": 2}, told="cannot be written: File too large",
         commands="run compare",
+    ),
+    "full disk": Row(
+        APART.format("size=160k", "out"), codes=dict.fromkeys(("run", "ssp", "pack"), 4),
+        told="No space left on device", commands="run ssp pack",
     ),
     "read-only": Row(
         APART.format("ro", "out"), codes={"run": 4, "compare": 2}, told="cannot be written: Read-only file system",
@@ -111,7 +121,8 @@ def test_surroundings(name: str, command: str, place: Path, fmus: Path, request:
     if name == "comma":
         environment |= request.getfixturevalue("comma")
     if "unshare" in row.shell:
-        tried = subprocess.run(["bash", "-c", APART.format("size=300k", "/mnt"), "-", "true"], capture_output=True)
+        trial = ["bash", "-c", APART.format("size=300k", "/mnt"), "-", "true"]
+        tried = subprocess.run(trial, capture_output=True, cwd=place)
         if tried.returncode:
             pytest.skip("no name spaces of its own here")
     environment.pop(row.without, None)
@@ -132,7 +143,12 @@ def test_surroundings(name: str, command: str, place: Path, fmus: Path, request:
     assert done.returncode == row.codes.get(command, 0), told
     assert command not in row.codes or row.told in told
     assert list(temporary.iterdir()) == []
-    if command == "compare":
+    if "unshare" in row.shell:
+        assert set((place / "listed.txt").read_text().split()) <= {"result.partial.csv"}
+        (place / "listed.txt").unlink()
+    if command in ("ssp", "pack"):
+        assert not list(out.iterdir())
+    elif command == "compare":
         assert {path.name for path in out.iterdir()} == (set() if command in row.codes else {"a.html", "a.json"})
     else:
         whole_or_nothing(out)

@@ -44,7 +44,8 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
                 temporary.chmod(0o666 & ~_umask())
                 temporary.replace(target)
             except BaseException:
-                file.close()
+                with suppress(OSError):  # on a full disk what is still to be written fails once more
+                    file.close()
                 with suppress(OSError):
                     temporary.unlink()
                 raise

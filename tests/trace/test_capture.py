@@ -186,3 +186,36 @@ def test_a_real_control() -> None:
         "1": (10.0, -1), "2": (10.0, -1), "6": (5.0, 1)
     }  # fmt: skip
     assert found["4"].rotary
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        ("name", "TORQUE|" + "9" * 5000, "a name of 5007 characters, 'TORQUE|9"),
+        ("CYCLE", 10**400, "row 2: CYCLE is 1000"),
+        ("ENC_POS|1", 1e300, "row 2: ENC_POS|1 is 1e+300; allowed: up to 1e+100"),
+        ("TORQUE|1", 1e101, "row 2: TORQUE|1 is 1e+101; allowed: up to 1e+100"),
+    ],
+    ids=["name", "counter", "position", "torque"],
+)
+def test_numbers_that_nothing_records(tmp_path: Path, place: str, value: Any, words: str) -> None:
+    """They are refused in a short sentence before anything is calculated with them."""
+    data = content({"X1|1": axis_signals(10.0, 1)})
+    signals = data["Header"]["SignalListHFData"]
+    if place == "name":
+        next(each for each in signals if each["Address"] == "TORQUE|1")["Address"] = value
+    else:
+        data["Payload"][0]["HFData"][1][[each["Address"] for each in signals].index(place)] = value
+    with pytest.raises(InputError) as raised:
+        read_recording(written(tmp_path, data))
+    assert words in str(raised.value)
+    assert len(str(raised.value)) < 400
+
+
+def test_what_no_sensor_resolves_is_zero(tmp_path: Path) -> None:
+    data = content({"X1|1": axis_signals(10.0, 1)})
+    column = [each["Address"] for each in data["Header"]["SignalListHFData"]].index("CURRENT|1")
+    for row in data["Payload"][0]["HFData"]:
+        row[column] = 1e-310
+    recording = read_recording(written(tmp_path, data))
+    assert not recording.read(["CURRENT|1"])["CURRENT|1"][:400].any()

@@ -43,6 +43,7 @@ class Shift:
         return f"the shift in time is found from {few(self.used, LISTED)}{without}"
 
 
+@np.errstate(all="ignore")  # values of any magnitude are compared; what is no number then fits nowhere
 def estimated_shift(
     result: Series, reference: Series, most: float, options: Options | None = None, tolerances: Tolerances | None = None
 ) -> Shift:

@@ -20,10 +20,11 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.files import regular
-from feedsim.trace.trace import Array
+from feedsim.trace.trace import LARGEST, Array, recorded
 
 SUFFIX = ".json"
 COUNTER = "CYCLE"
+LONGEST_NAME, MOST_SHOWN = 200, 60  # characters: of a name; of a cell in a message
 LENGTHS = {"DES_POS": "mm", "ENC_POS": "mm", "ENC1_POS": "mm", "ENC2_POS": "mm", "CONT_DEV": "mm",
            "VEL_FFW": "mm/s", "CMD_SPEED": "mm/s"}  # fmt: skip
 OTHERS = {"TORQUE": "N.m", "TORQUE_FFW": "N.m", "CURRENT": "A", "POWER": "W", "LOAD": "%"}
@@ -127,6 +128,12 @@ def _signals(header: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 def _names(path: Path, header: Mapping[str, Any]) -> list[str]:
     names = [str(signal.get("Address") or signal.get("Name")) for signal in _signals(header)]
+    texts = [*names, *(str(signal.get("Axis", "")) for signal in _signals(header))]
+    if long := [text for text in texts if len(text) > LONGEST_NAME]:
+        raise InputError(
+            f"{path}: Header.SignalListHFData has a name of {len(long[0])} characters, {_shown(long[0])}; allowed: up "
+            f"to {LONGEST_NAME}"
+        )
     if COUNTER not in names:
         raise InputError(f"{path}: Header.SignalListHFData has no {COUNTER}, the counter that is the clock")
     if doubled := [name for name in names if names.count(name) > 1]:
@@ -141,7 +148,7 @@ def _axes(header: Mapping[str, Any]) -> dict[str, str]:
         _, bar, number = str(signal.get("Address") or signal.get("Name")).partition("|")
         if bar and number.isdecimal():
             found.setdefault(number, str(signal.get("Axis") or number))
-    return dict(sorted(found.items(), key=lambda item: int(item[0])))
+    return dict(sorted(found.items(), key=lambda item: (len(item[0]), item[0])))
 
 
 def _rows(path: Path, messages: Sequence[Any], names: Sequence[str]) -> Array:
@@ -163,8 +170,20 @@ def _rows(path: Path, messages: Sequence[Any], names: Sequence[str]) -> Array:
         values = np.array([[_number(cell) for cell in row] for row in rows])
     if (wrong := np.argwhere(~np.isfinite(values))).size:
         row, column = (int(index) for index in wrong[0])
-        raise InputError(f"{path}, row {row + 1}: {names[column]} is {rows[row][column]!r}, no finite number")
+        raise InputError(f"{path}, row {row + 1}: {names[column]} is {_shown(rows[row][column])}, no finite number")
+    values, too_large = recorded(values)
+    if (found := np.argwhere(too_large)).size:
+        row, column = (int(index) for index in found[0])
+        raise InputError(
+            f"{path}, row {row + 1}: {names[column]} is {_shown(rows[row][column])}; allowed: up to {LARGEST:g}"
+        )
     return values
+
+
+def _shown(cell: object) -> str:
+    """A cell for a message, which a number of a hundred digits would fill."""
+    text = repr(cell)
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 
 def _number(cell: object) -> float:

@@ -20,9 +20,9 @@ from typing import Literal
 import numpy as np
 
 from feedsim import units
-from feedsim.errors import InputError
+from feedsim.errors import InputError, few
 from feedsim.files.regular import content
-from feedsim.trace.trace import Array, check_name, check_unit, suggest
+from feedsim.trace.trace import LARGEST, Array, check_name, check_unit, recorded, suggest
 
 _HEADER = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?")
 _ROUND = re.compile(r"(.*?[^\s])(\s*)\(([^()]*[^()0-9\s][^()]*)\)")
@@ -319,7 +319,7 @@ def numbers(cells: Sequence[str], decimal: Decimal, lines: Sequence[int], where:
         except ValueError:
             pass
         else:
-            if np.all(np.isfinite(values)):
+            if not recorded(values)[1].any():
                 return values
     for line, cell, text in zip(lines, cells, plain, strict=True):
         if not cell:
@@ -328,6 +328,8 @@ def numbers(cells: Sequence[str], decimal: Decimal, lines: Sequence[int], where:
             raise InputError(f"{where}:{line}: {cell!r} in column {name!r}; every value must be a finite number")
         if not _PLAIN.fullmatch(text):
             raise InputError(f"{where}:{line}: {cell!r} in column {name!r} is no number")
-        if not np.isfinite(float(text)):
-            raise InputError(f"{where}:{line}: {cell!r} in column {name!r} is too large")
+        if abs(float(text)) > LARGEST:
+            raise InputError(
+                f"{where}:{line}: {few([cell], 1)} in column {name!r} is too large; allowed: up to {LARGEST:g}"
+            )
     return np.array([float(text) for text in plain], dtype=np.float64)

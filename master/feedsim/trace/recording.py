@@ -18,7 +18,7 @@ from feedsim.trace import capture
 from feedsim.trace.cells import Table, read_table
 from feedsim.trace.csv import write_csv
 from feedsim.trace.mat import Other, Value, flat, read_mat
-from feedsim.trace.trace import Array, Trace, suggest
+from feedsim.trace.trace import LARGEST, Array, Trace, recorded, suggest
 
 MAT = ".mat"
 REAL = "fiu"  # kinds of numpy's types
@@ -56,7 +56,8 @@ class Recording:
         """
         wanted = list(dict.fromkeys(names))
         if self._table is not None:
-            return dict(zip(wanted, self._table.values(map(self._table.index, wanted)).values(), strict=True))
+            read = self._table.values(map(self._table.index, wanted)).values()
+            return {name: recorded(column)[0] for name, column in zip(wanted, read, strict=True)}
         values = {name: _vector(self.path, self._variables, name) for name in wanted}
         for name in wanted[1:]:
             if values[name].size != values[wanted[0]].size:
@@ -194,4 +195,8 @@ def _vector(path: Path, variables: Mapping[str, Value], variable: str) -> Array:
     numbers = value.astype(np.float64)
     if not np.all(np.isfinite(numbers)):
         raise InputError(f"{path}: {variable!r} is not finite at element {int(np.argmin(np.isfinite(numbers))) + 1}")
+    numbers, wrong = recorded(numbers)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(f"{path}: {variable!r} is {numbers[row]:g} at element {row + 1}; allowed: up to {LARGEST:g}")
     return numbers

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -134,10 +135,35 @@ def test_a_check_does_with_nothing_less(module: str, folder: Path) -> None:
     assert f"of which {module} is not installed" in done.stderr
 
 
-def test_a_shift_that_is_estimated_names_what_it_needs(folder: Path) -> None:
+def test_a_shift_is_estimated_without_any(folder: Path) -> None:
     done = without(EVERY, "compare", "a.csv", "a.csv", "--shift", "estimate", "--max-shift", "1 s", cwd=folder)
-    assert (done.returncode, done.stderr) == (2, "")
-    assert re.search(r'an estimated shift in time needs .*scipy.*: pip install "feedsim\[run\]"\n', done.stdout)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "the shift in time is found from x" in done.stdout
+
+
+def test_a_difference_is_explained_without_any(folder: Path) -> None:
+    """What it looks like: late, in another unit, with fewer digits."""
+    time = [0.001 * k for k in range(400)]
+
+    def table(name: str, values: Callable[[float], float], form: str = ".17g") -> None:
+        rows = [f"{t:.9g},{values(t):{form}}" for t in time]
+        (folder / name).write_text("\n".join(["time [s],x [m]", *rows]) + "\n")
+
+    def course(t: float) -> float:
+        return 0.1 * math.sin(7 * t) + 0.02 * math.cos(19 * t)
+
+    table("course.csv", course)
+    table("late.csv", lambda t: course(t - 0.003))
+    table("mm.csv", lambda t: 1000 * course(t))
+    table("digits.csv", course, ".6f")
+    for name, words in (
+        ("late.csv", "later by 3 ms (3 rows): --shift '-3 ms'"),
+        ("mm.csv", "factor 1000: in mm? (its header says m)"),
+        ("digits.csv", "rounded to 1e-06 m: more digits, or --tol 'x=1e-06 m'"),
+    ):
+        done = without(EVERY, "compare", name, "course.csv", "--tol", "1e-9 m", cwd=folder)
+        assert (done.returncode, done.stderr) == (1, "")
+        assert f"  looks like: x: {words}" in done.stdout
 
 
 def test_what_is_drawn_is_asked_for_ahead_of_a_run(folder: Path) -> None:

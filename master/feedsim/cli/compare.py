@@ -56,7 +56,12 @@ def compare(options: Namespace) -> int:
             # Of many pairs those that are the same take one line.
             full = options.all or len(comparisons) == 1
             print("\n".join(_plain(line) for each in comparisons for line in _lines(each, options.all, full)))
-            for line in (*_unused(comparisons, options), *_unreferenced(comparisons, options), *_sum(comparisons)):
+            for line in (
+                *_default(comparisons),
+                *_unused(comparisons, options),
+                *_unreferenced(comparisons, options),
+                *_sum(comparisons),
+            ):
                 print(_plain(line))
             sys.stdout.flush()
     except OSError:
@@ -244,6 +249,7 @@ def _lines(comparison: Comparison, everything: bool, notes: bool) -> list[str]:
     found += [f"  {_plain(each.name):<{width}}  {_variable_line(each)}" for each in cut]
     if len(shown) > len(cut):
         found.append(f"  and {len(shown) - len(cut)} more; --all lists them")
+    found += [f"  looks like: {each.text}" for each in comparison.looks_like]
     return found + [f"  note: {note}" for note in comparison.notes if notes or not comparison.same]
 
 
@@ -255,6 +261,17 @@ def _plain(text: str) -> str:
 def _variable_line(variable: Variable) -> str:
     outside = f"; outside in {variable.outside} of {variable.rows} rows" if variable.outside else ""
     return f"{variable.verdict}: {variable.line}{outside}"
+
+
+def _default(comparisons: list[Comparison]) -> list[str]:
+    """Of several pairs, whose notes are not shown where they are the same: that no tolerance is given for some."""
+    if len(comparisons) == 1:
+        return []
+    hidden = [
+        (each, note) for each in comparisons if each.same for note in each.notes if note.startswith("no tolerance")
+    ]
+    more = f" (as in {len(hidden) - 1} more)" if len(hidden) > 1 else ""
+    return [f"note: {hidden[0][0].result}: {hidden[0][1]}{more}"] if hidden else []
 
 
 def _unused(comparisons: list[Comparison], options: Namespace) -> list[str]:

@@ -12,11 +12,12 @@ from feedsim.compare.options import Options
 from feedsim.compare.shift import Shift, estimated_shift
 from feedsim.compare.tolerance import DEFAULT, Tolerance, Tolerances
 from feedsim.compare.tube import along, bounds
-from feedsim.compare.verdict import EXIT_CODES, Comparison, Coverage, Curves, Variable, percent, seconds
+from feedsim.compare.verdict import EXIT_CODES, Comparison, Coverage, Curves, Proposal, Variable, percent, seconds
 
 __all__ = [
-    "DEFAULT", "EXIT_CODES", "Comparison", "Coverage", "Curves", "Options", "Shift", "Tolerance", "Tolerances",
-    "Variable", "along", "bounds", "bounds_of", "compare", "compare_files", "compare_series", "estimated_shift",
+    "DEFAULT", "EXIT_CODES", "Comparison", "Coverage", "Curves", "Options", "Proposal", "Shift", "Tolerance",
+    "Tolerances", "Variable", "along", "bounds", "bounds_of", "compare", "compare_files", "compare_series",
+    "estimated_shift",
     "pairs_of", "percent", "seconds", "thinned", "tolerances_of", "unusable",
 ]  # fmt: skip
 

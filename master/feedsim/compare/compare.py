@@ -9,6 +9,7 @@ from math import inf
 import numpy as np
 
 from feedsim.compare.between import ABOVE, BELOW, Between, check_bounds
+from feedsim.compare.likeness import likeness
 from feedsim.compare.options import (
     LISTED,
     Options,
@@ -21,7 +22,7 @@ from feedsim.compare.options import (
     with_units,
 )
 from feedsim.compare.overlap import Overlap
-from feedsim.compare.tolerance import OF_MAGNITUDE, Tolerances, allowed
+from feedsim.compare.tolerance import DEFAULT, OF_MAGNITUDE, Tolerances, allowed
 from feedsim.compare.tube import along, bounds
 from feedsim.compare.verdict import Comparison, Coverage, Curves, Variable, Verdict, percent
 from feedsim.errors import InputError, few
@@ -29,6 +30,8 @@ from feedsim.trace import Array, Series, Trace, as_series, matches
 
 # A conversion of units rounds twice.
 ROUNDING = 4 * np.finfo(float).eps
+# A variable follows another one where they differ by less than this share of its range.
+FOLLOWS = 0.1
 # Curves are kept of so many variables, the worst ones.
 CURVES = 12
 
@@ -51,6 +54,26 @@ def compare(
     """
     tolerances, options = tolerances or Tolerances(), options or Options()
     result, reference = as_series(result), as_series(reference)
+
+    def again(options: Options) -> Comparison:
+        return _compared(result, reference, tolerances, options, between, names)
+
+    found = again(options)
+    if found.those("different"):
+        ours, theirs = with_units(result, options.units), with_units(reference, options.reference_units)
+        found = replace(found, looks_like=likeness(found, ours, theirs, tolerances, options, again))
+    return replace(found, variables=_light(found.variables))
+
+
+def _compared(
+    result: Series,
+    reference: Series,
+    tolerances: Tolerances,
+    options: Options,
+    between: Series | None,
+    names: tuple[str, str],
+) -> Comparison:
+    """compare(), with the curves of all variables."""
     asked = [name for name in chosen(reference.all_names, options) if not tolerances.of(name).ignore]
     found = sources((*result.all_names, *result.skipped), asked, options)
     notes = _unused(result, reference, tolerances, options)
@@ -87,6 +110,7 @@ def compare(
         elif not options.common:
             variables.append(Variable(name, "missing", reason=missing(name, result.names)))
     notes += [f"{few(who, LISTED)}: {remark}" for remark, who in told.items()]
+    notes += _default(variables, reference, tolerances)
     verdict: Verdict = "same"
     if over.uncovered or any(each.verdict in ("different", "missing") for each in variables):
         verdict = "different"
@@ -99,7 +123,7 @@ def compare(
         asked_for = f"{coverage.rows} of {coverage.of_rows} rows of the result are compared"
         problem = "; ".join(part for part in (problem, f"{asked_for}, {percent(options.cover)} are asked for") if part)
     return replace(
-        blank, verdict=verdict, variables=_light(variables), problem=problem, notes=tuple(notes), coverage=coverage
+        blank, verdict=verdict, variables=tuple(variables), problem=problem, notes=tuple(notes), coverage=coverage
     )
 
 
@@ -240,6 +264,45 @@ def _unused(result: Series, reference: Series, tolerances: Tolerances, options: 
         if series.skipped:
             notes.append(f"columns of text in the {whose} are not compared: {', '.join(series.skipped[:5])}")
     return notes
+
+
+def _default(variables: Sequence[Variable], reference: Series, tolerances: Tolerances) -> list[str]:
+    """What the default allows where no tolerance is given, beside what matters: how near a variable is to another one
+    that it follows, such as a position to its setpoint."""
+    compared = [
+        each
+        for each in variables
+        if each.verdict in ("same", "different") and each.deviation > 0 and not tolerances.given(each.name)
+    ]
+    if not compared:
+        return []
+    names = few([each.name for each in compared], LISTED)
+    text = f"no tolerance is given for {names}: {DEFAULT:g} of the range is allowed"
+    followed = [(each, *_leader(each, reference)) for each in compared]
+    each, leader, apart = max(followed, key=lambda item: item[0].allowed / item[2] if item[2] else 0.0)
+    if apart:
+        text += (
+            f", {each.allowed:.3g} {each.unit} of {each.name}, which differs from {leader} by {apart:.3g} {each.unit} "
+            f"at most; --tol '{each.name}={DEFAULT * apart:.1g} {each.unit}' is a thousandth of that"
+        )
+    return [text]
+
+
+def _leader(variable: Variable, reference: Series) -> tuple[str, float]:
+    """The column of the same unit that a variable is nearest to, and the largest difference from it.
+
+    ("", 0.0) without a unit, and where there is none within a tenth of the variable's range.
+    """
+    if variable.unit in ("", "1"):
+        return "", 0.0
+    values = reference[variable.name]
+    best, apart = "", FOLLOWS * float(np.ptp(values))
+    for name in reference.columns:
+        if name != variable.name and reference.units[name] == variable.unit:
+            far = float(np.abs(values - reference[name]).max(initial=0.0))
+            if 0 < far < apart:
+                best, apart = name, far
+    return (best, apart) if best else ("", 0.0)
 
 
 def _magnitudes(reference: Series, names: Sequence[str]) -> dict[str, float]:

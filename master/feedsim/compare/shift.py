@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from math import floor, log10
+from math import floor, log10, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from feedsim.compare.options import LISTED, Options, chosen, factor, sources, wi
 from feedsim.compare.tolerance import Tolerances
 from feedsim.compare.tube import Rows, usual_step
 from feedsim.errors import InputError, few
-from feedsim.extras import need
 from feedsim.trace import Array, Series
 
 # Positions tried over the whole range before the best is refined, at most.
@@ -98,12 +97,26 @@ def estimated_shift(
     best = _best(misfit, tried)
     if best is None or best in (0, len(tried) - 1):
         raise InputError(f"the shift in time cannot be found within +-{most:.6g} s; allow a larger one")
-    # A comparison without an estimate does without scipy.
-    refined = need("scipy.optimize", "an estimated shift in time").minimize_scalar(
-        misfit.of, bounds=(tried[best - 1], tried[best + 1]), method="bounded", options={"xatol": 1e-6 * step}
-    )
-    # No more digits than it was found with.
-    return Shift(round(float(refined.x), -floor(log10(1e-6 * step))) + 0.0, tuple(found), left_out)
+    refined = _lowest(misfit.of, float(tried[best - 1]), float(tried[best + 1]), 1e-8 * step)
+    # No more digits than rounding of the misfit leaves.
+    return Shift(round(refined, -floor(log10(1e-6 * step))) + 0.0, tuple(found), left_out)
+
+
+def _lowest(of: Callable[[float], float], low: float, high: float, width: float) -> float:
+    """Where a function with one minimum between two places has it, to `width`: by golden sections."""
+    golden = (sqrt(5) - 1) / 2
+    inner, outer = high - golden * (high - low), low + golden * (high - low)
+    at_inner, at_outer = of(inner), of(outer)
+    while high - low > width:
+        if at_inner <= at_outer:
+            high, outer, at_outer = outer, inner, at_inner
+            inner = high - golden * (high - low)
+            at_inner = of(inner)
+        else:
+            low, inner, at_inner = inner, outer, at_outer
+            outer = low + golden * (high - low)
+            at_outer = of(outer)
+    return (low + high) / 2
 
 
 @dataclass(frozen=True, eq=False)

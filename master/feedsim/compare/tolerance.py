@@ -103,6 +103,10 @@ class Tolerances:
                 found = tolerance.over(found)
         return found
 
+    def given(self, name: str) -> bool:
+        """Whether a rule says a tolerance in value, so that the default does not count."""
+        return any(tolerance.value is not None and matches(name, pattern) for pattern, tolerance in self.rules)
+
     def unused(self, names: Sequence[str]) -> list[str]:
         """Patterns that no name matches, each once."""
         return [p for p in dict(self.rules) if not any(matches(name, p) for name in names)]

@@ -122,6 +122,14 @@ class Coverage:
         return ", ".join(parts)
 
 
+@dataclass(frozen=True)
+class Proposal:
+    """What the difference of some variables looks like, and what to do about it: words that begin with their names."""
+
+    names: tuple[str, ...]
+    text: str
+
+
 @dataclass(frozen=True, repr=False)
 class Comparison:
     """A result against a reference.
@@ -134,6 +142,7 @@ class Comparison:
     shift              added to the result's time [s]
     unused             patterns of tolerances that match no column: they may be for other references
     coverage           how much of the result was compared; None where nothing was
+    looks_like         what the differences look like (likeness.py)
     """
 
     result: str
@@ -147,6 +156,7 @@ class Comparison:
     shift: float = 0.0
     unused: tuple[str, ...] = ()
     coverage: Coverage | None = None
+    looks_like: tuple[Proposal, ...] = ()
 
     def __repr__(self) -> str:
         return f"Comparison: {self.line}"

@@ -123,6 +123,7 @@ def _answer(comparisons: Sequence[Comparison]) -> list[str]:
     return [
         f"{len(outside)} of {counted(len(compared), 'variable')} leave their tolerance, {one.worst.name} the furthest: "
         f"{one.worst.line}.",
+        *(f"It looks like: {each.text}." for each in one.looks_like),
         "The picture shows whether it is a matter of value or of time; which differences are allowed is yours to say "
         "(--tol).",
     ]
@@ -154,6 +155,8 @@ def _single(comparison: Comparison, number: int, *, draw: bool, alone: bool) -> 
     """A pair: what came out, notes, picture, variables."""
     if not alone or comparison.problem:
         yield Paragraph(minus(comparison.line))
+    if not alone:
+        yield from (Paragraph(f"It looks like: {minus(each.text)}.") for each in comparison.looks_like)
     yield from (Paragraph(note, "note") for note in comparison.notes)
     if draw and (picture := picture_of(comparison, number)):
         yield picture
@@ -286,6 +289,7 @@ def to_json(comparisons: Sequence[Comparison]) -> str:
                 "verdict": each.verdict,
                 "problem": each.problem,
                 "notes": list(each.notes),
+                "looks_like": [asdict(proposal) for proposal in each.looks_like],
                 "start": each.start,
                 "end": each.end,
                 "shift": each.shift,
@@ -324,6 +328,7 @@ def _details(comparison: Comparison, variable: Variable) -> str:
         f"result: {comparison.result}, column {variable.source}",
         f"reference: {comparison.reference}",
     ]
+    lines += [f"looks like: {each.text}" for each in comparison.looks_like if variable.name in each.names]
     return "\n".join(lines + ([variable.reason] if variable.reason else []))
 
 

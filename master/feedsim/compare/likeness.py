@@ -1,0 +1,254 @@
+"""What a difference looks like: another time, unit, sign, zero point or number of digits, and what to do about it.
+
+A guess is made of a whole variable, never of its worst row, and only where it explains the difference: with it the
+variable lies within its tolerance, or what is left is a tenth of what there was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from feedsim.compare.options import LISTED, Options, factor
+from feedsim.compare.shift import estimated_shift
+from feedsim.compare.tolerance import Tolerances
+from feedsim.compare.tube import along, usual_step
+from feedsim.compare.verdict import Comparison, Curves, Proposal, Variable, seconds
+from feedsim.errors import InputError, few
+from feedsim.trace import Array, Series
+
+EXPLAINED = 0.1  # of the difference may be left
+# Units that are mistaken for one another, by what is meant: those that are not of the reference's kind drop out.
+MISTAKEN = ("m", "mm", "um", "in", "rad", "deg", "rev", "rad/s", "rpm", "deg/s", "rev/s", "m/s", "mm/s", "mm/min",
+            "m/min", "in/min", "N", "kN", "N.m", "N.cm", "mN.m", "A", "mA", "percent", "1")  # fmt: skip
+LIKE_A_UNIT = 1e-3  # relative; a factor is called a unit when it is that near
+SEEN = 2000  # rows of a result that its digits and its shift are looked for in,
+LOOKED_AT = 6  # and variables, the worst, that tell a shift
+FEWEST = 3  # rows that a guess rests on
+# Largest shift that is looked for: so many steps, or that long, but no more than a tenth of the compared time.
+STEPS, LONGEST, SHARE = 200, 0.05, 0.1
+WHOLE = 0.01  # of a step; a shift that is so near to whole rows is one of whole rows
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """What one variable looks like. left: root mean square of what is left of the difference; outside: rows that would
+    still be outside, None where nothing can be put right."""
+
+    left: float
+    words: str
+    outside: int | None = None
+
+
+def likeness(
+    found: Comparison,
+    result: Series,
+    reference: Series,
+    tolerances: Tolerances,
+    options: Options,
+    again: Callable[[Options], Comparison],
+) -> tuple[Proposal, ...]:
+    """What the variables that differ look like, those with one explanation together.
+
+    found: with the curves of all variables. again: the same comparison with other options.
+    """
+    asked = [each for each in found.those("different") if each.curves is not None and _enough(each.curves)]
+    if not asked:
+        return ()
+    guessed: dict[str, _Guess] = {}
+    open_ones: list[Variable] = []  # that no guess of their values explains to the last row
+    for each in asked:
+        assert each.curves is not None
+        guesses = [] if each.curves.hold else list(_guesses(each, each.curves, result))
+        if guesses:
+            guessed[each.name] = min(guesses, key=lambda guess: guess.left)
+        if not guesses or guessed[each.name].outside:
+            open_ones.append(each)
+    shift = _shifted(open_ones, result, reference, tolerances, options) if open_ones else None
+    late: list[Variable] = []
+    for each in open_ones:
+        assert each.curves is not None
+        left = np.inf if shift is None else _rest(each.curves, shift - options.shift)
+        if left <= EXPLAINED * _rms(_difference(each.curves)) and (
+            each.name not in guessed or left < guessed[each.name].left
+        ):
+            late.append(each)
+            guessed.pop(each.name, None)
+    groups: dict[str, list[Variable]] = {}
+    for each in asked:
+        if each.name in guessed:
+            groups.setdefault(guessed[each.name].words, []).append(each)
+    outside = {name: guess.outside for name, guess in guessed.items()}
+    made = [_told(those, words, outside) for words, those in groups.items()]
+    if late and shift is not None:
+        after = {each.name: each.outside for each in again(replace(options, shift=shift)).variables}
+        made.insert(0, _told(late, _time_words(shift, options.shift, result), after))
+    return tuple(made)
+
+
+def _told(those: Sequence[Variable], words: str, outside: Mapping[str, int | None]) -> Proposal:
+    """The same words of several variables, and what it would change; outside: rows that it would leave outside."""
+    names = [each.name for each in those]
+    rest = [f"{outside[each.name]} of {each.rows} rows of {each.name}" for each in those if outside.get(each.name)]
+    if all(outside.get(name) is None for name in names):
+        then = ""
+    elif rest:
+        then = f"; outside would still be {few(rest, 2)}"
+    else:
+        then = "; all of it would be within the tolerance"
+    return Proposal(tuple(names), f"{few(names, LISTED)}: {words}{then}")
+
+
+def _enough(curves: Curves) -> bool:
+    return int(np.isfinite(curves.values).sum()) >= FEWEST
+
+
+def _difference(curves: Curves) -> Array:
+    """(M,) result less reference."""
+    return curves.values - along(curves.reference_time, curves.reference, curves.time)
+
+
+def _rms(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    largest = float(np.abs(known).max(initial=0.0))
+    return largest * float(np.sqrt(np.mean((known / largest) ** 2))) if largest else 0.0
+
+
+def _rest(curves: Curves, by: float) -> float:
+    """What a shift of the result [s] would leave of the difference, as a root mean square."""
+    at = curves.time + by
+    inside = (at >= curves.reference_time[0]) & (at <= curves.reference_time[-1])
+    if 2 * np.sum(inside) < len(at):
+        return np.inf
+    return _rms(curves.values[inside] - along(curves.reference_time, curves.reference, at[inside]))
+
+
+def _shifted(
+    asked: Sequence[Variable], result: Series, reference: Series, tolerances: Tolerances, options: Options
+) -> float | None:
+    """Shift [s] that fits best all that differ; None where none is found."""
+    step = usual_step(result.time)
+    begin = max(float(reference.time[0]), -np.inf if options.start is None else options.start)
+    end = min(float(reference.time[-1]), np.inf if options.end is None else options.end)
+    most = min(SHARE * (end - begin), max(LONGEST, STEPS * step)) + abs(options.shift)
+    names = [each.name for each in sorted(asked, key=lambda each: -each.ratio)[:LOOKED_AT]]
+    thin = max(1, len(result) // SEEN)
+    every = Series(result.time[::thin], {name: y[::thin] for name, y in result.columns.items()}, result.units)
+    others = [name for name in reference.all_names if name not in names]
+    try:
+        found = estimated_shift(every, reference, most, replace(options, only=(), ignore=others), tolerances).seconds
+    except InputError:
+        return None
+    rows = round(found / step) if step else 0
+    return rows * step if rows and abs(found - rows * step) <= WHOLE * step else found
+
+
+def _time_words(shift: float, before: float, result: Series) -> str:
+    by = before - shift
+    step = usual_step(result.time)
+    rows = round(abs(by) / step) if step else 0
+    exactly = rows > 0 and abs(abs(by) - rows * step) <= 1e-9 * step + 1e-12 * abs(by)
+    counted = f" ({rows} row{'s'[: rows != 1]})" if exactly else ""
+    reason = ""
+    if exactly and rows == 1:
+        reason = (
+            ": results of a step written beside its start"
+            if by < 0
+            else ": results of the step before, or inputs held for a step"
+        )
+    direction = "later" if by > 0 else "earlier"
+    return f"{direction} by {_short(abs(by))}{counted}{reason}: --shift '{_short(shift)}'"
+
+
+def _short(time: float) -> str:
+    """To the digits that a shift is known to."""
+    return seconds(float(f"{time:.5g}"))
+
+
+def _guesses(variable: Variable, curves: Curves, result: Series) -> Iterator[_Guess]:
+    """What the values alone may look like."""
+    y = curves.values
+    x = along(curves.reference_time, curves.reference, curves.time)
+    known = np.isfinite(y) & np.isfinite(x)
+    off = _rms(y - x)
+    header = result.units.get(variable.source, "")
+    if rounded := _digits(variable, curves, result, x):
+        yield _Guess(0.0, rounded)
+        return
+    size = float(np.abs(x[known]).max(initial=0.0))
+    gain = float((y[known] / size) @ (x[known] / size) / ((x[known] / size) @ (x[known] / size))) if size else 0.0
+    if gain and np.isfinite(gain) and abs(gain - 1) > LIKE_A_UNIT and size:
+        words, exact = _factor_words(gain, variable, header)
+        left = _rms(y - exact * x)
+        if left <= EXPLAINED * min(off, _rms(y)):
+            yield _Guess(left, words, _outside(curves, y / exact))
+    constant = float(np.median((y - x)[known]))
+    left = _rms(y - x - constant)
+    if constant and left <= EXPLAINED * off:
+        unit = f" {variable.unit}" if variable.unit not in ("", "1") else ""
+        words = f"{'more' if constant > 0 else 'less'} by {abs(constant):.4g}{unit} throughout: another zero point?"
+        yield _Guess(left, words, _outside(curves, y - constant))
+
+
+def _outside(curves: Curves, values: Array) -> int:
+    """Rows of values that are put right which would still be outside."""
+    return int(np.sum((values < curves.lower) | (values > curves.upper)))
+
+
+def _factor_words(gain: float, variable: Variable, header: str) -> tuple[str, float]:
+    """Words of a factor, and the factor that is meant."""
+    sign = -1.0 if gain < 0 else 1.0
+    turned = "sign reversed" if sign < 0 else ""
+    if abs(abs(gain) - 1) <= LIKE_A_UNIT:
+        return f"{turned}: the other direction counts as positive there?", sign
+    # A column without unit is taken as SI where the reference has one.
+    meant = header or variable.unit
+    for unit in MISTAKEN:
+        try:
+            each = factor(meant, variable.unit)[0] / factor(unit, variable.unit or meant)[0]
+        except InputError:
+            continue
+        if unit != meant and abs(abs(gain) / each - 1) <= LIKE_A_UNIT:
+            cure = f"its header says {header}" if header else f"--unit '{variable.source}={unit}'"
+            parts = [turned, f"factor {each:.6g}: in {unit}? ({cure})"]
+            return ", ".join(part for part in parts if part), sign * each
+    parts = [turned, f"{abs(gain):.6g} times the reference throughout"]
+    return ", ".join(part for part in parts if part), gain
+
+
+def _digits(variable: Variable, curves: Curves, result: Series, x: Array) -> str:
+    """That the result is the reference with fewer digits, in words; else ""."""
+    header = result.units.get(variable.source, "")
+    try:
+        scale = factor(header, variable.unit)[0]
+    except InputError:
+        return ""
+    picked = np.flatnonzero(np.isfinite(curves.values) & np.isfinite(x))
+    picked = picked[:: max(1, len(picked) // SEEN)]
+    y, x, room = curves.values[picked] / scale, x[picked] / scale, variable.allowed / scale
+    unit = f" {header or variable.unit}" if (header or variable.unit) not in ("", "1") else ""
+    off = np.abs(y - x)
+    if not off.any() or not y.any():
+        return ""
+    for places in range(-3, 16):
+        quantum = 10.0**-places
+        counts = y / quantum
+        if np.all(np.abs(counts - np.round(counts)) <= 1e-6 + 4e-16 * np.abs(counts)):
+            # Of values that are all multiples, a coarser reference would be one too.
+            if np.all(off <= 0.5 * quantum * (1 + 1e-6) + room) and off.max() > 0.25 * quantum:
+                return f"rounded to {quantum:g}{unit}: more digits, or --tol '{variable.name}={quantum:g}{unit}'"
+            break
+    with np.errstate(divide="ignore"):
+        decade = 10.0 ** np.floor(np.log10(np.maximum(np.abs(x), 1e-300)))
+    for digits in range(3, 13):
+        if np.all(np.array([float(f"{value:.{digits - 1}e}") for value in y]) == y):
+            if np.all(off <= 0.5 * 10.0 ** (1 - digits) * decade * (1 + 1e-6) + room):
+                return f"rounded to {digits} significant digits: more digits, or a tolerance that allows for them"
+            break
+    with np.errstate(over="ignore"):
+        single = y.astype(np.float32).astype(np.float64)
+    if np.all(single == y) and np.all(off <= 2.0**-24 * np.abs(x) * (1 + 1e-6) + room):
+        return "in single precision: 7 digits, or a tolerance that allows for them"
+    return ""

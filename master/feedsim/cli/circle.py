@@ -50,7 +50,7 @@ def circle(options: Namespace) -> None:
         )
         diagnosis = diagnose(recorded.circle, [turn.path for turn in recorded.turns], centred=recorded.centred)
         report.write(recorded, diagnosis, options.records, directory, drawn=options.figures)
-    finish(options.quiet, (), *report.lines(diagnosis, recorded), f"-> {directory / 'report.html'}")
+    finish(options.quiet, recorded.doubts, *report.lines(diagnosis, recorded), f"-> {directory / 'report.html'}")
 
 
 COMMAND = Command(

@@ -28,7 +28,7 @@ from feedsim.files.source import Place
 # What drives write that is no unit of its own: a whole unit -> the unit, and what to know about it.
 SPELLINGS: dict[str, str] = {
     "increment": "1", "increments": "1", "inc": "1", "incs": "1", "count": "1", "counts": "1", "digits": "1",
-    "turn": "rev", "turns": "rev", "revs": "rev", "revolutions": "rev",
+    "inch": "in", "inches": "in", "turn": "rev", "turns": "rev", "revs": "rev", "revolutions": "rev",
     "r/min": "rpm", "u/min": "rpm", "upm": "rpm", "1/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
     "a rms": "A", "arms": "A", "a(rms)": "A", "a_rms": "A", "aeff": "A", "a eff": "A",
 }  # fmt: skip

@@ -16,10 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from feedsim import units
+from feedsim.analysis.circle.doubts import check_feed, check_radius, checked, unusual_radius
 from feedsim.analysis.circle.model import CircleUnderTest, TurnedPath
 from feedsim.analysis.circularity import EVEN, PARTS, fitted_circle
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
+from feedsim.files.columns import spelled
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.trace import Recording, read_recording
 
@@ -49,22 +51,25 @@ LEAST = 180
 @dataclass(frozen=True, eq=False)
 class RecordedTurn:
     """A turn of a file: what it is called, the path, when it began and how long it took [s], None where the file has no
-    time."""
+    time. doubts: what is the matter with its samples."""
 
     name: str
     path: TurnedPath
     begin: float | None
     duration: float | None
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedCircle:
-    """Turns of one circle. centred: its centre was not known and is fitted. notes: how the files were read."""
+    """Turns of one circle. centred: its centre was not known and is fitted. notes: how the files were read. doubts:
+    what is the matter with them."""
 
     circle: CircleUnderTest
     turns: tuple[RecordedTurn, ...]
     centred: bool
     notes: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
 
 def read_circle(
@@ -82,6 +87,7 @@ def read_circle(
     they are those of the files. Raises InputError: what a file lacks, and what it has.
     """
     notes: list[str] = []
+    doubts: list[str] = []
     turns: list[RecordedTurn] = []
     timed: list[tuple[Path, RecordedTurn, float]] = []
     radii: list[float] = []
@@ -93,21 +99,26 @@ def read_circle(
             found, mean = _of_both(recording, *both, radius)
         elif polar is None:
             x, y = _positions(recording, axes)
-            found, mean = _of_positions(recording, x, y, centre, radius)
+            found, mean = _of_positions(recording, (x, y), axes, centre, radius)
         else:
             found, mean = _of_angles(recording, *polar, radius)
         notes += recording.notes
         notes.append(f"{file}: {', '.join(turn.name for turn in found)}")
+        doubts += [f"{file}, {turn.name}: {doubt}" for turn in found for doubt in turn.doubts]
         turns += found
         timed += [(file, turn, turn.duration) for turn in found if turn.duration is not None]
         radii.append(mean)
     nominal = radius if radius is not None else radii[0]
     _one_feed(timed, nominal)
+    durations = [duration for _, _, duration in timed]
+    own = 2 * math.pi * nominal / float(np.mean(durations)) if durations else None
+    check_feed(str(files[0]), feed, own)
     speed = feed if feed is not None else _speed(turns, nominal, files)
     if radius is None:
+        doubts += unusual_radius(nominal)
         notes.append(f"the programmed radius is taken to be {nominal * 1e3:.6g} mm, that of the recorded turns")
     circle = CircleUnderTest(axes, nominal, speed, pitch or {})
-    return RecordedCircle(circle, tuple(turns), centre is None, tuple(notes))
+    return RecordedCircle(circle, tuple(turns), centre is None, tuple(notes), tuple(doubts))
 
 
 def _speed(turns: Sequence[RecordedTurn], radius: float, files: Sequence[Path]) -> float:
@@ -161,20 +172,29 @@ def _only(recording: Recording, unit: str) -> str | None:
 
 def _is(recording: Recording, name: str, unit: str) -> bool:
     try:
-        units.factor(recording.units[name] or "1", unit)
+        units.factor(spelled(recording.units[name]) or "1", unit)
     except InputError:
         return False
     return bool(recording.units[name])
 
 
 def _values(recording: Recording, name: str, unit: str) -> Array:
-    factor = float(units.factor(recording.units[name], unit))
+    factor = float(units.factor(spelled(recording.units[name]), unit))
     return np.asarray(recording.read([name])[name], dtype=np.float64) * factor
 
 
 def _time(recording: Recording) -> Array | None:
     name = _column(recording, TIMES, "s")
-    return None if name is None else _values(recording, name, "s")
+    if name is None:
+        return None
+    time = _values(recording, name, "s")
+    if (back := np.flatnonzero(np.diff(time) < 0)).size:
+        row = int(back[0]) + 1
+        raise InputError(
+            f"{recording.row(row)}: the time runs back, {time[row]:.6g} s follow {time[row - 1]:.6g} s; give rows in "
+            "their order, each measurement in a file of its own"
+        )
+    return time
 
 
 def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool] | None:
@@ -215,20 +235,26 @@ def _positions(recording: Recording, axes: tuple[str, str]) -> tuple[Array, Arra
 
 
 def _of_positions(
-    recording: Recording, x: Array, y: Array, centre: tuple[float, float] | None, radius: float | None
+    recording: Recording,
+    positions: tuple[Array, Array],
+    axes: tuple[str, str],
+    centre: tuple[float, float] | None,
+    radius: float | None,
 ) -> tuple[list[RecordedTurn], float]:
+    x, y = positions
     about, mean = fitted_circle(x, y)
     for _ in range(2):  # the first fit may hold a way to the circle; the second one holds full turns alone
         u, w = x - about[0], y - about[1]
         stretches = _turns(np.unwrap(np.arctan2(w, u)), str(recording.path))
         rows = np.concatenate([np.arange(part.start, part.stop) for part, _ in stretches])
         about, mean = fitted_circle(x[rows], y[rows])
+    check_radius(str(recording.path), radius, mean)
     if centre is not None:
         about = centre
     nominal = radius if radius is not None else mean
     u, w = x - about[0], y - about[1]
     angle, deviation = np.arctan2(w, u), np.hypot(u, w) - nominal
-    return _named(recording, angle, deviation, _time(recording), by_axes=True), mean
+    return _named(recording, angle, deviation, _time(recording), nominal, axes), mean
 
 
 def _of_angles(
@@ -236,7 +262,7 @@ def _of_angles(
 ) -> tuple[list[RecordedTurn], float]:
     phi = _values(recording, angle, "rad")
     deviation, mean = _deviation(recording, column, is_radius, radius)
-    return _named(recording, phi, deviation, _time(recording)), mean
+    return _named(recording, phi, deviation, _time(recording), mean if radius is None else radius), mean
 
 
 def _beside_each_other(recording: Recording) -> tuple[str, Mapping[int, str]] | None:
@@ -257,7 +283,7 @@ def _of_both(
         is_radius = float(np.abs(_values(recording, name, "m")).min()) > LEAST_RADIUS
         deviation, mean = _deviation(recording, name, is_radius, radius)
         order = slice(None, None, 1 if sense * (phi[-1] - phi[0]) > 0 else -1)
-        turns += _named(recording, phi[order], deviation[order], None)
+        turns += _named(recording, phi[order], deviation[order], None, mean if radius is None else radius)
     return turns, mean
 
 
@@ -271,6 +297,8 @@ def _deviation(recording: Recording, column: str, is_radius: bool, radius: float
     mean = float(np.median(length)) if is_radius else float(radius or 0.0)
     nominal = radius if radius is not None else mean
     deviation = length - nominal if is_radius else length
+    if is_radius:
+        check_radius(str(recording.path), radius, mean)
     if float(np.abs(deviation).max()) > 0.2 * nominal:
         raise InputError(
             f"{recording.header}: {column!r} leaves the radius of {nominal * 1e3:.6g} mm by up to "
@@ -280,9 +308,14 @@ def _deviation(recording: Recording, column: str, is_radius: bool, radius: float
 
 
 def _named(
-    recording: Recording, angle: Array, deviation: Array, time: Array | None, *, by_axes: bool = False
+    recording: Recording,
+    angle: Array,
+    deviation: Array,
+    time: Array | None,
+    radius: float,
+    axes: tuple[str, str] | None = None,
 ) -> list[RecordedTurn]:
-    """by_axes: both axes' positions were measured, not the radius alone."""
+    """axes: whose positions were measured; None: the radius alone was. radius: that the deviation is from [m]."""
     found = []
     for rows, sense in _turns(np.unwrap(angle), str(recording.path)):
         begin = duration = phase = None
@@ -297,11 +330,17 @@ def _named(
                 )
             begin = float(time[rows][0])
             duration = float(time[rows][-1] - begin) * 2 * math.pi / float(turned[-1])
-            phase = (time[rows] - begin) * (2 * math.pi / duration) if by_axes else None
-        path = TurnedPath((angle[rows] + math.pi) % (2 * math.pi) - math.pi, deviation[rows], sense, phase)
-        found.append(
-            RecordedTurn(f"a turn {DIRECTIONS[sense]}, {rows.stop - rows.start} samples", path, begin, duration)
+            phase = (time[rows] - begin) * (2 * math.pi / duration) if axes else None
+        told = checked(angle[rows], deviation[rows], radius, axes is not None, axes or ("", ""))
+        kept = told.keep
+        path = TurnedPath(
+            (angle[rows][kept] + math.pi) % (2 * math.pi) - math.pi,
+            deviation[rows][kept],
+            sense,
+            None if phase is None else phase[kept],
         )
+        name = f"a turn {DIRECTIONS[sense]}, {rows.stop - rows.start} samples"
+        found.append(RecordedTurn(name, path, begin, duration, told.doubts))
     return found
 
 

@@ -109,6 +109,7 @@ def report_of(
         f"Recorded circle {prefix}",
         f"{', '.join(file.name for file in files)} · {counted(len(recorded.turns), 'turn')}",
         answer=[f"{prefix}: {answer(diagnosis)}"],
+        warnings=list(recorded.doubts),
         tiles=tiles,
         main=[
             picture(circle, recorded, diagnosis),

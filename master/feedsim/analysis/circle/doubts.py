@@ -1,0 +1,201 @@
+"""What is the matter with a recorded circle before anything is diagnosed in it: a wrong unit, radius or feed, samples
+that are missing, stand out alone, or come from a scale that is too coarse or at its end.
+
+A radius or feed that contradicts the record is refused; the rest is said, as somebody at the machine can tell best.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.analysis.figures import Array
+from feedsim.errors import InputError
+
+# Of a radius and of a feed that are given, the share by which the record may differ: path lag changes the former.
+OFF_RADIUS, OFF_FEED = 0.2, 0.05
+NEAR = 0.02  # relative; a ratio that is so near to one of these is called so
+RATIOS = {
+    2.0: "the diameter?", 25.4: "inches, under a header of mm?", 1000.0: "another unit of length?",
+    10.0: "centimetres?", 60.0: "per minute for per second?", 0.06: "m/min for mm/s?",
+}  # fmt: skip
+ROUND, IN_INCHES, SMALL = 0.5e-3, 5e-3, 5e-4  # a radius in mm is a multiple of these [m], to this share
+# Samples are missing where the angle goes on by so many usual steps, and by so much [rad].
+STEPS, SECTOR = 5.0, math.radians(2)
+# A step of the positions that is this share of the range of the deviation hides what there is to see.
+COARSE = 0.2
+# A scale is at its end where it says the same in so many samples, and the circle would move by so many of its steps.
+STILL, MOVED = 5, 3.0
+# A sample stands out alone where it is off the median of so many neighbours by so many times their scatter, and by so
+# much of the range of all others: more where an axis reverses, as peaks of friction are narrow.
+AROUND, ALONE, OF_RANGE, OF_RANGE_AT_REVERSAL, REVERSAL = 3, 8.0, 0.3, 2.0, math.radians(6)
+FINEST = 1e-12  # [m]; below it a step is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """keep: rows of a turn that are no spikes (N,) bool. doubts: sentences."""
+
+    keep: NDArray[np.bool_]
+    doubts: tuple[str, ...]
+
+
+def check_radius(where: str, given: float | None, own: float) -> None:
+    """Refuse a radius that is not the record's. given: as programmed, None where nobody says; own: of the turns [m]."""
+    if given is None or abs(own / given - 1) <= OFF_RADIUS:
+        return
+    raise InputError(
+        f"{where}: the turns have a radius of {own * 1e3:.6g} mm, given is {given * 1e3:.6g} mm"
+        f"{_ratio(own / given)}; allowed: 20 % apart. Give the radius that was programmed, in the unit of the record"
+    )
+
+
+def check_feed(where: str, given: float | None, own: float | None) -> None:
+    """Refuse a feed that is not the record's. own: of its radius and its time [m/s], None where it has no time."""
+    if given is None or own is None or abs(own / given - 1) <= OFF_FEED:
+        return
+    raise InputError(
+        f"{where}: the turns were driven at {own * 6e4:.5g} mm/min, by their radius and their time; given is "
+        f"{given * 6e4:.5g} mm/min{_ratio(own / given)}; allowed: {100 * OFF_FEED:g} % apart. Leave --feed out, or "
+        "give the feed that was driven, override included"
+    )
+
+
+def _ratio(ratio: float) -> str:
+    for each, words in RATIOS.items():
+        if min(abs(ratio / each - 1), abs(ratio * each - 1)) < NEAR:
+            return f": {words}"
+    larger = max(ratio, 1 / ratio)
+    return f", {larger:.3g} times {'less' if ratio > 1 else 'as much'}"
+
+
+def unusual_radius(radius: float) -> list[str]:
+    """That a radius [m] which nobody has given would be a round one if the record were in inches."""
+
+    def multiple(value: float, of: float) -> bool:
+        return value >= of and abs(value / of - round(value / of)) * of < SMALL * value
+
+    if multiple(25.4 * radius, IN_INCHES) and not multiple(radius, ROUND) and radius < 0.02:
+        return [
+            f"the radius is {radius * 1e3:.5g} mm; were the record in inches, it would be {radius * 25.4e3:.5g} mm: "
+            "look at the unit in its header, or give --radius"
+        ]
+    return []
+
+
+def checked(angle: Array, deviation: Array, radius: float, by_axes: bool, axes: tuple[str, str]) -> Checked:
+    """A turn, (N,) angles as they follow [rad] and deviations from `radius` [m]; by_axes: from positions of `axes`."""
+    turned = np.unwrap(angle)
+    keep = ~_alone(turned, deviation)
+    doubts = list(_spikes(turned, deviation, keep)) + list(_missing(turned))
+    angles, rest = turned[keep], deviation[keep]
+    if by_axes:
+        columns = {axes[0]: (radius + rest) * np.cos(angles), axes[1]: (radius + rest) * np.sin(angles)}
+        steps = {axis: _step(values) for axis, values in columns.items()}
+        for (axis, values), other in zip(columns.items(), reversed(columns.values()), strict=True):
+            doubts += _clipped_position(axis, values, other, radius, steps[axis])
+    else:
+        steps = {"the deviation": _step(rest)}
+        doubts += _clipped_deviation(rest)
+    span = float(np.ptp(rest))
+    for what, step in steps.items():
+        if step > COARSE * span > 0:
+            doubts.append(
+                f"{what} has steps of {step * 1e6:.4g} um, the radial deviation ranges over {span * 1e6:.4g} um: "
+                "nothing smaller than a step can be diagnosed"
+            )
+    return Checked(keep, tuple(doubts))
+
+
+def _alone(turned: Array, deviation: Array) -> NDArray[np.bool_]:
+    """Rows that stand out alone, one or two beside each other."""
+    padded = np.pad(deviation, AROUND, mode="edge")
+    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1), axis=1)
+    off = np.abs(deviation - median)
+    scatter = 1.4826 * float(np.median(off))
+    ordered = np.sort(deviation)
+    span = float(min(ordered[-3] - ordered[0], ordered[-1] - ordered[2], ordered[-2] - ordered[1]))
+    to_reversal = np.abs((turned + math.pi / 4) % (math.pi / 2) - math.pi / 4)
+    share = np.where(to_reversal < REVERSAL, OF_RANGE_AT_REVERSAL, OF_RANGE)
+    found = (off > ALONE * scatter) & (off > share * span) & (off > FINEST)
+    # Three beside each other are a motion.
+    three = found & np.r_[False, found[:-1]] & np.r_[found[1:], False]
+    wide = three | np.r_[False, three[:-1]] | np.r_[three[1:], False]
+    alone: NDArray[np.bool_] = found & ~wide
+    return alone
+
+
+def _spikes(turned: Array, deviation: Array, keep: NDArray[np.bool_]) -> Iterator[str]:
+    rows = np.flatnonzero(~keep)
+    if rows.size:
+        worst = int(rows[np.argmax(np.abs(deviation[rows] - np.median(deviation)))])
+        near = float(np.median(deviation[max(0, worst - AROUND) : worst + AROUND + 1]))
+        several = f"{len(rows)} samples stand" if len(rows) > 1 else "one sample stands"
+        yield (
+            f"{several} out alone, at {_degrees(turned[worst])} deg by {(deviation[worst] - near) * 1e6:.4g} um: a "
+            "fault of the measurement; left out"
+        )
+
+
+def _missing(turned: Array) -> Iterator[str]:
+    steps = np.abs(np.diff(turned))
+    usual = float(np.median(steps))
+    for row in np.flatnonzero((steps > STEPS * usual) & (steps > SECTOR)):
+        yield (
+            f"samples are missing from {_degrees(turned[row])} to {_degrees(turned[row + 1])} deg: what happens there "
+            "is not seen, and G may be larger"
+        )
+
+
+def _step(values: Array) -> float:
+    """The step that all values are multiples of, 0 where there is none."""
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > FINEST]
+    if not steps.size:
+        return 0.0
+    step = float(steps.min())
+    counts = steps / step
+    return step if float(np.abs(counts - np.round(counts)).max()) < 0.05 and len(steps) < 0.9 * len(values) else 0.0
+
+
+def _longest(same: NDArray[np.bool_]) -> tuple[int, int]:
+    """First row and length of the longest run of true."""
+    edges = np.flatnonzero(np.diff(np.r_[False, same, False].astype(int)))
+    if not edges.size:
+        return 0, 0
+    lengths = edges[1::2] - edges[::2]
+    k = int(np.argmax(lengths))
+    return int(edges[2 * k]), int(lengths[k])
+
+
+def _clipped_position(axis: str, values: Array, other: Array, radius: float, step: float) -> Iterator[str]:
+    for end, word in ((float(values.max()), "largest"), (float(values.min()), "smallest")):
+        first, length = _longest(np.abs(values - end) <= FINEST)
+        rows = slice(first, first + length)
+        moves = np.sqrt(np.maximum(radius**2 - other[rows] ** 2, 0.0))
+        if length >= STILL and (gone := float(np.ptp(moves))) > max(MOVED * step, 1e-6):
+            yield (
+                f"{axis} stands at its {word} value for {length} samples, where the circle moves it by "
+                f"{gone * 1e6:.4g} um: the scale, or the range of the file, is at its end"
+            )
+
+
+def _clipped_deviation(values: Array) -> Iterator[str]:
+    for end, word, inner in ((float(values.max()), "largest", -1), (float(values.min()), "smallest", 1)):
+        same = np.abs(values - end) <= FINEST
+        _, length = _longest(same)
+        levels, counts = np.unique(values, return_counts=True)
+        beside = counts[-6:-1] if inner < 0 else counts[1:6]
+        if length >= STILL and len(levels) > 2 * STILL and same.sum() > 5 * np.median(beside):
+            yield (
+                f"the deviation stands at its {word} value of {end * 1e6:.4g} um for {length} samples: the instrument, "
+                "or the range of the file, is at its end"
+            )
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle) % 360:.4g}"

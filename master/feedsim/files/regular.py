@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BufferedReader
 from pathlib import Path
 
 from feedsim.errors import InputError
@@ -18,6 +22,27 @@ _OTHERS = (
 _OPENING = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_BINARY", "O_CLOEXEC", "O_NONBLOCK", "O_NOCTTY"))
 
 
+@contextmanager
+def opened(path: Path, *, pipes: bool = False) -> Iterator[BufferedReader]:
+    """A file to be read piece by piece. pipes, errors: as of content(), without its limit."""
+    try:
+        number = os.open(path, _OPENING)
+        with os.fdopen(number, "rb") as file:
+            found = os.fstat(number)
+            if not (stat.S_ISREG(found.st_mode) or (pipes and stat.S_ISFIFO(found.st_mode))):
+                what = next(name for is_one, name in _OTHERS if is_one(found.st_mode))
+                raise InputError(f"{path} is {what}, not a file")
+            if hasattr(os, "O_NONBLOCK"):
+                os.set_blocking(number, True)
+            yield file
+    except FileNotFoundError:
+        raise InputError(f"no such file: {path}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path} is a folder, not a file") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
+
+
 def content(path: Path, largest: int | None = None, *, pipes: bool = False) -> bytes:
     """What is in a file.
 
@@ -28,23 +53,15 @@ def content(path: Path, largest: int | None = None, *, pipes: bool = False) -> b
     Raises:
         InputError: no such file, one that cannot be read, is too large, or is no regular one.
     """
-    try:
-        number = os.open(path, _OPENING)
-        with os.fdopen(number, "rb") as file:
-            found = os.fstat(number)
-            if not (stat.S_ISREG(found.st_mode) or (pipes and stat.S_ISFIFO(found.st_mode))):
-                what = next(name for is_one, name in _OTHERS if is_one(found.st_mode))
-                raise InputError(f"{path} is {what}, not a file")
-            if hasattr(os, "O_NONBLOCK"):
-                os.set_blocking(number, True)
-            read = file.read() if largest is None else file.read(largest + 1)
-    except FileNotFoundError:
-        raise InputError(f"no such file: {path}") from None
-    except IsADirectoryError:
-        raise InputError(f"{path} is a folder, not a file") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
+    with opened(path, pipes=pipes) as file:
+        read = file.read() if largest is None else file.read(largest + 1)
+        size = max(os.fstat(file.fileno()).st_size, len(read))
     if largest is not None and len(read) > largest:
-        size = max(found.st_size, len(read))
         raise InputError(f"{path} has {size / 1e6:.4g} MB; a file of this kind may have {largest / 1e6:.4g} MB at most")
     return read
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of what is in a file, which may be larger than the memory. InputError: as of content()."""
+    with opened(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

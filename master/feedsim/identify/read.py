@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +13,7 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.fields import no_axis
 from feedsim.files.columns import Columns, Signal
-from feedsim.files.regular import content
+from feedsim.files.regular import digest
 from feedsim.identify.inertia import inertia
 from feedsim.identify.magnitudes import check_slide, check_time
 from feedsim.identify.record import Array, Record, even_pieces
@@ -200,7 +199,7 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
         if pitch is None and channel.target in ("m", "m/s", "N"):
             raise InputError(
                 f"{recording.header}: {role} {channel.column!r} counts on the slide; its pitch is needed: pitch: 20 mm "
-                "in the mapping, or a machine with that axis" + _which(chosen, machine)
+                "in the mapping, or a machine with that axis" + _which(chosen, machine) + _why(chosen)
             )
         if role == "current" and constant is None:
             raise InputError(
@@ -215,6 +214,10 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
     if mapping is not None and mapping.mass is not None and pitch is None:
         raise InputError(f"{mapping.where('mass')}: the pitch is needed with it; give pitch: 20 mm, or an inertia")
     return _Drive(pitch, constant, tuple(warnings))
+
+
+def _why(chosen: Chosen) -> str:
+    return f". The record itself does not tell it: {chosen.why}" if chosen.why else ""
 
 
 def _which(chosen: Chosen, machine: Machine | None) -> str:
@@ -293,7 +296,7 @@ def _provenance(
         inertia = mapping.mass * (drive.pitch / (2 * pi)) ** 2
     return Provenance(
         file=path,
-        sha256=hashlib.sha256(content(path)).hexdigest(),
+        sha256=digest(path),
         axis=chosen.axis,
         columns=columns,
         mapping=mapping.file if mapping is not None else None,

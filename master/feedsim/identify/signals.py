@@ -54,13 +54,15 @@ class Channel:
 
 @dataclass(frozen=True)
 class Chosen:
-    """Columns to use; of the time either the column or the interval [s]. pitch: [m], as the recording tells it."""
+    """Columns to use; of the time either the column or the interval [s]. pitch: [m], as the recording tells it; why: it
+    tells none, "" where nothing would tell it."""
 
     axis: str
     channels: Mapping[str, Channel]
     interval: float | None
     notes: tuple[str, ...]
     pitch: float | None = None
+    why: str = ""
 
 
 def choose(
@@ -158,14 +160,16 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
             channels[role] = column(recording, role, Signal(column=name, unit=unit, sign=sign))
         except InputError as error:
             problem = f"{recording.header}: {error}; mapping: {_line(role, recording, name)}"
+            if role in DRIVING and len(recording.axes) == 1 and recording.axes[0].why:
+                problem = f"{recording.header}: {recording.axes[0].why}"
             if role in OF_CONTROL:
                 notes.append(f"{problem}; it is not read")
             else:
                 faults.append(problem)
     if faults:
         raise InputError.of(str(recording.path), faults)
-    pitch = recording.axes[0].pitch if recording.axes else None
-    return Chosen(axis, channels, None, tuple(notes), None if pitch is None else 1e-3 * pitch)
+    pitch, why = (recording.axes[0].pitch, recording.axes[0].why) if recording.axes else (None, "")
+    return Chosen(axis, channels, None, tuple(notes), None if pitch is None else 1e-3 * pitch, why)
 
 
 def _of_capture(recording: Recording, axis: str) -> tuple[Recording, list[str]]:
@@ -177,17 +181,21 @@ def _of_capture(recording: Recording, axis: str) -> tuple[Recording, list[str]]:
         raise InputError(f"{recording.header}: {problem}; there is {there}")
     found = meant[0]
     where = f"{recording.path}: axis {found.name} (|{found.number})"
+    doubts = [f"{where}: {doubt}" for doubt in found.doubts]
     if found.pitch is None:
         return recording.of_axis(found), [
+            *doubts,
             f"{where}: POWER does not tell the pitch, nor whether TORQUE and CURRENT count in the position's "
-            "direction: they are taken to"
+            f"direction: they are taken to. {found.why[:1].upper()}{found.why[1:]}",
         ]
     if found.rotary:
         raise InputError(f"{where}: turns by 360 deg with its motor; rotary axes are not identified here")
     against = "against" if found.sign < 0 else "in"
     return recording.of_axis(found), [
+        *doubts,
         f"{where}: by POWER = TORQUE times the motor's speed the pitch is {found.pitch:.6g} mm, and TORQUE and CURRENT "
-        f"count {against} the position's direction; positions are taken as mm, as the file has no units"
+        f"count {against} the position's direction; positions are taken as {found.length}, as the file has no "
+        "units",
     ]
 
 

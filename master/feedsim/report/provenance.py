@@ -5,7 +5,6 @@ And what every summary.json says of these and of figures, each value with its un
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import platform
@@ -16,7 +15,9 @@ from pathlib import Path
 from typing import Any, get_args
 
 from feedsim.analysis import Figure
+from feedsim.errors import InputError
 from feedsim.fields import Quantity
+from feedsim.files.regular import digest
 from feedsim.scenario import Axis, Drive, ForeignUnit, Friction, Machine, Scenario
 
 Parameter = float | int | bool | str
@@ -139,8 +140,8 @@ def _units(model: Any) -> Iterator[tuple[str, str]]:
 def sha256(path: Path) -> str | None:
     """Of a file's bytes; None where it cannot be read."""
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError:
+        return digest(path)
+    except InputError:
         return None
 
 

@@ -3,16 +3,16 @@
 A file holds a header with the list of signals, and a payload of messages: rows of all signals ("HFData"), and events
 such as NC blocks ("HFBlockEvent"). A counter of cycles is the clock of both. Signals are called NAME|n,
 n being the control's number of the axis. The header tells neither units nor directions nor pitches. Units are those
-that the signals have on such controls, held against the data; pitch and direction follow from POWER = TORQUE times the
-motor's speed.
+that the signals have on such controls, held against the data; pitch and direction: capture_axes.py. Rows are read one
+by one (json_stream.py), so that a file takes the memory of its numbers.
 """
 
 from __future__ import annotations
 
-import json
-import re
+import io
+from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,8 @@ import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.files import regular
+from feedsim.trace.capture_axes import CaptureAxis, axes_of
+from feedsim.trace.json_stream import JsonStream
 from feedsim.trace.trace import LARGEST, Array, recorded
 
 SUFFIX = ".json"
@@ -28,33 +30,8 @@ LONGEST_NAME, MOST_SHOWN = 200, 60  # characters: of a name; of a cell in a mess
 LENGTHS = {"DES_POS": "mm", "ENC_POS": "mm", "ENC1_POS": "mm", "ENC2_POS": "mm", "CONT_DEV": "mm",
            "VEL_FFW": "mm/s", "CMD_SPEED": "mm/s"}  # fmt: skip
 OTHERS = {"TORQUE": "N.m", "TORQUE_FFW": "N.m", "CURRENT": "A", "POWER": "W", "LOAD": "%"}
-# Pitches of ball screws that manufacturers list; one of them is meant where the estimate holds it.
-USUAL_PITCHES = (1, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 12.5, 15, 16, 20, 25, 30, 32, 40, 50)  # mm
-TURN = 360.0  # deg: what a rotary axis travels with a turn
-FITS = 0.1  # relative residual up to which POWER is TORQUE times a speed
-NEAR = 0.01  # relative; a pitch is told to that at best, as the channels are sampled at different instants
-
-
-@dataclass(frozen=True)
-class CaptureAxis:
-    """What a capture tells of an axis.
-
-    Attributes:
-        number: the control's, behind the bar of its signals. name: in the header, such as "Y1".
-        pitch: travel per motor turn in mm (deg of a rotary axis), positive; None where its motion does not tell.
-        sign: of TORQUE and CURRENT in the direction of the position; 0 where its motion does not tell.
-        rotary: its positions are degrees, as far as its motion tells.
-    """
-
-    number: str
-    name: str
-    pitch: float | None
-    sign: int
-    rotary: bool
-
-    def called(self, axis: str) -> bool:
-        """Whether a person means this one: "Y1", "Y" or "2"."""
-        return axis.casefold() in {self.name.casefold(), re.sub(r"[0-9]+$", "", self.name).casefold(), self.number}
+# Of programs that know no UTF-8; characters outside ASCII are in names alone.
+WINDOWS = "cp1252"
 
 
 @dataclass(frozen=True)
@@ -75,6 +52,21 @@ class Capture:
     marks: tuple[Mark, ...]
 
 
+@dataclass
+class _Content:
+    """What has been read of a file."""
+
+    path: Path
+    header: Mapping[str, Any] | None = None
+    names: Sequence[str] = ()
+    cycle: float = 0.0
+    payload: bool = False
+    width: int | None = None
+    rows: int = 0
+    cells: array[float] = field(default_factory=lambda: array("d"))
+    events: list[Mapping[str, Any]] = field(default_factory=list)
+
+
 def read_capture(path: Path) -> Capture:
     """Read a capture.
 
@@ -82,43 +74,126 @@ def read_capture(path: Path) -> Capture:
         InputError: not such a file (what is missing), rows of another length than the list of signals, a counter that
             stands still or runs back, values that are no numbers.
     """
-    try:
-        content = json.loads(regular.content(path))
-    except ValueError as error:
-        raise InputError(f"{path} is no JSON file that can be read: {error}") from None
-    except RecursionError:
-        raise InputError(f"{path} is no capture of a control: its values are nested too deep") from None
-    header = _part(path, content, "Header", dict)
-    names = _names(path, header)
-    cycle = header.get("CycleTimeMs")
-    if not isinstance(cycle, (int, float)) or isinstance(cycle, bool) or not 0 < cycle <= 1000:
-        raise InputError(f"{path}: Header.CycleTimeMs is {cycle!r}; a number of milliseconds up to 1000 is expected")
-    messages = _part(path, content, "Payload", list)
-    values = _rows(path, messages, names)
+    content = _content(path)
+    names = content.names
+    values = np.frombuffer(content.cells, dtype=np.float64).reshape(-1, len(names))
+    for k, name in enumerate(names):
+        column, wrong = recorded(values[:, k])
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            cell = values[row, k]
+            allowed = f"; allowed: up to {LARGEST:g}" if np.isfinite(cell) else ", no finite number"
+            raise InputError(f"{path}, row {row + 1}: {name} is {_shown(float(cell))}{allowed}")
+        values[:, k] = column
     counter = values[:, names.index(COUNTER)]
-    if (wrong := np.flatnonzero(np.diff(counter) <= 0)).size:
-        row = int(wrong[0]) + 1
+    if (backwards := np.flatnonzero(np.diff(counter) <= 0)).size:
+        row = int(backwards[0]) + 1
         raise InputError(
             f"{path}, row {row + 1}: {COUNTER} is {counter[row]:.0f} behind {counter[row - 1]:.0f}; it must grow"
         )
-    interval = 1e-3 * cycle
+    interval = 1e-3 * content.cycle
     columns = {"time": (counter - counter[0]) * interval}
-    columns |= {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(names) if name != COUNTER}
-    axes = tuple(_axis(number, name, columns) for number, name in _axes(header).items())
-    rotary = {axis.number for axis in axes if axis.rotary}
-    marks = tuple(_marks(messages, counter[0], interval))
-    return Capture(columns, {"time": "s"} | {name: _unit(name, columns, rotary) for name in columns if name != "time"},
-                   axes, marks)  # fmt: skip
+    columns |= {name: values[:, k] for k, name in enumerate(names) if name != COUNTER}
+    axes = axes_of(_axes(content.header or {}), columns)
+    by_number = {axis.number: axis for axis in axes}
+    marks = tuple(_marks(content.events, counter[0], interval))
+    units = {name: _unit(name, columns, by_number) for name in columns if name != "time"}
+    return Capture(columns, {"time": "s"} | units, axes, marks)
 
 
-def _part(path: Path, content: object, key: str, kind: type) -> Any:
-    found = content.get(key) if isinstance(content, dict) else None
-    if not isinstance(found, kind):
-        raise InputError(
-            f"{path} is no capture of a control: {key} is missing; expected is a SINUMERIK capture with Header "
-            "(SignalListHFData, CycleTimeMs) and Payload (HFData)"
-        )
+def _content(path: Path) -> _Content:
+    """All that is read of a file, in UTF-8, or, where it is none, in UTF-16 or Windows-1252."""
+    with regular.opened(path) as file:
+        wide = file.read(2) in (b"\xff\xfe", b"\xfe\xff")
+    for encoding in ("utf-16",) if wide else ("utf-8-sig", WINDOWS):
+        try:
+            with regular.opened(path) as file, io.TextIOWrapper(file, encoding, newline="") as text:
+                return _walked(JsonStream(text, path), path)
+        except UnicodeDecodeError as error:
+            problem = error
+    raise InputError(f"{path} is no JSON file that can be read: {problem}")
+
+
+def _walked(stream: JsonStream, path: Path) -> _Content:
+    found = _Content(path)
+    if stream.peek() != "{":
+        stream.value()
+        raise _missing(path, "Header")
+    for key in stream.members():
+        if key == "Header":
+            header = stream.value()
+            if isinstance(header, dict):
+                found.header, found.names = header, _names(path, header)
+                found.cycle = _cycle(path, header)
+        elif key == "Payload" and stream.peek() == "[":
+            found.payload = True
+            for k in stream.items():
+                _message(stream, found, k)
+        else:
+            stream.value()
+    stream.end()
+    if found.header is None:
+        raise _missing(path, "Header")
+    if not found.payload:
+        raise _missing(path, "Payload")
+    if found.rows < 2:
+        raise InputError(f"{path}: {found.rows} rows of HFData; at least 2 are needed")
+    if found.width != len(found.names):
+        raise _of_length(found, 0, f"{found.width} values")
     return found
+
+
+def _message(stream: JsonStream, found: _Content, number: int) -> None:
+    no_list = InputError(f"{found.path}: Payload, message {number + 1}: no list of rows under HFData")
+    if stream.peek() != "{":
+        raise no_list
+    for key in stream.members():
+        if key == "HFData":
+            if stream.peek() != "[":
+                raise no_list
+            for _ in stream.items():
+                _row(found, stream.value())
+        else:
+            value = stream.value()
+            if key == "HFBlockEvent" and isinstance(value, dict):
+                found.events.append(value)
+
+
+def _row(found: _Content, row: object) -> None:
+    wanted = len(found.names) or found.width  # a header may stand behind its rows
+    if not isinstance(row, list) or (wanted is not None and len(row) != wanted):
+        raise _of_length(found, found.rows, f"{len(row)} values" if isinstance(row, list) else "no list")
+    found.width = len(row)
+    found.rows += 1
+    try:
+        found.cells.extend(row)
+    except (TypeError, OverflowError):
+        for k, cell in enumerate(row):
+            if not isinstance(cell, (int, float)) or abs(cell) > LARGEST:
+                name = found.names[k] if found.names else f"value {k + 1}"
+                fault = ", no finite number"
+                if isinstance(cell, int) and not isinstance(cell, bool):
+                    fault = f"; allowed: up to {LARGEST:g}"
+                raise InputError(f"{found.path}, row {found.rows}: {name} is {_shown(cell)}{fault}") from None
+
+
+def _of_length(found: _Content, row: int, there: str) -> InputError:
+    wanted = f"Header.SignalListHFData has {len(found.names)} signals" if found.names else f"others have {found.width}"
+    return InputError(f"{found.path}, row {row + 1}: {there}; {wanted}")
+
+
+def _missing(path: Path, key: str) -> InputError:
+    return InputError(
+        f"{path} is no capture of a control: {key} is missing; expected is a SINUMERIK capture with Header "
+        "(SignalListHFData, CycleTimeMs) and Payload (HFData)"
+    )
+
+
+def _cycle(path: Path, header: Mapping[str, Any]) -> float:
+    cycle = header.get("CycleTimeMs")
+    if not isinstance(cycle, (int, float)) or isinstance(cycle, bool) or not 0 < cycle <= 1000:
+        raise InputError(f"{path}: Header.CycleTimeMs is {cycle!r}; a number of milliseconds up to 1000 is expected")
+    return float(cycle)
 
 
 def _signals(header: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -151,57 +226,22 @@ def _axes(header: Mapping[str, Any]) -> dict[str, str]:
     return dict(sorted(found.items(), key=lambda item: (len(item[0]), item[0])))
 
 
-def _rows(path: Path, messages: Sequence[Any], names: Sequence[str]) -> Array:
-    rows: list[Any] = []
-    for k, message in enumerate(messages):
-        part = message.get("HFData", []) if isinstance(message, dict) else None
-        if not isinstance(part, list):
-            raise InputError(f"{path}: Payload, message {k + 1}: no list of rows under HFData")
-        rows += part
-    for k, row in enumerate(rows):
-        if not isinstance(row, list) or len(row) != len(names):
-            there = f"{len(row)} values" if isinstance(row, list) else "no list"
-            raise InputError(f"{path}, row {k + 1}: {there}; Header.SignalListHFData has {len(names)} signals")
-    if len(rows) < 2:
-        raise InputError(f"{path}: {len(rows)} rows of HFData; at least 2 are needed")
-    try:
-        values = np.array(rows, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        values = np.array([[_number(cell) for cell in row] for row in rows])
-    if (wrong := np.argwhere(~np.isfinite(values))).size:
-        row, column = (int(index) for index in wrong[0])
-        raise InputError(f"{path}, row {row + 1}: {names[column]} is {_shown(rows[row][column])}, no finite number")
-    values, too_large = recorded(values)
-    if (found := np.argwhere(too_large)).size:
-        row, column = (int(index) for index in found[0])
-        raise InputError(
-            f"{path}, row {row + 1}: {names[column]} is {_shown(rows[row][column])}; allowed: up to {LARGEST:g}"
-        )
-    return values
-
-
 def _shown(cell: object) -> str:
     """A cell for a message, which a number of a hundred digits would fill."""
     text = repr(cell)
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 
-def _number(cell: object) -> float:
-    try:
-        return float(cell) if isinstance(cell, (int, float)) else np.nan
-    except OverflowError:
-        return np.inf
-
-
-def _unit(name: str, columns: Mapping[str, Array], rotary: set[str]) -> str:
+def _unit(name: str, columns: Mapping[str, Array], axes: Mapping[str, CaptureAxis]) -> str:
     """Unit of a signal; "" where none is known, or the data contradict what is usual."""
     signal, _, number = name.partition("|")
-    unit = LENGTHS.get(signal)
+    unit, axis = LENGTHS.get(signal), axes.get(number)
     if unit is None:
-        return OTHERS.get(signal, "")
+        unit = OTHERS.get(signal, "")
+        return axis.torque if unit == "N.m" and axis is not None else unit
     if unit == "mm/s" and not _per_second(columns, signal, number):
         return ""
-    return unit.replace("mm", "deg") if number in rotary else unit
+    return unit.replace("mm", "deg" if axis is not None and axis.rotary else axis.length if axis is not None else "mm")
 
 
 def _per_second(columns: Mapping[str, Array], signal: str, number: str) -> bool:
@@ -215,50 +255,9 @@ def _per_second(columns: Mapping[str, Array], signal: str, number: str) -> bool:
     return not moved or 0.5 < float(speed @ slope) / moved < 2.0
 
 
-def _axis(number: str, name: str, columns: Mapping[str, Array]) -> CaptureAxis:
-    pitch = _signed_pitch(number, columns)
-    if pitch is None:
-        return CaptureAxis(number, name, None, 0, False)
-    rotary = abs(abs(pitch) - TURN) < NEAR * TURN
-    usual = TURN if rotary else min(USUAL_PITCHES, key=lambda each: abs(np.log(each / abs(pitch))))
-    fits = abs(usual - abs(pitch)) < NEAR * usual
-    return CaptureAxis(number, name, float(usual) if fits else abs(pitch), 1 if pitch > 0 else -1, rotary)
-
-
-def _signed_pitch(number: str, columns: Mapping[str, Array]) -> float | None:
-    """Travel per motor turn, below 0 where the motor's own direction is against the position's, by least squares of
-    POWER over TORQUE times speed; None where it does not fit or the axis stands.
-
-    The channels are sampled at instants of their own: the speed is shifted by what fits best, up to three rows.
-    """
-    try:
-        torque, power, position = (columns[f"{signal}|{number}"] for signal in ("TORQUE", "POWER", "ENC_POS"))
-    except KeyError:
-        return None
-    time = columns["time"]
-    step = float(np.median(np.diff(time)))
-    scatter = float(power @ power)
-    best, found = FITS, None
-    for lag in np.arange(-3.0, 3.1, 0.25) * step:
-        speed = (
-            np.interp(time - lag + step / 2, time, position) - np.interp(time - lag - step / 2, time, position)
-        ) / step
-        product = torque * speed
-        weight, fitted = float(product @ product), float(product @ power)
-        if not weight or not scatter or not fitted:
-            continue
-        residual = float(np.sqrt(max(0.0, 1.0 - fitted * fitted / (weight * scatter))))
-        if residual < best:
-            best, found = residual, 2 * np.pi * weight / fitted
-    return found if found is not None and 1e-9 < abs(found) < 1e9 else None  # beyond that it is no pitch in mm
-
-
-def _marks(messages: Sequence[Any], first: float, interval: float) -> list[Mark]:
+def _marks(events: Sequence[Mapping[str, Any]], first: float, interval: float) -> list[Mark]:
     marks = []
-    for message in messages:
-        event = message.get("HFBlockEvent") if isinstance(message, dict) else None
-        if not isinstance(event, dict):
-            continue
+    for event in events:
         at, block = event.get("HFProbeCounter"), event.get("GCode")
         if isinstance(at, (int, float)) and isinstance(block, str):
             marks.append(Mark(float((at - first) * interval), block.strip()))

@@ -15,6 +15,7 @@ import numpy as np
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.trace import capture
+from feedsim.trace.capture_axes import CaptureAxis
 from feedsim.trace.cells import Table, read_table
 from feedsim.trace.csv import write_csv
 from feedsim.trace.mat import Other, Value, flat, read_mat
@@ -42,7 +43,7 @@ class Recording:
     names: tuple[str, ...]
     units: Mapping[str, str]
     scalars: Mapping[str, float] = field(default_factory=dict)
-    axes: tuple[capture.CaptureAxis, ...] = ()
+    axes: tuple[CaptureAxis, ...] = ()
     marks: tuple[capture.Mark, ...] = ()
     notes: tuple[str, ...] = ()
     _table: Table | None = None  # of a CSV file
@@ -75,7 +76,7 @@ class Recording:
         hint = "; a CSV file has none, write the number itself" if self._table else suggest(name, self.scalars)
         raise InputError(f"{self.path}: no variable {name!r}{hint}")
 
-    def of_axis(self, axis: capture.CaptureAxis) -> Recording:
+    def of_axis(self, axis: CaptureAxis) -> Recording:
         """The signals of one axis of a capture alone, and the time."""
         own = tuple(name for name in self.names if "|" not in name or name.endswith(f"|{axis.number}"))
         return replace(self, names=own, axes=(axis,))

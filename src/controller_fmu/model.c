@@ -155,7 +155,14 @@ static bool accepts(Unit *unit, const Scalars *scalars, const void *state, size_
                              (double)counts[i].value, (double)(counts[i].end - 1));
         }
     }
-    return true;
+    if (!instants_agree(unit, unit_clock_behind(unit, scalars), x->instant, p.T_c)) {
+        return false;
+    }
+    return x->instant % p.ticks == x->tick ||
+           unit_fail(unit,
+                     "the state contradicts itself: behind %.0f sample instants it is in cycle %.0f of %.0f within "
+                     "T_pos",
+                     (double)x->instant, (double)x->tick, (double)p.ticks);
 }
 
 /* --- time --------------------------------------------------------------------------------------------------------- */

@@ -47,6 +47,22 @@ static inline bool instants_too_many(Unit *unit, double count, double T_c) {
                      number_text(text[2], INSTANTS_MOST * T_c));
 }
 
+/* Whether that many instants, T_c apart, are what a clock that was stepped in any way has behind it: each lies ahead of
+ * the clock, and the next one is at most the margin behind it; false, with the reason logged. */
+static inline bool instants_agree(Unit *unit, Clock clock, int64_t count, double T_c) {
+    const double grain = 4 * INSTANTS_GRAIN * (fabs(clock.start) + fabs(clock.time));
+    const double next = clock.start + (double)count * T_c;
+    if (!clock.valid || (next >= clock.time - INSTANTS_DRIFT * T_c - grain && next - T_c <= clock.time + grain)) {
+        return true;
+    }
+    char text[3][NUMBER_TEXT_SIZE];
+    return unit_fail(
+        unit,
+        "the state contradicts itself: it has %.0f sample instants, T_c = %s s apart, behind it since %s s, "
+        "and stands at %s s",
+        (double)count, number_text(text[0], T_c), number_text(text[1], clock.start), number_text(text[2], clock.time));
+}
+
 /* Share [1] of the cycle, the last one begun, that lies behind where its end, t_k, is `ahead` [s] of the step's. */
 static inline double instants_share(double ahead, double T_c) {
     return ahead < INSTANTS_ROUNDING * T_c ? 1.0 : fmax(1.0 - ahead / T_c, 0.0);

@@ -23,6 +23,7 @@
 #define unit_set_axes PREFIXED(unit_set_axes)
 #define unit_set_start PREFIXED(unit_set_start)
 #define unit_axis_behind PREFIXED(unit_axis_behind)
+#define unit_clock_behind PREFIXED(unit_clock_behind)
 #define unit_derived_for PREFIXED(unit_derived_for)
 #define unit_derived PREFIXED(unit_derived)
 #define unit_set_derived PREFIXED(unit_set_derived)

@@ -173,6 +173,11 @@ static bool header_sound(Unit *unit, const Header *header) {
         return unit_fail(unit, "the serialized state is damaged: started at %s s, it stands at %s s%s",
                          number_text(text[0], header->start_time), number_text(text[1], header->time),
                          isnan(header->stop_time) ? " and stops at nan s" : "");
+    const bool begun = header->phase > PHASE_INITIALIZATION;
+    if (!begun && (header->time < header->start_time || header->time > header->start_time))
+        return unit_fail(unit,
+                         "the serialized state is damaged: not initialised yet, to start at %s s, it stands at %s s",
+                         number_text(text[0], header->start_time), number_text(text[1], header->time));
     return true;
 }
 

@@ -218,6 +218,13 @@ const AxisBlock *unit_axis_behind(const Scalars *scalars, size_t axis) {
     return (const AxisBlock *)(const void *)axes + axis;
 }
 
+Clock unit_clock_behind(const Unit *unit, const Scalars *scalars) {
+    (void)unit;
+    Header header;
+    memcpy(&header, (const unsigned char *)scalars - SCALARS_AT, sizeof header);
+    return (Clock){header.start_time, header.time, header.phase != PHASE_FAILED};
+}
+
 size_t unit_axes(const Unit *unit) {
     return unit->axes;
 }

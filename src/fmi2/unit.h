@@ -50,6 +50,13 @@ bool unit_set_start(Unit *unit, const char *name, const char *value);
 
 /* The block of an axis that lies behind `scalars`: those of accepts() as well. */
 const AxisBlock *unit_axis_behind(const Scalars *scalars, size_t axis);
+/* accepts(): the clock of the saved state that `scalars` lies in. `valid`: steps that went well have brought it to
+ * `time`; not so where a step failed on its way. */
+typedef struct Clock {
+    double start, time; /* [s] */
+    bool valid;
+} Clock;
+Clock unit_clock_behind(const Unit *unit, const Scalars *scalars);
 /* accepts(): whether the derived data of now belongs to the parameters among `scalars` and behind them. */
 bool unit_derived_for(const Unit *unit, const Scalars *scalars);
 

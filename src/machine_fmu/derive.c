@@ -1,4 +1,5 @@
 /* Parameters to coefficients, part by part; where the parts' states lie; which saved states belong to them. */
+#include <math.h>
 #include <string.h>
 
 #include "instants.h"
@@ -159,14 +160,61 @@ static bool parts_accept(Machine *machine, const Scalars *scalars, const unsigne
     if (!plant_part.accepts(&machine->plant, plant, state + places[0], places[1] - places[0])) {
         return false;
     }
+    /* The drives have worked the instants of the cycles, each of them. */
+    const Clock clock = unit_clock_behind(machine->plant.host, scalars);
+    const int64_t cycle = ((const StateHead *)(const void *)state)->cycle;
     for (size_t i = 0; i < machine->axes; i++) {
         const unsigned char *axis = (const unsigned char *)unit_axis_behind(scalars, i);
+        machine->drives[i].clock.start = clock.start;
+        machine->drives[i].clock.time = clock.start + (double)cycle * machine->T_c;
+        machine->drives[i].clock.valid = clock.valid;
         const size_t at = places[drive_place(machine, i)], size = places[drive_place(machine, i) + 1] - at;
         if (!controller_part.accepts(&machine->drives[i], axis + offsetof(AxisBlock, drive_x_s), state + at, size)) {
             return false;
         }
     }
     return true;
+}
+
+/* The clock, the cycles worked and where in the last one the clock stands. */
+static bool clock_agrees(Unit *unit, const Scalars *scalars, const StateHead *head) {
+    const double T_c = unit_axis_behind(scalars, 0)->drive_T_c;
+    const Clock clock = unit_clock_behind(unit, scalars);
+    if (!instants_agree(unit, clock, head->cycle, T_c)) {
+        return false;
+    }
+    const double share = machine_share(clock.start + (double)head->cycle * T_c - clock.time, T_c);
+    const double rounding = 2 * INSTANTS_ROUNDING + INSTANTS_GRAIN * (fabs(clock.start) + fabs(clock.time)) / T_c;
+    /* 1 as well where the beginning of the last cycle is not known any more, and the clock is behind its end. */
+    const bool agrees = fabs(head->share - share) <= rounding || (head->share == 1 && share > 1);
+    if (!(head->share >= 0 && head->share <= 1 + INSTANTS_DRIFT) || (clock.valid && !agrees)) {
+        char text[2][NUMBER_TEXT_SIZE];
+        return unit_fail(
+            unit,
+            "the state contradicts itself: the share of the last cycle that its clock has behind it is %s, "
+            "its clock says %s",
+            number_text(text[0], head->share), number_text(text[1], share));
+    }
+    return true;
+}
+
+/* Samples of setpoints are there where a path needs them; the newest is of the last step. */
+static bool samples_agree(Unit *unit, const Scalars *scalars, const StateHead *head) {
+    const Clock clock = unit_clock_behind(unit, scalars);
+    const double grain = INSTANTS_GRAIN * (fabs(clock.start) + fabs(clock.time));
+    if (head->sampled < 0 || head->sampled > machine_path_used(scalars)) {
+        return unit_fail(unit,
+                         "the state is out of range: samples of setpoints are there %.0f times; allowed is 0, and 1 "
+                         "where setpoints.delay or setpoints.n_ffw_inside needs them",
+                         (double)head->sampled);
+    }
+    bool ordered = head->sample_t[0] <= clock.time + grain && isfinite(head->sample_t[SAMPLES - 1]);
+    for (size_t k = 1; k < SAMPLES; k++) {
+        ordered = ordered && head->sample_t[k - 1] >= head->sample_t[k];
+    }
+    return !head->sampled || ordered ||
+           unit_fail(unit, "the state contradicts itself: its samples of setpoints do not lie one behind the other "
+                           "ahead of its clock");
 }
 
 /* Asked twice where the parameters change with the state: ahead, when only its head can be judged, as the places of
@@ -183,13 +231,8 @@ bool machine_accepts(Unit *unit, const Scalars *scalars, const void *state, size
         return unit_fail(unit, "the state is out of range: control cycle %.0f; allowed is 0 to %.0f",
                          (double)head->cycle, (double)(INSTANTS_COUNTED - 1));
     }
-    if (!(head->share >= 0 && head->share <= 1)) {
-        return unit_fail(unit, "the state is out of range: the share of the last cycle is no number from 0 to 1");
-    }
-    if (head->sampled < 0 || head->sampled > 1) {
-        return unit_fail(unit,
-                         "the state is out of range: samples of setpoints are there %.0f times; allowed is 0 or 1",
-                         (double)head->sampled);
+    if (!clock_agrees(unit, scalars, head) || !samples_agree(unit, scalars, head)) {
+        return false;
     }
     if (head->end != size || (unit_derived_for(unit, scalars) && machine->places[end_place(machine)] != size)) {
         return unit_fail(unit, "the state says that it has %.0f bytes of model state; it has %.0f", (double)head->end,

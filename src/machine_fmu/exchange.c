@@ -127,6 +127,8 @@ static void tell_drive(Unit *unit, size_t i, double t, double t_k) {
         axis->drive_n_ffw = axis->motion_n_ffw;
     } else {
         machine_path_tell(unit, i, t, t_k);
+        axis->motion_x_s = axis->drive_x_s; /* the setpoint in use, wherever it comes from */
+        axis->motion_n_ffw = axis->drive_n_ffw;
     }
 }
 
@@ -307,5 +309,5 @@ bool machine_cycle(Unit *unit, double t, double t_k) {
         axis->drive_x_a = axis->plant_x_a;
         axis->drive_n_a = axis->plant_n_a;
     }
-    return good && (!machine->has_motion || setpoint_part.step(&machine->motion, t_k, machine->T_c));
+    return good && (!unit_scalars(unit)->motion_built_in || setpoint_part.step(&machine->motion, t_k, machine->T_c));
 }

@@ -221,6 +221,9 @@ static bool load_parts(Unit *unit, Machine *machine, const Settings *settings) {
     if (!plant_part.load(&machine->plant) || !load_axes(unit, machine)) {
         return false;
     }
+    for (size_t i = 0; i < machine->axes; i++) {
+        unit_axis(unit, i)->x_s = unit_axis(unit, i)->plant_x_0; /* setpoints begin where the axes stand */
+    }
     machine->has_motion = machine->motion_hash[0] != '\0';
     machine->motion = part_of(unit, "motion", machine->motion_hash);
     return (!machine->has_motion || setpoint_part.load(&machine->motion)) &&

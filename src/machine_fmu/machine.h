@@ -2,11 +2,13 @@
 #ifndef FEEDSIM_MACHINE_H
 #define FEEDSIM_MACHINE_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include "hash.h"
+#include "instants.h"
 #include "part.h"
 #include "unit.h"
 
@@ -29,6 +31,7 @@ extern const Scheme machine_schemes[SCHEMES]; /* in the order of the parameter c
 typedef struct Machine {
     size_t axes;
     bool warned;             /* of held setpoints */
+    bool warned_far;         /* of setpoints that begin elsewhere than the axes stand */
     bool has_motion;         /* the archive holds one */
     Part plant, motion;      /* motion: has_motion alone */
     Part *drives, *contacts; /* [axes] */
@@ -59,8 +62,8 @@ enum { SAMPLES = 12, SAMPLES_IN_DELAY = 8 };
 typedef struct StateHead {
     int64_t cycle;            /* control cycles worked */
     uint64_t end;             /* places[2 axes + 1]: which layout the state has */
-    double share;             /* of the last cycle, that lies behind the communication point [1] */
-    double tool[3];           /* at the start of the last cycle, where share is below 1: tool.x [m] */
+    double share;             /* of the last cycle, that lies behind the communication point, machine_share() [1] */
+    double tool[3];           /* at the start of the last cycle, where share is not 1: tool.x [m] */
     double tool_v[3];         /* and its speed [m/s] */
     int64_t sampled;          /* whether there are samples of setpoints */
     double sample_t[SAMPLES]; /* [s] */
@@ -71,7 +74,7 @@ typedef struct AxisState {
     double M_fr, M_fr_slope;         /* at its end, and over its last exchange step */
     double n_slope;                  /* of the last exchange step, as the extrapolating schemes need it */
     double M_a, M_a_slope, i_d, i_q; /* at its end; over it */
-    double x_a, x_a_v, n_a, M_fr_0;  /* at its start, where share is below 1 */
+    double x_a, x_a_v, n_a, M_fr_0;  /* at its start, where share is not 1 */
     double M_a_before;               /* at its start, as those schemes know it that hold it */
     double x_s[SAMPLES], n_ffw[SAMPLES];
 } AxisState;
@@ -102,6 +105,14 @@ bool machine_rows_agree(Unit *unit);
 bool machine_load(Unit *unit);
 void machine_release(Unit *unit);
 
+/* Share [1] of the last cycle that lies behind the communication point, which is `ahead` [s] of the cycle's end. Above
+ * 1 where the point lies behind that end, and yet the next cycle belongs to the next step (instants_margin()): up to a
+ * hundredth of a cycle. What is shown there runs on as in the last cycle. */
+static inline double machine_share(double ahead, double T_c) {
+    const double share = 1 - ahead / T_c;
+    return fabs(ahead) < INSTANTS_ROUNDING * T_c ? 1 : fmin(fmax(share, 0), 1 + INSTANTS_DRIFT);
+}
+
 /* --- derive.c */
 bool machine_derive(Unit *unit);
 bool machine_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t size);
@@ -110,7 +121,7 @@ void machine_bind(Unit *unit, bool with_states);
 
 /* --- path.c: setpoints from outside, between their samples */
 /* Whether the samples are needed, at all. */
-bool machine_path_used(Unit *unit);
+bool machine_path_used(const Scalars *scalars);
 /* Keep the setpoints that hold at the start of a step of h from t on; false where the step is too long for the delay.
  */
 bool machine_path_take(Unit *unit, double t, double h);

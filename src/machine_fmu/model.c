@@ -13,6 +13,7 @@
  * instants, are the same whatever the steps. */
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 
 #include "instants.h"
 #include "machine.h"
@@ -28,6 +29,7 @@ static void machine_start(Unit *unit) {
     machine_bind(unit, true);
     machine_head(unit)->end = machine_state_size(unit);
     machine_head(unit)->share = 1;
+    machine->warned_far = false;
     if (machine->has_motion) {
         setpoint_part.start(&machine->motion);
     }
@@ -44,10 +46,15 @@ static void machine_start(Unit *unit) {
         own->M_fr = axis->plant_M_fr = axis->friction_M_fr;
         axis->drive_x_a = axis->plant_x_a;
         axis->drive_n_a = axis->plant_n_a;
-        axis->drive_x_s = unit_scalars(unit)->motion_built_in ? axis->motion_x_s : axis->x_s;
+        if (!unit_scalars(unit)->motion_built_in) {
+            axis->motion_x_s = axis->x_s;
+            axis->motion_n_ffw = axis->n_ffw;
+        }
+        axis->drive_x_s = axis->motion_x_s;
         controller_part.start(&machine->drives[i]);
         axis->plant_M_a = axis->drive_M_a;
         axis->x_e_min = axis->x_e_max = axis->drive_x_e;
+        axis->x_a_min = axis->x_a_max = axis->plant_x_a;
         axis->M_a_min = axis->M_a_max = axis->drive_M_a;
     }
 }
@@ -120,6 +127,11 @@ static void show_inside(Unit *unit, Machine *machine, double share) {
     }
 }
 
+/* Whether what is shown is not that of the last cycle's end. */
+static bool inside(const StateHead *head) {
+    return head->share < 1 || head->share > 1;
+}
+
 /* Ahead of a cycle: what the parts read of their own outputs. */
 static void show_end(Unit *unit, const Machine *machine) {
     for (size_t i = 0; i < machine->axes; i++) {
@@ -139,7 +151,7 @@ static void machine_show_late(Unit *unit) {
     const StateHead *head = machine_head(unit);
     machine_bind(unit, true);
     plant_part.show_late(&machine->plant);
-    for (size_t d = 0; head->share < 1 && d < 3; d++) {
+    for (size_t d = 0; inside(head) && d < 3; d++) {
         double *shown = tool_displacement(unit, d), *point = tool_point(unit, d);
         const double offset = *point - *shown;
         const double v = plant_part.output_derivative(&machine->plant, tool_vr[d]);
@@ -150,6 +162,8 @@ static void machine_show_late(Unit *unit) {
 
 /* --- steps ---------------------------------------------------------------------------------------------------------
  */
+
+enum { FAR_TEXT_SIZE = 256 };
 
 /* Steps longer than the position cycle, and nobody told how the setpoints go on: the drives see stairs. */
 static void warn_of_held(Unit *unit, Machine *machine, double h) {
@@ -168,12 +182,40 @@ static void warn_of_held(Unit *unit, Machine *machine, double h) {
     machine->warned = true;
 }
 
+/* Setpoints that begin so far from the axis that the speed controller's gain alone takes it to its torque limit: mostly
+ * an input that nothing is connected to, or a pose that is another one here than there. */
+static bool begins_far(const AxisBlock *axis) {
+    const double step = axis->drive_K_p * axis->drive_K_v * (axis->x_s - axis->drive_x_a) / axis->drive_I_P;
+    return axis->release && fabs(step) > axis->drive_M_max;
+}
+
+static void warn_of_far(Unit *unit, Machine *machine) {
+    char axes[FAR_TEXT_SIZE] = "", text[2][NUMBER_TEXT_SIZE];
+    size_t at = 0;
+    for (size_t i = 0; i < machine->axes && at < sizeof axes; i++) {
+        const AxisBlock *axis = unit_axis(unit, i);
+        if (begins_far(axis)) {
+            at += (size_t)snprintf(axes + at, sizeof axes - at, "%s'%s.x_s' is %s m and the axis stands at %s m",
+                                   at > 0 ? ", " : "", unit_axis_name(unit, i), number_text(text[0], axis->x_s),
+                                   number_text(text[1], axis->drive_x_a));
+        }
+    }
+    if (at > 0 && !machine->warned_far) {
+        unit_warn(
+            unit,
+            "the first setpoints are far from the axes: %s; the drives go there at their torque limits. Setpoints "
+            "begin where the axes stand, which is also the inputs' start value; or set the pose (x_0)",
+            axes);
+        machine->warned_far = true;
+    }
+}
+
 /* Motor torque is linear from instant to instant, so that its extremes are there or at the end of the step. */
 static void begin_extremes(Unit *unit, const Machine *machine) {
     for (size_t i = 0; i < machine->axes; i++) {
         AxisBlock *axis = unit_axis(unit, i);
-        axis->x_e_min = axis->M_a_min = DBL_MAX;
-        axis->x_e_max = axis->M_a_max = -DBL_MAX;
+        axis->x_e_min = axis->x_a_min = axis->M_a_min = DBL_MAX;
+        axis->x_e_max = axis->x_a_max = axis->M_a_max = -DBL_MAX;
     }
 }
 
@@ -182,10 +224,22 @@ static void take_torque(AxisBlock *axis, double M_a) {
     axis->M_a_max = M_a > axis->M_a_max ? M_a : axis->M_a_max;
 }
 
+static void take_position(AxisBlock *axis, double x_a) {
+    axis->x_a_min = x_a < axis->x_a_min ? x_a : axis->x_a_min;
+    axis->x_a_max = x_a > axis->x_a_max ? x_a : axis->x_a_max;
+}
+
 static void take_error(AxisBlock *axis) {
     const double x_e = axis->drive_x_e;
     axis->x_e_min = x_e < axis->x_e_min ? x_e : axis->x_e_min;
     axis->x_e_max = x_e > axis->x_e_max ? x_e : axis->x_e_max;
+}
+
+/* At the instant that the next cycle begins with. */
+static void take_positions(Unit *unit, const Machine *machine) {
+    for (size_t i = 0; i < machine->axes; i++) {
+        take_position(unit_axis(unit, i), unit_axis(unit, i)->drive_x_a);
+    }
 }
 
 /* At the instant that the last cycle began with. */
@@ -202,6 +256,7 @@ static void take_end(Unit *unit, const Machine *machine, bool none) {
     for (size_t i = 0; i < machine->axes; i++) {
         AxisBlock *axis = unit_axis(unit, i);
         take_torque(axis, axis->drive_M_a);
+        take_position(axis, axis->plant_x_a);
         if (none) {
             take_error(axis);
         }
@@ -219,20 +274,27 @@ static bool machine_step(Unit *unit, double t, double h) {
     }
     machine_bind(unit, true);
     unit_leave_late(unit); /* ahead: where a cycle fails they are of the state that it has left, shown before or not */
-    if (head->share < 1) {
+    bool kept = inside(head); /* where the last cycle began */
+    if (kept) {
         show_end(unit, machine);
     }
-    if (machine_path_used(unit) && !machine_path_take(unit, t, h)) {
+    if (machine_path_used(unit_scalars(unit)) && !machine_path_take(unit, t, h)) {
         return false;
     }
     warn_of_held(unit, machine, h);
+    if (head->cycle == 0 && !unit_scalars(unit)->motion_built_in) {
+        warn_of_far(unit, machine);
+    }
     begin_extremes(unit, machine);
     const int64_t first = head->cycle;
     while (t_k < last) {
         const double next = start_time + (double)(head->cycle + 1) * T_c;
-        if (instants_share(next - end, T_c) < 1) {
+        const double share = machine_share(next - end, T_c);
+        kept = next >= last && (share < 1 || share > 1);
+        if (kept) {
             keep_start(unit, machine);
         }
+        take_positions(unit, machine);
         if (!machine_cycle(unit, t, t_k)) {
             return false;
         }
@@ -240,8 +302,8 @@ static bool machine_step(Unit *unit, double t, double h) {
         head->cycle++;
         t_k = next;
     }
-    head->share = instants_share(t_k - end, T_c);
-    if (head->share < 1) {
+    head->share = kept ? machine_share(t_k - end, T_c) : 1;
+    if (inside(head)) {
         show_inside(unit, machine, head->share);
     }
     take_end(unit, machine, head->cycle == first);

@@ -38,6 +38,11 @@ struct Part {
     double *slopes; /* by its value references; all 0 unless `sloped` */
     double start_time;
     bool sloped;
+    /* Of the saved state that it is asked to accept; see Clock in unit.h. */
+    struct {
+        double start, time;
+        bool valid;
+    } clock;
 };
 
 /* A model's functions on its part; as in unit.h. `scalars` of accepts(): where they lie in a foreign block. */

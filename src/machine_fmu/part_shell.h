@@ -53,6 +53,11 @@ double unit_start_time(const Unit *unit) {
     return unit->part.start_time;
 }
 
+Clock unit_clock_behind(const Unit *unit, const Scalars *scalars) {
+    (void)scalars; /* the machine knows */
+    return (Clock){unit->part.clock.start, unit->part.clock.time, unit->part.clock.valid};
+}
+
 const char *unit_resources(const Unit *unit) {
     return unit->part.resources;
 }

@@ -17,8 +17,7 @@
 
 enum { POINTS = 4 }; /* of a cubic */
 
-bool machine_path_used(Unit *unit) {
-    const Scalars *v = unit_scalars(unit);
+bool machine_path_used(const Scalars *v) {
     return !v->motion_built_in && (v->setpoints_delay > 0 || v->setpoints_n_ffw_inside);
 }
 

@@ -153,5 +153,10 @@ bool plant_accepts(Unit *unit, const Scalars *scalars, const void *state, size_t
         return unit_fail(unit, "the state belongs to cell %.0f of the poses; allowed is less than %.0f",
                          (double)head.cell, (double)cells);
     }
+    if (scalars->pose_cell < 0 || (uint64_t)scalars->pose_cell != head.cell) {
+        return unit_fail(unit,
+                         "the state contradicts itself: it belongs to cell %.0f of the poses, and pose.cell is %.0f",
+                         (double)head.cell, (double)scalars->pose_cell);
+    }
     return true;
 }

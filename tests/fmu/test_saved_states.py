@@ -226,7 +226,11 @@ def test_counts_of_the_controller_are_refused_beyond_their_range(
         image = _with(keeper.image, _model(keeper.image) + at, layout, value)
         keeper.refuses(image, f"the state is out of range: {text} is {float(value):.0f}; allowed is 0 to {end - 1}")
     keeper.is_unharmed()
-    assert keeper.slave.restore(_with(keeper.image, _model(keeper.image) + at, layout, end - 1)) == OK
+    last = _with(keeper.image, _model(keeper.image) + at, layout, end - 1)
+    if layout == "<q":  # in range, but not what the clock says, or the count of the instants
+        keeper.refuses(last, "the state contradicts itself", "sample instants")
+        return
+    assert keeper.slave.restore(last) == OK
     go_on(keeper.slave, FIRST, 20)
 
 

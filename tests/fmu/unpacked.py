@@ -169,6 +169,7 @@ def expected_variables(archive: Archive) -> list[dict[str, str]]:
     for axis, x_0 in named:
         for row in (row for row in rows if row["axis"]):
             name = f"{axis}.{row['name']}"
-            start = x_0 if row["name"] == "x_0" else given.get(name, row["start"])
+            stands = row["name"] == "x_0" or (row["name"], archive.unit) == ("x_s", "machine")
+            start = x_0 if stands else given.get(name, row["start"])
             found.append(row | {"name": name, "start": start})
     return found

@@ -91,7 +91,30 @@ static void failed_initial_values_can_be_saved(void) {
     fmi2FreeInstance(c);
 }
 
+/* Nothing has moved the clock ahead of the first step. */
+static void a_clock_ahead_of_the_start_is_refused(void) {
+    static char bytes[IMAGE_SIZE];
+    size_t size;
+    Log log = {.count = 0};
+    fmi2FMUstate state = NULL;
+    const double later = 120;
+    for (Phase phase = PHASE_INSTANTIATED; phase <= PHASE_INITIALIZATION; phase++) {
+        fmi2Component c = toy_in(phase, &log);
+        image_of(c, bytes, &size);
+        memcpy(bytes + HEADER(time), OF(later));
+        sign(bytes, size);
+        CHECK(fmi2DeSerializeFMUstate(c, bytes, size, &state) == fmi2Error);
+        CHECK_CONTAINS(log.message, "not initialised yet, to start at 0 s, it stands at 120 s");
+        memcpy(bytes + HEADER(start_time), OF(later));
+        sign(bytes, size);
+        CHECK(fmi2DeSerializeFMUstate(c, bytes, size, &state) == fmi2OK);
+        CHECK(fmi2FreeFMUstate(c, &state) == fmi2OK);
+        fmi2FreeInstance(c);
+    }
+}
+
 int main(void) {
+    a_clock_ahead_of_the_start_is_refused();
     forged_contents_are_refused();
     failed_initial_values_can_be_saved();
     CHECK(memory.held == 0);

@@ -30,7 +30,7 @@ class WholeMachine(Resources):
 
     kind = "whole_machine"
     noun = "Machine"
-    columns = MachineTables.columns
+    columns = {**MachineTables.columns, "x_s": "m"}  # noqa: RUF012
     default_note = "Start values and motion are those of a synthetic default machine; no existing machine has them."
 
     @property
@@ -57,8 +57,8 @@ class WholeMachine(Resources):
         return self.settings
 
     def start(self, axis: str, row: str) -> str:
-        """Start value of x_0."""
-        return self.tables.start(axis, row)
+        """Start value of x_0, and of x_s: setpoints from outside begin where the axis stands."""
+        return self.tables.start(axis, "x_0")
 
     def summary(self) -> str:
         """Its axes, and the motion."""

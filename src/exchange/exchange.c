@@ -3,6 +3,12 @@
 #include "fmi2FunctionTypes.h"
 #include "vectors.h"
 
+#ifdef __GNUC__
+#define ALWAYS_INLINE inline __attribute__((always_inline))
+#else
+#define ALWAYS_INLINE inline
+#endif
+
 #define TEXT(number) TEXT_OF(number)
 #define TEXT_OF(number) #number
 #define KIND_TEXT(name) " " #name
@@ -106,15 +112,24 @@ static fmi2Status work_rest(Operation *o, int64_t k, double t) {
     return o->next == k ? execute(o, o->what, take_row(o), t) : fmi2OK;
 }
 
+/* Whose call comes next, in memory that another process reads; without a mark, as a constant, nothing is left of it. */
+static ALWAYS_INLINE void note(Fault *mark, int64_t cycle, int64_t operation) {
+    if (mark) {
+        *(volatile int64_t *)&mark->cycle = cycle;
+        *(volatile int64_t *)&mark->operation = operation;
+    }
+}
+
 /* One cycle, from operation *at on; where it ends, the closing one or the one that failed.
  *
  * Operations mostly come as turns of a unit: values and slopes set, a step, values and slopes got. Comparisons with
  * what a turn has next mostly come out the same, which a processor foresees better than where a switch leads. */
-static inline fmi2Status work(Operation **at, int64_t k, double t) {
+static ALWAYS_INLINE fmi2Status work(Operation **at, int64_t k, double t, const Operation operations[], Fault *mark) {
     Operation *o = *at;
     fmi2Status status = fmi2OK;
 #define PART(part, argument)                                                                                           \
     if (o->kind == EXCHANGE_##part) {                                                                                  \
+        note(mark, k, o - operations);                                                                                 \
         status = part(o, argument);                                                                                    \
         if (status > fmi2Warning)                                                                                      \
             break;                                                                                                     \
@@ -132,6 +147,7 @@ static inline fmi2Status work(Operation **at, int64_t k, double t) {
             continue;
         if (o->kind == EXCHANGE_end)
             break;
+        note(mark, k, o - operations);
         status = work_rest(o, k, t);
         if (status > fmi2Warning)
             break;
@@ -158,12 +174,13 @@ static int64_t first_due(const Operation operations[], int64_t count) {
     return first;
 }
 
-int exchange_run(Operation operations[], double T_c, int64_t begin, int64_t end, Fault *fault) {
+static ALWAYS_INLINE int run(Operation operations[], double T_c, int64_t begin, int64_t end, Fault *fault,
+                             Fault *mark) {
     const int64_t head = count_head(operations);
     int64_t due = begin;
     for (int64_t k = begin; k < end; k++) {
         Operation *at = k < due ? operations + head : operations;
-        const fmi2Status status = work(&at, k, (double)k * T_c);
+        const fmi2Status status = work(&at, k, (double)k * T_c, operations, mark);
         if (status > fmi2Warning) {
             *fault = (Fault){k, at - operations};
             return (int)status;
@@ -172,4 +189,12 @@ int exchange_run(Operation operations[], double T_c, int64_t begin, int64_t end,
             due = first_due(operations, head);
     }
     return fmi2OK;
+}
+
+int exchange_run(Operation operations[], double T_c, int64_t begin, int64_t end, Fault *fault) {
+    return run(operations, T_c, begin, end, fault, NULL);
+}
+
+int exchange_run_marked(Operation operations[], double T_c, int64_t begin, int64_t end, Fault *fault) {
+    return run(operations, T_c, begin, end, fault, fault);
 }

@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 /* To be counted up when an operation comes to mean something else though the tables below stay. */
-#define EXCHANGE_VERSION 3
+#define EXCHANGE_VERSION 4
 
 /* The operations. FMI calls take values (slopes) from y or leave them there:
  *   set_real, set_slopes, get_real, get_slopes, get_boolean (int)   count variables by their references
@@ -110,5 +110,9 @@ EXCHANGE_API const char *exchange_interface(void);
  * of their rows: what follows continues at cycle `end`. Returns the fmi2Status (fmi2OK or fmi2Warning) 0, or that of
  * the call that failed, with *fault telling which; the operations ahead of it in that cycle are done. */
 EXCHANGE_API int exchange_run(Operation operations[], double T_c, int64_t begin, int64_t end, Fault *fault);
+
+/* The same; ahead of each call of a unit *fault says which it is, for who reads that memory when a call does not come
+ * back. */
+EXCHANGE_API int exchange_run_marked(Operation operations[], double T_c, int64_t begin, int64_t end, Fault *fault);
 
 #endif

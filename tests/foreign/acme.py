@@ -42,7 +42,7 @@ class Variable:
     reference: int = 0
 
 
-def _numbered(*variables: Variable) -> tuple[Variable, ...]:
+def numbered(*variables: Variable) -> tuple[Variable, ...]:
     counts: dict[str, int] = {}
     found = []
     for each in variables:
@@ -51,7 +51,7 @@ def _numbered(*variables: Variable) -> tuple[Variable, ...]:
     return tuple(found)
 
 
-DRIVE = _numbered(
+DRIVE = numbered(
     Variable("PosSetpoint", "input", "mm", "0"),
     Variable("PosActual", "input", "mm", "0"),
     Variable("SpeedForward", "input", "rpm", "0"),
@@ -67,7 +67,7 @@ DRIVE = _numbered(
     Variable("Enable", "input", None, "false", "Boolean"),
     Variable("Limited", "output", None, None, "Boolean"),
 )
-FRICTION = _numbered(
+FRICTION = numbered(
     Variable("Speed", "input", "rpm", "0"),
     Variable("Torque", "output", "N.mm"),
     Variable("Coulomb", "parameter", "N.mm", "8", limits=("0", None)),

@@ -5,6 +5,10 @@
 
 #include "fmi2Functions.h"
 
+#ifndef BEFORE_INSTANTIATION
+#define BEFORE_INSTANTIATION
+#endif
+
 typedef struct Unit {
     double real[REALS];
     fmi2Boolean boolean[BOOLEANS];
@@ -24,6 +28,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
     (void)name, (void)resources, (void)visible, (void)logging;
+    BEFORE_INSTANTIATION
     if (type != fmi2CoSimulation || strcmp(guid, GUID) != 0)
         return NULL;
     Unit *unit = calloc(1, sizeof *unit);

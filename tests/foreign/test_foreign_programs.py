@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import os
 import subprocess
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -117,10 +118,11 @@ def test_an_ssp_with_other_programs_in_the_place_of_ours(
     assert cli.main(["run", str(marked_ssp), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
     assert mark.exists()
-    digest = hashlib.sha256(marking).hexdigest()
-    for name in ("plant", "controller", "friction"):
+    with zipfile.ZipFile(marked_ssp) as package:
+        digests = {n: hashlib.sha256(package.read(f"resources/{n}.fmu")).hexdigest() for n in ("plant", "friction")}
+    for name, digest in digests.items():
         assert f"feedsim: executes {marked_ssp}: resources/{name}.fmu as " in said
-        assert f": binaries/{folders()[0]}/{name}.so, SHA-256 {digest}\n" in said
+        assert f": binaries/{folders()[0]}/{name}.so; SHA-256 {digest}\n" in said
 
 
 def test_a_run_says_ahead_what_it_executes(
@@ -130,9 +132,32 @@ def test_a_run_says_ahead_what_it_executes(
     acme.archive(tmp_path / "acme_friction.fmu", "friction", libraries.friction, acme.FRICTION)
     assert cli.main(["run", str(scenario_file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
     said = capsys.readouterr().err
-    digest = hashlib.sha256(libraries.drive).hexdigest()
+    digest = hashlib.sha256((tmp_path / "acme_drive.fmu").read_bytes()).hexdigest()
     place = f"{tmp_path / 'acme_drive.fmu'} as drive of X: binaries/{folders()[0]}/drive.so"
-    assert said.startswith(f"feedsim: executes {place}, SHA-256 {digest}\n"), said
+    assert said.startswith(f"feedsim: executes {place}; SHA-256 {digest}\n"), said
+
+
+def test_the_sum_is_of_the_whole_archive(libraries: Libraries, tmp_path: Path) -> None:
+    """One wrapper's library executes whatever program lies in resources/."""
+    sums = set()
+    for program in ("print(1)", "print(2)"):
+        path = acme.archive(tmp_path / "wrapped.fmu", "friction", libraries.friction, acme.FRICTION)
+        with zipfile.ZipFile(path, "a") as package:
+            package.writestr("resources/program.py", program)
+        sums.add(binaries.executing(path, "friction of X")[0])
+    assert len(sums) == 2
+
+
+def test_what_is_not_executed_is_not_announced(
+    scenario_file: Path, libraries: Libraries, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A run that is refused, and frequency responses in closed form, execute nothing."""
+    acme.archive(tmp_path / "acme_drive.fmu", "drive", libraries.drive, acme.DRIVE)
+    acme.archive(tmp_path / "acme_friction.fmu", "friction", libraries.friction, acme.FRICTION)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "result.csv").write_text("of another program")
+    assert cli.main(["run", str(scenario_file), "--out", str(tmp_path / "out"), "--quiet"]) == 4
+    assert "executes" not in capsys.readouterr().err
 
 
 def test_whose_programs_they_are(fmus: Path, tmp_path: Path) -> None:
@@ -163,7 +188,7 @@ def test_archives_that_are_named_apart(
     base = write(tmp_path / "plant.fmu", own)
     machine = str(ROOT / "scenarios" / "machines" / "test_centre")
     cli.main(["machine", "pack", machine, "--base", str(base), "--out", str(tmp_path / "packed.fmu")])
-    digest = hashlib.sha256(marking).hexdigest()
+    digest = hashlib.sha256(base.read_bytes()).hexdigest()
     said = capsys.readouterr().err
-    assert f"executes {base} as the packed plant's trial: binaries/{folders()[0]}/plant.so, SHA-256 {digest}" in said
+    assert f"executes {base} as the packed plant's trial: binaries/{folders()[0]}/plant.so; SHA-256 {digest}" in said
     assert binaries.executing(fmus / "friction.fmu", "friction law") == []

@@ -71,7 +71,7 @@ def test_another_machine(tmp_path: Path, fmus: Path) -> None:
     for path in (out, bare):
         with ssp.opened(path) as found:
             assert found.scenario.coupling.model_dump() == {
-                "scheme": "gauss_seidel", "substeps": 1, "units": "one",
+                "scheme": "gauss_seidel", "substeps": 1, "call_limit": 60.0, "units": "one",
             }  # fmt: skip
             there = cosim.run(found.scenario, program=found.program, fmus=found.fmus)
         for name in here.trace.columns:

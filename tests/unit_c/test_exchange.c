@@ -76,6 +76,41 @@ static void tables_are_used_row_by_row(void) {
     CHECK(fault.cycle == -1); /* untouched */
 }
 
+/* What the memory of the mark holds while a unit works: whose call it is. */
+typedef struct Seen {
+    const Fault *mark;
+    int64_t cycle[3], operation[3];
+    int calls;
+} Seen;
+
+static fmi2Status note_mark(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_return) {
+    (void)t, (void)h, (void)no_return;
+    Seen *seen = c;
+    seen->cycle[seen->calls] = seen->mark->cycle;
+    seen->operation[seen->calls++] = seen->mark->operation;
+    return fmi2OK;
+}
+
+static void a_mark_says_whose_call_it_is(void) {
+    double a = 1, y = 0;
+    Fault mark = {-1, -1};
+    Seen first = {.mark = &mark}, second = {.mark = &mark};
+    Operation operations[] = {
+        {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 1},
+        {.kind = EXCHANGE_do_step, .call = (function)note_mark, .component = &first, .h = 1},
+        {.kind = EXCHANGE_line, .count = 1, .y = &y, .a = &y, .b = &a, .s = 1},
+        {.kind = EXCHANGE_do_step, .call = (function)note_mark, .component = &second, .h = 1},
+        {.kind = EXCHANGE_end},
+    };
+    CHECK(exchange_run_marked(operations, 1, 5, 8, &mark) == fmi2OK);
+    CHECK(first.calls == 3 && second.calls == 3);
+    for (int k = 0; k < 3; k++) {
+        CHECK(first.cycle[k] == 5 + k && first.operation[k] == 1);
+        CHECK(second.cycle[k] == 5 + k && second.operation[k] == 3);
+    }
+    CHECK_EQUAL(y, 6);
+}
+
 static void failure_ends_the_loop(void) {
     double a = 1, y = 0;
     Notes notes = {.fail_at = 0.095};
@@ -204,8 +239,9 @@ static void turns_are_worked_part_by_part(void) {
 }
 
 int main(void) {
-    CHECK_CONTAINS(exchange_interface(), "3: set_real set_slopes do_step");
+    CHECK_CONTAINS(exchange_interface(), "4: set_real set_slopes do_step");
     tables_are_used_row_by_row();
+    a_mark_says_whose_call_it_is();
     failure_ends_the_loop();
     states_are_kept_where_y_says();
     arithmetic();

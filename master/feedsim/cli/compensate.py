@@ -34,7 +34,6 @@ def compensate(options: Namespace) -> None:
     from feedsim.report.provenance import input_paths
 
     plan = scenario.load(options.scenario, options.overrides)
-    announce(plan.machine, options.fmus, coupling=plan.coupling)
     directory: Path = options.out or Path("results") / f"compensate_{options.scenario.stem}"
     program = nc.plan(plan)
     analysis.circle_task(plan, program)
@@ -45,6 +44,7 @@ def compensate(options: Namespace) -> None:
         results_in(directory, report.check_writable, [*input_paths(plan), *files.values()], options.overrides),
         progress_bar(options.quiet, "it", shortened=True) as progress,
     ):
+        announce(plan.machine, options.fmus, coupling=plan.coupling)
         result = analysis.compensate(
             plan, program, frictions=frictions, delays=delays, table=options.table, fmus=options.fmus,
             progress=progress,

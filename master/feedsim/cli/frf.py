@@ -52,7 +52,6 @@ def frf(options: Namespace) -> None:
 
     subject = load_subject(options.subject, options.overrides)
     machine = subject.machine
-    announce(machine, options.fmus)
     axes = _axes(options.axes, machine)
     plan = _plan(options, machine)
     named = options.subject.stem if options.subject.is_file() else options.subject.resolve().name
@@ -83,6 +82,7 @@ def frf(options: Namespace) -> None:
         full = _full_model(machine, progress, warnings) if options.full_model else None
         campaign = None
         if not (options.no_measure or result.unstable_poles):
+            announce(machine, options.fmus)
             campaign = run_campaign(machine, axes, plan, fmus=options.fmus, progress=progress)
         figures = linear.figures(result)
         if not options.tool:

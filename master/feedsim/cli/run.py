@@ -43,12 +43,12 @@ def run(options: Namespace) -> None:
 
     directory: Path = options.out or Path("results") / options.scenario.stem
     with _subject(options) as (plan, program, fmus, worded, named):
-        announce(plan.machine, fmus, named, plan.coupling)
         analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
         with (
             results_in(directory, report.check_writable, report.input_paths(plan), options.overrides),
             _rows_kept(report.growing(directory)) as recorded,
         ):
+            announce(plan.machine, fmus, named, plan.coupling)
             with progress_bar(options.quiet, " cycles", shortened=True) as progress:
                 result = cosim.run(
                     plan, program=program, fmus=fmus, progress=progress.of(plan.name), scratch=recorded.scratch,

@@ -18,6 +18,7 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 from feedsim.cosim import signals, untrusted
+from feedsim.cosim.mark import calling
 from feedsim.cosim.unpacked import STORE, Content, check_there
 from feedsim.errors import InputError
 from feedsim.owned import Closing
@@ -136,10 +137,11 @@ class Archive(Closing):
         path = self.library()
         before = Path.cwd()
         try:
-            return FMU2Slave(
-                guid=self.guid, unzipDirectory=str(self.directory), libraryPath=str(path),
-                modelIdentifier=self.description.coSimulation.modelIdentifier,
-            )  # fmt: skip
+            with calling(f"{self.path}: loading its library"):
+                return FMU2Slave(
+                    guid=self.guid, unzipDirectory=str(self.directory), libraryPath=str(path),
+                    modelIdentifier=self.description.coSimulation.modelIdentifier,
+                )  # fmt: skip
         except Exception as error:
             os.chdir(before)  # fmpy goes to the library's folder and does not come back when it fails
             folder = f"binaries/{path.parent.name}"

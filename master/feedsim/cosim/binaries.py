@@ -44,24 +44,58 @@ def programs(archive: Archive) -> dict[str, str]:
     return {file.relative_to(root).as_posix(): _digest(file.read_bytes()) for file in sorted(found)}
 
 
+def _parts(machine: Machine, folder: Path, coupling: Coupling | None) -> dict[Path, list[str]]:
+    """Archives that a run of the machine takes out of a folder or from elsewhere, and the parts that they play."""
+    if coupling is not None and coupling.units == "one":
+        return {folder / "machine.fmu": ["machine"]}
+    parts: dict[Path, list[str]] = {machine.plant or folder / "plant.fmu": ["plant"]}
+    for axis in machine.axes:
+        for role in (DRIVE, FRICTION):
+            parts.setdefault(archive_path(machine, axis, role, folder), []).append(f"{role.name} of {axis}")
+    return parts
+
+
+def any_foreign(machine: Machine, fmus: Path, coupling: Coupling | None = None) -> bool:
+    """Whether a run of the machine executes a program that is not shipped; what cannot be opened is none."""
+    try:
+        states = [(path, path.stat().st_mtime_ns, path.stat().st_size) for path in _parts(machine, fmus, coupling)]
+    except OSError:
+        return False  # the run says which archive is missing
+    ours = fmus_directory()
+    return any(_foreign(*state, ours) for state in states) or _loop(fmus, ours) is not None
+
+
+def _loop(folder: Path, ours: Path) -> str | None:
+    """SHA-256 of the cycle loop beside the archives of a folder, where it is another one than the shipped one."""
+    with suppress(OSError):
+        if folder != ours and (digest := _digest((folder / exchange.NAME).read_bytes())) != _digest(
+            (ours / exchange.NAME).read_bytes()
+        ):
+            return digest
+    return None
+
+
+@lru_cache(maxsize=64)
+def _foreign(path: Path, changed: int, size: int, ours: Path) -> bool:
+    """Of an archive in that state, where the shipped ones are in the folder `ours`."""
+    if _is_ours(path):
+        return False
+    with suppress(InputError), Archive(path) as archive:
+        return not is_shipped(archive)
+    return False
+
+
 def executed(machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> list[str]:
-    """What a run of the machine executes that is not shipped, a sentence for each file: who, where, SHA-256.
+    """What a run of the machine executes that is not shipped, a sentence for each archive: who, what, its SHA-256.
 
     What cannot be opened is left out: the run says why. fmus: folder of the archives, where one was named. coupling:
     of the run; None: of units of their own.
     """
     folder = fmus or fmus_directory()
-    parts: dict[Path, list[str]] = {machine.plant or folder / "plant.fmu": ["plant"]}
-    for axis in machine.axes:
-        for role in (DRIVE, FRICTION):
-            parts.setdefault(archive_path(machine, axis, role, folder), []).append(f"{role.name} of {axis}")
-    if coupling is not None and coupling.units == "one":
-        parts = {folder / "machine.fmu": ["machine"]}
+    parts = _parts(machine, folder, coupling)
     told = [sentence for path, who in parts.items() for sentence in executing(path, ", ".join(who))]
-    loop, ours = folder / exchange.NAME, fmus_directory() / exchange.NAME
-    with suppress(OSError):
-        if folder != fmus_directory() and (digest := _digest(loop.read_bytes())) != _digest(ours.read_bytes()):
-            told.append(f"executes {loop} as cycle loop, SHA-256 {digest}")
+    if (digest := _loop(folder, fmus_directory())) is not None:
+        told.append(f"executes {folder / exchange.NAME} as cycle loop, SHA-256 {digest}")
     return told
 
 
@@ -71,8 +105,8 @@ def executing(path: Path, who: str) -> list[str]:
         return []
     with suppress(InputError), Archive(path) as archive:
         if not is_shipped(archive):
-            found = programs(archive)
-            return [f"executes {path} as {who}: {name}, SHA-256 {digest}" for name, digest in found.items()]
+            # Of the whole archive: what a wrapper's library executes may lie beside it, in resources/.
+            return [f"executes {path} as {who}: {', '.join(programs(archive))}; SHA-256 {_digest(path.read_bytes())}"]
     return []
 
 

@@ -24,7 +24,7 @@ from feedsim.findings import Note
 from feedsim.installation import mend
 
 # src/exchange/exchange.h, word for word.
-VERSION = 3
+VERSION = 4
 KINDS = (
     "set_real", "set_slopes", "do_step", "get_real", "get_slopes", "get_boolean", "get_state", "set_state",
     "copy", "line", "rate", "bond", "due", "end",
@@ -74,11 +74,11 @@ def library(folder: Path) -> Native | str:
         return f"{NAME}: cannot be used: {str(error).replace(str(path), NAME)}"
     if found != INTERFACE:
         return f"{NAME}: built from other sources (its interface is {found!r}, wanted is {INTERFACE!r})"
-    run = loaded.exchange_run
-    run.restype = ctypes.c_int
-    run.argtypes = (
-        ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.POINTER(_Fault),
-    )  # fmt: skip
+    for run in (loaded.exchange_run, loaded.exchange_run_marked):
+        run.restype = ctypes.c_int
+        run.argtypes = (
+            ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.POINTER(_Fault),
+        )  # fmt: skip
     _loaded[digest] = loaded
     return loaded
 
@@ -131,8 +131,12 @@ class Exchange(Executor):
             row["rows"], row["stride"] = len(o.y), o.y.strides[0]
 
     def run(self, begin: int, end: int) -> None:
-        fault = _Fault()
-        if self._native.exchange_run(self._table.ctypes.data, self._T_c, begin, end, ctypes.byref(fault)):
+        mark = self.mark
+        fault = _Fault() if mark is None else _Fault.from_address(mark.numbers.ctypes.data)
+        run = self._native.exchange_run if mark is None else self._native.exchange_run_marked
+        if run(self._table.ctypes.data, self._T_c, begin, end, ctypes.byref(fault)):
             self.done = fault.cycle
             self._fail(fault.operation)
         self.done = end
+        if mark is not None:
+            mark.back()

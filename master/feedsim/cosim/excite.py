@@ -15,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
-from feedsim.cosim import wiring
-from feedsim.cosim.binaries import fmus_directory
+from feedsim.cosim import wiring, worker
+from feedsim.cosim.binaries import any_foreign, fmus_directory
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.operations import Operation, When, copy, get_row, set_real, set_slopes
@@ -30,7 +30,7 @@ from feedsim.motions.profile import speed_change
 from feedsim.nc import Program
 from feedsim.nc.excitation import Excitation
 from feedsim.nc.program import violations
-from feedsim.scenario import Machine
+from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure import checked_modes
 from feedsim.trace import Trace
@@ -113,6 +113,18 @@ def measure(
             response is not the linear one; the message tells the amplitude and the limit.
         SimulationError: a unit failed.
     """
+    fmus = fmus or fmus_directory()
+    given = (machine, axis, excitation, inject, friction, offset_speed, periods, settle, fmus, native)
+    if any_foreign(machine, fmus):
+        return worker.call(_measured, *given, limit=Coupling().call_limit, progress=progress)
+    return _measured(*given, progress=progress)
+
+
+def _measured(
+    machine: Machine, axis: str, excitation: Excitation, inject: str, friction: bool, offset_speed: float | None,
+    periods: int, settle: int, fmus: Path, native: bool | None, *, progress: Progress | None = None,
+) -> Measurement:  # fmt: skip
+    """The same in this process."""
     _check(machine, axis, excitation, inject, offset_speed, periods, settle)
     checked_modes(machine)
     cycles = machine.cycles
@@ -123,7 +135,6 @@ def measure(
     machine, program, first = _setpoints(machine, axis, offset_speed or 0.0, wait, duration)
     kept = first * ratio + settle * rows
     total = kept + periods * rows
-    fmus = fmus or fmus_directory()
     library, told = chosen(native, fmus)
     with System(machine, fmus, friction=friction) as system:
         cycle = Cycle(system, SCHEMES["extrapolated"], cycles.T_c, 1)

@@ -5,7 +5,7 @@ Executed natively where the library is at hand (:mod:`~feedsim.cosim.exchange`),
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
 import numpy as np
@@ -21,6 +21,8 @@ Progress = Callable[[int, int], None]
 
 # Cycles between two reports of progress, some 60 ms in Python, 3 ms in the native loop, which is interrupted here only.
 REPORTED_EVERY = 2048
+# The same in a process that is watched: at first, and in the end; an eighth of what has been done between.
+WATCHED = 16, 512
 # Rows that are held at the least of what is long.
 RING = 1024
 
@@ -52,6 +54,7 @@ class Loop:
         T_c = cycle.cycle
         self._executor = Interpreter(operations, T_c) if native is None else Exchange(native, operations, T_c)
         self._buffered = buffered
+        self._watched = self._executor.mark is not None
 
     @property
     def done(self) -> int:
@@ -65,15 +68,22 @@ class Loop:
             SimulationError: a unit failed; the message names the unit, the time and the unit's reason.
         """
         with np.errstate(over="ignore", invalid="ignore"):  # the unit that meets an overflow reports it
-            for begin in range(0, total, REPORTED_EVERY):
-                end = min(begin + REPORTED_EVERY, total)
+            for begin, end in self._stretches(total):
                 for part in self._buffered:
                     part.ahead(begin, end)
                 self._executor.run(begin, end)
-                if progress is not None and end - begin == REPORTED_EVERY:
+                if progress is not None and (end - begin == REPORTED_EVERY or self._watched):
                     progress(end, total)
         if progress is not None:
             progress(total, total)
+
+    def _stretches(self, total: int) -> Iterator[tuple[int, int]]:
+        """Between which cycles rows are taken over. Where a unit may crash, little of a run is then in its process."""
+        end = 0
+        while end < total:
+            length = min(max(end // 8, WATCHED[0]), WATCHED[1]) if self._watched else REPORTED_EVERY
+            begin, end = end, min(end + length, total)
+            yield begin, end
 
 
 class Setpoints:

@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.cosim.mark import watched
 from feedsim.cosim.unit import OK, WARNING, Floats, Log, Port, Unit, exchanging
 
 # An operation in cycle k, which begins at t [s]; it returns the unit's fmi2Status.
@@ -199,12 +200,18 @@ class Executor:
 
     Attributes:
         done: cycles so far; of one that was not worked to its end, not counting it.
+        mark: where whose call it is is noted, for a process that watches; None: nobody does.
     """
 
     def __init__(self, operations: Sequence[Operation], T_c: float) -> None:
         self._operations = tuple(operations)
         self._T_c = T_c
         self.done = 0
+        here = watched()
+        self.mark = None if here is None else here.mark
+        if here is not None:
+            here.describe(T_c, [(o.unit.name if o.unit else "", o.about or o.kind, o.s if o.kind == "do_step" else 0.0)
+                                for o in self._operations])  # fmt: skip
 
     def run(self, begin: int, end: int) -> None:
         """Work the cycles `begin` to `end` - 1; they follow those of the last call.
@@ -243,12 +250,17 @@ class Interpreter(Executor):
         self._acts = [_call(each) if each.unit else _arithmetic(each) for each in self._operations]
 
     def run(self, begin: int, end: int) -> None:
+        noted = None if self.mark is None else self.mark.numbers
         for k in range(begin, end):
             t = k * self._T_c
             for at, act in enumerate(self._acts):
+                if noted is not None:
+                    noted[0], noted[1] = k, at
                 if act(k, t) > WARNING:
                     self._fail(at)
             self.done = k + 1
+        if self.mark is not None:
+            self.mark.back()
 
 
 def _call(o: Operation) -> Act:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from feedsim.cosim import wiring
 from feedsim.cosim.loop import REPORTED_EVERY, RING
+from feedsim.cosim.mark import watched
 from feedsim.cosim.operations import Interpreter, Operation, When, copy, get_row
 from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.signals import held
@@ -158,7 +159,7 @@ class Recording:
 
     def ahead(self, begin: int, end: int) -> None:
         """Make room for the rows of the cycles `begin` to `end` - 1."""
-        if -(-end // self.every) - self.rows > self._ring:
+        if -(-end // self.every) - self.rows > self._ring or (self._sink is not None and watched() is not None):
             self.collect(begin)
 
     def collect(self, cycles: int) -> None:

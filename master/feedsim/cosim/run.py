@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feedsim.cosim import trust
-from feedsim.cosim.binaries import fmus_directory
+from feedsim.cosim import trust, worker
+from feedsim.cosim.binaries import any_foreign, fmus_directory
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.loads import Acting, Loads, Work, acting
@@ -17,7 +17,7 @@ from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
 from feedsim.cosim.trust import PoseUse, pose_use
 from feedsim.cosim.whole import cycle_of, system_of
-from feedsim.errors import InputError
+from feedsim.errors import InputError, SimulationError
 from feedsim.linear.judgement import judge
 from feedsim.nc import Program, plan
 from feedsim.scenario import Coupling, Logging, Machine, Scenario
@@ -102,6 +102,31 @@ def run(
         OutputError: a file without a name cannot be written.
     """
     program = program or plan(scenario, scratch=scratch)
+    fmus = fmus or fmus_directory()
+    limit = scenario.coupling.call_limit
+    if any_foreign(scenario.machine, fmus, scenario.coupling):
+        return worker.call(
+            _run, scenario, program, fmus, limit=limit, progress=progress, torque_feedforward=torque_feedforward,
+            native=native, scratch=scratch, sink=sink,
+        )  # fmt: skip
+    return _run(
+        scenario, program, fmus, progress=progress, torque_feedforward=torque_feedforward, native=native,
+        scratch=scratch, sink=sink,
+    )  # fmt: skip
+
+
+def _run(
+    scenario: Scenario,
+    program: Program,
+    fmus: Path,
+    *,
+    progress: Progress | None = None,
+    torque_feedforward: TorqueFeedforward | None = None,
+    native: bool | None = None,
+    scratch: Path | None = None,
+    sink: Sink | None = None,
+) -> Run:
+    """A run in this process."""
     recorded = recorded_columns(scenario)
     loads, loaded = acting(scenario, program), loaded_inputs(scenario)
     modes = checked_modes(scenario.machine)
@@ -109,7 +134,6 @@ def run(
     ratio = round(cycles.T_pos / cycles.T_c)
     every = round(scenario.recording.interval / cycles.T_c)
     total = (len(program.time) - 1) * ratio
-    fmus = fmus or fmus_directory()
     library, told = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
     with system_of(scenario.machine, scenario.coupling, fmus) as system:
         cycle = cycle_of(system, scenario.coupling)
@@ -129,6 +153,10 @@ def run(
         begun = time.perf_counter()
         try:
             loop.run(total, progress)
+        except SimulationError as error:
+            recording.collect(loop.done)
+            first = trust.left_first(recording.trace(), program, scenario.machine)
+            raise SimulationError(f"{error}{first}") from error
         except BaseException:
             recording.collect(loop.done)
             raise
@@ -185,10 +213,21 @@ def follow(
     Raises:
         InputError, SimulationError: as :func:`run`.
     """
-    cycles, coupling = machine.cycles, coupling or Coupling()
+    coupling, fmus = coupling or Coupling(), fmus or fmus_directory()
+    given = (machine, program, columns, interval, loads, coupling, fmus, native)
+    if any_foreign(machine, fmus, coupling):
+        return worker.call(_follow, *given, limit=coupling.call_limit)
+    return _follow(*given)
+
+
+def _follow(
+    machine: Machine, program: Program, columns: Collection[str], interval: float, loads: Sequence[Acting],
+    coupling: Coupling, fmus: Path, native: bool | None,
+) -> Trace:  # fmt: skip
+    """The same in this process."""
+    cycles = machine.cycles
     ratio, every = round(cycles.T_pos / cycles.T_c), round(interval / cycles.T_c)
     total = (len(program.time) - 1) * ratio
-    fmus = fmus or fmus_directory()
     library, _ = chosen(native, fmus, fmus_directory())
     with system_of(machine, coupling, fmus) as system:
         cycle = cycle_of(system, coupling)

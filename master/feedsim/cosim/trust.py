@@ -24,6 +24,7 @@ from feedsim.structure.pack import POSES_IN_ARCHIVE
 from feedsim.structure.pose_change import NEAR, PoseChange, pose_change, warnings
 from feedsim.structure.poses_file import GridAxis, read_grid
 from feedsim.structure.table_check import table_mismatch
+from feedsim.trace import Trace
 
 # Of the friction work, and J (an axis at rest has no work to speak of). On the default machine the first-order schemes
 # lose up to 5e-5 of it, the second-order ones 2e-7; chatter loses 1e-3 and more.
@@ -39,6 +40,9 @@ DRIVING, MATTERS = 0.5, 0.05
 # A load that the recorded motor torque contradicts: the least change of its factor, and the least share of the motor's
 # work by which run and record differ while it acts. Below the last factor the record shows little of such a load.
 AMISS, APART, SHOWN = 0.5, 0.1, 0.3
+# Of its travel: an axis that is off by more has left its setpoint; at rapid traverse without feedforward it is off by
+# 1 %.
+LEFT = 0.02
 
 
 def energies(cycle: Cycle) -> dict[str, float]:
@@ -343,3 +347,27 @@ def _crossings(system: System) -> Crossings:
     names = ("crossings", "E_kin_lost", "E_el_lost", "held", "jump_x_a", "jump_n_a", "jump_tool")
     count, *values = (system.plant.value(f"pose.{name}") for name in names)
     return Crossings(round(count), *values)
+
+
+def left_first(trace: Trace, program: Program, machine: Machine) -> str:
+    """Which axis was the first to leave its setpoint, for the message of a run that has failed; "" where none has.
+
+    trace: the rows so far. The unit that fails first is often that of another axis, which the structure has dragged
+    along. An axis has left its setpoint where it is off by more than LEFT of its travel; of axes that leave in the same
+    row it is the one that is off the furthest, each as a share of its travel.
+    """
+    found: list[tuple[float, float, str, float]] = []
+    for name, axis in machine.axes.items():
+        if (column := f"{name}.x_a") not in trace.columns:
+            continue
+        setpoint = np.interp(trace.time, program.time, program.x_s[name])
+        with np.errstate(invalid="ignore"):
+            off = np.nan_to_num(np.abs(np.asarray(trace[column]) - setpoint), nan=np.inf)
+        share = off / (axis.travel[1] - axis.travel[0])
+        if (rows := np.flatnonzero(share > LEFT)).size:
+            row = int(rows[0])
+            found.append((float(trace.time[row]), -float(share[row]), name, float(off[row])))
+    if not found:
+        return ""
+    at, _, name, largest = min(found)
+    return f"; axis {name} left its setpoint first: {largest * 1e3:.3g} mm off at {at:.9g} s"

@@ -21,6 +21,7 @@ from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLogge
 from numpy.typing import NDArray
 
 from feedsim.cosim.archive import Archive
+from feedsim.cosim.mark import calling
 from feedsim.errors import InputError, SimulationError
 
 Floats = NDArray[np.float64]
@@ -93,7 +94,8 @@ class Unit:
         callbacks.allocateMemory = defaultCallbacks.allocateMemory
         callbacks.freeMemory = defaultCallbacks.freeMemory
         try:
-            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
+            with calling(f"unit {name} ({archive.path}): fmi2Instantiate"):
+                self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
             known = {category.name for category in archive.description.logCategories or ()}
             if wanted := [name for name in ("logStatusWarning", "logStatusError") if name in known]:
                 self._fmu.setDebugLogging(True, wanted)
@@ -125,7 +127,8 @@ class Unit:
     def _checked(self, action: str, call: Any, *arguments: Any) -> None:
         """A call of fmpy's own wrapper: it raises without the unit's words, which belong into the message."""
         try:
-            call(*arguments)
+            with calling(f"unit {self.name}, t = {self._time:.9g} s: {action}"):
+                call(*arguments)
         except Exception:
             self.fail(action)
 
@@ -166,7 +169,8 @@ class Unit:
             groups.setdefault(setter, []).append((name, variable.valueReference, of_type(value)))
         for setter, group in groups.items():
             try:
-                setter([reference for _, reference, _ in group], [value for _, _, value in group])
+                with calling(f"unit {self.name}: setting {', '.join(name for name, _, _ in group)}"):
+                    setter([reference for _, reference, _ in group], [value for _, _, value in group])
             except Exception:
                 self._said()
                 self._set_each(setter, group)
@@ -197,7 +201,8 @@ class Unit:
         """
         reals = [v for v in self.archive.variables.values() if v.causality == "output" and v.type == "Real"]
         try:
-            self._fmu.getReal([reals[0].valueReference])
+            with calling(f"unit {self.name}: judging its parameters"):
+                self._fmu.getReal([reals[0].valueReference])
         except Exception:
             raise InputError(f"unit {self.name} refuses its parameters: {self._said() or 'no message'}") from None
 
@@ -210,7 +215,8 @@ class Unit:
         reference = self.references([name]).tolist()
         kind = self.archive.variables[name].type
         try:
-            values = self._fmu.getInteger(reference) if kind == "Integer" else self._fmu.getReal(reference)
+            with calling(f"unit {self.name}: reading {name}"):
+                values = self._fmu.getInteger(reference) if kind == "Integer" else self._fmu.getReal(reference)
         except Exception:
             self.fail(f"reading {name}")
         return float(values[0])
@@ -226,7 +232,8 @@ class Unit:
         if self._component is not None:
             if self.kept_state[0]:
                 self.call("free_state")(self.kept_state.ctypes.data)
-            self._fmu.fmi2FreeInstance(self._component)  # the library stays loaded, for other instances
+            with calling(f"unit {self.name}: fmi2FreeInstance"):
+                self._fmu.fmi2FreeInstance(self._component)  # the library stays loaded, for other instances
             self._component = None
 
     def alias(self, name: str) -> Alias:
@@ -362,7 +369,9 @@ class Port:
 
     def _exchange(self, operation: str) -> None:
         at, count = self.references.ctypes.data, self.references.size
-        if self.unit.call(operation)(at, count, self.own_values.ctypes.data) > WARNING:
+        with calling(f"unit {self.unit.name}: {exchanging(operation, self.names)}"):
+            status = self.unit.call(operation)(at, count, self.own_values.ctypes.data)
+        if status > WARNING:
             self.unit.fail(exchanging(operation, self.names))
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StrictInt
 
-from feedsim.fields import Model
+from feedsim.fields import Model, Quantity
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,9 @@ class Coupling(Model):
     )
     substeps: Annotated[StrictInt, Field(ge=1, le=1000)] = Field(
         default=1, description="Exchange steps of plant and friction per control cycle"
+    )
+    call_limit: Annotated[float, Quantity("s", above=0, example="60 s")] = Field(
+        default=60.0, description="Time after which a call of another maker's unit is ended"
     )
     units: Literal["separate", "one"] = Field(
         default="separate",

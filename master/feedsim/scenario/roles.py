@@ -137,7 +137,9 @@ def mapping(name: str, signals: tuple[Signal, ...]) -> Any:
         )
         for signal in signals
     }
-    return create_model(name, __base__=Model, **fields)
+    # A scenario is sent to other processes, where a class is looked up by its name.
+    globals()[name] = create_model(name, __base__=Model, __module__=__name__, **fields)
+    return globals()[name]
 
 
 def _described(signal: Signal) -> str:

@@ -118,6 +118,10 @@ class Trace(TimeColumns):
         rows = slice(first, int(np.searchsorted(self.time, t1 + slack, side="right")))
         return Trace(self.time[rows], {name: values[rows] for name, values in self.columns.items()}, self.units)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What another process makes it of."""
+        return Trace, (self.time, dict(self.columns), dict(self.units))
+
     def select(self, patterns: Iterable[str]) -> "Trace":
         """Columns whose name matches any of the glob patterns ("Z.*", "*.x_a"), in their present order.
 

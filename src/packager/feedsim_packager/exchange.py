@@ -11,7 +11,7 @@ from .checkout import LOOP
 from .targets import Target
 
 SOURCES = ("exchange.c",)
-FUNCTIONS = frozenset({"exchange_run", "exchange_interface"})
+FUNCTIONS = frozenset({"exchange_run", "exchange_run_marked", "exchange_interface"})
 
 
 def build(folder: Path, compiler: Sequence[str], target: Target | None = None) -> Path:

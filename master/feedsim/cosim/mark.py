@@ -1,0 +1,95 @@
+"""What a process is just at, in memory that another process reads: whose call it is, and in which control cycle.
+
+A process that executes programs of other makers (worker.py) has a mark; elsewhere there is none, and nothing is noted.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+SIZE = 4096
+_HEAD = 24  # bytes of cycle, operation, and how often anything was noted
+CALL, OWN = -1, -2  # in place of an operation: a call that `text` describes; code of our own, which takes its time
+
+
+class Mark:
+    """A note in a file that two processes have in their memory.
+
+    Attributes:
+        numbers: (3,) control cycle, operation in it (or CALL, or OWN), notes so far. The native loop writes the first
+            two itself (exchange_run_marked).
+    """
+
+    def __init__(self, path: Path) -> None:
+        """path: the file, SIZE bytes long; it is made where it is missing."""
+        if not path.exists():
+            path.write_bytes(bytes(SIZE))
+        with path.open("r+b") as file:
+            self._memory = mmap.mmap(file.fileno(), SIZE)
+        self.numbers = np.frombuffer(self._memory, dtype=np.int64, count=3)
+
+    def at(self, text: str, what: int = CALL) -> None:
+        """Note what comes next."""
+        content = text.encode("utf-8", "replace")[: SIZE - _HEAD - 1]
+        self._memory[_HEAD : _HEAD + len(content) + 1] = content + b"\0"
+        self.numbers[1] = what
+        self.numbers[2] += 1
+
+    def back(self) -> None:
+        """Note that the call has come back."""
+        self.numbers[1] = OWN
+        self.numbers[2] += 1
+
+    @property
+    def text(self) -> str:
+        """What :meth:`at` has noted last."""
+        return bytes(self._memory[_HEAD:]).partition(b"\0")[0].decode("utf-8", "replace")
+
+    def state(self) -> tuple[int, ...]:
+        """The numbers: where they stay as they are, a call has not come back."""
+        return tuple(int(each) for each in self.numbers)
+
+
+class Watched:
+    """The mark of this process, and who is to be told which operations its numbers speak of."""
+
+    def __init__(self) -> None:
+        self.mark: Mark | None = None
+        self.process = os.getpid()
+
+    def describe(self, T_c: float, operations: Sequence[tuple[str, str, float]]) -> None:
+        """Say what the operations of a cycle are: unit, what it is at, when in the cycle [s]."""
+
+
+_here: Watched | None = None
+
+
+def watched() -> Watched | None:
+    """Of this process; None: nobody watches."""
+    return _here
+
+
+def watch(here: Watched | None) -> None:
+    """Have this process watched."""
+    global _here
+    _here = here
+
+
+@contextmanager
+def calling(text: str) -> Iterator[None]:
+    """A block that calls another program; `text` says which and for what, where somebody watches."""
+    mark = None if _here is None else _here.mark
+    if mark is None:
+        yield
+        return
+    mark.at(text)
+    try:
+        yield
+    finally:
+        mark.back()

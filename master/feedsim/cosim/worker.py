@@ -1,0 +1,243 @@
+"""Programs of other makers in a process of their own, and what is said where one does not come back.
+
+A unit of another maker may crash, hang, or end the process. So what executes one is done by a worker process, which
+notes in shared memory whose call it is in (mark.py); this process watches, and loses nothing when the worker dies. A
+worker serves one call after the other, so that a study starts it once. Where all programs are the shipped ones there is
+none. Windows has no such worker: there the call is made in this process.
+
+Start reading at call(); serve() is what the worker does.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, TypeVar
+
+from feedsim.cosim.mark import CALL, OWN, Mark, Watched, watch, watched
+from feedsim.errors import FeedsimError, SimulationError
+from feedsim.owned import TemporaryFolder, remove_orphans
+
+T = TypeVar("T")
+
+AVAILABLE = os.name == "posix"
+LOOK = 0.05  # s between two looks at a worker that says nothing
+TOLD_EVERY = 0.1  # s between two reports of progress
+DYING = 5.0  # s for a worker to end that is asked to
+_SERVE = "import sys; from feedsim.cosim.worker import serve; serve(*sys.argv[1:])"
+_local = threading.local()  # a worker for each thread that needs one
+_all: list[_Worker] = []
+
+
+def call(
+    function: Callable[..., T],
+    *given: Any,
+    limit: float,
+    sink: Callable[[Any], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    **named: Any,
+) -> T:
+    """What ``function(*given, sink=..., progress=..., **named)`` returns, executed by the worker of this thread.
+
+    Args:
+        function: of a module; it and what it is given are sent to the worker.
+        limit: how long a single call of a unit may take [s].
+        sink, progress: called here with what the function calls its own with; left out where they are None.
+
+    Raises:
+        SimulationError: the worker has ended, or a call takes longer than `limit`: which unit, in what, when.
+        FeedsimError: what the function raises.
+    """
+    if watched() is not None or not AVAILABLE:  # already there; or it cannot be helped
+        more = {name: one for name, one in (("sink", sink), ("progress", progress)) if one is not None}
+        return function(*given, **more, **named)
+    worker: _Worker | None = getattr(_local, "worker", None)
+    if worker is None or not worker.alive:
+        worker = _local.worker = _Worker()
+    answer: T = worker.call(function, given, named, limit, sink, progress)
+    return answer
+
+
+class _Worker:
+    """A worker, seen from the process that watches it."""
+
+    def __init__(self) -> None:
+        self._folder = TemporaryFolder()
+        self._mark = Mark(self._folder.path / "mark")
+        their_end, ours = os.pipe()
+        our_end, theirs = os.pipe()
+        words = [sys.executable, "-c", _SERVE, str(their_end), str(theirs), str(self._folder.path / "mark")]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
+        # In a session of its own: a Ctrl-C is for us, and we end it.
+        self._process = subprocess.Popen(
+            words, env=environment, stdin=subprocess.DEVNULL, pass_fds=(their_end, theirs), start_new_session=True
+        )
+        os.close(their_end)
+        os.close(theirs)
+        self._to, self._from = Connection(ours, readable=False), Connection(our_end, writable=False)
+        self._owner = os.getpid()
+        _all.append(self)
+
+    @property
+    def alive(self) -> bool:
+        """Whether it can be asked for something more."""
+        return self._owner == os.getpid() and not self._to.closed and self._process.poll() is None
+
+    def call(
+        self, function: Callable[..., Any], given: Sequence[Any], named: Mapping[str, Any], limit: float,
+        sink: Callable[[Any], None] | None, progress: Callable[[int, int], None] | None,
+    ) -> Any:  # fmt: skip
+        """As :func:`call`."""
+        surroundings = (Path.cwd(), {name: value for name, value in os.environ.items() if name.startswith("FEEDSIM")})
+        self._mark.at("the worker: starting", OWN)
+        try:
+            self._to.send((surroundings, function, given, dict(named), sink is not None, progress is not None))
+            return self._watch(limit, sink, progress)
+        except FeedsimError:
+            raise
+        except BaseException:  # interrupted: the call may never come back
+            self.end()
+            raise
+
+    def _watch(self, limit: float, sink: Callable[[Any], None] | None, progress: Any) -> Any:
+        operations: tuple[float, Sequence[tuple[str, str, float]]] = (0.0, ())
+        state, since = self._mark.state(), time.monotonic()
+        while True:
+            if self._from.poll(LOOK):
+                try:
+                    kind, content = self._from.recv()
+                except (EOFError, OSError, pickle.UnpicklingError):
+                    self._lost(operations)
+                if kind == "result":
+                    return content
+                if kind == "error":
+                    raise content
+                if kind == "operations":
+                    operations = content
+                elif kind == "rows" and sink is not None:
+                    sink(content)
+                elif kind == "progress" and progress is not None:
+                    progress(*content)
+            elif self._process.poll() is not None and not self._from.poll(0):
+                self._lost(operations)
+            if (now := self._mark.state()) != state:
+                state, since = now, time.monotonic()
+            elif state[1] != OWN and time.monotonic() - since > limit:
+                where = self._where(operations)
+                self.end()
+                raise SimulationError(
+                    f"{where} does not come back within {limit:g} s; it has been ended. coupling.call_limit allows a "
+                    "longer call"
+                )
+
+    def _lost(self, operations: tuple[float, Sequence[tuple[str, str, float]]]) -> None:
+        """Raise for a worker that has ended by itself."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(DYING)
+        code, where = self._process.poll(), self._where(operations)
+        self.end()
+        if code is not None and code < 0:
+            name = signal.Signals(-code).name if -code in {int(each) for each in signal.Signals} else f"signal {-code}"
+            how = f"was ended by {name} ({signal.strsignal(-code) or 'unknown'})"
+        else:
+            how = f"ended the process by itself, with exit status {code}"
+        raise SimulationError(f"{where} {how}; the fault is in that unit's own program")
+
+    def _where(self, operations: tuple[float, Sequence[tuple[str, str, float]]]) -> str:
+        """Which unit, in what, when; what a sentence begins with."""
+        cycle, operation, _ = self._mark.state()
+        T_c, known = operations
+        if operation == OWN:
+            return f'the worker process, behind "{self._mark.text}",'
+        if operation == CALL or not 0 <= operation < len(known):
+            return self._mark.text
+        unit, about, within = known[operation]
+        return f"unit {unit}, t = {cycle * T_c + within:.9g} s: {about}"
+
+    def end(self) -> None:
+        """End it, and remove what it leaves behind."""
+        if self._owner != os.getpid():
+            return
+        with suppress(OSError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        for end in (self._to, self._from):
+            end.close()
+        self._folder.close()
+        remove_orphans()
+        with suppress(ValueError):
+            _all.remove(self)
+
+
+@atexit.register
+def _end_all() -> None:
+    for worker in [*_all]:
+        worker.end()
+
+
+# --- in the worker
+
+
+class _Served(Watched):
+    def __init__(self, mark: Mark, answers: Connection) -> None:
+        super().__init__()
+        self.mark = mark
+        self._answers = answers
+        self._told = 0.0
+
+    def describe(self, T_c: float, operations: Sequence[tuple[str, str, float]]) -> None:
+        self._answers.send(("operations", (T_c, list(operations))))
+
+    def rows(self, part: Any) -> None:
+        self._answers.send(("rows", part))
+
+    def progress(self, done: int, total: int) -> None:
+        if done == total or time.monotonic() - self._told > TOLD_EVERY:
+            self._told = time.monotonic()
+            self._answers.send(("progress", (done, total)))
+
+
+def serve(asked: str, answers: str, mark: str) -> None:
+    """What a worker does: one call after the other, until nobody asks any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    questions, replies = Connection(int(asked), writable=False), Connection(int(answers), readable=False)
+    here = _Served(Mark(Path(mark)), replies)
+    watch(here)
+    waiting: list[Any] = []
+    arrived = threading.Semaphore(0)
+
+    def receive() -> None:
+        """Beside the calls: when the process that asks has gone, nobody is left who could end a call that hangs."""
+        while True:
+            try:
+                waiting.append(questions.recv())
+            except (EOFError, OSError):
+                os._exit(0)
+            arrived.release()
+
+    threading.Thread(target=receive, daemon=True).start()
+    while True:
+        arrived.acquire()
+        (folder, environment), function, given, named, rows, progress = waiting.pop(0)
+        os.chdir(folder)
+        os.environ.update(environment)
+        more: dict[str, Any] = {"sink": here.rows} if rows else {}
+        more |= {"progress": here.progress} if progress else {}
+        try:
+            answer = ("result", function(*given, **named, **more))
+        except FeedsimError as error:
+            answer = ("error", error)
+        except Exception:
+            answer = ("error", RuntimeError(f"in the worker:\n{traceback.format_exc()}"))
+        replies.send(answer)

@@ -1,0 +1,185 @@
+"""Units of another maker that crash, hang or end the process: the run says which unit, in what and when, keeps its
+rows, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from command_helpers import feedsim, feedsim_process
+from feedsim import cosim, scenario
+from feedsim.cosim import worker
+from feedsim.errors import SimulationError
+from feedsim.report import run as report
+from feedsim.trace import read_csv
+from feedsim_packager import toolchain
+from foreign import acme
+
+pytestmark = pytest.mark.skipif(not worker.AVAILABLE, reason="this system has no worker process")
+ROOT = Path(__file__).resolve().parents[2]
+AT = 0.05  # s, when the unit fails
+# Fault -> number in faulty.c, what is said of it, and whether rows are there by then.
+FAULTS = {
+    "crash": (1, "was ended by SIGSEGV", True),
+    "abort": (2, "was ended by SIGABRT", True),
+    "stack": (3, "was ended by SIGSEGV", True),
+    "exit 0": (4, "ended the process by itself, with exit status 0", True),
+    "exit 1": (5, "ended the process by itself, with exit status 1", True),
+    "loop": (6, "does not come back within 1 s; it has been ended", True),
+    "sleep": (7, "does not come back within 1 s; it has been ended", True),
+    "loading": (8, "was ended by SIGSEGV", False),
+    "instantiating": (9, "was ended by SIGSEGV", False),
+}
+ROWS = acme.numbered(
+    acme.Variable("Speed", "input", None, "0"),
+    acme.Variable("Torque", "output", None),
+    acme.Variable("Coulomb", "parameter", None, "0.01"),
+    acme.Variable("Viscous", "parameter", None, "1e-5"),
+    acme.Variable("At", "parameter", None, "1e9"),
+)
+PLAN = """
+name: a faulty unit
+machine: {machine}
+motions:
+  - {{kind: move, by: {{X: 10 mm}}, feed: 3000 mm/min}}
+  - {{kind: dwell, duration: 200 ms}}
+recording: {{interval: 1 ms, variables: [X.x_a, X.M_fr]}}
+coupling: {{call_limit: 1 s}}
+set:
+  machine.axes.X.friction: {friction}
+"""
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], bytes]:
+    folder, known = tmp_path_factory.mktemp("faulty"), dict[str, bytes]()
+
+    def library(fault: str) -> bytes:
+        if fault not in known:
+            out = folder / "faulty.so"
+            command = [*toolchain.find_compiler(), "-std=gnu99", "-O0", "-fPIC", "-shared", f"-I{acme.HEADERS}"]
+            source = [f"-DFAULT={FAULTS[fault][0]}", str(acme.HERE / "faulty.c"), "-o", str(out), "-lm"]
+            subprocess.run([*command, *source], check=True)
+            known[fault] = out.read_bytes()
+        return known[fault]
+
+    return library
+
+
+@pytest.fixture
+def place(compiled: Callable[[str], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
+    """A scenario whose friction has a fault, in a folder with a folder for temporary files of its own."""
+
+    def made(fault: str) -> Path:
+        acme.archive(tmp_path / "faulty.fmu", "friction", compiled(fault), ROWS)
+        friction = {"fmu": "faulty.fmu", **acme.MAPPED_FRICTION, "parameters": {"At": AT}}
+        text = PLAN.format(machine=ROOT / "scenarios" / "machines" / "emps", friction=json.dumps(friction))
+        (tmp_path / "s.yaml").write_text(text, encoding="utf-8")
+        (tmp_path / "temporary").mkdir()
+        monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+        monkeypatch.setattr(tempfile, "tempdir", None)
+        return tmp_path
+
+    return made
+
+
+def nothing_left(folder: Path) -> None:
+    """Of the worker, or what it has unpacked. The archives that this process keeps open are its own."""
+    worker._end_all()
+    left = [path for path in (folder / "temporary").iterdir() if not list(path.glob("**/modelDescription.xml"))]
+    assert not left
+
+
+@pytest.mark.parametrize("native", [True, False], ids=["native", "Python"])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_run_says_who_and_when(fault: str, native: bool, place: Callable[[str], Path], fmus: Path) -> None:
+    folder, (_, how, rows) = place(fault), FAULTS[fault]
+    plan = scenario.load(folder / "s.yaml")
+    partial = report.growing(folder)
+    with pytest.raises(SimulationError) as raised, partial:
+        cosim.run(plan, fmus=fmus, native=native, sink=partial)
+    said = str(raised.value)
+    assert how in said
+    if rows:
+        assert said.startswith(f"unit friction_X, t = {AT:.9g} s: step of 0.001 s "), said
+        kept = read_csv(folder / "result.partial.csv")
+        assert 0.8 * AT < kept.time[-1] <= AT
+    else:
+        assert "faulty.fmu" in said
+        assert not (folder / "result.partial.csv").exists()
+    nothing_left(folder)
+
+
+@pytest.mark.parametrize("fault", ["crash", "exit 0", "loop", "loading"])
+def test_commands_end_with_3(fault: str, place: Callable[[str], Path], fmus: Path) -> None:
+    """A scenario, and the same as an SSP file."""
+    folder, (_, how, rows) = place(fault), FAULTS[fault]
+    assert feedsim("ssp", "s.yaml", "--out", "s.ssp", fmus=fmus, cwd=folder).returncode == 0
+    before = {*(folder / "temporary").iterdir()}  # of this process, which keeps archives unpacked
+    for subject in ("s.yaml", "s.ssp"):
+        done = feedsim_process("run", subject, "--out", "out", fmus=fmus, cwd=folder)
+        assert done.returncode == 3, done.stderr
+        assert how in done.stderr
+        assert {path.name for path in (folder / "out").glob("*")} == ({"result.partial.csv"} if rows else set())
+        assert {*(folder / "temporary").iterdir()} == before
+
+
+@pytest.mark.parametrize("fault", ["abort", "exit 0", "sleep"])
+def test_a_study_goes_on(fault: str, place: Callable[[str], Path], fmus: Path) -> None:
+    """The run that fails is a row with its message; the others are made."""
+    folder = place(fault)
+    (folder / "study.yaml").write_text(
+        "name: st\nscenario: s.yaml\nsampling: {method: grid}\nfigures: [X.overshoot]\n"
+        "parameters: {at: {key: machine.axes.X.friction.parameters.At, values: [1000, 0.05, 2000]}}\n"
+    )
+    text = (folder / "s.yaml").read_text().replace("set:", "evaluate: [{kind: positioning, axis: X}]\nset:")
+    (folder / "s.yaml").write_text(text)
+    done = feedsim("sweep", "study.yaml", "--workers", "1", "--out", "out", "--quiet", fmus=fmus, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    table = (folder / "out" / "table.csv").read_text()
+    assert table.count(FAULTS[fault][1].split(";")[0]) == 1
+    assert "unit friction_X, t = 0.05 s" in table
+
+
+def test_healthy_units_give_the_same_bits_here_and_in_a_worker(
+    place: Callable[[str], Path], fmus: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = scenario.load(place("crash") / "s.yaml", ["machine.axes.X.friction.parameters.At=1000"])
+    watched = cosim.run(plan, fmus=fmus)
+    monkeypatch.setattr(worker, "AVAILABLE", False)
+    here = cosim.run(plan, fmus=fmus)
+    assert list(watched.trace) == list(here.trace)
+    assert all((watched.trace[name] == here.trace[name]).all() for name in here.trace)
+    assert watched.warnings == here.warnings
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_hanging_unit_is_left_at_once(number: signal.Signals, place: Callable[[str], Path], fmus: Path) -> None:
+    """By Ctrl-C and by a plain kill: rows are kept, and no process stays."""
+    folder = place("loop")
+    words = [sys.executable, "-c", "from feedsim.cli import entry; entry()", "run", "s.yaml", "--out", "out",
+             "--set", "coupling.call_limit=600 s"]  # fmt: skip
+    environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master")}
+    process = subprocess.Popen(words, cwd=folder, env=environment, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL)
+    kept = folder / "out" / "result.partial.csv"
+    for _ in range(600):
+        time.sleep(0.05)
+        if kept.is_file() and len(kept.read_text().splitlines()) > 40:
+            break
+    process.send_signal(number)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == (130 if number == signal.SIGINT else 143)
+    assert b"are kept in" in said
+    assert {path.name for path in (folder / "out").iterdir()} == {"result.partial.csv"}
+    assert not list((folder / "temporary").iterdir())
+    listed = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True).stdout
+    assert f"{folder}/temporary" not in listed

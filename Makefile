@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all release lint format schemas reference check-reference bench worst-case pictures pose-study identification-study identification-accuracy lock ansys clean
+.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case pictures pose-study identification-study identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -121,6 +121,13 @@ $(foreach unit,$(UNITS),$(eval $(BUILD)/fmus-all/$(unit).fmu: $(wildcard src/$(u
 $(BUILD)/fmus-all/machine.fmu: $(MACHINE_SOURCES)
 $(BUILD)/fmus-all/plant.fmu: scenarios/machines/test_centre/modes.csv
 
+# The unit machine for pages: clang with wasi-libc where they are there, else zig from PyPI.
+page-module: fmus/machine.wasm ## build the machine as WebAssembly for feedsim page, with clang or zig
+
+fmus/machine.wasm: $(VENV)/.run $(COMPILER) $(PACKAGER) $(SHELL_SOURCES) $(MACHINE_SOURCES) $(wildcard src/page/*.c)
+	@$(PY) -m feedsim_packager web --out $@ || { echo "installing zig from PyPI (requirements-zig.lock)"; \
+	    $(PIP) install -r requirements-zig.lock && $(PY) -m feedsim_packager web --out $@; }
+
 # Archives carry the reference results of their unit.
 $(FMUS) $(ALL_FMUS): tests/reference/integrators.md
 $(foreach unit,$(UNITS),$(eval fmus/$(unit).fmu $(BUILD)/fmus-all/$(unit).fmu: \
@@ -164,6 +171,7 @@ test-sanitize-scenario: $(VARIABLES) $(if $(ASAN_RUNTIME),$(UNITS:%=$(SANITIZED)
 # A file of tests stays together on one core: its fixtures are made once. Programs that packages bring (cmake) are found.
 # What tests start by the hundred finds feedsim compiled, even where the shell lets Python write no bytecode.
 test-python: fmus $(VENV)/.importers
+	@$(MAKE) -s page-module || echo "no compiler for WebAssembly here: tests of pages are left out"
 	PYTHONDONTWRITEBYTECODE= PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m pytest -n auto --dist loadfile --durations=25
 
 # Calls of the units made of bytes, and what reads files with files that are changed at random (ARGS="--seconds 3600 --seed 7").
@@ -213,7 +221,7 @@ identification-accuracy: fmus $(VENV)/.run ## how accurate parameters from good 
 
 # --- keep ----------------------------------------------------------------------------------------------------------
 
-C_FILES := $(foreach folder,src/fmi2 src/exchange $(UNITS:%=src/%_fmu) tests/unit_c tests/unit_c/toy_unit tests/fuzz tests/platforms \
+C_FILES := $(foreach folder,src/fmi2 src/exchange src/page $(UNITS:%=src/%_fmu) tests/unit_c tests/unit_c/toy_unit tests/fuzz tests/platforms \
     tests/reference/monolithic benchmarks benchmarks/floor,$(wildcard $(folder)/*.[ch]))
 
 lint: $(VENV)/.dev ## style, types, formatting
@@ -238,4 +246,4 @@ lock: ## resolve the dependencies of pyproject.toml anew
 	uv pip compile -q --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --no-deps pyproject.toml --extra ansys -c requirements.lock -o requirements-ansys.lock
 
 clean: ## remove what was built, keep the environment
-	rm -rf $(BUILD) $(FMUS) fmus/exchange.* $(VARIABLES) $(RESULTS) $(DIST)
+	rm -rf $(BUILD) $(FMUS) fmus/exchange.* fmus/machine.wasm $(VARIABLES) $(RESULTS) $(DIST)

@@ -15,6 +15,7 @@ ORDER = [
     "__main__",
     "cli",
     "front",
+    "page",
     "report",
     "sweep",
     "replay",

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feedsim_packager import build, checkout, declared, exchange, table, targets
-from feedsim_packager.errors import InputError
+from feedsim_packager import build, checkout, declared, exchange, table, targets, web
+from feedsim_packager.errors import CompilerError, InputError
 
 from .project import PROJECT, files
 
@@ -36,7 +36,7 @@ class Shipped:
 def for_this_machine(compiler: Sequence[str]) -> Shipped:
     """By a compiler that makes code for this machine alone, as `make fmus` does."""
     tag = sysconfig.get_platform().replace("-", "_").replace(".", "_").replace("universal2", platform.machine())
-    return Shipped(_archives(compiler, None) | _loop(compiler, None) | _plain(compiler), tag)
+    return Shipped(_archives(compiler, None) | _loop(compiler, None) | _page(None) | _plain(compiler), tag)
 
 
 def for_platform(name: str, compiler: Sequence[str], archives: Path | None = None) -> Shipped:
@@ -48,7 +48,8 @@ def for_platform(name: str, compiler: Sequence[str], archives: Path | None = Non
         raise InputError(f"platform {name}: no wheel is made for it (known: {', '.join(TAGS)}, {ANY})")
     held = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
     loop = {} if name == ANY else _loop(compiler, targets.ALL[name])
-    return Shipped(held | loop | _plain(compiler), TAGS.get(name, ANY))
+    page = _page((*zig(), "-target", "wasm32-wasi"))
+    return Shipped(held | loop | page | _plain(compiler), TAGS.get(name, ANY))
 
 
 def taken(folder: Path) -> dict[str, bytes]:
@@ -76,6 +77,18 @@ def _loop(compiler: Sequence[str], target: targets.Target | None) -> dict[str, b
     with tempfile.TemporaryDirectory() as scratch:
         library = exchange.build(Path(scratch), compiler, target)
         return _placed({library.name: library.read_bytes()})
+
+
+def _page(compiler: Sequence[str] | None) -> dict[str, bytes]:
+    """The module of pages. compiler: for WebAssembly; None: one that is here, and without one there are no pages."""
+    with tempfile.TemporaryDirectory() as scratch:
+        try:
+            built = web.make(Path(scratch) / web.FILE, compiler)
+        except CompilerError:
+            if compiler is not None:
+                raise
+            return {}
+        return _placed({built.name: built.read_bytes()})
 
 
 def _plain(compiler: Sequence[str]) -> dict[str, bytes]:

@@ -1,11 +1,12 @@
 """Commands of the packager."""
 
 import argparse
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import archive, build, checkout, declared, exchange, kinds, repack, table, targets
+from . import archive, build, checkout, declared, exchange, kinds, repack, table, targets, web
 from .compile import EXTRA_FLAGS
 from .errors import InputError, PackagerError
 from .machine import named
@@ -55,6 +56,9 @@ def _parser() -> argparse.ArgumentParser:
     looping.add_argument("--cc", help="C compiler, one or more words (default: $CC, cc, gcc, clang, zig)")
     looping.add_argument("--platform", choices=targets.ALL, help="compile for this platform (default: this machine)")
     looping.add_argument("--out", type=Path, required=True, help="folder of the archives")
+    paging = commands.add_parser("web", help="compile the unit machine as a WebAssembly module for pages")
+    paging.add_argument("--cc", help="compiler for WebAssembly, one or more words (default: clang, zig)")
+    paging.add_argument("--out", type=Path, required=True, help="module to write")
     repacking = commands.add_parser("repack", help="pack another machine or motion into an archive; needs no compiler")
     repacking.add_argument("base", type=Path, metavar="BASE.fmu", help="archive whose binaries and sources are taken")
     _add_resources(repacking)
@@ -82,9 +86,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.command != "repack":
             checkout.check_there(options.command)
-        {"describe": _describe, "build": _build, "variables": _variables, "exchange": _exchange, "repack": _repack}[
-            options.command
-        ](options)
+        {
+            "describe": _describe, "build": _build, "variables": _variables, "exchange": _exchange, "web": _web,
+            "repack": _repack,
+        }[options.command](options)  # fmt: skip
     except PackagerError as error:
         print(f"error: {error}", file=sys.stderr)
         return error.exit_code
@@ -123,6 +128,11 @@ def _variables(options: argparse.Namespace) -> None:
 def _exchange(options: argparse.Namespace) -> None:
     target = None if options.platform is None else targets.ALL[options.platform]
     print(exchange.build(options.out, find_compiler(options.cc), target))
+
+
+def _web(options: argparse.Namespace) -> None:
+    found = web.make(options.out, shlex.split(options.cc) if options.cc else None)
+    print(f"{found}: {found.stat().st_size / 1024:.0f} KiB")
 
 
 def _build(options: argparse.Namespace) -> None:

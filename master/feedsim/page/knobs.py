@@ -1,0 +1,159 @@
+"""What can be turned in a page: parameters of drives and frictions, and of motions, with their ranges.
+
+A knob is a key of the scenario as ``--set`` takes it, and what it sets in the page: parameters of the unit `machine`,
+or a field of a motion. Names, units, ranges and descriptions are those of the units' tables.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from typing import Any
+
+from feedsim import units, variables
+from feedsim.cosim.roles import controller_parameters
+from feedsim.errors import InputError
+from feedsim.motions.circular import Circle
+from feedsim.motions.move import Move
+from feedsim.scenario import Scenario
+from feedsim.variables import Variable
+
+# Shown where nobody chooses, of every axis that a motion moves.
+USUAL = {
+    "drive": ("K_v", "T_sym", "k_ffw", "K_p", "T_n"),
+    "friction": ("F_S", "F_C", "W", "gamma", "sigma_0"),
+}
+# Parameters that the machine's cycles and axes fix, and those that are no matter of trying.
+FIXED = ("T_c", "T_pos", "I_P")
+# How far a slider goes about the scenario's value; a number may be typed beyond, within the table's range.
+REACH = 4.0
+SYMBOLS = {"1": ""}
+SHOWN_UNIT = {"1/s": "(m/min)/mm"}
+
+
+@dataclass(frozen=True)
+class Knob:
+    """Something that can be turned; values are SI.
+
+    Attributes:
+        key: as --set takes it. group: what it belongs to, in words. name: symbol; text: what it is.
+        value: of the scenario, a number or one of `choices`.
+        low, high: ends of the slider; least, most: what is allowed.
+        unit, shown: SI unit, unit in the page; factor: of what is shown per SI.
+        sets: names of the unit's parameters. motion: place of a motion's field.
+    """
+
+    key: str
+    group: str
+    name: str
+    text: str
+    value: float | str
+    unit: str = "1"
+    shown: str = ""
+    factor: float = 1.0
+    low: float = 0.0
+    high: float = 0.0
+    least: float = -math.inf
+    most: float = math.inf
+    sets: tuple[str, ...] = ()
+    motion: tuple[int | str, ...] = ()
+    choices: tuple[str, ...] = field(default=())
+
+
+def chosen(scenario: Scenario, wanted: Sequence[str], *, planned: bool) -> list[Knob]:
+    """The knobs that fit one of the patterns (keys, with ``*``), in the scenario's order; without: the usual ones.
+
+    planned: whether the page plans the motions, so that they can be changed.
+
+    Raises:
+        InputError: a pattern fits none; it lists what there is.
+    """
+    known = [*(_of_motions(scenario) if planned else []), *_of_axes(scenario)]
+    if not wanted:
+        moved = {axis for motion in scenario.motions for axis in motion.axes} or set(scenario.machine.axes)
+        usual = {
+            f"machine.axes.{axis}.{part}.{name}" for axis in moved for part, names in USUAL.items() for name in names
+        }
+        return [knob for knob in known if knob.motion or knob.key in usual]
+    lost = [pattern for pattern in wanted if not any(fits(knob, pattern) for knob in known)]
+    if lost:
+        raise InputError.of(
+            "there is no such knob",
+            [f"--knobs {pattern}: fits none of {', '.join(knob.key for knob in known)}" for pattern in lost],
+        )
+    return [knob for knob in known if any(fits(knob, pattern) for pattern in wanted)]
+
+
+def fits(knob: Knob, pattern: str) -> bool:
+    """Whether a pattern names a knob, by its key or by the end of its key: "Z.drive.K_v", "K_v", "motions.*"."""
+    return fnmatchcase(knob.key, pattern) or fnmatchcase(knob.key, f"*.{pattern}")
+
+
+def _of_axes(scenario: Scenario) -> list[Knob]:
+    machine, found = scenario.machine, []
+    for axis in machine.axes:
+        parts: Mapping[str, Mapping[str, Any]] = {
+            "drive": controller_parameters(machine, axis),
+            "friction": machine.shipped_friction(axis, "machine.fmu").parameters(),
+        }
+        for part, unit in (("drive", "controller"), ("friction", "friction")):
+            table = variables.parameters(unit)
+            found += [
+                _number(f"machine.axes.{axis}.{part}.{name}", f"axis {axis}", name, float(value), table[name],
+                        (f"{axis}.{part}.{name}",))
+                for name, value in parts[part].items()
+                if name in table and table[name].kind == "REAL" and name not in FIXED
+            ]  # fmt: skip
+    return found
+
+
+def _number(key: str, group: str, name: str, value: float, table: Variable, sets: tuple[str, ...]) -> Knob:
+    shown = SHOWN_UNIT.get(table.unit, table.display_unit or table.unit)
+    low, high = _ends(value, table)
+    return Knob(
+        key, group, name, table.short, value, table.unit, shown, units.convert(1.0, table.unit, shown), low, high,
+        table.minimum, table.maximum, sets,
+    )  # fmt: skip
+
+
+def _ends(value: float, table: Variable) -> tuple[float, float]:
+    """Ends of a slider: the table's where both are near, else some times the value or the table's start."""
+    size = abs(value) or abs(float(table.start)) or 1.0
+    if math.isfinite(table.minimum) and table.maximum <= 10:
+        return table.minimum, table.maximum
+    return max(table.minimum, value / REACH if value > 0 else (0.0 if value == 0 else -REACH * size)), min(
+        table.maximum, REACH * size
+    )
+
+
+def _of_motions(scenario: Scenario) -> list[Knob]:
+    found = []
+    for i, motion in enumerate(scenario.motions):
+        group = f"motion {i}: {motion.kind}"
+        if isinstance(motion, Move | Circle):
+            found.append(
+                _length(i, group, ("feed",), "feed", "programmed speed along the path", motion.feed, "m/s", "mm/min")
+            )
+        if isinstance(motion, Circle):
+            found.append(_length(i, group, ("radius",), "radius", "radius", motion.radius, "m", "mm"))
+            found.append(
+                Knob(f"motions.{i}.direction", group, "direction", "sense of the turns", motion.direction,
+                     motion=(i, "direction"), choices=("counterclockwise", "clockwise", "both"))
+            )  # fmt: skip
+        if isinstance(motion, Move):
+            for axis, by in motion.by.items():
+                found.append(_length(i, group, ("by", axis), f"by {axis}", f"distance of {axis}", by, "m", "mm"))
+    return found
+
+
+def _length(
+    i: int, group: str, path: tuple[str, ...], name: str, text: str, value: float, unit: str, shown: str
+) -> Knob:
+    ends = sorted((value / REACH, value * REACH))
+    least = 0.0 if path[0] != "by" else -math.inf
+    return Knob(
+        f"motions.{i}.{'.'.join(path)}", group, name, text, value, unit, shown, units.convert(1.0, unit, shown),
+        ends[0], ends[1], least, motion=(i, *path),
+    )  # fmt: skip

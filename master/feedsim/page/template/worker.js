@@ -1,0 +1,27 @@
+// In the worker: one state at a time; a newer one ends what is under way.
+let work = null, newest = 0;
+const turns = new MessageChannel(), waiting = [];
+turns.port1.onmessage = () => waiting.shift()();
+const breath = () => new Promise(done => { waiting.push(done); turns.port2.postMessage(0); });
+
+onmessage = async ({ data: asked }) => {
+  if (asked.data) {
+    try { work = await work_of(asked.data); postMessage({ ready: true }); } catch (error) { postMessage({ failed: String(error.message || error) }); }
+    return;
+  }
+  const { id, state, axis } = asked, on = async share => { postMessage({ id, share }); await breath(); return id === newest; };
+  newest = id;
+  await breath();
+  if (id !== newest) return;
+  try {
+    const found = await work.run(state, on);
+    if (found) postMessage({ id, found });
+  } catch (error) { postMessage({ id, problem: String(error.message || error) }); }
+  if (id !== newest || !axis) return;
+  await breath();
+  if (id !== newest) return;
+  try {
+    const loop = await work.bode(state, axis, on);
+    if (loop) postMessage({ id, loop });
+  } catch (error) { postMessage({ id, loop: { axis, problem: String(error.message || error), frequency: [] } }); }
+};

@@ -48,7 +48,7 @@ def for_platform(name: str, compiler: Sequence[str], archives: Path | None = Non
         raise InputError(f"platform {name}: no wheel is made for it (known: {', '.join(TAGS)}, {ANY})")
     held = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
     loop = {} if name == ANY else _loop(compiler, targets.ALL[name])
-    page = _page((*zig(), "-target", "wasm32-wasi"))
+    page = _page(zig_for_pages())
     return Shipped(held | loop | page | _plain(compiler), TAGS.get(name, ANY))
 
 
@@ -101,3 +101,8 @@ def _plain(compiler: Sequence[str]) -> dict[str, bytes]:
 def zig() -> tuple[str, ...]:
     """The compiler for all platforms."""
     return (sys.executable, "-m", "ziglang", "cc")
+
+
+def zig_for_pages() -> tuple[str, ...] | None:
+    """The compiler for the module of pages."""
+    return (*zig(), "-target", "wasm32-wasi")

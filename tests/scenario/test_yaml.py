@@ -6,7 +6,7 @@ import pytest
 
 from feedsim.errors import InputError
 from feedsim.files import source
-from feedsim.files.source import LARGEST, Place, parse, read
+from feedsim.files.source import LARGEST, Place, _brackets, parse, read
 
 
 def values(text: str) -> object:
@@ -85,7 +85,7 @@ def test_anchors_and_merge_keys() -> None:
 def test_alias_bomb_is_refused_before_it_goes_off() -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 12)]
-    assert f"aliases expand to more than {LARGEST} values" in refusal("\n".join(lines))
+    assert f"more than {LARGEST} values, an alias counted as all that it stands for" in refusal("\n".join(lines))
 
 
 @pytest.mark.parametrize(
@@ -180,3 +180,16 @@ def test_questions_in_comments_are_read_fast(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(source, "_Loader", None)
     if source._FastLoader is not None:
         assert values("  # why?\na: {b: 1} \n") == {"a": {"b": 1}}
+
+
+def test_a_file_of_too_many_values_is_given_up_early() -> None:
+    """A list of a hundred thousand groups, in brackets: neither parser composes it to its end first."""
+    text = "motions:\n" + "  - {kind: dwell, duration: 10 ms}\n" * 100_000
+    assert "more than 100000 values" in refusal(text)
+    assert "more than 100000 values" in refusal(text + "note: 'quoted'\n")
+
+
+def test_brackets_that_lie_side_by_side_are_not_deep() -> None:
+    assert _brackets("- {a: [1, 2]}\n" * 40_000) == 2
+    assert _brackets("[" * 30_000) == 30_000
+    assert _brackets("- {a: '}'}\n" * 40_000) == 40_000  # a quote may hide a bracket: all count

@@ -17,6 +17,7 @@ LARGEST = 4 << 30  # bytes that a file may unpack to; the setpoints of the longe
 RATIO = 100  # to the file's own size; tables of setpoints reach some 10, files made to fill a disk 1000
 FREE = 64 << 20  # bytes up to which the ratio does not count
 LARGEST_DOCUMENT = 64 << 20  # bytes of what is read into memory at once: XML, JSON, YAML
+MOST_ENTRIES = 20_000  # files and folders; archives of simulators have some hundreds
 LONGEST_PART = 240  # bytes of a file's or folder's name; systems know 255
 LONGEST_NAME = 1024  # bytes of a name with its folders
 # On Windows, with any ending.
@@ -55,6 +56,8 @@ def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
             every system has, cannot be on a disk together (one that does not tell upper from lower case, nor the ways
             to write an accent) or are too long; links; what is encrypted or packed by an unusual method.
     """
+    if (count := len(package.infolist())) > MOST_ENTRIES:
+        raise InputError(f"{where}: cannot be trusted: it has {count} entries; allowed: up to {MOST_ENTRIES}")
     found = [entry for entry in package.infolist() if not entry.is_dir()]
     names: dict[str, str] = {}  # as a disk compares them -> as the first of the entries has it
     for entry in found:

@@ -22,6 +22,7 @@ from feedsim.files.regular import content
 Place = tuple[str | int, ...]
 
 LARGEST = 100_000  # values in a file, aliases expanded
+_MANY = f"more than {LARGEST} values, an alias counted as all that it stands for; a long table is a CSV file of its own"
 LARGEST_FILE = 4_000_000  # bytes; people write some kB, and a long line of text is read at 0.3 MB/s
 _FAST_DEPTH = 2000
 # Where libyaml has a mind of its own: tabs, tags, byte order marks within a text, directives, "#" at the head of a
@@ -113,6 +114,8 @@ def parse(text: str, name: str, folder: Path, *, lines: bool = True) -> Source:
         node = _composed(text)
     except RecursionError:
         raise InputError(f"{name}: nested too deeply") from None
+    except _TooLarge:
+        raise InputError(f"{name}: {_MANY}") from None
     except yaml.MarkedYAMLError as error:
         raise builder.error(_wording(error), error.problem_mark or error.context_mark) from None
     except yaml.YAMLError as error:
@@ -133,13 +136,25 @@ def _composed(text: str) -> yaml.Node | None:
     """
     # libyaml's binding overruns the stack on text that is nested some ten thousand times. Every level takes a bracket
     # or a column, of which a list and the group that it stands in may share one.
-    deepest = text.count("[") + text.count("{") + 2 * max(map(len, text.splitlines()), default=0)
+    deepest = _brackets(text) + 2 * max(map(len, text.splitlines()), default=0)
     if _FastLoader is not None and deepest < _FAST_DEPTH and _READ_DIFFERENTLY.search(text) is None:
         with suppress(yaml.YAMLError):
             node = _root(_FastLoader, text)
             if node is None or node.value:  # where nothing stands, the two differ about where
                 return node
     return _root(_Loader, text)
+
+
+def _brackets(text: str) -> int:
+    """How deep brackets are nested, or more: all that are opened, unless no quote or remark could hide one."""
+    opened = text.count("[") + text.count("{")
+    if opened < _FAST_DEPTH or any(mark in text for mark in "\"'#|>"):
+        return opened
+    depth = deepest = 0
+    for bracket in re.findall(r"[\[\]{}]", text):
+        depth += 1 if bracket in "[{" else -1
+        deepest = max(deepest, depth)
+    return deepest
 
 
 def _root(kind: Any, text: str) -> yaml.Node | None:
@@ -151,10 +166,23 @@ def _root(kind: Any, text: str) -> yaml.Node | None:
         loader.dispose()
 
 
+class _TooLarge(Exception):
+    """More values than a file may have."""
+
+
 class _Loader(yaml.SafeLoader):
     """Composes nodes and resolves plain scalars by the YAML 1.2 core schema."""
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012  (PyYAML's own name; emptied of the 1.1 rules)
+
+    nodes = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """As usual, but a file that is too large is given up as soon as that shows."""
+        self.nodes += 1
+        if self.nodes > LARGEST:
+            raise _TooLarge
+        return super().compose_node(parent, index)
 
     def scan_tag(self) -> Any:
         """As usual, but a `!` alone, which the standard takes for "text" and PyYAML for nothing, is refused."""
@@ -196,9 +224,7 @@ class _Builder:
     def build(self, node: yaml.Node, place: Place, marks: dict[Place, Mark]) -> Any:
         self.count += 1
         if self.count > LARGEST:
-            raise InputError(
-                f"{self.name}: aliases expand to more than {LARGEST} values; write it out or make it smaller"
-            )
+            raise InputError(f"{self.name}: {_MANY}")
         if id(node) in self.open:
             raise self.error("an alias refers to the value that it is part of", node.start_mark)
         marks.setdefault(place, Mark(self.where(node.start_mark), self.folder))

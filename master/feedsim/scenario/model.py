@@ -16,6 +16,8 @@ from feedsim.scenario.loads import Load, MotionIndex
 from feedsim.scenario.logging import Logging, interval_fault, on_the_grid
 from feedsim.scenario.machine import Machine
 
+MOST_MOTIONS = 10_000  # of a scenario; a longer program is recorded setpoints
+
 
 class Recording(Model):
     """What goes into result.csv."""
@@ -95,7 +97,7 @@ class Scenario(Model):
     name: StrictStr = Field(description="Name in reports")
     note: StrictStr = Field(default="", description="Remark")
     machine: Machine = Field(description="Folder with a machine.yaml, a machine file, or the machine itself")
-    motions: Annotated[tuple[Motion, ...], Field(min_length=1)] = Field(
+    motions: Annotated[tuple[Motion, ...], Field(min_length=1, max_length=MOST_MOTIONS)] = Field(
         description="What the machine does, in this order"
     )
     loads: tuple[Load, ...] = Field(default=(), description="Torques and forces that act on the axes and at the tool")

@@ -199,6 +199,7 @@ def test_numpy_comes_after_the_harness() -> None:
         "stability",
         "startup",
         "sweep",
+        "watched",
         "worst_case",
     ],
 )

@@ -215,7 +215,8 @@ def test_what_cannot_be_done_is_refused(case: str, tmp_path: Path, capsys: pytes
 def test_a_file_of_something_else_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for text, message in (
         ("time [s],force [N]\n0,1\n1,2\n", "needed are positions of both axes (X [mm], Y [mm]"),
-        ("angle,deviation\ndeg,um\n0,1\n1,2\n", "other.csv:2: is a row of units, deg, um; needed is one row of names"),
+        ("deg,um\n0,1\n1,2\n", "other.csv:1: is a row of units, deg, um; needed is one row of names"),
+        ("angle,deviation\ndeg,um\n0,1\n1,2\n", "other.csv:1: 'deviation' is a deviation; give the radius"),
         ("angle [deg],deviation [N]\n0,1\n1,2\n", "column 'deviation' is in N; one such as deviation [m] is needed"),
         ("angle [deg],radius [mm]\n" + "".join(f"{i},100\n" for i in range(300)), "covers 299 deg in one direction"),
         ("angle [deg],radius [mm]\n" + "".join(f"{3 * i},100\n" for i in range(122)), "180 or more are needed"),

@@ -130,6 +130,9 @@ def kinds(folder: Path, fmus: Path) -> dict[str, Kind]:
         "response": Kind(".csv", read_response, responses),
         "mat": Kind(".mat", lambda path: _all(trace.read_recording(path)), _mat()),
         "capture": Kind(".json", lambda path: _all(trace.read_recording(path)), [_capture()]),
+        "xml": Kind(".xml", lambda path: _all(trace.read_recording(path)), _xml()),
+        "response_xml": Kind(".xml", read_response, _xml()[1:]),
+        "scope": Kind(".csv", lambda path: _all(trace.read_recording(path)), _scopes()),
         "uff": Kind(".uff", read_response, _uff(folder)),
         "scenario": Kind(".yaml", scenario.load, [plan]),
         "machine": Kind(".yaml", load_machine, [machine]),
@@ -174,6 +177,24 @@ def _capture() -> bytes:
     return json.dumps(
         {"Header": {"CycleTimeMs": 2, "SignalListHFData": listed}, "Payload": [{"HFData": rows}, event]}
     ).encode()
+
+
+def _xml() -> list[bytes]:
+    """A trace over time, and a measured response, of a SINUMERIK."""
+    from sinumerik_xml_helpers import TRACE, measured
+
+    rows = "".join(f'<rec time="{0.002 * k}" f1="{k}" f2="{-k}"/>' for k in range(8))
+    return [TRACE.format(rows=rows).encode(), measured()[0].encode()]
+
+
+def _scopes() -> list[bytes]:
+    """Of TwinCAT with tabs and with commas, of halscope, names above units."""
+    head = "Name\tP\t\nStarttime of export\t133238090039920000\n\n"
+    head += "Name\tA\tName\tB\nSampleTime[ms]\t2\tSampleTime[ms]\t4\n\n"
+    pairs = "".join(f"{2 * k}\t{k},5\t{4 * k}\t-{k},25\n" for k in range(6))
+    commas = "SymbolName,Name\nName,A,B\nUnit,mm,N\nScaleFactor,1,2\n0,1,2\n1,2,3\n2,3,4\nEOF\n"
+    scope = "Sampling period is 1000000 ns \n" + "".join(f"\na.b {k:+.3f} c {-k:+.3f} " for k in range(6))
+    return [(head + pairs).encode("cp1252"), commas.encode(), scope.encode(), b"t;pos\ns;mm\n0;1,5\n1;2,5\n"]
 
 
 def _uff(folder: Path) -> list[bytes]:

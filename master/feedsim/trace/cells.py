@@ -21,6 +21,7 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError, few
+from feedsim.files.columns import known_unit
 from feedsim.files.regular import content
 from feedsim.trace.trace import LARGEST, Array, check_name, check_unit, recorded, suggest
 
@@ -47,7 +48,7 @@ class Table:
     """Cells of a file by column, all of one length, with the line of every row; `where` is the file's name.
 
     numbers: (N, M) in place of the cells, where they were asked for and are nothing else. remarks: lines ahead of the
-    header that are not read.
+    header, which are no part of the table.
     """
 
     where: str
@@ -58,7 +59,7 @@ class Table:
     lines: Sequence[int]
     decimal_comma: bool  # may a comma stand in a number
     numbers: Array | None = None
-    remarks: int = 0
+    remarks: tuple[str, ...] = ()
 
     @property
     def head(self) -> str:
@@ -126,22 +127,30 @@ def read_table(
     if as_numbers and (table := _numbers(path, first, header_line, lines, separator, split or _header)) is not None:
         return table
     lines.seek(0)
+    ahead = tuple(lines.readline().rstrip("\r\n") for _ in range(remarks))  # of any form
     reader = csv.reader(lines, delimiter=separator, strict=True)
-    rows: list[list[str]] = []
-    numbers_of_lines: list[int] = []
+    rows: list[list[str]] = [[] for _ in ahead]
+    numbers_of_lines: list[int] = list(range(1, remarks + 1))
     try:
         for row in reader:
             rows.append(row)
-            numbers_of_lines.append(reader.line_num)
+            numbers_of_lines.append(reader.line_num + remarks)
     except csv.Error as error:
-        raise InputError(f"{path}:{reader.line_num}: {error}") from None
-    while rows and not any(cell.strip() for cell in rows[-1]):
+        raise InputError(f"{path}:{reader.line_num + remarks}: {error}") from None
+    while len(rows) > header_line and not any(cell.strip() for cell in rows[-1]):
         rows.pop()
         numbers_of_lines.pop()
+    if len(rows) < header_line:
+        raise InputError(f"{path}:{header_line}: no rows below the header")
     header, body, body_lines = rows[header_line - 1], rows[header_line:], numbers_of_lines[header_line:]
     if not header[-1].strip() and all(len(row) == len(header) and not row[-1].strip() for row in body):
         header, body = header[:-1], [row[:-1] for row in body]  # every line ends with a separator
-    names, header_units = (split or _header)(header, f"{path}:{header_line}")
+    above = next(csv.reader(ahead[-1:], delimiter=separator), [])
+    if (both := _names_above_units(above, header)) is not None:
+        names, header_units = _header([f"{name} [{unit}]" for name, unit in both], f"{path}:{header_line - 1}")
+        header_line, ahead = header_line - 1, ahead[:-1]
+    else:
+        names, header_units = (split or _header)(header, f"{path}:{header_line}")
     if not body:
         raise InputError(f"{path}:{header_line}: no rows below the header")
     for line, row in zip(body_lines, body, strict=True):
@@ -155,7 +164,22 @@ def read_table(
             )
             raise InputError(f"{path}:{line}: {len(row)} values, the header has {len(header)} columns{hint}")
     cells = tuple(tuple(cell.strip() for cell in column) for column in zip(*body, strict=True))
-    return Table(str(path), header_line, names, header_units, cells, tuple(body_lines), separator != ",", None, remarks)
+    return Table(str(path), header_line, names, header_units, cells, tuple(body_lines), separator != ",", None, ahead)
+
+
+def _names_above_units(above: Sequence[str], header: Sequence[str]) -> list[tuple[str, str]] | None:
+    """Names and units where a row of names stands above a row of units; None where there are no such two rows."""
+    if len(above) < len(header) or not all(cell.strip() for cell in above[: len(header)]):
+        return None
+    units_below = [cell.strip().strip("[]()").strip() for cell in header]
+    if not any(units_below) or not all(each in ("", "-") or known_unit(each) for each in units_below):
+        return None
+    if any(each in TIME_NAMES for each in units_below):
+        return None  # names that are units as well: t, m
+    if any(_is_number(cell) or known_unit(cell.strip()) for cell in above[: len(header)] if len(cell.strip()) > 1):
+        return None
+    names = [cell.strip().replace("[", "(").replace("]", ")") for cell in above]
+    return [(name, "" if unit == "-" else unit) for name, unit in zip(names, units_below, strict=False)]
 
 
 def _remarks(text: str) -> int:

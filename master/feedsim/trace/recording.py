@@ -14,11 +14,12 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.trace import capture
+from feedsim.trace import capture, sinumerik_xml
 from feedsim.trace.capture_axes import CaptureAxis
 from feedsim.trace.cells import Table, read_table
 from feedsim.trace.csv import write_csv
 from feedsim.trace.mat import Other, Value, flat, read_mat
+from feedsim.trace.scopes import read_scope
 from feedsim.trace.trace import LARGEST, Array, Trace, recorded, suggest
 
 MAT = ".mat"
@@ -37,6 +38,7 @@ class Recording:
         axes: of a capture, whose columns are called NAME|number of the axis; empty for other files.
         marks: what the control did, and when (capture).
         notes: what a reader of the file should know.
+        remarks: lines ahead of the header (CSV).
     """
 
     path: Path
@@ -46,6 +48,7 @@ class Recording:
     axes: tuple[CaptureAxis, ...] = ()
     marks: tuple[capture.Mark, ...] = ()
     notes: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
     _table: Table | None = None  # of a CSV file
     _variables: Mapping[str, Value] = field(default_factory=dict)  # of a MAT file or a capture
 
@@ -107,12 +110,26 @@ def read_recording(path: str | Path) -> Recording:
         )
     if path.suffix.lower() == MAT:
         return _read_mat(path)
+    signals = sinumerik_xml.read_signals(path) if path.suffix.lower() == sinumerik_xml.SUFFIX else read_scope(path)
+    if signals is not None:
+        _check(path, signals.columns)
+        return Recording(path, tuple(signals.columns), signals.units, notes=signals.notes, _variables=signals.columns)
     table = read_table(path, remarks_ahead=True)
     taken = f"{path}: the header is taken to be line {table.header_line}; the lines ahead of it are not read"
     notes = (taken,) if table.remarks else ()
     # A bracket with digits alone is the index of a parameter, r0078[0], not a unit.
     units = ["" if unit.isdecimal() else unit for unit in table.units]
-    return Recording(path, table.names, dict(zip(table.names, units, strict=True)), notes=notes, _table=table)
+    return Recording(
+        path, table.names, dict(zip(table.names, units, strict=True)), notes=notes, remarks=table.remarks, _table=table
+    )
+
+
+def _check(path: Path, columns: Mapping[str, Array]) -> None:
+    """InputError: a value that nothing records."""
+    for name, values in columns.items():
+        if (wrong := recorded(values)[1]).any():
+            row = int(np.argmax(wrong))
+            raise InputError(f"{path}: {name!r} is {values[row]:.6g} at sample {row + 1}; allowed: up to {LARGEST:g}")
 
 
 def _read_mat(path: Path) -> Recording:
@@ -178,7 +195,7 @@ def _load(path: Path) -> dict[str, Value]:
 
 
 def _vector(path: Path, variables: Mapping[str, Value], variable: str) -> Array:
-    names = variable.split(".")
+    names = [variable] if variable in variables else variable.split(".")
     value = variables.get(names[0])
     if value is None:
         raise InputError(f"{path}: no variable {names[0]!r}{suggest(names[0], variables)}")

@@ -21,6 +21,7 @@ from feedsim.trace.cells import Table, read_table
 from feedsim.trace.csv import quoted, shortest
 from feedsim.trace.files import written_whole
 from feedsim.trace.response import Complexes, FrequencyResponse
+from feedsim.trace.sinumerik_xml import SUFFIX, read_response_xml
 from feedsim.trace.trace import Array
 from feedsim.trace.uff import read_response_uff
 
@@ -75,8 +76,9 @@ def read_overlay(text: str) -> FrequencyResponse:
         raise InputError(f"{text!r}: behind the colon the name of a response is expected, such as Z.n_a/Z.M_a")
     name, _, source = (part.strip() for part in wanted.partition("="))
     if "," in source:
-        if path.suffix.lower() in UNIVERSAL:
-            raise InputError(f"{text!r}: a universal file has no columns; name the response, as in 12:+Z/7:+X")
+        if path.suffix.lower() in (*UNIVERSAL, SUFFIX):
+            kind = "an XML file" if path.suffix.lower() == SUFFIX else "a universal file"
+            raise InputError(f"{text!r}: {kind} has no columns; name the response, as in 12:+Z/7:+X")
         return read_response_csv(path, columns={name: [part.strip() for part in source.split(",")]})
     response = read_response(path)
     if not name:
@@ -100,8 +102,12 @@ def read_overlay(text: str) -> FrequencyResponse:
 
 
 def read_response(path: str | Path) -> FrequencyResponse:
-    """Responses of a file: a universal file by its ending (.uff, .unv, .uf, .bunv), CSV otherwise; InputError."""
+    """Responses of a file: a universal file by its ending (.uff, .unv, .uf, .bunv), a SINUMERIK's (.xml), else CSV.
+
+    InputError."""
     path = Path(path)
+    if path.suffix.lower() == SUFFIX:
+        return read_response_xml(path)
     return read_response_uff(path) if path.suffix.lower() in UNIVERSAL else read_response_csv(path)
 
 

@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from feedsim import units
-from feedsim.analysis.circle.doubts import check_feed, check_radius, checked, unusual_radius
+from feedsim.analysis.circle.doubts import OFF_FEED, check_feed, check_radius, checked, unusual_radius
+from feedsim.analysis.circle.header import Told, own_format
 from feedsim.analysis.circle.model import CircleUnderTest, TurnedPath
 from feedsim.analysis.circularity import EVEN, PARTS, fitted_circle
 from feedsim.analysis.figures import Array
@@ -91,8 +92,12 @@ def read_circle(
     turns: list[RecordedTurn] = []
     timed: list[tuple[Path, RecordedTurn, float]] = []
     radii: list[float] = []
+    headers = Told(radius, feed)
     for file in files:
+        own_format(file)
         recording = read_recording(file)
+        headers.add(file, recording.remarks)
+        radius = headers.radius
         both = _beside_each_other(recording)
         polar = None if both else _polar(recording, axes)
         if both:
@@ -113,21 +118,19 @@ def read_circle(
     durations = [duration for _, _, duration in timed]
     own = 2 * math.pi * nominal / float(np.mean(durations)) if durations else None
     check_feed(str(files[0]), feed, own)
-    speed = feed if feed is not None else _speed(turns, nominal, files)
+    speed = feed if feed is not None else own or headers.feed
+    if speed is None:
+        raise InputError(
+            f"{files[0]}: has no column of time, and the feed is not known: give it, for example --feed '1000 mm/min'"
+        )
+    if own is not None and headers.feed is not None and abs(own / headers.feed - 1) > OFF_FEED:
+        doubts.append(f"{files[0]}: its header tells another feed than its time, {own * 6e4:.5g} mm/min, which counts")
+    notes, doubts = [*headers.notes, *notes], [*headers.doubts, *doubts]
     if radius is None:
         doubts += unusual_radius(nominal)
         notes.append(f"the programmed radius is taken to be {nominal * 1e3:.6g} mm, that of the recorded turns")
     circle = CircleUnderTest(axes, nominal, speed, pitch or {})
     return RecordedCircle(circle, tuple(turns), centre is None, tuple(notes), tuple(doubts))
-
-
-def _speed(turns: Sequence[RecordedTurn], radius: float, files: Sequence[Path]) -> float:
-    known = [turn.duration for turn in turns if turn.duration is not None]
-    if not known:
-        raise InputError(
-            f"{files[0]}: has no column of time, and the feed is not known: give it, for example --feed '1000 mm/min'"
-        )
-    return 2 * math.pi * radius / float(np.mean(known))
 
 
 def _one_feed(timed: Sequence[tuple[Path, RecordedTurn, float]], radius: float) -> None:

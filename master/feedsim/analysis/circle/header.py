@@ -1,0 +1,113 @@
+"""Radius and feed that an instrument writes ahead of the columns of a circle, such as "Radius: 150 mm".
+
+Instruments of several makers, and controls, export circles as text; how their own files are built is not public. What
+is common to the texts are lines of a label and a value with its unit, before or behind it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from feedsim import units
+from feedsim.errors import InputError
+from feedsim.files.columns import spelled
+
+# Label, as it may stand in a line, and the unit of its kind.
+LABELS = {
+    "radius": ("m", ("radius", "nominal radius", "programmed radius", "test radius", "circle radius", "ballbar length",
+                     "nominal length", "sollradius", "nennradius", "kreisradius", "programmierter radius", "rayon",
+                     "rayon nominal")),
+    "feed": ("m/s", ("feed", "feed rate", "feedrate", "path feed", "path speed", "programmed feed", "feed speed",
+                     "vorschub", "bahnvorschub", "bahngeschwindigkeit", "vorschubgeschwindigkeit", "avance",
+                     "vitesse d'avance")),
+}  # fmt: skip
+# Files of instruments that only their own programs read.
+OWN_FORMATS = (".b5r", ".b20", ".b5s", ".bbx", ".kgm", ".acc")
+_LINE = re.compile(
+    r"""^["'\s#;,%*]*(?P<label>[^\W\d][^:=;,\t\[(\d"]*?)\s*       # a label,
+        (?:[\[(](?P<before>[^\])]*)[\])])?["'\s]*[:=;,\t\s]\s*["']?  # its unit in brackets, a separator,
+        (?P<value>[+]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*["']?[;,\t]?\s*["']?   # a number,
+        (?:[\[(]?(?P<behind>[^\s;,"\])]+)[\])]?)?                 # and its unit behind it
+    """,
+    re.VERBOSE,
+)
+
+
+def own_format(path: Path) -> None:
+    """InputError: a file that only its instrument's program reads."""
+    if path.suffix.lower() in OWN_FORMATS:
+        raise InputError(
+            f"{path}: files {path.suffix} are read by their instrument's own program, and how they are built is not "
+            "public; export the test as text or CSV, with angle and deviation (or radius), or both positions"
+        )
+
+
+def told_ahead(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
+    """Of "radius" [m] and "feed" [m/s] those that lines tell, and words of those that they do not tell clearly."""
+    found: dict[str, float] = {}
+    notes: list[str] = []
+    for line in lines:
+        match = _LINE.match(line)
+        if match is None:
+            continue
+        label = " ".join(re.split(r"[\s_-]+", match["label"].strip().lower()))
+        for what, (kind, labels) in LABELS.items():
+            if label not in labels:
+                continue
+            unit = (match["before"] or match["behind"] or "").strip()
+            value = float(match["value"].replace(",", "."))
+            try:
+                size = value * float(units.factor(spelled(unit), kind)) if unit else None
+            except InputError:
+                size = None
+            if size is None or not size > 0:
+                notes.append(f"{line.strip()!r} may be the {what}, and is not read: its unit is not known")
+            elif what in found and abs(found[what] / size - 1) > 1e-9:
+                notes.append(f"{line.strip()!r} is another {what} than the one ahead of it, and is not read")
+            else:
+                found[what] = size
+    return found, notes
+
+
+class Told:
+    """What the headers of several files tell of one circle. given: what is known without them; notes, doubts: words."""
+
+    def __init__(self, radius: float | None, feed: float | None) -> None:
+        self._given = {"radius": radius, "feed": feed}
+        self._ahead: dict[str, tuple[Path, float]] = {}
+        self.notes: list[str] = []
+        self.doubts: list[str] = []
+
+    def add(self, file: Path, lines: Sequence[str]) -> None:
+        """InputError: the file is of another circle than those ahead of it."""
+        found, unclear = told_ahead(lines)
+        self.doubts += [f"{file}: {each}" for each in unclear]
+        for what, value in found.items():
+            if self._given[what] is not None:
+                continue
+            self.notes.append(f"{file}: the {what} is {_shown(what, value)}, as its header tells")
+            first, other = self._ahead.setdefault(what, (file, value))
+            if abs(other / value - 1) > 1e-9:
+                raise InputError(
+                    f"{file}: its header tells a {what} of {_shown(what, value)}, that of {first} one of "
+                    f"{_shown(what, other)}; give files of one circle"
+                )
+
+    @property
+    def radius(self) -> float | None:
+        """[m]"""
+        return self._known("radius")
+
+    @property
+    def feed(self) -> float | None:
+        """[m/s]"""
+        return self._known("feed")
+
+    def _known(self, what: str) -> float | None:
+        return self._ahead[what][1] if what in self._ahead else self._given[what]
+
+
+def _shown(what: str, value: float) -> str:
+    return f"{value * 1e3:.6g} mm" if what == "radius" else f"{value * 6e4:.6g} mm/min"

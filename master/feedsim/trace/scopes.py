@@ -1,0 +1,218 @@
+"""Text files of oscilloscopes in controls: TwinCAT Scope (CSV export with its block of headers), LinuxCNC's halscope.
+
+They are known by their first lines. Nothing is resampled but channels of another sampling time, which keep their value
+until their next one.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from feedsim.errors import InputError, few
+from feedsim.files import regular
+from feedsim.files.columns import known_unit, spelled
+from feedsim.trace.trace import Array
+
+HEAD = 65536  # bytes within which a file tells what it is
+# Rows of a TwinCAT header; they repeat their key ahead of every column of time.
+KEYS = frozenset({
+    "Name", "SymbolName", "SymbolComment", "NetId", "NetID", "Port", "IndexGroup", "IndexOffset", "Data-Type",
+    "SampleTime[ms]", "SymbolBased", "VariableSize", "Offset", "ScaleFactor", "BitMask", "Unit", "Unit ScaleFactor",
+    "Unit Offset",
+})  # fmt: skip
+_TWINCAT = re.compile(
+    r"^(?:Starttime of export|StartRecord|SampleTime\[ms\]|SymbolName|Data-Type)([\t;,])", re.MULTILINE
+)
+_HALSCOPE = re.compile(r"\s*Sampling period is (\d+) ns")
+TICKS = 1e15  # a time beyond is a date in 100 ns, not in ms since the start
+TICK, MS = 1e-7, 1e-3  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Columns of one length, "time" [s] among them, their units ("" where none is told), what a reader should know."""
+
+    columns: Mapping[str, Array]
+    units: Mapping[str, str]
+    notes: tuple[str, ...] = ()
+
+
+def read_scope(path: Path) -> Signals | None:
+    """The signals of such a file; None where it is another one. InputError with the line: what cannot be read."""
+    if not path.is_file():
+        return None  # a pipe is read once
+    with regular.opened(path) as file:
+        raw = file.read(HEAD)
+    head = _decoded(raw)
+    if _HALSCOPE.match(head):
+        return _halscope(path, _decoded(regular.content(path)))
+    if found := _TWINCAT.search(head):
+        return _twincat(path, _decoded(regular.content(path)), found[1])
+    return None
+
+
+def _decoded(raw: bytes) -> str:
+    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return raw.decode("utf-16", "replace")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        # A character may be cut at the end of a head.
+        return raw.decode("utf-8-sig" if error.start > len(raw) - 4 else "cp1252", "replace")
+
+
+def unique(names: Iterable[str]) -> list[str]:
+    """Names that a column may have: without brackets, each once."""
+    found: list[str] = []
+    for name in names:
+        plain = "".join(c for c in name.strip().replace("[", "(").replace("]", ")") if c.isprintable()) or "signal"
+        plain = f"{plain} (1)" if plain == "time" else plain
+        again = 2
+        candidate = plain
+        while candidate in found:
+            candidate, again = f"{plain} ({again})", again + 1
+        found.append(candidate)
+    return found
+
+
+# --- TwinCAT ---
+
+
+def _twincat(path: Path, text: str, separator: str) -> Signals:
+    rows = list(csv.reader(text.splitlines(), delimiter=separator))
+    first = next((k for k, row in enumerate(rows) if _is_data(row)), None)
+    if first is None:
+        raise InputError(f"{path}: a TwinCAT Scope header without a row of values below it")
+    header: dict[str, list[str]] = {}
+    for row in rows[:first]:
+        if row and row[0].strip() in KEYS:
+            header[row[0].strip()] = row  # of two rows of names the second is that of the channels
+    if "Name" not in header:
+        raise InputError(f"{path}: a TwinCAT Scope header without the names of its channels; export it with them")
+    names = header["Name"]
+    clocks = [k for k, cell in enumerate(names) if cell.strip() == "Name"]
+    channels = {k: names[k].strip() for k in range(len(names)) if k not in clocks and names[k].strip()}
+    if not channels:
+        raise InputError(f"{path}: a TwinCAT Scope header without the names of its channels; export it with them")
+    if "SymbolName" in header and len(set(channels.values())) < len(channels):
+        channels = {k: _cell(header, "SymbolName", k) or name for k, name in channels.items()}
+    body = [(k + 1, row) for k, row in enumerate(rows[first:], first) if row and row[0].strip() != "EOF"]
+    width = max(max(channels), max(clocks)) + 1
+    if any(len(row) < width for _, row in body[:1]):
+        raise InputError(
+            f"{path}:{first + 1}: {len(rows[first])} values below {width} columns of the header; export it with a "
+            "column of time for every channel or sampling time (Timelines: All)"
+        )
+    return _grouped(path, header, clocks, channels, body, separator)
+
+
+def _cell(header: Mapping[str, Sequence[str]], key: str, column: int) -> str:
+    row = header.get(key, ())
+    return row[column].strip() if column < len(row) else ""
+
+
+def _grouped(
+    path: Path, header: Mapping[str, Sequence[str]], clocks: Sequence[int], channels: Mapping[int, str],
+    body: Sequence[tuple[int, Sequence[str]]], separator: str,
+) -> Signals:  # fmt: skip
+    """One time of all groups of channels: that of the group with the most rows."""
+    groups: dict[int, tuple[Array, dict[int, Array]]] = {}
+    for clock in clocks:
+        own = [k for k in channels if clock < k and not any(clock < other < k for other in clocks)]
+        if not own:
+            continue
+        kept = [(line, row) for line, row in body if len(row) > max(own) and row[clock].strip()]
+        times = _numbers(path, kept, clock, "the time", separator)
+        times = (times - times[0]) * (TICK if times.size and times[0] > TICKS else MS) if times.size else times
+        groups[clock] = times, {k: _numbers(path, kept, k, channels[k], separator) for k in own}
+    if not groups:
+        raise InputError(f"{path}: no channel has a column of time; export it with one (Timelines: All)")
+    base = max(groups, key=lambda clock: groups[clock][0].size)
+    time = groups[base][0]
+    if time.size < 2:
+        raise InputError(f"{path}: {time.size} rows of values; at least 2 are needed")
+    order = [k for own in groups.values() for k in own[1]]
+    titles = dict(zip(order, unique(channels[k] for k in order), strict=True))
+    columns, units, notes, held, unknown, scaled = {"time": time}, {"time": "s"}, [], [], [], []
+    for times, values in groups.values():
+        same = times.size == time.size and bool(np.all(np.abs(times - time) <= 1e-9 + 1e-9 * time))
+        for k, signal in values.items():
+            name = titles[k]
+            rows = np.searchsorted(times, time + 1e-9, side="right") - 1
+            columns[name] = signal if same else signal[rows.clip(0)]
+            held += [] if same else [name]
+            unit = _cell(header, "Unit", k)
+            known = bool(unit) and known_unit(unit)
+            units[name] = spelled(unit) if known else ""
+            unknown += [name] if unit and not known and unit.strip("()").lower() not in ("none", "-") else []
+            factor = _cell(header, "ScaleFactor", k).replace(",", ".")
+            scaled += [name] if factor not in ("", "1", "1.0") else []
+    for names, words in (
+        (held, "has another sampling time: its values are kept until its next one"),
+        (unknown, "is in a unit that is not known"),
+        (scaled, "has a scale factor; the file does not tell whether its values are scaled"),
+    ):
+        notes += [f"{path}: {few(names, 4)} {words}"] if names else []
+    return Signals(columns, units, tuple(notes))
+
+
+def _is_data(row: Sequence[str]) -> bool:
+    return bool(row) and _number(row[0]) is not None and len([c for c in row if _number(c) is not None]) > 1
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return float(cell.strip().replace(",", "."))
+    except ValueError:
+        return None
+
+
+def _numbers(path: Path, rows: Sequence[tuple[int, Sequence[str]]], k: int, name: str, separator: str) -> Array:
+    plain: Callable[[str], str] = (lambda cell: cell) if separator == "," else (lambda cell: cell.replace(",", "."))
+    try:
+        return np.array([float(plain(row[k])) for _, row in rows], dtype=np.float64)
+    except ValueError:
+        line, cell = next((line, row[k]) for line, row in rows if _number(row[k]) is None)
+        words = {"true": 1.0, "false": 0.0}
+        if all(row[k].strip().lower() in words for _, row in rows):
+            return np.array([words[row[k].strip().lower()] for _, row in rows])
+        raise InputError(f"{path}:{line}: {cell!r} in {name!r} is no number") from None
+
+
+# --- LinuxCNC ---
+
+
+def _halscope(path: Path, text: str) -> Signals:
+    """Lines of `label value label value`, below the sampling period in ns."""
+    first, *lines = text.splitlines()
+    found = _HALSCOPE.match(first)
+    if found is None or not int(found[1]):
+        raise InputError(f"{path}:1: {first!r}; a sampling period in ns is expected")
+    rows = [(k, line.split()) for k, line in enumerate(lines, 2) if line.strip()]
+    if len(rows) < 3:
+        raise InputError(f"{path}: {len(rows)} rows of samples; at least 3 are needed")
+    labels = rows[0][1][::2]
+    if len(rows[-1][1]) < 2 * len(labels):
+        rows.pop()
+    values = []
+    for line, cells in rows:
+        if cells[::2] != labels or len(cells) != 2 * len(labels):
+            raise InputError(f"{path}:{line}: holds {' '.join(cells[::2])}, the first row {' '.join(labels)}")
+        try:
+            values.append([float(cell) for cell in cells[1::2]])
+        except ValueError:
+            wrong = next(cell for cell in cells[1::2] if _number(cell) is None)
+            raise InputError(f"{path}:{line}: {wrong!r} is no number") from None
+    table = np.array(values[:-1], dtype=np.float64)  # halscope writes one sample more than it has recorded
+    names = unique(labels)
+    columns: dict[str, Array] = {"time": np.arange(len(table), dtype=np.float64) * (int(found[1]) * 1e-9)}
+    columns |= {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
+    note = f"{path}: halscope writes one sample more than it has recorded: the last one is left out"
+    return Signals(columns, {"time": "s"} | dict.fromkeys(names, ""), (note,))

@@ -1,0 +1,171 @@
+"""Text files of oscilloscopes in controls: the layouts that TwinCAT Scope and halscope write, and rows of units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from feedsim.errors import InputError
+from feedsim.identify import read_records
+from feedsim.trace import convert, read_csv, read_recording
+from feedsim.trace.recording import Recording
+
+PROJECT = [
+    "Name\tScope Project\t",
+    "File\tD:\\autosave\\axis.csv\t",
+    "Starttime of export\t133238090039920000\tMontag, 20. März 2023\t19:03:23.992",
+    "Endtime of export\t133238090060450000\tMontag, 20. März 2023\t19:03:26.045",
+    "",
+]
+
+
+def head(**rows: list[str]) -> list[str]:
+    """Rows of a header; each channel has its key ahead, as with a column of time for every channel."""
+    return ["\t".join(f"{key}\t{cell}" for cell in cells) for key, cells in rows.items()]
+
+
+def read(folder: Path, text: str, encoding: str = "utf-8") -> Recording:
+    path = folder / "scope.csv"
+    path.write_text(text, encoding=encoding)
+    return read_recording(path)
+
+
+FULL = [
+    *PROJECT,
+    *head(Name=["ActPos", "ActTorque"], SymbolComment=["", " of the drive"]),
+    "Data-Type\tREAL64\tData-Type\tREAL64",
+    "SampleTime[ms]\t2\tSampleTime[ms]\t2",
+    "SymbolName\tAxes.X.ActPos\tSymbolName\tAxes.X.ActTorque",
+    "Offset\t0\tOffset\t0",
+    "ScaleFactor\t1\tScaleFactor\t1",
+    "Unit\tmm\tUnit\t(None)",
+    "",
+]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+def test_twincat_with_a_time_for_every_channel(tmp_path: Path, encoding: str) -> None:
+    rows = [f"{2 * k}\t{0.5 * k:.3f}\t{2 * k}\t{-1.25 * k:.3f}".replace(".", ",") for k in range(6)]
+    found = read(tmp_path, "\n".join([*FULL, *rows, "EOF"]), encoding)
+    assert found.names == ("time", "ActPos", "ActTorque")
+    assert dict(found.units) == {"time": "s", "ActPos": "mm", "ActTorque": ""}
+    values = found.read(found.names)
+    np.testing.assert_allclose(values["time"], 0.002 * np.arange(6), rtol=1e-15)
+    np.testing.assert_allclose(values["ActPos"], 0.5 * np.arange(6))
+    np.testing.assert_allclose(values["ActTorque"], -1.25 * np.arange(6))
+    assert found.notes == ()
+
+
+def test_twincat_with_a_time_for_every_sampling_time(tmp_path: Path) -> None:
+    """Commas between columns, dates in 100 ns, a slower group whose cells are empty in between."""
+    lines = [
+        "Name,Project", "File,a.csv", "Starttime of export,133238090039920000", "",
+        "Name,Pos,Speed,Name,Temp[1]", "SampleTime[ms],1,1,SampleTime[ms],3", "ScaleFactor,1,1,ScaleFactor,0.1", "",
+    ]  # fmt: skip
+    for k in range(9):
+        slow = f"{133238090039920000 + 30000 * (k // 3)},{20 + k}" if k % 3 == 0 else ","
+        lines.append(f"{133238090039920000 + 10000 * k},{0.25 * k},{k},{slow}")
+    found = read(tmp_path, "\n".join(lines))
+    assert found.names == ("time", "Pos", "Speed", "Temp(1)")
+    values = found.read(found.names)
+    # Ticks of 100 ns since 1601 have 18 digits, a double 16: 32 of them are lost in a date, 3 us.
+    np.testing.assert_allclose(values["time"], 0.001 * np.arange(9), atol=4e-6)
+    np.testing.assert_array_equal(values["Temp(1)"], [20, 20, 20, 23, 23, 23, 26, 26, 26])
+    assert len(found.notes) == 2
+    assert "Temp(1) has another sampling time" in found.notes[0]
+    assert "Temp(1) has a scale factor" in found.notes[1]
+
+
+def test_twincat_of_the_second_version(tmp_path: Path) -> None:
+    """With StartRecord in its head, and flags as words."""
+    lines = [
+        "Name\tScope01", "File", "StartRecord\t128783093223690000", "EndRecord\t128783093339880000", "",
+        *head(Name=["DREIECK", "On"], NetId=["172.16.8.205.1.1"] * 2, Port=["801"] * 2), "",
+        "0\t-1,03799391\t0\tTRUE", "1\t-1,03599393\t1\tFALSE", "2\t-1,033994\t2\tTRUE",
+    ]  # fmt: skip
+    values = read(tmp_path, "\n".join(lines)).read(["time", "DREIECK", "On"])
+    assert values["DREIECK"].tolist() == [-1.03799391, -1.03599393, -1.033994]
+    assert values["On"].tolist() == [1.0, 0.0, 1.0]
+
+
+def test_twincat_for_identification(tmp_path: Path) -> None:
+    """Known names, and a mapping only where the unit is missing."""
+    t = 0.002 * np.arange(1500)
+    x, torque = 20 * np.sin(6 * t), 2 * np.sign(np.cos(6 * t)) - 0.4 * np.sin(6 * t)
+    lines = [line.replace("(None)", "N.m") for line in FULL]
+    rows = [f"{2 * k}\t{x[k]:.6f}\t{2 * k}\t{torque[k]:.6f}".replace(".", ",") for k in range(1500)]
+    read(tmp_path, "\n".join([*lines, *rows]))
+    from feedsim.files.columns import load_columns
+
+    mapping = tmp_path / "columns.yaml"
+    mapping.write_text("axis: X\npitch: 10 mm\nposition: {column: ActPos}\ntorque: {column: ActTorque}\n")
+    (record,) = read_records(tmp_path / "scope.csv", load_columns(mapping)).records
+    assert record.angle is not None
+    np.testing.assert_allclose(record.angle, 2 * np.pi * x / 10, atol=1e-6)
+    np.testing.assert_allclose(record.torque, torque, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (FULL, "a TwinCAT Scope header without a row of values below it"),
+        ([*FULL, "0\t1\t0\tx", "2\t1\t2\t1"], "scope.csv:15: 'x' in 'ActTorque' is no number"),
+        ([*FULL, "0\t1\t2"], "export it with a column of time"),
+        ([*FULL, "0\t1\t0\t1"], "1 rows of values; at least 2"),
+        ([*[line for line in FULL if not line.startswith("Name")], "0\t1\t0\t1"], "without the names of its channels"),
+    ],
+)
+def test_twincat_files_that_are_refused(tmp_path: Path, lines: list[str], message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, "\n".join(lines))
+    assert message in str(caught.value)
+
+
+def test_halscope(tmp_path: Path) -> None:
+    lines = ["Sampling period is 1000000 ns ", ""]
+    lines += [f"joint.0.motor-pos-fb {0.5 * k:+.14f} joint.0.motor-pos-cmd {0.75 * k:+.14f} " for k in range(5)]
+    lines.append(f"joint.0.motor-pos-fb {9e9:+.14f} joint.0.motor-pos-cmd {9e9:+.14f} ")  # beyond the buffer
+    found = read(tmp_path, "\n".join(lines))
+    values = found.read(found.names)
+    assert found.names == ("time", "joint.0.motor-pos-fb", "joint.0.motor-pos-cmd")
+    np.testing.assert_allclose(values["time"], 1e-3 * np.arange(5), rtol=1e-15)
+    assert values["joint.0.motor-pos-fb"].tolist() == [0, 0.5, 1, 1.5, 2]
+    assert any("the last one is left out" in note for note in found.notes)
+    convert(tmp_path / "scope.csv", [], tmp_path / "out.csv")
+    assert read_csv(tmp_path / "out.csv").names == found.names[1:]
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (["Sampling period is 0 ns", "a 1", "a 2", "a 3"], "scope.csv:1: "),
+        (["Sampling period is 5 ns", "a 1", "b 2", "a 3"], "scope.csv:3: holds b, the first row a"),
+        (["Sampling period is 5 ns", "a 1", "a x", "a 3", "a 4"], "scope.csv:3: 'x' is no number"),
+        (["Sampling period is 5 ns", "a 1"], "1 rows of samples"),
+    ],
+)
+def test_halscope_files_that_are_refused(tmp_path: Path, lines: list[str], message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, "\n".join(lines))
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "units"),
+    [
+        ("Time;Actual position;Flag\nms;mm;-\n0;1,5;0\n1;2,5;1\n", {"Time": "ms", "Actual position": "mm", "Flag": ""}),
+        ("log of X\nx\n\nt,pos [1],n\n[s],[um],[rpm]\n0,1,2\n1,2,3\n", {"t": "s", "pos (1)": "um", "n": "rpm"}),
+    ],
+)
+def test_a_row_of_names_above_a_row_of_units(tmp_path: Path, text: str, units: dict[str, str]) -> None:
+    found = read(tmp_path, text)
+    assert dict(found.units) == units
+    assert all(len(values) == 2 for values in found.read(found.names).values())
+
+
+def test_one_row_of_names_is_none_of_units(tmp_path: Path) -> None:
+    """Names that are units as well, below a remark."""
+    found = read(tmp_path, "A,remark\nt,m\n0,1\n1,2\n")
+    assert found.names == ("t", "m")

@@ -11,8 +11,8 @@ void drive_layout(Drive *p) {
 /* The past before the first instant with release: setpoint and axis stood at their present values, everything else was
  * at rest. It is made here and not at the start, because importers may set the first inputs as late as before the first
  * step. */
-static void begin(const Drive *p, DriveState *x, double *lines, const DriveInputs *in) {
-    position_start(&p->position, &x->position, lines + p->x_ring, lines + p->n_ring, in->x_s);
+static void begin(const Drive *p, DriveState *x, double *lines, const DriveInputs *in, double x_s) {
+    position_start(&p->position, &x->position, lines + p->x_ring, lines + p->n_ring, x_s);
     reference_model_start(&p->reference_model, &x->reference_model, lines + p->reference_ring, 0.0);
     if (!x->measured) {
         measured_speed_start(&p->measured_speed, &x->speed_newest, lines + p->speed_ring, in->x_a);
@@ -50,21 +50,22 @@ static void rest(const Drive *p, DriveState *x, double *lines, const DriveInputs
     x->u_q = x->current.u_q;
 }
 
-static void control(const Drive *p, DriveState *x, double *lines, const DriveInputs *in) {
+/* `in` as it is measured; the motor itself turns with n_a [rad/s]. */
+static void control(const Drive *p, DriveState *x, double *lines, const DriveInputs *in, double n_a) {
     /* The motor first, whose long chain of divisions depends on nothing that follows: a processor does the rest
      * meanwhile. */
     PmsmState current = x->right.i;
     if (!p->ideal_current_loop) {
-        pmsm_step(&p->motor, &current, x->current.u_d, x->current.u_q, in->n_a, p->T_c);
+        pmsm_step(&p->motor, &current, x->current.u_d, x->current.u_q, n_a, p->T_c);
     }
-    bool position_too = x->tick == 0;
-    if (!x->released) {
-        begin(p, x, lines, in);
-        position_too = true;
-    }
-    if (position_too) {
+    const bool begins = !x->released;
+    if (begins || x->tick == 0) {
+        const double x_s = p->corrections.used ? corrections_step(&p->corrections, &x->corrections, in->x_s) : in->x_s;
+        if (begins) {
+            begin(p, x, lines, in, x_s);
+        }
         setpoint_ramp_take(&x->ramp, position_step(&p->position, &x->position, lines + p->x_ring, lines + p->n_ring,
-                                                   in->x_s, in->n_ffw, in->x_a));
+                                                   x_s, in->n_ffw, in->x_a));
     }
     x->n_s = setpoint_ramp_value(&p->ramp, &x->ramp, (int32_t)x->tick) + in->n_add;
     x->n_ref = reference_model_step(&p->reference_model, &x->reference_model, lines + p->reference_ring, x->n_s);
@@ -89,11 +90,31 @@ static void control(const Drive *p, DriveState *x, double *lines, const DriveInp
     }
 }
 
+/* Cogging and ripple on the torque at the ends of the cycle that was opened. */
+static void add_orders(const Drive *p, DriveState *x, double n_a) {
+    orders_turn(&p->orders, &x->orders, n_a, p->T_c);
+    if (p->ideal_current_loop) { /* its torque jumped: else the beginning is the end of the cycle before */
+        x->left.M_a = orders_torque(&p->orders, x->orders.theta, x->left.M_a);
+    }
+    x->right.M_a = orders_torque(&p->orders, x->orders.ahead, x->right.M_a);
+}
+
 void drive_instant(const Drive *p, DriveState *x, double *lines, const DriveInputs *in) {
+    DriveInputs measured;
+    const double n_a = in->n_a;
+    if (p->measuring.used) {
+        measured = *in;
+        measuring_step(&p->measuring, &x->measuring, x->instant, &measured.x_a, &measured.n_a);
+        in = &measured;
+    }
+    x->x_m = in->x_a;
     if (in->release) {
-        control(p, x, lines, in);
+        control(p, x, lines, in, n_a);
     } else {
         rest(p, x, lines, in);
+    }
+    if (p->orders.count > 0) {
+        add_orders(p, x, n_a);
     }
     ++x->instant;
     x->tick = x->tick + 1 < p->ticks ? x->tick + 1 : 0;

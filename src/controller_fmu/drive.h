@@ -1,7 +1,7 @@
 /* The whole cascade of one axis: what happens at one sample instant t_k, in its order, with the motor.
  *
  *   position (every T_pos) -> ramp, + n_add -> reference model -> speed PI, + M_add, limit -> up to four filters
- *     -> current PI -> one T_c of computing delay -> motor -> M_a(t_k+1)
+ *     -> current PI -> one T_c of computing delay -> motor, + cogging and ripple -> M_a(t_k+1)
  *
  * M_a is linear over the cycle from M_a(t_k) to M_a(t_k+1). With an ideal current loop the filtered torque setpoint of
  * t_k acts at once and is held over the cycle.
@@ -22,8 +22,11 @@
 #include <stdint.h>
 
 #include "biquad.h"
+#include "corrections.h"
 #include "current.h"
 #include "measured_speed.h"
+#include "measuring.h"
+#include "orders.h"
 #include "pmsm.h"
 #include "position.h"
 #include "prefix.h"
@@ -50,6 +53,9 @@ typedef struct Drive {
     double K_t; /* [N.m/A] */
     CurrentController current;
     Pmsm motor;
+    Orders orders;           /* cogging and torque ripple of the motor */
+    Measuring measuring;     /* what it reads instead of x_a and n_a */
+    Corrections corrections; /* what it adds to x_s */
     /* Where the delay lines begin among the `samples` doubles; filled in by drive_layout(). */
     size_t x_ring, n_ring, reference_ring, speed_ring, samples;
 } Drive;
@@ -88,6 +94,10 @@ typedef struct DriveState {
     CurrentState current;
     int released; /* at the last instant; 0 or not, see speed.h */
     int measured; /* positions are kept for the speed: since the first release; 0 or not */
+    double x_m;   /* measured position, at the last instant [m] */
+    OrdersState orders;
+    MeasuringState measuring;
+    CorrectionsState corrections;
 } DriveState;
 
 /* Place the delay lines of a Drive whose blocks are filled in. */

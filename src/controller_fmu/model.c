@@ -4,9 +4,10 @@
  *   output   M_a, linear over a control cycle; the rest are observables
  *
  * Equations, symbols and units stand in the headers of the blocks: position.h (delay.h, lag.h), setpoint_ramp.h,
- * reference_model.h, measured_speed.h, speed.h, biquad.h, current.h, pmsm.h; drive.h puts them in order; README.md
- * shows the whole. Source: Wiesauer, Bleicher, 18th CIRP CMMO (2021), section 2.2. This file holds what is about time
- * and about the unit's interface.
+ * reference_model.h, measured_speed.h, speed.h, biquad.h, current.h, pmsm.h, and of what real drives have besides, off
+ * by default: orders.h, measuring.h, corrections.h; drive.h puts them in order; README.md shows the whole. Source:
+ * Wiesauer, Bleicher, 18th CIRP CMMO (2021), section 2.2. This file holds what is about time and about the unit's
+ * interface.
  *
  * Instant k lies at t_k = start + k T_c; k is counted, so that nothing drifts. A step [t, t + H) works the instants in
  * that interval and reads the inputs at each, value + slope (t_k - t). H may be anything. */
@@ -21,6 +22,12 @@ typedef struct State {
     DriveState drive;
     double lines[]; /* delay lines */
 } State;
+
+/* Derived data. */
+typedef struct Controller {
+    Drive drive;
+    bool warned; /* of orders too fast for the sampling rate */
+} Controller;
 
 /* --- parameters to coefficients ----------------------------------------------------------------------------------- */
 
@@ -94,6 +101,43 @@ static void derive_blocks(const Scalars *v, Drive *p) {
     p->motor.psi = pmsm_flux_linkage(v->K_t, v->p);
 }
 
+/* Rows of a table over position lie one behind the other in the unit's table: e_0 ... e_10. */
+static void derive_effects(const Scalars *v, Drive *p) {
+    p->orders.count = 0;
+    orders_add(&p->orders, v->cogging_1_order, v->cogging_1_amplitude, v->cogging_1_phase, 0);
+    orders_add(&p->orders, v->cogging_2_order, v->cogging_2_amplitude, v->cogging_2_phase, 0);
+    orders_add(&p->orders, v->cogging_3_order, v->cogging_3_amplitude, v->cogging_3_phase, 0);
+    orders_add(&p->orders, v->ripple_1_order, v->ripple_1_amplitude, v->ripple_1_phase, 1);
+    orders_add(&p->orders, v->ripple_2_order, v->ripple_2_amplitude, v->ripple_2_phase, 1);
+    orders_add(&p->orders, v->ripple_3_order, v->ripple_3_amplitude, v->ripple_3_phase, 1);
+
+    Measuring *m = &p->measuring;
+    *m = (Measuring){.indirect = v->measuring_indirect != 0,
+                     .T_c = v->T_c,
+                     .I_P = v->I_P,
+                     .linear = v->measuring_linear,
+                     .resolution = v->measuring_resolution,
+                     .noise = v->measuring_noise,
+                     .seed = (uint64_t)v->measuring_seed,
+                     .eccentricity = v->encoder_eccentricity,
+                     .eccentric_phase = v->encoder_phase};
+    measuring_add(m, v->periodic_error_1_period, v->periodic_error_1_amplitude, v->periodic_error_1_phase);
+    measuring_add(m, v->periodic_error_2_period, v->periodic_error_2_amplitude, v->periodic_error_2_phase);
+    measuring_add(m, v->periodic_error_3_period, v->periodic_error_3_amplitude, v->periodic_error_3_phase);
+    m->table = points_of(v->measuring_table_first, v->measuring_table_spacing, &v->measuring_table_e_0);
+    m->used = m->indirect || m->periodic_errors > 0 || m->table.used || fabs(m->linear) > 0 || m->resolution > 0 ||
+              m->noise > 0 || fabs(m->eccentricity) > 0;
+
+    Corrections *c = &p->corrections;
+    c->backlash = v->backlash_compensation_value;
+    c->change = v->backlash_compensation_ramp > 0 ? fmin(2, 2 * v->T_pos / v->backlash_compensation_ramp) : 2;
+    c->leadscrew =
+        points_of(v->leadscrew_compensation_first, v->leadscrew_compensation_spacing, &v->leadscrew_compensation_e_0);
+    c->leadscrew_minus = points_of(v->leadscrew_compensation_minus_first, v->leadscrew_compensation_minus_spacing,
+                                   &v->leadscrew_compensation_minus_e_0);
+    c->used = fabs(c->backlash) > 0 || c->leadscrew.used;
+}
+
 static bool derive_drive(Unit *unit, const Scalars *v, Drive *p) {
     bool cycles = derive_cycles(unit, v, p);
     bool filters = derive_filters(unit, v, p);
@@ -101,12 +145,13 @@ static bool derive_drive(Unit *unit, const Scalars *v, Drive *p) {
         return false;
     }
     derive_blocks(v, p);
+    derive_effects(v, p);
     drive_layout(p);
     return true;
 }
 
 static bool derive(Unit *unit) {
-    Drive *p = unit_derived(unit);
+    Controller *p = unit_derived(unit);
     if (p == NULL) {
         p = unit_alloc(unit, 1, sizeof *p);
         if (p == NULL) {
@@ -114,11 +159,11 @@ static bool derive(Unit *unit) {
         }
         unit_set_derived(unit, p);
     }
-    return derive_drive(unit, unit_scalars(unit), p);
+    return derive_drive(unit, unit_scalars(unit), &p->drive);
 }
 
 static size_t state_size(const Unit *unit) {
-    const Drive *p = unit_derived(unit);
+    const Drive *p = &((const Controller *)unit_derived(unit))->drive;
     return sizeof(State) + p->samples * sizeof(double);
 }
 
@@ -170,6 +215,7 @@ static bool accepts(Unit *unit, const Scalars *scalars, const void *state, size_
 /* What the outputs show that belong to the last instant. */
 static void show_instant(Scalars *v, const DriveState *x) {
     unit_show(&v->x_e, x->position.x_e);
+    unit_show(&v->x_m, x->x_m);
     unit_show(&v->n_s, x->n_s);
     unit_show(&v->n_ref, x->n_ref);
     unit_show(&v->M_s, x->M_s);
@@ -198,6 +244,7 @@ static void start(Unit *unit) {
     show_instant(v, &state->drive);
     show_cycle(v, &state->drive, 1.0);
     v->x_e = v->x_s - v->x_a;
+    v->x_m = v->x_a;
 }
 
 /* Inputs `since` the start of the step [s]. */
@@ -221,8 +268,24 @@ static DriveInputs inputs_at(Unit *unit, double since) {
     return in;
 }
 
+/* A wave sampled at fewer than five points of its period is shown as another one. */
+static void warn_of_orders(Unit *unit, Controller *controller, double n) {
+    const Drive *p = &controller->drive;
+    const double order = orders_too_fast(&p->orders, n, p->T_c);
+    if (order > 0) {
+        char text[3][NUMBER_TEXT_SIZE];
+        unit_warn(unit,
+                  "a torque of order %s has %s Hz at n_a = %s rad/s, above a fifth of the sampling rate 1/T_c: it acts "
+                  "with another shape then; lower the order or T_c, or leave it out at such speeds",
+                  number_text(text[0], order), number_text(text[1], order * fabs(n) / (2 * acos(-1.0))),
+                  number_text(text[2], n));
+        controller->warned = true;
+    }
+}
+
 static bool step(Unit *unit, double t, double h) {
-    const Drive *p = unit_derived(unit);
+    Controller *controller = unit_derived(unit);
+    const Drive *p = &controller->drive;
     State *state = unit_state(unit);
     DriveState *x = &state->drive;
     Scalars *v = unit_scalars(unit);
@@ -244,12 +307,15 @@ static bool step(Unit *unit, double t, double h) {
         show_instant(v, x);
         show_cycle(v, x, instants_share(ahead, p->T_c));
     }
+    if (p->orders.count > 0 && !controller->warned) {
+        warn_of_orders(unit, controller, x->orders.n);
+    }
     return true;
 }
 
 /* Slope over the cycle that the communication point ends or lies in; 0 at the start, where there is none yet. */
 static double output_derivative(Unit *unit, unsigned vr) {
-    const Drive *p = unit_derived(unit);
+    const Drive *p = &((const Controller *)unit_derived(unit))->drive;
     const State *state = unit_state(unit);
     const DriveEnd *left = &state->drive.left;
     const DriveEnd *right = &state->drive.right;
@@ -269,6 +335,9 @@ static double output_derivative(Unit *unit, unsigned vr) {
  * the difference of its inputs. */
 static double partial(Unit *unit, unsigned output, unsigned input, bool initial) {
     (void)unit;
+    if (initial && output == VR_x_m) {
+        return input == VR_x_a ? 1.0 : 0.0;
+    }
     if (!initial || output != VR_x_e) {
         return 0.0;
     }

@@ -43,7 +43,7 @@ def test_they_are_those_of_the_initial_values(archive: Archive) -> None:
             np.testing.assert_allclose(_partials(slave, unknown, inputs[name]), quotient, rtol=1e-12, atol=1e-14)
             reacting |= {(output, name) for output, moves in zip(outputs, quotient != 0, strict=True) if moves}
         expected = {
-            "controller": {("x_e", "x_s"), ("x_e", "x_a")},
+            "controller": {("x_e", "x_s"), ("x_e", "x_a"), ("x_m", "x_a")},
             "friction": {("M_fr", "n_fr")},
             "plant": set(),
             "setpoint": set(),

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 STEP = 125e-6  # control cycle of the default machine, the units' default step
 AXES = ("X", "Y", "Z")
 CONTROLLER_OUTPUTS = ("M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q")
+MEASURED_OUTPUTS = ("x_m", "M_a", "x_e")
 SPEEDS, SCALES = tuple(f"{a}.n_a" for a in AXES), tuple(f"{a}.x_a" for a in AXES)
 TOOL, TCP = tuple(f"tool.x_{a}" for a in AXES), tuple(f"tcp.x_{a}" for a in AXES)
 
@@ -147,13 +148,15 @@ def plant_cases() -> list[Pinned]:
 # --- controller -----------------------------------------------------------------------------------------------------
 
 
-def _motion(stop: float, distance: float, disturbance: float, excited: bool = False) -> Table:
-    """A move whose measured values are made up, not simulated: late as neutral delays make it, vibrating at the end."""
+def _motion(stop: float, distance: float, disturbance: float, excited: bool = False, back: bool = False) -> Table:
+    """A move (and one back) whose measured values are made up, not simulated: late as neutral delays make it, and
+    vibrating at the end."""
     t = grid(stop, 1e-3)
     begin, end, late, lead, start = 0.02, 0.14, 4.9e-3, 0.02 / (2 * np.pi), 0.1
 
     def position(time: Array) -> Array:
-        return distance * smooth_step(time, begin, end)
+        there = distance * smooth_step(time, begin, end)
+        return there - distance * smooth_step(time, 0.22, 0.34) if back else there
 
     def measured(time: Array) -> Array:
         return position(time - late) + disturbance * np.sin(2 * np.pi * 21 * time) * smooth_step(time, 0.15, 0.2)
@@ -210,6 +213,20 @@ def controller_cases() -> list[Pinned]:
     # delays of no whole cycles, on both sides of one cycle, and one of the reference model
     delays = {"T_dyn": 0.31e-3, "T_sym": 7.27e-3, "T_ref": 0.29e-3, "speed_window": 3}
     late = {"T_ref": 0.29e-3, "speed_window": 3}
+    # what real drives have besides, all at once; the motion is one of 4 mm about 0.1 m
+    scale = {"measuring.linear": 50e-6, "periodic_error_1.amplitude": 0.2e-6, "periodic_error_1.phase": 0.5}
+    scale |= {"periodic_error_3.amplitude": 2e-6, "periodic_error_3.period": 5e-3}
+    scale |= {"measuring_table.first": 0.099, "measuring_table.spacing": 1e-3}
+    scale |= {f"measuring_table.e_{i}": e * 1e-6 for i, e in enumerate((0, 1, 3, 2, -1, -2, 0, 0, 0, 0, 0))}
+    own = {"backlash_compensation.value": 6e-6, "backlash_compensation.ramp": 5.5e-3}
+    own |= {"leadscrew_compensation.first": 0.0985, "leadscrew_compensation.spacing": 2e-3}
+    own |= {f"leadscrew_compensation.e_{i}": 1e-6 * i * (-1) ** i for i in range(11)}
+    own |= {"leadscrew_compensation_minus.first": 0.09, "leadscrew_compensation_minus.spacing": 5e-3}
+    own |= {f"leadscrew_compensation_minus.e_{i}": 5e-7 * i for i in range(11)}
+    motor = {"cogging_1.amplitude": 0.4, "cogging_2.amplitude": 0.2, "cogging_2.order": 0.5, "cogging_2.phase": 1.0}
+    motor |= {"ripple_1.amplitude": 0.05, "ripple_3.amplitude": -0.1, "ripple_3.order": 3, "ripple_3.phase": -0.4}
+    encoder = {"measuring.indirect": 1, "encoder.eccentricity": 2e-3, "encoder.phase": 0.9}
+    back = _motion(0.4, 4e-3, 10e-6, back=True)
     ideal = {"ideal_current_loop": 1, "reference_model": 0, "filter_1.type": 0}
     move = _motion(0.4, 4e-3, 10e-6)
 
@@ -232,6 +249,10 @@ def controller_cases() -> list[Pinned]:
         case("other_settings", _motion(0.4, -4e-3, 10e-6, True), other),
         case("speed_step", _speed_step(0.06), every=STEP),
         case("ideal_current_loop", move, ideal, ("M_a", "x_e", "n_s", "n_ref", "M_s")),
+        case("measuring_errors", back, scale, MEASURED_OUTPUTS),
+        case("indirect", back, encoder, MEASURED_OUTPUTS),
+        case("corrections", back, own, ("M_a", "x_e")),
+        case("motor_orders", back, motor, ("M_a", "i_q")),
         # in motion, and back within a position cycle; for one cycle; and once more while the axis vibrates
         case("release", _released(move, 0.07, 0.0905, 0.11, 0.110125, 0.25, 0.3), late),
         case("uneven_step", _motion(0.3, 4e-3, 10e-6), None, ("M_a", "n_s"), 0.2e-3, 1e-3),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import controller_effects as effects
 import numpy as np
 from numpy.typing import NDArray
 from reference_files import Case, Table, booleans
@@ -207,8 +208,10 @@ class Cascade:
         n_add: float = 0.0,
         M_add: float = 0.0,
         release: float = 1.0,
+        turns: float | None = None,
     ) -> float:
-        """Work at the next sample instant t_k; return M_a(t_k+1) [N.m]."""
+        """Work at the next sample instant t_k; return M_a(t_k+1) [N.m]. `turns`: speed of the motor itself, where
+        another one is measured."""
         p = self.p
         x_s, x_a = x_s - self.origin, x_a - self.origin
         if not release:
@@ -228,7 +231,7 @@ class Cascade:
         self.u = self.u_next
         self.u_next = u
         self.seen |= {"u_d": float(self.u[0]), "u_q": float(self.u[1])}
-        self._motor(n_a)
+        self._motor(n_a if turns is None else turns)
         return float(1.5 * p["p"] * (self.psi + (p["L_d"] - p["L_q"]) * self.i[0]) * self.i[1])
 
 
@@ -249,13 +252,18 @@ def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
     given.setdefault("n_ffw", np.zeros_like(t))
     if "release" in case.inputs:
         given["release"] = booleans(case.inputs, "release", seen_at)
+    given["turns"] = given["n_a"]
+    given["x_a"], given["n_a"] = effects.measured(p, given["x_a"], given["n_a"])
+    given["x_s"] = effects.corrected(p, given["x_s"], round(p["T_pos"] / T_c))
     cascade = Cascade(case.parameters, float(given["x_s"][0]))
     torque, seen = [0.0], [dict.fromkeys((*OBSERVABLES, "i_d", "i_q"), 0.0)]
+    seen[0]["x_m"] = float(given["x_a"][0])
     for k in range(cycles):
         torque.append(cascade.sample(**{name: float(values[k]) for name, values in given.items()}))
         seen.append(cascade.seen | {"i_d": float(cascade.i[0]), "i_q": float(cascade.i[1])})
+        seen[-1]["x_m"] = float(given["x_a"][k])
     times = np.arange(round(case.stop / every) + 1) * every
     last = np.ceil(times / T_c - 1e-9).astype(int)
-    table = {"time": times, "M_a": np.interp(times, t, torque)}
+    table = {"time": times, "M_a": np.interp(times, t, effects.torque(p, given["turns"][:-1], np.asarray(torque)))}
     table |= {name: np.array([seen[i][name] for i in last]) for name in seen[0]}
     return {"time": times} | {name: table[name] for name in outputs}

@@ -42,6 +42,7 @@ SOURCES_test_setpoints := src/setpoint_fmu/setpoints.c $(addprefix src/fmi2/,csv
 
 SOURCES_test_controller_delay   := $(addprefix src/controller_fmu/,delay.c lag.c measured_speed.c)
 SOURCES_test_controller_drive   := $(filter-out %/model.c,$(wildcard src/controller_fmu/*.c))
+SOURCES_test_controller_effects := $(filter-out %/model.c,$(wildcard src/controller_fmu/*.c))
 SOURCES_test_controller_filters := $(filter-out %/model.c,$(wildcard src/controller_fmu/*.c))
 SOURCES_test_controller_loops   := $(filter-out %/model.c,$(wildcard src/controller_fmu/*.c))
 SOURCES_test_controller_pmsm    := src/controller_fmu/pmsm.c

@@ -13,7 +13,7 @@ from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Machine
 from feedsim.scenario.coupling import SCHEMES, Coupling
-from feedsim.scenario.machine import Parameter
+from feedsim.scenario.parameter_group import Parameter
 from feedsim.structure.pack import POSES_IN_ARCHIVE, Packed, packaging, packed, plant_tables, setpoint_table
 
 UNIT = "machine"  # its archive is machine.fmu

@@ -14,7 +14,7 @@ from feedsim.cosim.unit import Alias
 from feedsim.errors import InputError, few
 from feedsim.fields import did_you_mean
 from feedsim.scenario import ForeignUnit, Machine
-from feedsim.scenario.machine import Parameter
+from feedsim.scenario.parameter_group import Parameter
 from feedsim.scenario.roles import BOOLEAN, DRIVE, Role, Signal
 
 MOST_NAMES = 12  # of an archive's variables that a message lists

@@ -5,7 +5,8 @@ in the controller unit's documentation). At the instants t_k of the control cycl
 
     n_s  = r + n_add                          r: the position controller's setpoint, ramped or held over T_pos
     M_s  = S n_s - C n + M_add                S = K_p + I R, C = K_p + I, I = (K_p T_c/T_n)/(1 - 1/z), R: n_ref/n_s
-    n    = n_a, or V x_a                      V = (1 - 1/z^N)/(N T_c I_P): speed from the position over N cycles
+    n    = n_a, or V x_m                      V = (1 - 1/z^N)/(N T_c I_P): speed from the position over N cycles
+    x_m  = x_a, or I_P J n_a                  J = T_c/2 (z + 1)/(z - 1): position from the motor encoder (indirect)
     M_a  = E M_s - G_n n_a                    E: current setpoint filters and current loop, G_n: what the EMF leaves
 
 Limits (torque, voltage) are not reached. The motor's equations are linearised about a steady speed and torque.
@@ -79,6 +80,13 @@ class LinearDrive:
         last_cycle = np.exp(-s * self.cycles.T_pos)[:, None]
         ticks = np.exp(-s[:, None] * j * T_c) * (share + (1 - share) * last_cycle)
         return np.asarray(ticks.sum(axis=1) / m)
+
+    def measured_position(self, s: Complexes, n_a: Complexes, x_a: Complexes) -> Complexes:
+        """x_m of responses of n_a and x_a, (F, ...) alike; errors of the measuring system are no part of it."""
+        if not self.drive.indirect:
+            return x_a
+        turned = 0.5 * self.cycles.T_c * self.I_P * (np.exp(s * self.cycles.T_c) + 1) / np.expm1(s * self.cycles.T_c)
+        return np.asarray(turned.reshape(-1, *[1] * (n_a.ndim - 1)) * n_a)
 
     # --- speed controller --------------------------------------------------------------------------------------------
 

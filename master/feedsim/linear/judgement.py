@@ -321,6 +321,9 @@ class _Sampled:
                 R = self._bristles(s)
                 n = np.asarray(np.linalg.solve(np.eye(A) + n_fr * R[:, None], n_M))
                 x = np.asarray(x_M - x_fr @ (R[:, :, None] * n))
+            if any(drive.drive.indirect for drive in self.drives):
+                each = [drive.measured_position(s, n[:, i], x[:, i]) for i, drive in enumerate(self.drives)]
+                x = np.stack(each, axis=1)
             seen = n.copy()
             for i, V in enumerate(windows):
                 if V is not None:

@@ -117,7 +117,7 @@ def speed_gain(system: LinearSystem, axis: str, s: Complexes) -> Complexes:
     per_torque = cut.at(s)[:, :, 2 * axes + i]
     n_a = per_torque[:, i]
     V = drive.speed_of_position(s)
-    n = n_a if V is None else V * per_torque[:, axes + i]
+    n = n_a if V is None else V * drive.measured_position(s, n_a, per_torque[:, axes + i])
     E, G_n = drive.torque(s)
     return np.asarray(E * drive.from_speed(s) * n / (1 + G_n * n_a))
 

@@ -213,7 +213,7 @@ class LinearSystem:
         # what the position controllers compute at their instants, per input
         gains = self.position_gains
         answers = np.zeros((len(s), axes, len(self.inputs)), dtype=np.complex128)
-        answers[:, :, : fast.shape[2]] = -gains[:, None] * fast[:, axes : 2 * axes]
+        answers[:, :, : fast.shape[2]] = -gains[:, None] * self._measured(s, fast)
         for i, drive in enumerate(self.drives):
             column = fast.shape[2] + i
             answers[:, i, column] = gains[i] * drive.setpoint_delay(s)
@@ -269,12 +269,12 @@ class LinearSystem:
             drive = self.drives[i]
             E[:, i], G_n = drive.torque(s)
             V, n_a = drive.speed_of_position(s), ports[:, i]
-            n = n_a if V is None else V[:, None] * ports[:, axes + i]
+            n = n_a if V is None else V[:, None] * drive.measured_position(s, n_a, ports[:, axes + i])
             loop[:, i] = (E[:, i] * drive.from_speed(s))[:, None] * n + G_n[:, None] * n_a
         return E, loop
 
     def position_level(self, s: Complexes) -> Complexes:
-        """(F, A, A): what the position controllers sample of x_a per setpoint that they give, position loops open.
+        """(F, A, A): what the position controllers sample of x_m per setpoint that they give, position loops open.
 
         The sum over all components that one answer of a controller has within the ticks of its cycle.
         """
@@ -284,8 +284,16 @@ class LinearSystem:
         axes, ticks = len(self.axes), self.drives[0].ticks
         components = (s[:, None] + 2j * np.pi * np.arange(ticks) / self.machine.cycles.T_pos).ravel()
         ports = self._structure("components", s, lambda _: self._ports(components, "linear"))
-        x_a = (ports[:, axes : 2 * axes, :axes] @ self._torques(components, ports))[:, :, :axes]
-        return np.asarray((x_a * self._ramps(components)[:, None, :]).reshape(len(s), ticks, axes, axes).sum(axis=1))
+        x_m = (self._measured(components, ports)[:, :, :axes] @ self._torques(components, ports))[:, :, :axes]
+        return np.asarray((x_m * self._ramps(components)[:, None, :]).reshape(len(s), ticks, axes, axes).sum(axis=1))
+
+    def _measured(self, s: Complexes, rows: Complexes) -> Complexes:
+        """(F, A, ...): measured positions, of rows n_a of all axes, x_a of all axes."""
+        axes = len(self.axes)
+        if not any(drive.drive.indirect for drive in self.drives):
+            return rows[:, axes : 2 * axes]
+        each = [drive.measured_position(s, rows[:, i], rows[:, axes + i]) for i, drive in enumerate(self.drives)]
+        return np.stack(each, axis=1)
 
     def _ramps(self, s: Complexes) -> Complexes:
         """(F, A): the ramps of the axes' setpoints, of which there are two kinds."""

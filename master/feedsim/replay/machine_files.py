@@ -15,7 +15,7 @@ from feedsim.fields import Quantity
 from feedsim.identify.friction_file import DIGITS, Line, friction_text, interval_text
 from feedsim.identify.result import Estimate
 from feedsim.scenario import Drive, Filter, Friction
-from feedsim.scenario.machine import ParameterGroup
+from feedsim.scenario.parameter_group import ParameterGroup
 
 TOOL = ("X", "Y", "Z")
 CONTROL = 125e-6  # [s] control cycle of a machine that tells none

@@ -23,26 +23,11 @@ from pydantic import (
 from feedsim import variables
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, File, Model, Quantity, Reading, fault, is_multiple, parameter
+from feedsim.scenario.parameter_group import Parameter, ParameterGroup, effects
 from feedsim.scenario.roles import DRIVE, FOREIGN, FRICTION, SHIPPED, ForeignUnit, filled, mapping
 
-Parameter = float | int | bool | str
 FilterType = Literal["off", "second_order", "band_stop", "low_pass"]
 FILTER_TYPES: dict[str, int] = {"off": 0, "second_order": 1, "band_stop": 1, "low_pass": 2}
-
-
-class ParameterGroup(Model):
-    """A group of parameters of an FMI unit, in the unit's names."""
-
-    def parameters(self) -> dict[str, Parameter]:
-        """FMU parameter name -> SI value. What is not given (and not needed) is left to the unit's start value."""
-        values: dict[str, Parameter] = {}
-        for name in type(self).model_fields:
-            value = getattr(self, name)
-            if isinstance(value, ParameterGroup):
-                values |= {f"{name}.{key}": part for key, part in value.parameters().items()}
-            elif value is not None:
-                values[name] = value
-        return values
 
 
 # What a friction file must give; and what the friction is without, where it does not give it: no effect. Any other
@@ -152,8 +137,39 @@ class CurrentController(ParameterGroup):
     T_n: float = _drive("current.T_n")
 
 
-class Drive(ParameterGroup):
+# What a real drive has besides, off where it is not given: groups of the unit's table, and what shows them in results.
+EFFECTS = {
+    **{f"cogging_{i}": f"Cogging torque {i} of the motor" for i in (1, 2, 3)},
+    **{f"ripple_{i}": f"Torque ripple {i} of the motor" for i in (1, 2, 3)},
+    "measuring": "Position measuring system: which one, and its errors",
+    **{f"periodic_error_{i}": f"Periodic error {i} of the measured position" for i in (1, 2, 3)},
+    "measuring_table": "Error of the measured position over position",
+    "encoder": "Eccentricity of the motor encoder",
+    "backlash_compensation": "Backlash compensation of the control",
+    "leadscrew_compensation": "Leadscrew error compensation of the control",
+    "leadscrew_compensation_minus": "Leadscrew error compensation in the negative direction",
+}
+_MEASURED = ("measuring", *(f"periodic_error_{i}" for i in (1, 2, 3)), "measuring_table", "encoder")
+
+if TYPE_CHECKING:
+    _Effects = ParameterGroup
+else:
+    _Effects = effects("controller", EFFECTS)
+
+
+class Drive(_Effects):
     """Position, speed and current control of an axis with its synchronous motor."""
+
+    @property
+    def not_shown(self) -> tuple[str, ...]:
+        """Outputs that say nothing that another one does not say: the measured position, where that is x_a."""
+        return () if any(getattr(self, name) is not None for name in _MEASURED) else ("x_m",)
+
+    @property
+    def indirect(self) -> bool:
+        """Whether the position is that of the motor encoder."""
+        measuring = getattr(self, "measuring", None)
+        return measuring is not None and bool(measuring.indirect)
 
     # position loop
     K_v: float = _drive("K_v")

@@ -51,9 +51,10 @@ class Role:
     outputs: tuple[Signal, ...]
 
     def shown(self, unit: Model) -> list[str]:
-        """The outputs that a unit in this role shows: of the shipped one all."""
+        """The outputs that a unit in this role shows: of the shipped one those that say something."""
         known = unit.variables if isinstance(unit, ForeignUnit) else self.signals
-        return [signal.name for signal in self.outputs if signal.name in known]
+        left_out = getattr(unit, "not_shown", ())
+        return [signal.name for signal in self.outputs if signal.name in known and signal.name not in left_out]
 
     @property
     def signals(self) -> dict[str, Signal]:

@@ -16,7 +16,7 @@ from feedsim import units
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.one_unit import UNIT
 from feedsim.errors import InputError
-from feedsim.scenario.machine import FILTER_TYPES
+from feedsim.scenario.machine import EFFECTS, FILTER_TYPES
 from feedsim.scenario.roles import DRIVE, FRICTION, Role
 from feedsim.ssp.described import RECORDINGS, STRUCTURE
 from feedsim.ssp.parameter_set import Value, number
@@ -251,6 +251,10 @@ def _axis(parts: Parts, axis: str, told: Mapping[str, Any], folder: Path) -> dic
 
 def _shipped_drive(parts: Parts, control: str) -> dict[str, Any]:
     drive = _group(parts, control, leave=("T_c", "T_pos", "I_P"))
+    for key in [key for key in drive if key in EFFECTS]:  # what is off is no part of the machine
+        names = [f"{key}.{name}" for name in drive[key]]
+        if all(parts.values[control][name] == start_value(parts.archives[control], name) for name in names):
+            del drive[key]
     for key, inner in drive.items():
         if key.startswith("filter_") and isinstance(inner, dict) and "type" in inner:
             inner["type"] = FILTER_NAMES.get(inner["type"], inner["type"])

@@ -1,0 +1,156 @@
+"""What real machines have besides, switched on in the whole machine: each shows what its closed form says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from feedsim import cosim, scenario
+from feedsim.cosim import Run
+
+Array = NDArray[np.float64]
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+Z = "machine.axes.Z.drive"
+PITCH, AXES = 0.020, ("X", "Z")
+T_C = 125e-6
+
+Driven = Callable[..., Run]
+
+
+@pytest.fixture(scope="module")
+def moved(fmus: Path) -> Driven:
+    """Z over 100 mm at 5000 mm/min, recorded at every control cycle."""
+
+    @cache
+    def run(*overrides: str) -> Run:
+        path = SCENARIOS / "z_positioning.yaml"
+        return cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus)
+
+    return run
+
+
+def order_of(values: Array, angle: Array, order: float) -> complex:
+    """Complex amplitude of exp(i order angle) in values, by least squares beside a straight line; angle [rad]."""
+    columns = [np.ones_like(angle), angle, np.sin(order * angle), np.cos(order * angle)]
+    a, b = np.linalg.lstsq(np.stack(columns, axis=1), values, rcond=None)[0][2:]
+    return complex(a, b)
+
+
+def turned(run: Run, axis: str) -> Array:
+    """Angle of the motor since the start [rad], speed linear between the rows."""
+    n = run.trace[f"{axis}.n_a"]
+    return np.concatenate([[0.0], np.cumsum(np.diff(run.trace.time) * (n[1:] + n[:-1]) / 2)])
+
+
+def test_cogging_has_its_order_and_amplitude(moved: Driven) -> None:
+    """Torque less K_t i_q: the motor's own share is gone, the rest is A sin(k phi + psi) over the motor's angle."""
+    run = moved(f"{Z}.cogging_1.order=7", f"{Z}.cogging_1.amplitude=0.4 N.m", f"{Z}.cogging_1.phase=30 deg")
+    cruise = (run.trace.time > 0.5) & (run.trace.time < 1.1)
+    rest = run.trace["Z.M_a"] - run.scenario.machine.axes["Z"].drive.K_t * run.trace["Z.i_q"]
+    found = order_of(rest[cruise], turned(run, "Z")[cruise], 7)
+    # the angle ahead is extrapolated: off by a cycle's change of slope, some 1e-6 of a turn
+    assert abs(found) == pytest.approx(0.4, rel=1e-6)
+    assert np.angle(found, deg=True) == pytest.approx(30, abs=1e-4)
+    left = rest - 0.4 * np.sin(7 * turned(run, "Z") + np.pi / 6)
+    assert np.max(np.abs(left[cruise])) < 1e-5  # and it is nothing else
+    # and it moves the axis: seven waves a turn in the speed, none without it
+    speed = order_of(run.trace["Z.n_a"][cruise], turned(run, "Z")[cruise], 7)
+    assert abs(speed) > 20 * abs(order_of(moved().trace["Z.n_a"][cruise], turned(moved(), "Z")[cruise], 7))
+
+
+def test_ripple_goes_with_the_torque(moved: Driven) -> None:
+    run = moved(f"{Z}.ripple_2.order=4", f"{Z}.ripple_2.amplitude=5 %")
+    motor = run.scenario.machine.axes["Z"].drive.K_t * run.trace["Z.i_q"]
+    angle = turned(run, "Z")
+    # phi at the end of a cycle as the last slope foretells it: 1e-4 of the torque while the axis jerks
+    np.testing.assert_allclose(run.trace["Z.M_a"], motor * (1 + 0.05 * np.sin(4 * angle)), rtol=0, atol=2e-3)
+
+
+def test_waves_too_fast_for_the_control_are_told(moved: Driven) -> None:
+    run = moved(f"{Z}.cogging_1.order=400", f"{Z}.cogging_1.amplitude=0.1 N.m")
+    told = [text for text in run.warnings if "fifth of the sampling rate" in text]
+    assert len(told) == 1
+    assert "order 400" in told[0]
+    assert not any("fifth" in text for text in moved(f"{Z}.cogging_1.amplitude=0.1 N.m").warnings)
+
+
+def test_pitch_error_of_a_micrometre_is_one(moved: Driven) -> None:
+    """The loop holds what it measures, so the slide has the error with the sign reversed."""
+    run = moved(f"{Z}.periodic_error_3.amplitude=1 um", f"{Z}.measuring.linear=30 um/m")
+    x_a, x_m = run.trace["Z.x_a"], run.trace["Z.x_m"]
+    start = x_a[0]
+    error = 30e-6 * (x_a - start) + 1e-6 * (np.sin(2 * np.pi * x_a / PITCH) - np.sin(2 * np.pi * start / PITCH))
+    # shown is what was measured at the last instant, a cycle ahead of the row
+    np.testing.assert_allclose(x_m[1:], (x_a + error)[:-1], rtol=0, atol=1e-15)
+    at_rest = run.trace.time > 2.2
+    travelled = 0.1 * (1 if x_a[-1] > start else -1)
+    assert x_a[at_rest].mean() - start == pytest.approx(travelled * (1 - 30e-6), abs=1e-8)
+
+
+def test_indirect_measuring_does_not_see_the_wind_up(moved: Driven) -> None:
+    """The measured position is the motor's angle; the scale differs by what the structure gives way."""
+    run = moved(f"{Z}.measuring.indirect=true")
+    lead = run.scenario.machine.axes["Z"].I_P
+    angle = turned(run, "Z")
+    np.testing.assert_allclose(run.trace["Z.x_m"][1:], run.trace["Z.x_a"][0] + lead * angle[:-1], rtol=0, atol=1e-13)
+    apart = run.trace["Z.x_a"] - run.trace["Z.x_m"]
+    assert 1e-6 < np.max(np.abs(apart)) < 2e-3
+    assert run.trace["Z.x_m"][-1] == pytest.approx(run.trace["Z.x_s"][-1], abs=1e-7)
+
+
+def test_noise_is_that_of_its_seed(moved: Driven) -> None:
+    noisy = [f"{Z}.measuring.noise=50 nm", f"{Z}.measuring.seed=3"]
+    run, other = moved(*noisy), moved(noisy[0], f"{Z}.measuring.seed=4")
+    noise = run.trace["Z.x_m"][1:] - run.trace["Z.x_a"][:-1]
+    assert np.std(noise) == pytest.approx(50e-9, rel=0.03)  # of 20000 samples: 0.5 %
+    assert np.array_equal(run.trace["Z.x_m"], moved(*noisy, "coupling.units=one").trace["Z.x_m"])
+    assert abs(np.corrcoef(noise, other.trace["Z.x_m"][1:] - other.trace["Z.x_a"][:-1])[0, 1]) < 0.05
+
+
+def test_resolution_rounds_what_is_measured(moved: Driven) -> None:
+    x_m = moved(f"{Z}.measuring.resolution=0.5 um").trace["Z.x_m"][1:]
+    np.testing.assert_allclose(x_m / 0.5e-6, np.round(x_m / 0.5e-6), rtol=0, atol=1e-7)
+
+
+def test_backlash_compensation_moves_the_slide_by_half_of_it(moved: Driven) -> None:
+    """The slide ends b/2 further in the direction of its last motion than it does without."""
+    run = moved(f"{Z}.backlash_compensation.value=8 um", f"{Z}.backlash_compensation.ramp=20 ms")
+    side = np.sign(run.trace["Z.x_s"][-1] - run.trace["Z.x_s"][0])
+    apart = run.trace["Z.x_a"][-1] - moved().trace["Z.x_a"][-1]
+    assert apart == pytest.approx(side * 4e-6, abs=5e-9)  # the creep that friction leaves 1 s after the end
+
+
+def test_leadscrew_compensation_takes_off_an_error_of_the_scale(moved: Driven) -> None:
+    """A scale that is 2 um too short at the target, and the table that says so."""
+    error = [f"{Z}.measuring_table.first=0 mm", f"{Z}.measuring_table.spacing=50 mm"]
+    error += [f"{Z}.measuring_table.e_{i}={2 * i} um" for i in range(11)]
+    table = [each.replace("measuring_table", "leadscrew_compensation") for each in error]
+    bare, without, corrected = moved(), moved(*error), moved(*error, *table)
+    goal = bare.trace["Z.x_a"][-1]
+    assert abs(without.trace["Z.x_a"][-1] - goal) == pytest.approx(4e-6, abs=5e-9)
+    # the table is absolute, the scale's error counts from the start at 100 mm, where the table says 4 um
+    assert corrected.trace["Z.x_a"][-1] - goal == pytest.approx(4e-6, abs=5e-9)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        (f"{Z}.cogging_1.amplitude=0.4 N.m", f"{Z}.ripple_1.amplitude=2 %"),
+        (
+            f"{Z}.measuring.indirect=true",
+            f"{Z}.periodic_error_1.amplitude=0.1 um",
+            f"{Z}.encoder.eccentricity=0.1 mrad",
+        ),
+        (f"{Z}.backlash_compensation.value=8 um",),
+    ],
+)
+def test_one_unit_gives_the_same_bits(moved: Driven, changes: tuple[str, ...]) -> None:
+    apart, one = moved(*changes), moved(*changes, "coupling.units=one")
+    assert apart.trace.names == one.trace.names
+    for name in apart.trace.names:
+        assert np.array_equal(apart.trace[name], one.trace[name]), name

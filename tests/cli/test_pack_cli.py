@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from zipfile import ZipFile
 
 import fmpy
 import pytest
@@ -36,6 +37,9 @@ def test_a_scenario_is_packed_with_its_motion(tmp_path: Path, capsys: Capture) -
     assert len(said.splitlines()) == 1
     description = fmpy.read_model_description(str(out))
     assert description.defaultExperiment.stopTime == "2.448"
+    assert float(description.defaultExperiment.stepSize) == 1e-3
+    assert description.modelName == "Z positioning"
+    assert description.coSimulation.modelIdentifier == "machine"
     assert "Test centre; motion: Z positioning" in description.description
     found = starts(out)
     assert (found["motion.built_in"], found["Z.drive.K_v"]) == ("true", "50")
@@ -49,6 +53,21 @@ def test_a_machine_has_setpoints_as_inputs(tmp_path: Path, capsys: Capture, word
     assert run(SCENARIOS / words[0], *words[1:], "--out", out) == 0
     assert "setpoints are inputs" in capsys.readouterr().out
     assert starts(out)["motion.built_in"] == "false"
+    assert fmpy.read_model_description(str(out)).modelName == "Test centre"
+
+
+def test_the_default_step_holds_no_setpoint_longer_than_the_drive(tmp_path: Path) -> None:
+    """With the motion inside nothing is held, and 1 ms is enough for whoever looks; so it is in an SSP file."""
+    out = tmp_path / "machine.fmu"
+    fast = "machine.cycles.position=500 us"
+    for words, step in ((("--inputs",), 0.5e-3), ((), 1e-3)):
+        assert run(SCENARIOS / "z_positioning.yaml", *words, "--set", fast, "--out", out) == 0
+        assert float(fmpy.read_model_description(str(out)).defaultExperiment.stepSize) == step
+    ssp = tmp_path / "one.ssp"
+    words = ["ssp", str(SCENARIOS / "z_positioning.yaml"), "--one", "--set", fast, "--out", str(ssp)]
+    assert cli.main(words) == 0
+    with ZipFile(ssp) as files:
+        assert 'baseStepSize="0.001"' in files.read("SystemStructure.ssd").decode()
 
 
 def test_the_same_bytes_again(tmp_path: Path) -> None:

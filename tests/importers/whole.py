@@ -63,7 +63,9 @@ def load(name: str, fmus: Path, folder: Path, *changes: str) -> Whole:
     loaded = scenario.load(SCENARIOS / f"{name}.yaml", made)
     program = nc.plan(loaded)
     archive = folder / f"{name}.fmu"
-    pack_whole(fmus / "machine.fmu", archive, loaded.machine, coupling=loaded.coupling, program=program)
+    pack_whole(
+        fmus / "machine.fmu", archive, loaded.machine, coupling=loaded.coupling, program=program, model=loaded.name
+    )
     trace = cosim.run(loaded, program=program, fmus=fmus).trace
     return Whole(archive, tuple(loaded.machine.axes), trace, program, made)
 

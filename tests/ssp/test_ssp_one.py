@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import pytest
 
 from feedsim import analysis, cosim, scenario, ssp
@@ -40,7 +41,7 @@ def test_it_runs_as_the_scenario_does(short: Path, one: Path, fmus: Path, overri
         assert axis.model_dump(exclude={"drive", "friction"}) == other.model_dump(exclude={"drive", "friction"})
 
 
-def test_what_is_inside(one: Path) -> None:
+def test_what_is_inside(one: Path, short: Path) -> None:
     files = contents(one)
     assert set(files) == {STRUCTURE, MACHINE}
     structure = files[STRUCTURE].decode()
@@ -48,6 +49,9 @@ def test_what_is_inside(one: Path) -> None:
     assert "<ssd:Connection " not in structure
     assert 'kind="input"' not in structure
     assert 'baseStepSize="0.001"' in structure
+    packed = one.with_name("machine.fmu")
+    packed.write_bytes(files[MACHINE])
+    assert fmpy.read_model_description(str(packed)).modelName == scenario.load(short).name
 
 
 def test_it_is_what_the_standard_wants(one: Path) -> None:

@@ -60,6 +60,7 @@ def pack(options: Namespace) -> None:
             base, folder / "machine.fmu", machine, coupling=plan.coupling if plan else None, program=program,
             name=machine.name if plan is None or program is None else f"{machine.name}; motion: {plan.name}",
             note=machine.note if program is None else " ".join(subject.notes),
+            model=machine.name if plan is None or program is None else plan.name,
         )  # fmt: skip
         with written_whole(options.out) as file:
             file.write(packed.path.read_bytes())

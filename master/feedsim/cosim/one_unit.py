@@ -28,6 +28,7 @@ def pack_whole(
     program: Program | None = None,
     name: str = "",
     note: str = "",
+    model: str = "",
     trial: bool = True,
 ) -> Packed:
     """Pack a machine into the archive `base` of the unit `machine`; write it to `out`, whole or not at all.
@@ -36,6 +37,7 @@ def pack_whole(
         coupling: how plant and friction are exchanged inside; default: as a scenario has it that does not say.
         program: motion that the unit holds; without, its setpoints are inputs.
         name, note: what the archive's description and documentation say of the machine.
+        model: what importers show as the model's name; default: that of the unit.
         trial: instantiate the packed unit once, where the base has a binary for this platform.
 
     Raises:
@@ -52,7 +54,7 @@ def pack_whole(
             setpoint_table(program) if program is not None else None,
             {name: whole_machine.spelled(value) for name, value in settings.items()},
         )
-        return packed(base, out, given, name=name, note=note, trial=trial)
+        return packed(base, out, given, name=name, note=note, model=model, trial=trial)
 
 
 def pack_tables(base: Path, out: Path, machine: Machine) -> None:

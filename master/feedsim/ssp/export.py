@@ -176,7 +176,7 @@ def _files(
             archives.values(), [c.unit for component in components for c in component.connectors if c.unit]
         ),
         stop=program.duration,
-        step=machine.cycles.T_pos if whole else machine.cycles.T_c,
+        step=float(archives[UNIT].description.defaultExperiment.stepSize) if whole else machine.cycles.T_c,
         scenario=described.text(scenario),
         description=" ".join(filter(None, (f"{scenario.name}.", scenario.note, machine.note))),
         tool="feedsim",

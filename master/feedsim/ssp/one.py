@@ -27,6 +27,7 @@ def pack(scenario: Scenario, program: Program, fmus: Path, out: Path) -> None:
     pack_whole(
         fmus / f"{UNIT}.fmu", out, machine, coupling=scenario.coupling, program=program, trial=False,
         name=f"{machine.name}; motion: {scenario.name}", note=" ".join(filter(None, (scenario.note, machine.note))),
+        model=scenario.name,
     )  # fmt: skip
 
 
@@ -36,7 +37,7 @@ def roles(structure: Structure, archives: Mapping[str, Archive], where: str) -> 
     Raises:
         InputError: it does not stand alone, or is connected.
     """
-    names = [name for name, archive in archives.items() if archive.description.modelName == UNIT]
+    names = [name for name, archive in archives.items() if archive.description.coSimulation.modelIdentifier == UNIT]
     if not names:
         return None
     name, archive = names[0], archives[names[0]]

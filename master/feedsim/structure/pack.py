@@ -108,12 +108,21 @@ def setpoint_table(program: Program) -> Setpoints:
 
 
 def packed(
-    base: Path, out: Path, given: Resources, *, name: str = "", note: str = "", trial: bool = True, level: int = 9
+    base: Path,
+    out: Path,
+    given: Resources,
+    *,
+    name: str = "",
+    note: str = "",
+    model: str = "",
+    trial: bool = True,
+    level: int = 9,
 ) -> Packed:
-    """Pack the unit of the archive `base` with what is `given`; the rest as in `pack`."""
+    """Pack the unit of the archive `base` with what is `given`; `model`: its modelName, where it is not the unit's; the
+    rest as in `pack`."""
     from feedsim_packager.machine import named
     from feedsim_packager.repack import repack
 
     with TemporaryFolder() if trial else nullcontext() as stage:
-        done = repack(base, given, named(name, note), out, trial_run=trial, level=level, stage=stage)
+        done = repack(base, given, named(name, note, model), out, trial_run=trial, level=level, stage=stage)
     return Packed(done.path, done.size, done.guid, done.platforms)

@@ -80,7 +80,7 @@ def describe(
         "fmiModelDescription",
         {
             "fmiVersion": "2.0",
-            "modelName": table.unit,
+            "modelName": machine.model or table.unit,
             "guid": guid,
             **({"description": summary} if summary else {}),
             "version": version,

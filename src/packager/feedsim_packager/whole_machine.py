@@ -17,6 +17,8 @@ from .variables import fnv1a_64
 
 SETTINGS = "resources/settings.csv"
 HEADER = ("name", "value")
+POSITION_CYCLE = "drive.T_pos"  # of an axis
+STEP = 1e-3  # s: results are the same at any, fewer calls cost less, and nobody looks more often
 PLANT_HASH, MOTION_HASH = "hash.plant", "hash.motion"
 
 
@@ -66,8 +68,12 @@ class WholeMachine(Resources):
         return f"{self.tables.summary()} {motion}"
 
     def experiment(self) -> Experiment:
-        """That of the motion."""
-        return self.motion.experiment() if self.motion else Experiment()
+        """To the end of the motion in steps of STEP; without a motion in those of the position cycle where it is
+        shorter, so that no setpoint is held for longer."""
+        if self.motion:
+            return Experiment(self.motion.experiment().stop, STEP)
+        cycles = (float(self.settings.get(f"{axis}.{POSITION_CYCLE}", STEP)) for axis in self.axis_names)
+        return Experiment(step=min(STEP, *cycles))
 
     def embedded_source(self) -> bytes:
         """All files but the poses, and but a large motion."""

@@ -141,8 +141,9 @@ release: $(ALL_FMUS) $(VENV)/.run $(ZIG_HERE) ## wheels, source archive, archive
 # --- run -----------------------------------------------------------------------------------------------------------
 
 run: fmus $(VENV)/.run ## build, run both scenarios, leave results, figures and reports in results/
-	@set -e; for scenario in $(SCENARIOS); do \
-	    $(VENV)/bin/feedsim run scenarios/$$scenario.yaml --out $(RESULTS)/$$scenario; done
+	@set -e; if $(MAKE) -s page-module; then page=--page; else echo "no compiler for WebAssembly here: no pages"; fi; \
+	for scenario in $(SCENARIOS); do \
+	    $(VENV)/bin/feedsim run scenarios/$$scenario.yaml $$page --out $(RESULTS)/$$scenario; done
 	@echo "open $(RESULTS)/*/report.html"
 
 # --- test ----------------------------------------------------------------------------------------------------------

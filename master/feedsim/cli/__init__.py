@@ -29,6 +29,7 @@ from feedsim.cli import (
     identify,
     machine,
     pack,
+    page,
     replay,
     run,
     show,
@@ -58,6 +59,7 @@ examples:
   feedsim compensate xz_circle.yaml
   feedsim circle ballbar.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
   feedsim pack xz_circle.yaml --out machine.fmu
+  feedsim page xz_circle.yaml --out machine.html
   feedsim show results/z results/lugre
   feedsim ssp xz_circle.yaml --out xz_circle.ssp
   feedsim run xz_circle.ssp
@@ -68,7 +70,7 @@ examples:
 
 COMMANDS = (
     example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, replay.IDENTIFY_DRIVE,
-    replay.REPLAY, compensate.COMMAND, circle.COMMAND, show.COMMAND, pack.COMMAND, run.SSP, sweep.COMMAND,
+    replay.REPLAY, compensate.COMMAND, circle.COMMAND, show.COMMAND, pack.COMMAND, page.COMMAND, run.SSP, sweep.COMMAND,
     compare.COMMAND, files.SCHEMA, files.CONVERT,
 )  # fmt: skip
 

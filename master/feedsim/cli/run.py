@@ -39,11 +39,15 @@ SSP_EXAMPLES = """examples:
 def run(options: Namespace) -> None:
     """feedsim run."""
     from feedsim import analysis, cosim
+    from feedsim.page.content import content
+    from feedsim.page.html import html
     from feedsim.report import run as report
 
     directory: Path = options.out or Path("results") / options.scenario.stem
     with _subject(options) as (plan, program, fmus, worded, named):
         analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
+        if options.page:
+            content(plan, program, fmus=fmus)  # nor a page
         with (
             results_in(directory, report.check_writable, report.input_paths(plan), options.overrides),
             _rows_kept(report.growing(directory)) as recorded,
@@ -57,7 +61,8 @@ def run(options: Namespace) -> None:
             result = replace(result, warnings=worded(result.warnings))
             figures = analysis.evaluate(result)
             causes = analysis.diagnoses(result)
-            report.write(result, figures, directory, recorded, causes, drawn=options.figures)
+            page = html(result, fmus=fmus) if options.page else ""
+            report.write(result, figures, directory, recorded, causes, drawn=options.figures, page=page)
     warnings = (*result.warnings, *analysis.doubts(figures, causes))
     finish(
         options.quiet,
@@ -164,6 +169,9 @@ error, with its place in the archive and its SHA-256, before it executes it. `fe
 it judges what the archives say of themselves, and tells what it has not checked. No text in an archive makes feedsim
 read a file outside of it."""
 
+PAGE = Option(
+    "--page", "", "leave the machine as a page that computes beside the report, which links it (docs/page.md)"
+)
 SUBJECT = (
     FMUS,
     Option("scenario", "SCENARIO", "scenario file (docs/scenarios.md), or SSP (docs/ssp.md)", type=Path),
@@ -173,7 +181,7 @@ RUN = Command(
     "run",
     "run a scenario or an SSP; write result.csv, summary.json, report.html and figures",
     run,
-    (*SUBJECT, out("<name of the scenario file>"), FIGURES, QUIET),
+    (*SUBJECT, out("<name of the scenario file>"), FIGURES, PAGE, QUIET),
     epilog=TRUST,
 )
 VALIDATE = Command(

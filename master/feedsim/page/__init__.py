@@ -3,3 +3,7 @@
 May use analysis, cosim and report.
 Start with `content.py`, what a page holds; `html.py` puts it together, and `template/` is what runs in a browser.
 """
+
+from feedsim.page.html import write
+
+__all__ = ["write"]

@@ -119,13 +119,12 @@ def _number(key: str, group: str, name: str, value: float, table: Variable, sets
 
 
 def _ends(value: float, table: Variable) -> tuple[float, float]:
-    """Ends of a slider: the table's where both are near, else some times the value or the table's start."""
+    """Ends of a slider: the table's where the value is not lost between them, else some times the value."""
     size = abs(value) or abs(float(table.start)) or 1.0
-    if math.isfinite(table.minimum) and table.maximum <= 10:
+    if math.isfinite(table.minimum) and table.maximum <= 2 * REACH * size:
         return table.minimum, table.maximum
-    return max(table.minimum, value / REACH if value > 0 else (0.0 if value == 0 else -REACH * size)), min(
-        table.maximum, REACH * size
-    )
+    low = value / REACH if value > 0 else min(0.0, REACH * value)
+    return max(table.minimum, low), min(table.maximum, REACH * size)
 
 
 def _of_motions(scenario: Scenario) -> list[Knob]:

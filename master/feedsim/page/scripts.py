@@ -1,24 +1,39 @@
-"""The scripts of a page: what computes, for a worker, and what shows, for the page itself."""
+"""The scripts and styles of a page: what computes, for a worker, and what shows, for the page itself."""
 
 from __future__ import annotations
 
 from functools import cache
 from importlib import resources
 
+from feedsim.report.page import drawing, style
+
 COMPUTING = ("unit.js", "plan.js", "figures.js", "bode.js", "work.js")
+SHOWING = ("figures.js", "pictures.js", "lessons.js", "page.js")
 
 
 @cache
 def computing() -> str:
     """Unit, planner, figures: without anything of a browser, so that node runs it as well."""
-    return "".join(_text(name) for name in COMPUTING)
+    return "".join(text(name) for name in COMPUTING)
 
 
 @cache
 def worker() -> str:
     """The worker's script."""
-    return '"use strict";\n' + computing() + _text("worker.js")
+    return '"use strict";\n' + computing() + text("worker.js")
 
 
-def _text(name: str) -> str:
+@cache
+def showing() -> str:
+    """The page's own script: charts of reports, and what is about knobs."""
+    return '"use strict";\n(() => {\n' + drawing() + "".join(text(name) for name in SHOWING) + "})();\n"
+
+
+def styles() -> str:
+    """The style sheet: that of reports, and the page's own."""
+    return style() + text("page.css")
+
+
+def text(name: str) -> str:
+    """A file of the template folder."""
     return (resources.files("feedsim.page") / "template" / name).read_text(encoding="utf-8")

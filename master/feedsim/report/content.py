@@ -22,10 +22,10 @@ TILE_DIGITS = 4
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch of text that is set apart; a link leads to an anchor of the same page."""
+    """A stretch of text that is set apart; a link leads to an anchor of the same page, a file to one beside it."""
 
     text: str
-    kind: Literal["code", "muted", "alarm", "link"]
+    kind: Literal["code", "muted", "alarm", "link", "file"]
     anchor: str = ""
 
 

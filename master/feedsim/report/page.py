@@ -6,6 +6,7 @@ import base64
 import hashlib
 from functools import cache
 from importlib import resources
+from typing import TYPE_CHECKING
 
 from feedsim.report.chart.embedded import embedded
 from feedsim.report.chart.still import still
@@ -13,22 +14,16 @@ from feedsim.report.content import Report
 from feedsim.report.formatting import typeset
 from feedsim.report.style import PALETTE
 
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
 # What draws the charts and what a reader does with them, in their order.
 SCRIPTS = ("chart_draw.js", "chart_use.js")
 
 
 def html(report: Report, kind: str = "") -> str:
     """HTML text; all text of the report is escaped. kind: of the result, which the page names as its generator."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # on first use: most commands write no report
-
-    environment = Environment(
-        loader=PackageLoader("feedsim.report", "template"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    environment = _environment()
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
     environment.filters["typeset"] = typeset
     environment.filters["kind"] = lambda part: type(part).__name__
@@ -40,15 +35,34 @@ def html(report: Report, kind: str = "") -> str:
     )  # fmt: skip
 
 
+def style() -> str:
+    """The style sheet of a page."""
+    return _environment().get_template("style.css.j2").render(palette=PALETTE)
+
+
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # on first use: most commands write no report
+
+    return Environment(
+        loader=PackageLoader("feedsim.report", "template"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def drawing() -> str:
+    """What draws the charts of a page and what a reader does with them."""
+    folder = resources.files("feedsim.report") / "template"
+    return "".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
+
+
 @cache
 def script() -> str:
     """The only script of a page."""
-    folder = resources.files("feedsim.report") / "template"
-    return (
-        '"use strict";\n(() => {\n'
-        + "".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
-        + "})();\n"
-    )
+    return '"use strict";\n(() => {\n' + drawing() + "})();\n"
 
 
 def policy(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from feedsim.analysis import (
 from feedsim.cosim import Run
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
-from feedsim.report.content import Report, Section, Table, Tile, tile_value
+from feedsim.report.content import Paragraph, Report, Section, Span, Table, Tile, tile_value
 from feedsim.report.formatting import counted, duration, number, typeset
 from feedsim.report.partial import PARTIAL, Partial
 from feedsim.report.picture import Picture
@@ -46,7 +47,7 @@ from feedsim.scenario import Level, Logging
 from feedsim.trace import Trace, write_csv
 from feedsim.units import show
 
-RESULT, LOG = "result.csv", "log.csv"
+RESULT, LOG, PAGE = "result.csv", "log.csv", "machine.html"
 TILES = {
     "overshoot": "overshoot",
     "settling_time": "settling time",
@@ -77,12 +78,17 @@ COUPLING = {
 }
 
 
+TRY_IT = Paragraph(
+    (Span("Try it: turn the knobs of this machine", "file", PAGE), ", and see what becomes of the pictures below.")
+)
+
+
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless a run's results can be written to ``directory`` without one of ``inputs`` being lost.
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (RESULT, REPORT, SUMMARY, LOG, PARTIAL), inputs, kind="run", own=(PARTIAL,))
+    check_place(directory, (RESULT, REPORT, SUMMARY, LOG, PAGE, PARTIAL), inputs, kind="run", own=(PARTIAL,))
 
 
 def growing(directory: Path | str) -> Partial:
@@ -98,13 +104,15 @@ def write(
     causes: Mapping[str, Diagnosis] | None = None,
     *,
     drawn: Sequence[str] = (),
+    page: str = "",
 ) -> tuple[Path, ...]:
     """Write result.csv, summary.json, report.html, log.csv, if there is one, and figures; returns their paths.
 
     figures: as from ``analysis.evaluate``. recorded: the run's rows where they have been written already, in the same
     directory; the file becomes result.csv, or stays as it is where the results cannot be written. Files of an earlier
     run are replaced. causes: as from ``analysis.diagnoses``, which is asked where they are not given. drawn: kinds of
-    files that figures/* are drawn as. Raises OutputError.
+    files that figures/* are drawn as. page: the machine as a page that computes, which the report links. Raises
+    OutputError.
     """
 
     def result(path: Path) -> Path | None:
@@ -117,8 +125,12 @@ def write(
     files: dict[str, Content] = {RESULT: result}
     if run.log is not None:
         files[LOG] = partial(write_csv, trace=run.log)
+    if page:
+        files[PAGE] = page
     causes = diagnoses(run) if causes is None else causes
     report = report_of(run, figures, draw(run, figures), causes)
+    if page:
+        report = replace(report, main=[TRY_IT, *report.main])
     return write_report(
         directory, report, partial(summary, run, figures, causes=causes), files, drawn, kind="run", own=(PARTIAL,)
     )

@@ -1,0 +1,167 @@
+"""The page: one file of HTML that asks nobody for anything. All text of a scenario is escaped.
+
+What a viewer without scripts shows is the scenario as it is written: still pictures, and the table of figures.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import CircleTask, Figure, PositioningTask, evaluate, tasks
+from feedsim.cosim import Run
+from feedsim.errors import InputError
+from feedsim.page.content import Content, content
+from feedsim.page.scripts import showing, styles, text, worker
+from feedsim.report.chart.still import still
+from feedsim.report.picture import Picture
+from feedsim.report.run.axis_plots import positioning_picture
+from feedsim.report.run.circle_plots import contour_picture, torque_picture
+from feedsim.report.style import PALETTE
+from feedsim.trace.files import written_whole
+
+# With a plant of thousands of modes or a grid of poses; a mail takes it, and a phone.
+LARGEST = 1_500_000  # bytes
+MARK = b'content="feedsim page"'
+
+
+def write(run: Run, out: Path, wanted: Sequence[str] = (), fmus: Path | None = None) -> int:
+    """Write the page of a run's scenario, whole or not at all; returns its size [bytes].
+
+    wanted: patterns of the knobs, see :func:`feedsim.page.knobs.chosen`. fmus: folder of archives and module.
+
+    Raises:
+        InputError: there is no such page (:func:`feedsim.page.content.content`), or it is too large.
+        OutputError: `out` cannot be written.
+    """
+    page = html(run, wanted, fmus).encode()
+    if len(page) > LARGEST:
+        raise InputError(
+            f"{run.scenario.file}: its page takes {len(page) / 1e6:.3g} MB; allowed are {LARGEST / 1e6:g} MB: "
+            "take fewer modes (feedsim machine build), no grid of poses, or shorter motions that a page does not plan"
+        )
+    with written_whole(out) as file:
+        file.write(page)
+    return len(page)
+
+
+def html(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
+    """The text of the page; arguments and errors as for :func:`write`."""
+    held = content(run.scenario, run.program, wanted, fmus)
+    scenario, machine = run.scenario, run.scenario.machine
+    shown = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]
+    moved = [axis for axis in machine.axes if any(axis in segment.axes for segment in run.program.segments)]
+    planes = [list(task.turn.axes) for task in shown if isinstance(task, CircleTask)]
+    data = held.data | {
+        "axes": list(machine.axes), "moved": moved, "plane": planes[0] if planes else None,
+        "signs": held.data["machine"]["signs"],
+    }  # fmt: skip
+    # The axis whose loop is shown at first stands last: that of the circle's ordinate, or the one that moves.
+    order = [axis for axis in machine.axes if axis not in moved] + moved
+    script, cycle = showing(), f"control cycle {machine.cycles.T_c * 1e6:g} us"
+    parts = {
+        "policy": _policy(script), "title": escape(scenario.name), "style": styles(),
+        "machine": escape(f"{machine.name}: axes {', '.join(machine.axes)}; {cycle}"),
+        "notes": "\n".join(f'<p class="note">{escape(note)}</p>' for note in _notes(run, held)),
+        "knobs": "\n".join(_groups(held.data["knobs"])), "pictures": "\n".join(_pictures(run, shown)),
+        "axes": "".join(f"<option{' selected' * (axis == order[-1])}>{escape(axis)}</option>" for axis in order),
+        "figures": _table(evaluate(run)), "footer": _footer(held), "worker": worker(), "script": script,
+        "charts": _json({"charts": {}, "arrays": [], "palette": {n: c for n, c, _ in PALETTE} | {"ground": "#ffffff"}}),
+        "data": _json(data | {"axes": order}),
+    }  # fmt: skip
+    return re.sub(r"\{(\w+)\}", lambda found: parts[found[1]], text("page.html"))
+
+
+def _policy(script: str) -> str:
+    """This script and no other, its worker and the module within; nobody is asked for anything."""
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+    return (
+        "default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:; "
+        f"script-src 'sha256-{digest}' 'wasm-unsafe-eval'"
+    )
+
+
+def _json(data: Mapping[str, Any]) -> str:
+    """For an element of the page: nothing in it ends the element."""
+    written = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return written.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _notes(run: Run, held: Content) -> Iterable[str]:
+    yield from filter(None, [run.scenario.machine.note, run.scenario.note])
+    if held.left_out:
+        yield "Not in this page: " + "; ".join(held.left_out) + "."
+    if run.warnings:
+        yield "As written, a run warns: " + "; ".join(run.warnings) + "."
+
+
+def _groups(knobs: Sequence[Mapping[str, Any]]) -> Iterable[str]:
+    numbered = list(enumerate(knobs))
+    for group, members in groupby(numbered, key=lambda each: each[1]["group"]):
+        rows = "\n".join(_row(k, knob) for k, knob in members)
+        yield f"<fieldset><legend>{escape(group)}</legend>\n{rows}\n</fieldset>"
+
+
+def _row(k: int, knob: Mapping[str, Any]) -> str:
+    unit = "" if knob["shown"] in ("", "1") else f" [{knob['shown']}]"
+    name, about = escape(f"{knob['name']}{unit}"), escape(str(knob["text"]))
+    label = escape(f"{knob['group']}, {knob['name']}: {knob['text']}", quote=True)
+    if knob["choices"]:
+        options = "".join(f"<option>{escape(choice)}</option>" for choice in knob["choices"])
+        control = f'<select id="value-{k}" aria-label="{label}">{options}</select>'
+    else:
+        control = (
+            f'<input type="range" min="0" max="400" step="1" aria-label="{label}, slider">'
+            f'<input type="number" id="value-{k}" step="any" aria-label="{label}">'
+        )
+    back = f'<button type="button" aria-label="{label}: back to the scenario\'s value" title="back">↺</button>'
+    return f'<div class="knob" id="knob-{k}"><label for="value-{k}"><b>{name}</b> {about}</label>{control}{back}</div>'
+
+
+def _pictures(run: Run, shown: Sequence[CircleTask | PositioningTask]) -> Iterable[str]:
+    signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
+    for task in shown:
+        end = re.sub(r"[^A-Za-z0-9]+", "-", task.prefix)
+        if isinstance(task, CircleTask):
+            yield _figure(contour_picture(run.trace, task.turn, f"contour-{end}", task.back))
+            if (torque := torque_picture(run.trace, task.turn, signs, f"torque-{end}")) is not None:
+                yield _figure(torque, bare=True)
+        else:
+            stop = positioning_picture(
+                run.trace, task.approach, task.figures(run.trace), f"stop-{end}", band=task.band,
+                torque_sign=signs[task.approach.axis],
+            )  # fmt: skip
+            yield _figure(stop)
+
+
+def _figure(picture: Picture, *, bare: bool = False) -> str:
+    """bare: without a still picture, which would make the page half as large again."""
+    kept = "" if bare or picture.chart is None else still(picture.chart, picture.stem, picture.title)
+    title = escape(picture.title)
+    return (
+        f'<figure id="{picture.stem}"{" class=needs" * bare} data-title="{title}"><h2>{title}</h2>'
+        f'<div class="scroll still">{kept}</div></figure>'
+    )
+
+
+def _table(figures: Mapping[str, Figure]) -> str:
+    rows = "".join(
+        f'<tr><th scope="row">{escape(name)}</th><td class="number">{escape(str(figure))}</td></tr>'
+        for name, figure in figures.items()
+    )
+    head = '<th scope="col">figure</th><th scope="col" class="number">as written</th>'
+    return f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody>"
+
+
+def _footer(held: Content) -> str:
+    return (
+        f"feedsim; the unit machine {escape(str(held.data['guid']))}, WebAssembly module SHA-256 "
+        f"<code>{held.sha256}</code>. It computes here, and nothing leaves this page."
+    )

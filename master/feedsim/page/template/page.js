@@ -1,0 +1,288 @@
+// The page: knobs, states, what the worker answers, figures, exports. Charts are made by pictures.js and drawn as in reports.
+const HELD = JSON.parse(document.getElementById("feedsim-page").textContent), KNOBS = HELD.knobs;
+const by = id => document.getElementById(id), START = KNOBS.map(knob => knob.value);
+const view = { state: [...START], undo: [], redo: [], found: null, loop: null, kept: null, kept_loop: null, first: null, lesson: null, step: 0 };
+const STEPS = 400; // of a slider
+
+// --- values -------------------------------------------------------------------------------------------------------------
+
+const limited = (knob, value) => Math.min(Math.max(value, knob.least ?? -Infinity), knob.most ?? Infinity);
+const shown_value = (knob, value) => knob.choices.length ? value : number(value * knob.factor, 6).replaceAll("−", "-").replace(/×10.*/, "") && String(Number((value * knob.factor).toPrecision(7)));
+const unit_text = knob => knob.shown === "1" ? "" : knob.shown.replace("N.m", "N·m").replaceAll(".s", "·s").replace(/^u(?=[a-z])/, "µ");
+const logarithmic = knob => knob.low > 0 && knob.high / knob.low > 4;
+
+function place_of(knob, value) {
+  const share = logarithmic(knob) ? Math.log(value / knob.low) / Math.log(knob.high / knob.low) : (value - knob.low) / (knob.high - knob.low || 1);
+  return Math.round(STEPS * Math.min(Math.max(share || 0, 0), 1));
+}
+
+function value_at(knob, place) {
+  const share = place / STEPS, value = logarithmic(knob) ? knob.low * (knob.high / knob.low) ** share : knob.low + share * (knob.high - knob.low);
+  return limited(knob, Number((value * knob.factor).toPrecision(4)) / knob.factor);
+}
+
+// --- the worker: the newest state wins ----------------------------------------------------------------------------------
+
+const blob = new Blob([by("feedsim-worker").textContent], { type: "text/javascript" });
+const worker = new Worker(URL.createObjectURL(blob));
+let asked = 0, busy = false, again = false, ready = false, chosen_axis = HELD.axes[HELD.axes.length - 1];
+
+function ask() {
+  if (!ready || busy) { again = true; return; }
+  again = false;
+  busy = true;
+  worker.postMessage({ id: ++asked, state: view.state, axis: chosen_axis });
+}
+
+worker.onmessage = ({ data }) => {
+  if (data.failed) return tell(`This machine cannot be computed here: ${data.failed}`, true);
+  if (data.ready) { ready = true; by("page").classList.add("alive"); return ask(); }
+  if (data.id !== asked) return;
+  if (data.share !== undefined) { by("progress").value = data.share; return; }
+  by("progress").value = 1;
+  if (data.loop) {
+    view.loop = data.loop;
+    show_loop();
+    document.documentElement.dataset.loops = String(asked);
+    return;
+  }
+  busy = false;
+  if (data.problem) tell(`With these values there is no run: ${data.problem}`, true);
+  else {
+    view.found = data.found;
+    view.first = view.first || data.found;
+    show();
+  }
+  document.documentElement.dataset.shown = String(asked); // of the answers, for those who wait
+  if (again) ask();
+};
+worker.onerror = event => tell(`The worker has stopped: ${event.message}`, true);
+
+// --- what is seen -------------------------------------------------------------------------------------------------------
+
+function tell(text, wrong = false) {
+  by("problem").textContent = text;
+  by("problem").hidden = !text;
+  by("problem").classList.toggle("warning", wrong);
+  by("pictures").classList.toggle("stale", wrong);
+}
+
+function draw_chart(stem, chart) {
+  const figure = by(stem), live = lives.find(each => each.stem === stem), before = DATA.charts[stem];
+  DATA.charts[stem] = chart;
+  if (!live) begin(figure);
+  else {
+    const names = each => JSON.stringify([each.panels.length, each.panels.map(panel => (panel.curves || []).map(curve => curve.name))]);
+    live.chart = chart;
+    live.told_apart();
+    if (names(before) !== names(chart)) { live.hidden.clear(); live.bar.replaceChildren(); live.buttons(); live.zooms = chart.panels.map(() => ({ x: null, y: null })); }
+    chart.panels.forEach((panel, k) => { if (panel.kind === "polar") live.reaches[k] = panel.ring * panel.rings / 2 ** Number(live.slider ? live.slider.value : 0); });
+    live.draw();
+  }
+  if (before) forget(before);
+}
+
+const slug = text => text.replace(/[^A-Za-z0-9]+/g, "-");
+
+function show() {
+  tell("");
+  const { found, kept } = view;
+  const same = kept && kept.tasks.map(each => each.prefix).join() === found.tasks.map(each => each.prefix).join() ? kept : null;
+  for (const task of found.tasks) {
+    if (task.kind === "circle") {
+      draw_chart(`contour-${slug(task.prefix)}`, contour_chart(task, found, same));
+      draw_chart(`torque-${slug(task.prefix)}`, torque_chart(task, found, same, HELD.signs));
+    } else draw_chart(`stop-${slug(task.prefix)}`, stop_chart(task, found, same, HELD.signs));
+  }
+  draw_chart("following", following_chart(HELD.moved, found, kept));
+  show_figures();
+  show_warnings();
+  lesson_look();
+}
+
+function show_loop() {
+  const { loop } = view, { axis } = loop;
+  if (!loop.frequency.length) by("margins").textContent = loop.problem || `The loops of axis ${axis} are unstable with any K_v tried: there is no frequency response to show.`;
+  else {
+    draw_chart("bode", bode_chart(loop, view.kept_loop && view.kept_loop.axis === axis ? view.kept_loop : null));
+    const gain = Number.isFinite(loop.gain_margin) ? `${fixed(20 * Math.log10(loop.gain_margin), 1)} dB at ${number(loop.gain_at, 3)} Hz` : "none is reached";
+    by("margins").textContent = `Axis ${axis}, sliding (friction left out): gain margin ${gain}; phase margin ${fixed(loop.phase_margin, 0)}° at ${number(loop.phase_at, 3)} Hz. Usual are 6 dB and 30°.`;
+  }
+  show_warnings();
+  lesson_look();
+}
+
+function show_warnings() {
+  const list = [...(view.found ? view.found.warnings : [])];
+  if (view.loop && view.loop.growing) list.unshift(`axis ${view.loop.axis}: the loops are unstable with these values: an impulse at its setpoint grows`);
+  by("warnings").replaceChildren(...list.map(text => { const item = document.createElement("li"); item.textContent = text; return item; }));
+  by("warned").hidden = !list.length;
+}
+
+const four = (value, unit) => Number.isFinite(value) ? `${number(value, 4)} ${unit.replace("um", "µm").replace("N.m", "N·m")}` : "not determined";
+
+function show_figures() {
+  const { found, kept, first } = view, rows = [], heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"];
+  for (const [name, [value, unit]] of Object.entries(found.figures)) {
+    const row = document.createElement("tr"), cell = (text, tag = "td") => element(tag, tag === "td" ? { class: "number" } : { scope: "row" }, row, text);
+    cell(name, "th");
+    cell(four(value, unit));
+    for (const other of [...(kept ? [kept] : []), first]) cell(other.figures[name] ? four(...other.figures[name]) : "–");
+    rows.push(row);
+  }
+  const head = document.createElement("tr");
+  heads.forEach((text, k) => element("th", { scope: "col", ...(k ? { class: "number" } : {}) }, head, text));
+  by("figures").tHead.replaceChildren(head);
+  by("figures").tBodies[0].replaceChildren(...rows);
+}
+
+// --- knobs --------------------------------------------------------------------------------------------------------------
+
+const inputs = KNOBS.map((knob, k) => {
+  const row = by(`knob-${k}`), slider = row.querySelector("input[type=range]"), field = row.querySelector("input[type=number]"), choice = row.querySelector("select");
+  const back = row.querySelector("button");
+  let before = null;
+  const turn = (value, done) => {
+    if (!knob.choices.length && !Number.isFinite(value)) return;
+    if (before === null) before = [...view.state];
+    view.state[k] = knob.choices.length ? value : limited(knob, value);
+    if (done) { if (before.some((each, i) => each !== view.state[i])) { view.undo.push(before); view.redo.length = 0; } before = null; settle(); }
+    sync();
+    ask();
+  };
+  if (choice) choice.addEventListener("change", () => turn(choice.value, true));
+  else {
+    slider.addEventListener("input", () => turn(value_at(knob, Number(slider.value)), false));
+    slider.addEventListener("change", () => turn(view.state[k], true));
+    field.addEventListener("change", () => turn(field.value === "" ? NaN : Number(field.value) / knob.factor, true));
+  }
+  back.addEventListener("click", () => turn(START[k], true));
+  return { row, slider, field, choice, back };
+});
+
+function sync() {
+  KNOBS.forEach((knob, k) => {
+    const { row, slider, field, choice, back } = inputs[k], value = view.state[k];
+    if (choice) choice.value = value;
+    else {
+      slider.value = place_of(knob, value);
+      slider.setAttribute("aria-valuetext", `${shown_value(knob, value)} ${unit_text(knob)}`);
+      if (field !== document.activeElement || Number(field.value) !== Number(shown_value(knob, value))) field.value = shown_value(knob, value);
+    }
+    row.classList.toggle("changed", value !== START[k]);
+    back.disabled = value === START[k];
+  });
+  by("undo").disabled = !view.undo.length;
+  by("redo").disabled = !view.redo.length;
+}
+
+function go_to(state, remember = true) {
+  if (remember && state.some((each, k) => each !== view.state[k])) { view.undo.push([...view.state]); view.redo.length = 0; }
+  view.state = [...state];
+  settle();
+  sync();
+  ask();
+}
+
+function settle() {
+  const text = changed().map(([key, value]) => `${encodeURIComponent(key)}=${encodeURIComponent(value)}`).join("&");
+  try { history.replaceState(null, "", text ? `#${text}` : "#"); } catch { /* a page inside a mail viewer has no address */ }
+}
+
+const changed = () => KNOBS.flatMap((knob, k) => view.state[k] === START[k] ? [] : [[knob.key, view.state[k], knob]]);
+
+function from_address() {
+  const state = [...START];
+  for (const part of location.hash.slice(1).split("&")) {
+    const [key, value] = part.split("=").map(each => { try { return decodeURIComponent(each || ""); } catch { return ""; } }), k = KNOBS.findIndex(knob => knob.key === key);
+    if (k < 0) continue;
+    if (KNOBS[k].choices.length ? KNOBS[k].choices.includes(value) : value !== "" && Number.isFinite(Number(value))) state[k] = KNOBS[k].choices.length ? value : limited(KNOBS[k], Number(value));
+  }
+  return state;
+}
+
+// --- what can be taken away ---------------------------------------------------------------------------------------------
+
+const quantity = (knob, value) => knob.choices.length ? value : `${value}${knob.unit === "1" ? "" : ` ${knob.unit}`}`;
+const set_line = () => changed().map(([key, value, knob]) => `--set "${key}=${quantity(knob, value)}"`).join(" ") || "(nothing is changed)";
+const yaml_text = () => `set:\n${changed().map(([key, value, knob]) => `  ${key}: ${quantity(knob, value)}\n`).join("")}`;
+
+function csv_text() {
+  const { trace } = view.found, names = Object.keys(trace), rows = [names.join(",")];
+  for (let k = 0; k < trace.time.length; k++) rows.push(names.map(name => String(trace[name][k])).join(","));
+  return `${rows.join("\n")}\n`;
+}
+
+function save(name, text) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+async function copy(text, what) {
+  by("taken").value = text;
+  by("taken").hidden = false;
+  by("taken").select();
+  try { await navigator.clipboard.writeText(text); by("said").textContent = `${what} copied`; } catch { by("said").textContent = `${what}: below, to be copied`; }
+}
+
+const on = (id, act) => by(id).addEventListener("click", act);
+on("undo", () => { if (view.undo.length) { view.redo.push([...view.state]); go_to(view.undo.pop(), false); } });
+on("redo", () => { if (view.redo.length) { view.undo.push([...view.state]); go_to(view.redo.pop(), false); } });
+on("reset", () => go_to(START));
+on("keep", () => {
+  const clear = view.kept !== null;
+  view.kept = clear ? null : view.found;
+  view.kept_loop = clear ? null : view.loop;
+  by("keep").setAttribute("aria-pressed", String(!clear));
+  by("keep").textContent = clear ? "Keep this state" : "Drop the kept state";
+  if (view.found) show();
+  if (view.loop) show_loop();
+});
+on("link", () => { settle(); copy(location.href, "link"); });
+on("set", () => copy(set_line(), "settings for feedsim run"));
+on("yaml", () => copy(yaml_text(), "YAML of the changes"));
+on("csv", () => { if (view.found) save("result.csv", csv_text()); });
+by("axis").addEventListener("change", () => { chosen_axis = by("axis").value; ask(); });
+addEventListener("keydown", event => {
+  if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.matches("input[type=number], textarea")) return;
+  event.preventDefault();
+  by(event.shiftKey ? "redo" : "undo").click();
+});
+addEventListener("hashchange", () => go_to(from_address()));
+
+// --- lessons ------------------------------------------------------------------------------------------------------------
+
+const offered = LESSONS.filter(lesson => lesson.fits(HELD));
+
+function lesson_begin(lesson) {
+  const values = lesson.start(HELD, key => START[KNOBS.findIndex(knob => knob.key === key)]);
+  view.lesson = { ...lesson, done: false };
+  view.kept = view.kept_loop = null;
+  go_to(KNOBS.map((knob, k) => values[knob.key] ?? START[k]));
+  by("lesson").hidden = false;
+  by("lesson-title").textContent = lesson.title;
+  by("lesson-text").replaceChildren(...lesson.text(HELD).map(text => { const item = document.createElement("p"); item.textContent = text; return item; }));
+  by("lesson-state").textContent = "";
+  for (const { row } of inputs) row.classList.remove("pointed");
+  for (const key of lesson.turn(HELD)) { const k = KNOBS.findIndex(knob => knob.key === key); if (k >= 0) inputs[k].row.classList.add("pointed"); }
+  by("lesson").focus();
+}
+
+function lesson_look() {
+  const { lesson } = view;
+  if (!lesson || !view.found) return;
+  const { text, done } = lesson.look(HELD, view);
+  by("lesson-state").textContent = done ? `✓ ${text} ${lesson.after}` : text;
+  by("lesson").classList.toggle("done", done);
+}
+
+on("lesson-end", () => { view.lesson = null; by("lesson").hidden = true; for (const { row } of inputs) row.classList.remove("pointed"); go_to(START); });
+for (const lesson of offered) element("button", { type: "button" }, by("lessons"), lesson.title).addEventListener("click", () => lesson_begin(lesson));
+by("lessons-part").hidden = !offered.length;
+
+view.state = from_address();
+sync();
+worker.postMessage({ data: HELD });

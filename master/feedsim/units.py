@@ -91,8 +91,9 @@ _DIMENSIONS = ("mass", "length", "time", "current", "temperature", "amount", "lu
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY = re.compile(rf"\s*({NUMBER})(.*)", re.DOTALL)
 _SYMBOL = re.compile(r"[^\W\d_]+|[%°]")
-_EXPRESSION = re.compile(r"(?:(?<![)^0-9])\^[+-]?[0-9](?![0-9^])|(?<![0-9^])1(?![0-9])|[^\W\d_]+|[*/()])*")
-_LEGAL = re.compile(r"(?:[^\W\d_]+|[%°]|[0-9]|[-+ ().*/^])*")
+_EXPRESSION = re.compile(r"(?:(?<![)^0-9])\^[+-]?[0-9](?![0-9^])|(?<![0-9^])1(?![0-9])|[^\W\d_]|[*/()])*")
+# No repetition within a repetition: what does not match would be tried in exponentially many ways.
+_LEGAL = re.compile(r"(?:[^\W\d_]|[%°]|[0-9]|[-+ ().*/^])*")
 _SPELLINGS = str.maketrans({"μ": "µ", "Ω": "Ω", "·": ".", "⋅": ".", "×": "*", "²": "^2", "³": "^3"})
 
 

@@ -155,3 +155,9 @@ def test_every_unit_of_messages_can_be_read() -> None:
         units.parse(example, unit)
     for spelling in (*units.SYMBOLS, *units.ALIASES):
         assert units.unit(spelling).factor > 0
+
+
+def test_a_long_word_is_refused_at_once() -> None:
+    """Letters ahead of a character that no unit has; tried in every way, it would take years."""
+    with pytest.raises(InputError, match="holds '&'"):
+        units.unit("o" * 50 + "&")

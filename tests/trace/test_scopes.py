@@ -144,6 +144,8 @@ def test_halscope(tmp_path: Path) -> None:
         (["Sampling period is 5 ns", "a 1", "b 2", "a 3"], "scope.csv:3: holds b, the first row a"),
         (["Sampling period is 5 ns", "a 1", "a x", "a 3", "a 4"], "scope.csv:3: 'x' is no number"),
         (["Sampling period is 5 ns", "a 1"], "1 rows of samples"),
+        (["Sampling period is 5 ns", "a 1", "a 1,5", "a 3", "a 4"], "scope.csv:3: '1,5' is no number"),
+        ([f"Sampling period is {10**400} ns", "a 1", "a 2", "a 3", "a 4"], "of up to 12 digits"),
     ],
 )
 def test_halscope_files_that_are_refused(tmp_path: Path, lines: list[str], message: str) -> None:

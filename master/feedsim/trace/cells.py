@@ -34,6 +34,7 @@ _PLAIN_COLUMN = re.compile(r"[0-9eE+\-.\n]*")
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 TIME_NAMES = ("time", "t")  # in any case
+LONGEST_UNIT = 60  # characters of a name or a unit in two rows of header
 MOST_REMARKS = 65536  # characters within which a header is looked for
 _SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # .xlsx and .ods; .xls
 _WINDOWS = "cp1252"  # of programs that know no UTF-8; it has no byte for five values, and digits are the same
@@ -172,6 +173,8 @@ def _names_above_units(above: Sequence[str], header: Sequence[str]) -> list[tupl
     if len(above) < len(header) or not all(cell.strip() for cell in above[: len(header)]):
         return None
     units_below = [cell.strip().strip("[]()").strip() for cell in header]
+    if any(len(cell) > LONGEST_UNIT for cell in (*units_below, *above)):
+        return None
     if not any(units_below) or not all(each in ("", "-") or known_unit(each) for each in units_below):
         return None
     if any(each in TIME_NAMES for each in units_below):

@@ -33,6 +33,7 @@ _TWINCAT = re.compile(
 _HALSCOPE = re.compile(r"\s*Sampling period is (\d+) ns")
 TICKS = 1e15  # a time beyond is a date in 100 ns, not in ms since the start
 TICK, MS = 1e-7, 1e-3  # s
+LONGEST = 12  # digits of halscope's sampling period in ns: 1000 s
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +194,8 @@ def _halscope(path: Path, text: str) -> Signals:
     """Lines of `label value label value`, below the sampling period in ns."""
     first, *lines = text.splitlines()
     found = _HALSCOPE.match(first)
-    if found is None or not int(found[1]):
-        raise InputError(f"{path}:1: {first!r}; a sampling period in ns is expected")
+    if found is None or not int(found[1][:LONGEST]) or len(found[1]) > LONGEST:
+        raise InputError(f"{path}:1: {first[:80]!r}; a sampling period in ns is expected, of up to {LONGEST} digits")
     rows = [(k, line.split()) for k, line in enumerate(lines, 2) if line.strip()]
     if len(rows) < 3:
         raise InputError(f"{path}: {len(rows)} rows of samples; at least 3 are needed")
@@ -208,7 +209,7 @@ def _halscope(path: Path, text: str) -> Signals:
         try:
             values.append([float(cell) for cell in cells[1::2]])
         except ValueError:
-            wrong = next(cell for cell in cells[1::2] if _number(cell) is None)
+            wrong = next(cell for cell in cells[1::2] if "," in cell or _number(cell) is None)
             raise InputError(f"{path}:{line}: {wrong!r} is no number") from None
     table = np.array(values[:-1], dtype=np.float64)  # halscope writes one sample more than it has recorded
     names = unique(labels)

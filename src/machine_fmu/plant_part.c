@@ -9,6 +9,7 @@
 #include "../plant_fmu/axes.c"
 #include "../plant_fmu/cells.c"
 #include "../plant_fmu/derive.c"
+#include "../plant_fmu/geometry.c"
 #include "../plant_fmu/load.c"
 #include "../plant_fmu/modal.c"
 #include "../plant_fmu/model.c"

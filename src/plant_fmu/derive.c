@@ -1,5 +1,6 @@
 /* Modal systems from the archive, one per cell of its poses, or a single one from the table that modes_file names; and
  * which saved states belong to them. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -89,10 +90,34 @@ static bool plant_build_from_file(Unit *unit, Plant *plant, const char *path, ui
     return good;
 }
 
+static void plant_derive_errors(Unit *unit, Plant *plant) {
+    const Scalars *v = unit_scalars(unit);
+    plant->geometry = (Geometry){.linear = {{v->geometry_E_XX, v->geometry_squareness_XY, v->geometry_squareness_XZ},
+                                            {0, v->geometry_E_YY, v->geometry_squareness_YZ},
+                                            {0, 0, v->geometry_E_ZZ}},
+                                 .second = {{0, v->geometry_E_XY_second, v->geometry_E_XZ_second},
+                                            {v->geometry_E_YX_second, 0, v->geometry_E_YZ_second},
+                                            {v->geometry_E_ZX_second, v->geometry_E_ZY_second, 0}},
+                                 .third = {{0, v->geometry_E_XY_third, v->geometry_E_XZ_third},
+                                           {v->geometry_E_YX_third, 0, v->geometry_E_YZ_third},
+                                           {v->geometry_E_ZX_third, v->geometry_E_ZY_third, 0}}};
+    double most = 0;
+    for (size_t i = 0; i < unit_axes(unit); i++) {
+        most = fmax(most, unit_axis(unit, i)->play);
+    }
+    for (int i = 0; i < 9; i++) {
+        const Geometry *g = &plant->geometry;
+        most = fmax(most, fabs(g->linear[i / 3][i % 3]));
+        most = fmax(most, fmax(fabs(g->second[i / 3][i % 3]), fabs(g->third[i / 3][i % 3])));
+    }
+    plant->errors = most > 0;
+}
+
 /* A file is read once for an instance as long as modes_file keeps its value: a state that is restored must find the
  * table it was made with, whatever has become of the file. */
 bool plant_derive(Unit *unit) {
     Plant *plant = unit_derived(unit);
+    plant_derive_errors(unit, plant);
     const char *path = unit_scalars(unit)->modes_file;
     if (plant->ready && strcmp(plant->table, path) == 0) {
         return true;

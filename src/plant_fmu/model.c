@@ -4,7 +4,7 @@
  *   f_k   = sum over axes A of (n_kA (M_a - M_fr - M_0) + x_kA F_a) + sum over directions d of tcp_kd F_d
  *   n_a   = n_fr = sum over k of n_kA q_k'             rotor against stator [rad/s]
  *   x_a   = x_0 + sum over k of x_kA q_k               slide against rail, at the linear scale [m]
- *   tool.x_d = sum over k of tcp_kd q_k                tool against workpiece [m]
+ *   tool.x_d = sum over k of tcp_kd q_k                tool against workpiece [m]; with play and geometry: geometry.h
  *   tcp.x_d  = tool.x_d + x_0 of the axis named d      tool centre point [m]
  *
  *   M_a motor torque, M_fr friction torque, M_0 constant load [N.m]; F_a force on the slide, F_d on the tool [N];
@@ -102,9 +102,46 @@ static void plant_show(Unit *unit, const Plant *plant, const double *y) {
     }
 }
 
-static void plant_show_tool(Unit *unit, const Plant *plant, const double *y) {
+/* Ways of the slides since the start, behind q and v of a state; what play takes off or adds follows. */
+static double *plant_ways(const Plant *plant, double *state) {
+    return state + plant_ports(plant) + 2 * plant->size;
+}
+
+/* Play of the drives, at the end of a step that leads from one place of the state to the other. */
+static void plant_play(Unit *unit, const Plant *plant, const double *before, double *ways) {
+    const double *x = plant->y + plant_slides(plant);
+    for (size_t i = 0; i < plant->axes; i++) {
+        AxisBlock *axis = unit_axis(unit, i);
+        ways[i] = geometry_play(before[i], x[i], axis->play);
+        ways[plant->axes + i] = ways[i] - x[i];
+        axis->x_a = axis->x_0 + ways[i];
+    }
+}
+
+/* Ways s[directions] of the slides that move the tool, or speeds, of the axes' own [axes]. */
+static void plant_by_direction(const Plant *plant, const double *of_axes, double *s) {
+    for (size_t d = 0; d < TOOL_DIRECTIONS; d++) {
+        s[d] = plant->tool_axis[d] == NO_AXIS ? 0 : of_axes[plant->tool_axis[d]];
+    }
+}
+
+/* What play and geometry add at the tool, whose displacements are tool[directions]. */
+static void plant_add_errors(const Plant *plant, const double *ways, double *tool) {
+    double s[TOOL_DIRECTIONS], play[TOOL_DIRECTIONS], error[TOOL_DIRECTIONS];
+    plant_by_direction(plant, ways, s);
+    plant_by_direction(plant, ways + plant->axes, play);
+    geometry_errors(&plant->geometry, s, error);
+    for (size_t d = 0; d < TOOL_DIRECTIONS; d++) {
+        tool[d] += play[d] + error[d];
+    }
+}
+
+static void plant_show_tool(Unit *unit, Plant *plant, double *y) {
     Scalars *v = unit_scalars(unit);
-    const double *tool = y + plant->axes;
+    double *tool = y + plant->axes;
+    if (plant->errors) {
+        plant_add_errors(plant, plant_ways(plant, plant_state(unit)), tool);
+    }
     v->tool_x_X = tool[0];
     v->tool_x_Y = tool[1];
     v->tool_x_Z = tool[2];
@@ -206,6 +243,9 @@ static bool plant_step(Unit *unit, double t, double h) {
     }
     plant_head(unit)->place = place;
     plant_show(unit, plant, plant->y);
+    if (plant->errors) {
+        plant_play(unit, plant, plant_ways(plant, state), plant_ways(plant, end));
+    }
     if (plant->cells > 1) {
         plant_show_tool(unit, plant, plant->y);
     } else {
@@ -216,10 +256,39 @@ static bool plant_step(Unit *unit, double t, double h) {
 
 /* The tool's displacements, a quarter of a step's work, when somebody reads them. */
 static void plant_show_late(Unit *unit) {
-    const Plant *plant = unit_derived(unit);
+    Plant *plant = unit_derived(unit);
     const Modal *modal = &plant->modal[plant_head(unit)->cell];
     plant_measure_tool(plant, modal, plant_state(unit) + plant_ports(plant), plant->y);
     plant_show_tool(unit, plant, plant->y);
+}
+
+/* Speed of an axis's slide: that of the structure there, unless play lets it stand. */
+static double plant_slide_speed(Unit *unit, const Plant *plant, const Modal *modal, size_t axis) {
+    double *state = plant_state(unit);
+    const double speed = modal_sum(modal, plant_slides(plant) + axis, state + plant_ports(plant) + plant->size);
+    const double half = unit_axis(unit, axis)->play / 2, apart = plant_ways(plant, state)[plant->axes + axis];
+    const double limit = half * (1 - 1e-9); /* the way is a difference of positions, rounded */
+    return half > 0 && !(speed > 0 ? apart <= -limit : apart >= limit) ? 0 : speed;
+}
+
+/* What play and geometry add to the speed at the tool in a direction. */
+static double plant_error_speed(Unit *unit, const Plant *plant, const Modal *modal, size_t direction) {
+    double *state = plant_state(unit), s[TOOL_DIRECTIONS], v[TOOL_DIRECTIONS] = {0}, slope[TOOL_DIRECTIONS];
+    plant_by_direction(plant, plant_ways(plant, state), s);
+    for (size_t d = 0; d < TOOL_DIRECTIONS; d++) {
+        v[d] = plant->tool_axis[d] == NO_AXIS ? 0 : plant_slide_speed(unit, plant, modal, plant->tool_axis[d]);
+    }
+    geometry_slopes(&plant->geometry, s, v, slope);
+    const size_t axis = plant->tool_axis[direction];
+    const double structure =
+        axis == NO_AXIS ? 0 : modal_sum(modal, plant_slides(plant) + axis, state + plant_ports(plant) + plant->size);
+    return slope[direction] + v[direction] - structure;
+}
+
+static double plant_tool_speed(Unit *unit, const Plant *plant, const Modal *modal, size_t direction) {
+    const double *v = plant_state(unit) + plant_ports(plant) + plant->size;
+    const double speed = modal_sum(modal, plant->axes + direction, v);
+    return plant->errors ? speed + plant_error_speed(unit, plant, modal, direction) : speed;
 }
 
 /* --- derivatives -------------------------------------------------------------------------------------------------- */
@@ -232,13 +301,13 @@ static double plant_output_derivative(Unit *unit, unsigned vr) {
     switch (vr) {
     case VR_tool_x_X:
     case VR_tcp_x_X:
-        return modal_sum(modal, plant->axes, v);
+        return plant_tool_speed(unit, plant, modal, 0);
     case VR_tool_x_Y:
     case VR_tcp_x_Y:
-        return modal_sum(modal, plant->axes + 1, v);
+        return plant_tool_speed(unit, plant, modal, 1);
     case VR_tool_x_Z:
     case VR_tcp_x_Z:
-        return modal_sum(modal, plant->axes + 2, v);
+        return plant_tool_speed(unit, plant, modal, 2);
     default:
         break;
     }
@@ -251,7 +320,8 @@ static double plant_output_derivative(Unit *unit, unsigned vr) {
     case AXIS_VR_n_fr:
         return modal_acceleration(modal, axis, ports, u, q, v);
     case AXIS_VR_x_a:
-        return modal_sum(modal, plant_slides(plant) + axis, v);
+        return plant->errors ? plant_slide_speed(unit, plant, modal, axis)
+                             : modal_sum(modal, plant_slides(plant) + axis, v);
     default:
         return 0;
     }

@@ -6,6 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "geometry.h"
 #include "modal.h"
 #include "modes.h"
 #include "poses.h"
@@ -43,10 +44,14 @@ typedef struct Plant {
     double *y, *y_before;    /* [ports] */
     double *x;               /* [axes] positions */
     double *carried;         /* [cells_scratch()] */
+
+    bool errors; /* play or geometry: what follows counts */
+    Geometry geometry;
 } Plant;
 
-/* State block: this head, then two places by turns for inputs at the end of the last step [ports], q [size], v [size]:
- * a step leaves its result in the other one, which counts once it is known to be sound. */
+/* State block: this head, then two places by turns for inputs at the end of the last step [ports], q [size], v [size],
+ * and with play or geometry, ways of the slides since the start and what play takes off or adds [axes] each: a step
+ * leaves its result in the other one, which counts once it is known to be sound. */
 typedef struct StateHead {
     uint64_t table_hash; /* mode table that the state belongs to */
     uint64_t cell;       /* whose modes q and v belong to */
@@ -63,7 +68,7 @@ static inline size_t plant_ports(const Plant *plant) {
 }
 
 static inline size_t plant_state_doubles(const Plant *plant) {
-    return plant_ports(plant) + 2 * plant->size;
+    return plant_ports(plant) + 2 * (plant->size + plant->axes);
 }
 
 /* --- load.c: the archive */

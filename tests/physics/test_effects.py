@@ -154,3 +154,59 @@ def test_one_unit_gives_the_same_bits(moved: Driven, changes: tuple[str, ...]) -
     assert apart.trace.names == one.trace.names
     for name in apart.trace.names:
         assert np.array_equal(apart.trace[name], one.trace[name]), name
+
+
+@pytest.fixture(scope="module")
+def circle(fmus: Path) -> Driven:
+    """A circle of X and Z, recorded at every control cycle."""
+
+    @cache
+    def run(*overrides: str) -> Run:
+        path = SCENARIOS / "xz_circle.yaml"
+        return cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus)
+
+    return run
+
+
+def ways(run: Run) -> dict[str, Array]:
+    """Ways of the slides since the start [m]."""
+    return {axis: run.trace[f"{axis}.x_a"] - run.trace[f"{axis}.x_a"][0] for axis in ("X", "Y", "Z")}
+
+
+def test_play_is_lost_where_the_motor_measures(circle: Driven) -> None:
+    """Between motor and slide stands half the play, before and behind a reversal on either side: b from one to the
+    other. All forces and the motors are those of the machine without."""
+    play = [f"machine.axes.{axis}.play=8 um" for axis in AXES]
+    indirect = [f"machine.axes.{axis}.drive.measuring.indirect=true" for axis in AXES]
+    without, run = circle(*indirect), circle(*indirect, *play)
+    for axis in AXES:
+        assert np.array_equal(run.trace[f"{axis}.M_a"], without.trace[f"{axis}.M_a"])
+        apart = run.trace[f"{axis}.x_a"] - without.trace[f"{axis}.x_a"]
+        steady = (run.trace.time > 3) & (np.abs(run.trace[f"{axis}.n_a"]) > 8)  # rad/s: away from the reversals
+        expected = -4e-6 * np.sign(run.trace[f"{axis}.n_a"][steady])
+        # the operator takes off b/2 to the last bit of 1 m
+        np.testing.assert_allclose(apart[steady], expected, rtol=0, atol=3e-16)
+        assert np.max(np.abs(apart)) <= 4e-6 + 3e-16
+    # the tool goes with the slides
+    tool = run.trace["tool.x_Z"] - without.trace["tool.x_Z"]
+    np.testing.assert_allclose(tool, run.trace["Z.x_a"] - without.trace["Z.x_a"], rtol=0, atol=3e-16)
+
+
+def test_geometry_acts_at_the_tool_alone(circle: Driven) -> None:
+    settings = {"squareness_XZ": "50 um/m", "E_ZZ": "20 um/m", "E_ZX_second": "2e-3 1/m", "E_YX_third": "0.1 1/m^2"}
+    bare, run = circle(), circle(*(f"machine.geometry.{name}={value}" for name, value in settings.items()))
+    for name in ("X.x_a", "Z.x_a", "X.M_a", "Z.M_a", "X.M_fr"):
+        assert np.array_equal(run.trace[name], bare.trace[name]), name
+    s = ways(run)
+    expected = {"X": 50e-6 * s["Z"], "Y": 0.1 * s["X"] ** 3, "Z": 20e-6 * s["Z"] + 2e-3 * s["X"] ** 2}
+    for direction, error in expected.items():
+        for point in ("tool", "tcp"):
+            added = run.trace[f"{point}.x_{direction}"] - bare.trace[f"{point}.x_{direction}"]
+            np.testing.assert_allclose(added, error, rtol=0, atol=3e-16)  # the last bit of 1 m
+
+
+def test_one_unit_has_play_and_geometry(circle: Driven) -> None:
+    changes = ("machine.axes.X.play=8 um", "machine.geometry.squareness_XZ=50 um/m", "machine.geometry.E_XX=1e-5")
+    apart, one = circle(*changes), circle(*changes, "coupling.units=one")
+    for name in apart.trace.names:
+        assert np.array_equal(apart.trace[name], one.trace[name]), name

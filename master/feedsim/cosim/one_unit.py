@@ -103,4 +103,4 @@ def parameters(machine: Machine, coupling: Coupling, *, built_in: bool) -> Mappi
         values |= {f"{name}.drive.{key}": value for key, value in controller_parameters(machine, name).items()}
         values |= {f"{name}.friction.{key}": value for key, value in friction.items()}
         values[f"{name}.M_0"] = axis.M_0
-    return values
+    return values | dict(machine.errors)

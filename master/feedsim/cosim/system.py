@@ -246,4 +246,4 @@ def plant_parameters(machine: Machine, modes_file: Path | None) -> dict[str, flo
     for name, axis in machine.axes.items():
         parameters[f"{name}.x_0"] = machine.pose[name]
         parameters[f"{name}.M_0"] = axis.M_0
-    return parameters
+    return parameters | machine.errors

@@ -23,7 +23,7 @@ from pydantic import (
 from feedsim import variables
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, File, Model, Quantity, Reading, fault, is_multiple, parameter
-from feedsim.scenario.parameter_group import Parameter, ParameterGroup, effects
+from feedsim.scenario.parameter_group import Parameter, ParameterGroup, effects, group
 from feedsim.scenario.roles import DRIVE, FOREIGN, FRICTION, SHIPPED, ForeignUnit, filled, mapping
 
 FilterType = Literal["off", "second_order", "band_stop", "low_pass"]
@@ -250,6 +250,9 @@ class Axis(Model):
         default=0.0,
         description="Constant load torque M_0, counted against the motor torque (weight on a vertical axis)",
     )
+    play: Annotated[float, Quantity("m", minimum=0, maximum=1, example="10 um")] = Field(
+        default=0.0, description="Play between motor and slide, without dynamics; for axes measured indirectly"
+    )
     display_sign: Literal[1, -1] = Field(default=1, description="Sign of torque and current in figures, nowhere else")
     drive: Annotated[Annotated[Drive, Tag(SHIPPED)] | Annotated[ForeignDrive, Tag(FOREIGN)], Discriminator(filled)] = (
         Field(description="Parameters of the shipped drive, or another unit (fmu) with its variables")
@@ -321,6 +324,12 @@ class PathLimits(Model):
     )
 
 
+if TYPE_CHECKING:
+    Geometry = ParameterGroup
+else:
+    Geometry = group("plant", "geometry", "Errors of the guides at the tool, zero where the axes start")
+
+
 class Machine(Model):
     """A machine: structure data, pose, cycles, path limits and axes.
 
@@ -355,6 +364,8 @@ class Machine(Model):
         description="Feed axes in the order of the plant"
     )
 
+    geometry: Geometry | None = Field(default=None, description="Errors of the guides at the tool")
+
     _directory: Path = PrivateAttr(default=Path())
     _files: tuple[tuple[str, Path], ...] = PrivateAttr(default=())
 
@@ -368,6 +379,13 @@ class Machine(Model):
         """YAML files that it was read from, each with the first key that it gives; "" for the machine file. Empty where
         it was read as part of a scenario, which has them."""
         return self._files
+
+    @property
+    def errors(self) -> dict[str, Parameter]:
+        """Parameters of the plant for play and geometry, where there are any."""
+        play: dict[str, Parameter] = {f"{name}.play": axis.play for name, axis in self.axes.items() if axis.play}
+        geometry = self.geometry.parameters() if self.geometry is not None else {}
+        return play | {f"geometry.{name}": value for name, value in geometry.items()}
 
     def shipped_drive(self, axis: str, who: str) -> Drive:
         """The parameters of an axis's drive, which `who` needs. InputError: it is another maker's unit."""

@@ -36,12 +36,13 @@ def effects(unit: str, groups: Mapping[str, str]) -> type[ParameterGroup]:
     """A model whose fields are groups of parameters of `unit`, name -> description: each with all that the unit's table
     declares of it, at its start value where a file does not give it. A group that is not given is None."""
     fields: dict[str, Any] = {
-        name: (_group(unit, name, text) | None, Field(default=None, description=text)) for name, text in groups.items()
+        name: (group(unit, name, text) | None, Field(default=None, description=text)) for name, text in groups.items()
     }
     return create_model("Effects", __base__=ParameterGroup, __module__=__name__, **fields)
 
 
-def _group(unit: str, name: str, text: str) -> Any:
+def group(unit: str, name: str, text: str) -> Any:
+    """A model of one group of parameters of `unit`, as :func:`effects` has them."""
     rows = {
         key.removeprefix(f"{name}."): row
         for key, row in variables.parameters(unit).items()

@@ -217,6 +217,9 @@ def scenario_data(
         "path": told.get("path", {"jerk": "1000 m/s^3", "acceleration": "100 m/s^2"}),
         "axes": axes,
     }
+    geometry = _group(parts, roles.plant).get("geometry", {}) if roles.plant in parts.archives else {}
+    if any(plant[f"geometry.{name}"] for name in geometry):
+        machine["geometry"] = {name: value for name, value in geometry.items() if plant[f"geometry.{name}"]}
     if told.get("structure") == STRUCTURE:
         machine["structure"] = STRUCTURE
     if parts.coupling is not None:
@@ -244,6 +247,7 @@ def _axis(parts: Parts, axis: str, told: Mapping[str, Any], folder: Path) -> dic
         **{key: value for key, value in told.items() if key in (*limits, "display_sign")},
         "pitch": pitch,
         "constant_load": f"{plant[f'{axis}.M_0']!r} N.m",
+        **({"play": f"{play!r} m"} if (play := plant.get(f"{axis}.play")) else {}),
         "drive": drive,
         "friction": friction,
     }

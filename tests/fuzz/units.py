@@ -18,7 +18,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -177,7 +177,15 @@ def main(words: Sequence[str]) -> int:
             print(f"{unit}: FOUND: {outcome.finding}")
             print(f"  again: python tests/fuzz/units.py --unit {unit} {outcome.finding}")
             print(f"  when it is mended, keep it: cp {outcome.finding} {CORPUS / unit}")
+    print(total(outcomes.values()))
     return int(any(outcome.finding for outcome in outcomes.values()))
+
+
+def total(outcomes: Iterable[Outcome]) -> str:
+    """The last line: what all units were called together."""
+    told = list(outcomes)
+    calls, instances = sum(each.calls for each in told), sum(each.instances for each in told)
+    return f"all {len(told)} units: {calls:,} calls, {instances:,} instances"
 
 
 if __name__ == "__main__":

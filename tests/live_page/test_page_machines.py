@@ -1,0 +1,90 @@
+"""Pages of other machines: one axis, five, measured ones; and what no page is made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feedsim import cosim, nc, scenario
+from feedsim.cosim import fmus_directory
+from feedsim.errors import InputError
+from feedsim.page import module
+from feedsim.page.content import content
+from live_page.test_page_numbers import SAME
+from machine_helpers import write_machine, write_scenario
+from page_helpers import NODE, answers
+
+MODULE = fmus_directory() / "machine.wasm"
+pytestmark = pytest.mark.skipif(not MODULE.is_file(), reason="no module of the machine (make page-module)")
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+REST = {"kind": "dwell", "duration": "0.2 s"}
+
+
+def move(feed: str, **by: str) -> dict[str, Any]:
+    return {"kind": "move", "by": by, "feed": feed}
+
+
+def written(name: str, folder: Path) -> Path:
+    """A short move on a machine."""
+    recorded = {"recording": {"interval": "1 ms"}}
+    if name == "five axes":
+        machine = write_machine(folder, dict.fromkeys("XYZBC", 0.1))
+        return write_scenario(folder, machine, [move("3000 mm/min", X="5 mm", C="3 mm"), REST], **recorded)
+    motions = [REST, move("1000 mm/min", X="4 mm"), REST]
+    return write_scenario(folder, SCENARIOS / "machines" / name / "machine.yaml", motions, **recorded)
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)")
+@pytest.mark.parametrize("name", ["one_axis", "five axes", "emps", "sinumerik_840d"])
+def test_machines_of_other_axes_compute_a_run(name: str, tmp_path: Path) -> None:
+    given = scenario.load(written(name, tmp_path))
+    program = nc.plan(given)
+    data = content(given, program).data
+    keep = [f"{axis}.x_a" for axis in given.machine.axes]
+    state = [knob["value"] for knob in data["knobs"]]
+    page = answers(data, [{"state": state, "keep": keep}], tmp_path)[0]
+    assert "problem" not in page
+    run = cosim.run(given, program=program)
+    for column in keep:
+        assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= SAME
+        assert np.ptp(run.trace[column]) >= 0
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)")
+def test_motions_that_a_page_does_not_plan_are_carried_along(tmp_path: Path) -> None:
+    sine = {"kind": "sine", "axis": "X", "moves": [{"amplitude": "1 mm", "frequency": "4 Hz", "periods": 3}]}
+    machine = SCENARIOS / "machines" / "one_axis" / "machine.yaml"
+    given = scenario.load(write_scenario(tmp_path, machine, [sine, REST], recording={"interval": "1 ms"}))
+    held = content(given, nc.plan(given))
+    assert not [knob for knob in held.data["knobs"] if knob["motion"]]
+    assert "sine" in " ".join(held.left_out)
+    page = answers(held.data, [{"state": [k["value"] for k in held.data["knobs"]], "keep": ["X.x_a"]}], tmp_path)[0]
+    assert np.abs(np.array(page["trace"]["X.x_a"]) - cosim.run(given).trace["X.x_a"]).max() <= SAME
+
+
+@pytest.mark.parametrize(
+    ("changes", "wanted", "said"),
+    [
+        (["motions.1.duration=80 s"], [], "allowed are 60 s"),
+        ([], ["Q.drive.*"], "fits none of"),
+    ],
+)
+def test_what_no_page_is_made_of(changes: list[str], wanted: list[str], said: str) -> None:
+    given = scenario.load(SCENARIOS / "one_axis.yaml", changes)
+    with pytest.raises(InputError, match=said):
+        content(given, nc.plan(given), wanted)
+
+
+def test_a_module_of_other_sources_is_refused(tmp_path: Path) -> None:
+    guid = "0123456789abcdef-0123456789abcdef"
+    with pytest.raises(InputError, match="there is no module"):
+        module.read(tmp_path, guid)
+    (tmp_path / "machine.wasm").write_bytes(MODULE.read_bytes())
+    with pytest.raises(InputError, match="is of other sources"):
+        module.read(tmp_path, guid)
+    (tmp_path / "machine.wasm").write_bytes(b"\0asm\1\0\0\0")
+    with pytest.raises(InputError, match="no WebAssembly module that feedsim made"):
+        module.read(tmp_path, guid)

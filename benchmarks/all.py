@@ -18,7 +18,7 @@ from harness import RESULTS, ROOT
 HERE = Path(__file__).resolve().parent
 # Not here: worst_case (its own target), eigen (gigabytes), the studies of other pages (pose_grid, identification).
 NAMES = ("cycle", "floor", "peers", "accuracy", "stability", "growth", "duration", "sweep", "startup", "setpoints",
-         "watched")  # fmt: skip
+         "foreign_units")  # fmt: skip
 DRAWING = ("accuracy", "growth", "duration", "sweep")
 
 

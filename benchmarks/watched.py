@@ -1,85 +1,166 @@
-"""What it costs that units of other makers run in a worker process: the same run there and here, in turns.
+"""A command of feedsim as it is, in a process of its own, with the time of its parts and the memory that it takes.
 
-The unit is another maker's friction on one axis (tests/foreign/faulty.c, which fails at a time that no run reaches). The
-cost is that of the whole run without its start: of marks, of rows that go from process to process, and of looking.
+``python watched.py FILE TIMES run SCENARIO ...`` makes that command TIMES times and writes a JSON file: per time the
+seconds of every part, without those of parts within it, and the process's memory. Rows go into result.csv while the
+loop works, libraries are loaded where they are needed first; each is a part of its own.
 """
 
 from __future__ import annotations
 
+import builtins
 import json
+import os
 import subprocess
 import sys
-import tempfile
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
-from harness import ROOT, Contestant, arguments, digits, measure, table
-
-sys.path.insert(0, str(ROOT / "tests"))
-from foreign import acme
-from foreign.test_faulty_units import ROWS
-
-from feedsim import cosim, nc, scenario
-from feedsim.cosim import worker
-from feedsim_packager import toolchain
-
-PLAN = """
-name: two units of an axis
-machine: {machine}
-motions:
-  - {{kind: move, by: {{X: 10 mm}}, feed: 3000 mm/min}}
-  - {{kind: dwell, duration: {duration} s}}
-recording: {{interval: 1 ms}}
-set: {{machine.axes.X.friction: {friction}}}
-"""
-DURATION = 100.0  # s simulated
+POLL = 0.02  # s between two looks at the memory of a process
 
 
-def main(words: Sequence[str] | None = None) -> int:
-    bench = arguments("watched", __doc__, words, rounds=7)
-    with tempfile.TemporaryDirectory() as scratch:
-        plan = scenario.load(_scenario(Path(scratch)))
-        program = nc.plan(plan)
-        cycles = round(program.duration / plan.machine.cycles.T_c)
-        steps = 3 * cycles  # drive, structure, friction
+# --- from outside ----------------------------------------------------------------------------------------------------
 
-        def run(watched: bool) -> float:
-            before, worker.AVAILABLE = worker.AVAILABLE, watched
+
+@dataclass(frozen=True)
+class Watched:
+    """What a process has told and taken.
+
+    Attributes:
+        whole: from the start of the process to its end, by the clock of who waits for it [s].
+        parts: seconds of the parts, for each time that the command was made.
+        peak: highest resident memory [MB], pages of files included. None where the system does not tell.
+        anonymous: highest memory that no file backs, of looks 20 ms apart [MB]. None likewise.
+    """
+
+    whole: float
+    parts: list[dict[str, float]]
+    peak: float | None
+    anonymous: float | None
+
+
+def watched(words: Sequence[str], times: int = 1) -> Watched:
+    """Make the command ``feedsim WORDS...`` in a process of its own and wait for its end."""
+    with TemporaryDirectory(prefix="feedsim-bench-") as folder:
+        told = Path(folder) / "told.json"
+        begun = time.perf_counter()
+        with (Path(folder) / "stderr").open("w+", encoding="utf-8") as complaints:
+            command = [sys.executable, __file__, str(told), str(times), *words]
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=complaints)
+            highest: list[float] = []
+            ended = threading.Event()
+            looker = threading.Thread(target=_look, args=(process.pid, ended, highest))
+            looker.start()
+            process.wait()
+            whole = time.perf_counter() - begun
+            ended.set()
+            looker.join()
+            if process.returncode:
+                complaints.seek(0)
+                raise SystemExit(f"feedsim {' '.join(words)}: {complaints.read().strip()}")
+        content = json.loads(told.read_text(encoding="utf-8"))
+    return Watched(whole, content["parts"], content["peak"], max(highest, default=None))
+
+
+def _look(process: int, ended: threading.Event, found: list[float]) -> None:
+    while not ended.wait(POLL):
+        if (now := memory("RssAnon", process)) is not None:
+            found.append(now)
+
+
+def memory(what: str, process: int | None = None) -> float | None:
+    """A line of a process's status, of this one unless told [MB]; None where there is none.
+
+    "VmHWM" is the highest resident memory: a process's resource usage would begin with its parent's.
+    """
+    status = Path(f"/proc/{process or os.getpid()}/status")
+    with suppress(OSError):
+        for line in status.read_text(encoding="utf-8").splitlines():
+            if line.startswith(f"{what}:"):
+                return float(line.split()[1]) * 1024 / 1e6
+    return None
+
+
+# --- from inside -----------------------------------------------------------------------------------------------------
+
+
+class Clock:
+    """Time by part. The time of a part within another one belongs to the inner one alone."""
+
+    def __init__(self) -> None:
+        self.spent: dict[str, float] = {}
+        self._now = ["libraries"]
+        self._since = time.perf_counter()
+
+    def turn(self) -> None:
+        """What has passed since the last turn belongs to the part at work."""
+        now = time.perf_counter()
+        self.spent[self._now[-1]] = self.spent.get(self._now[-1], 0.0) + now - self._since
+        self._since = now
+
+    def timed(self, part: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        def wrapper(*arguments: Any, **named: Any) -> Any:
+            self.turn()
+            self._now.append(part)
             try:
-                rows = 0
-
-                def sink(part: object) -> None:
-                    nonlocal rows
-                    rows += len(part)  # type: ignore[arg-type]
-
-                begun = time.perf_counter()
-                cosim.run(plan, program=program, sink=sink)
-                return time.perf_counter() - begun
+                return call(*arguments, **named)
             finally:
-                worker.AVAILABLE = before
+                self.turn()
+                self._now.pop()
 
-        run(True), run(False)  # the worker is started, the libraries are loaded
-        contestants = [Contestant(name, lambda w=w: run(w)) for name, w in (("watched", True), ("here", False))]
-        found = measure(contestants, bench.rounds)
-    watched, here = found.median("watched"), found.median("here")
-    cost = (watched - here) / steps
-    rows = [["in this process", digits(here)], ["watched", digits(watched)]]
-    text = f"{cycles} cycles of three units, {steps} steps. Watching costs {cost * 1e6:.2f} us a step.\n\n"
-    bench.tell(text + table(["run", "s"], rows), {"steps": steps, "watched": watched, "here": here, "per_step": cost})
+        return wrapper
+
+    def fetch(self) -> dict[str, float]:
+        """Parts since the last time."""
+        self.turn()
+        spent, self.spent = self.spent, {}
+        return spent
+
+    def now_rest(self) -> None:
+        """From here on time that no part takes is the command's rest."""
+        self.turn()
+        self._now = ["rest"]
+
+
+def main() -> int:
+    told, times, *words = sys.argv[1:]
+    clock = Clock()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ahead of numpy
+    from feedsim import analysis, cosim, nc, scenario
+    from feedsim.cli import main as command
+    from feedsim.cosim.system import System
+    from feedsim.report import run as report
+    from feedsim.report.partial import Partial
+
+    of_runs = sys.modules["feedsim.cosim.run"]
+    for home, name, part in (
+        (scenario, "load", "read"), (nc, "plan", "plan"), (System, "__init__", "open"),
+        (System, "initialise", "initialise"), (of_runs, "pose_use", "pose"), (Partial, "__call__", "rows"),
+        (analysis, "evaluate", "evaluate"), (report, "write", "report"), (builtins, "__import__", "libraries"),
+    ):  # fmt: skip
+        setattr(home, name, clock.timed(part, getattr(home, name)))
+    simulate = clock.timed("trace", cosim.run)
+
+    def run(*arguments: Any, **named: Any) -> Any:
+        found = simulate(*arguments, **named)
+        clock.spent["loop"] = found.wall_time
+        clock.spent["trace"] -= found.wall_time
+        return found
+
+    cosim.run = run
+    clock.now_rest()
+    parts = []
+    for _ in range(int(times)):
+        if code := command(words):
+            return code
+        parts.append(clock.fetch())
+    Path(told).write_text(json.dumps({"parts": parts, "peak": memory("VmHWM")}), encoding="utf-8")
     return 0
-
-
-def _scenario(folder: Path) -> Path:
-    library = folder / "friction.so"
-    command = [*toolchain.find_compiler(), "-std=gnu99", "-O1", "-fPIC", "-shared", f"-I{acme.HEADERS}", "-DFAULT=0"]
-    subprocess.run([*command, str(acme.HERE / "faulty.c"), "-o", str(library), "-lm"], check=True)
-    acme.archive(folder / "friction.fmu", "friction", library.read_bytes(), ROWS)
-    friction = json.dumps({"fmu": "friction.fmu", **acme.MAPPED_FRICTION, "parameters": {"At": 1e9}})
-    file = folder / "s.yaml"
-    machine = ROOT / "scenarios" / "machines" / "emps"
-    file.write_text(PLAN.format(machine=machine, duration=DURATION, friction=friction), encoding="utf-8")
-    return file
 
 
 if __name__ == "__main__":

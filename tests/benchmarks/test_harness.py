@@ -199,7 +199,7 @@ def test_numpy_comes_after_the_harness() -> None:
         "stability",
         "startup",
         "sweep",
-        "watched",
+        "foreign_units",
         "worst_case",
     ],
 )

@@ -101,7 +101,12 @@ def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: s
     """What is said is before the command looks at its arguments, or they are the example's."""
     needs = LEAVES[name].needs
     arguments = {"identify": ["a.csv"], "circle": ["a.csv"], "frf": ["a"], "show": ["a"], "compensate": ["a"]}
-    record = {"replay": ["a", "--machine", "a"], "identify-drive": ["a"], "pack": ["a", "--out", "b.fmu"]}
+    record = {
+        "replay": ["a", "--machine", "a"],
+        "identify-drive": ["a"],
+        "pack": ["a", "--out", "b.fmu"],
+        "page": ["a", "--out", "b.html"],
+    }
     given = example(name) if name in EXAMPLES else [*name.split(), *(arguments | record)[name]]
     done = without(EVERY, *given, cwd=folder)
     if not needs:

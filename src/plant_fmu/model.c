@@ -111,9 +111,14 @@ static double *plant_ways(const Plant *plant, double *state) {
 static void plant_play(Unit *unit, const Plant *plant, const double *before, double *ways) {
     const double *x = plant->y + plant_slides(plant);
     for (size_t i = 0; i < plant->axes; i++) {
-        AxisBlock *axis = unit_axis(unit, i);
-        ways[i] = geometry_play(before[i], x[i], axis->play);
+        ways[i] = geometry_play(before[i], x[i], unit_axis(unit, i)->play);
         ways[plant->axes + i] = ways[i] - x[i];
+    }
+}
+
+static void plant_show_play(Unit *unit, const Plant *plant, const double *ways) {
+    for (size_t i = 0; i < plant->axes; i++) {
+        AxisBlock *axis = unit_axis(unit, i);
         axis->x_a = axis->x_0 + ways[i];
     }
 }
@@ -134,6 +139,20 @@ static void plant_add_errors(const Plant *plant, const double *ways, double *too
     for (size_t d = 0; d < TOOL_DIRECTIONS; d++) {
         tool[d] += play[d] + error[d];
     }
+}
+
+/* Whether the tool's displacements with them are numbers, of q and of the ways that end a step: a cube of a way is soon
+ * none. */
+static bool plant_errors_are_numbers(Plant *plant, const Modal *modal, const double *q, const double *ways) {
+    double *tool = plant->y + plant->axes, probe = 0;
+    if (!plant_measure_tool(plant, modal, q, plant->y)) {
+        return false;
+    }
+    plant_add_errors(plant, ways, tool);
+    for (size_t d = 0; d < TOOL_DIRECTIONS; d++) {
+        probe += number_probe(tool[d]);
+    }
+    return !isnan(probe);
 }
 
 static void plant_show_tool(Unit *unit, Plant *plant, double *y) {
@@ -241,10 +260,18 @@ static bool plant_step(Unit *unit, double t, double h) {
         (plant->cells > 1 && !plant_follow(unit, plant, q_end, v_end))) {
         return unit_fail(unit, "an output would be no finite number at the end of the step");
     }
+    if (plant->errors) {
+        double *ways = plant_ways(plant, end);
+        plant_play(unit, plant, plant_ways(plant, state), ways);
+        if (!plant_errors_are_numbers(plant, &plant->modal[plant_head(unit)->cell], q_end, ways)) {
+            return unit_fail(unit, "an output would be no finite number at the end of the step");
+        }
+        plant_measure_tool(plant, &plant->modal[plant_head(unit)->cell], q_end, plant->y);
+    }
     plant_head(unit)->place = place;
     plant_show(unit, plant, plant->y);
     if (plant->errors) {
-        plant_play(unit, plant, plant_ways(plant, state), plant_ways(plant, end));
+        plant_show_play(unit, plant, plant_ways(plant, end));
     }
     if (plant->cells > 1) {
         plant_show_tool(unit, plant, plant->y);

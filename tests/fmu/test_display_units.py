@@ -53,7 +53,7 @@ def test_display_units_are_those_of_pint(archive: Archive, registry: Registry) -
 # What a person at a machine calls these quantities. SI units that are read as they are need no other.
 PEOPLES = {
     "m": {"mm", "um", "nm"},
-    "rad": {"deg"},
+    "rad": {"deg", "mrad"},  # mrad: an encoder off its centre
     "rad/s": {"rpm", "rad/s"},
     "s": {"ms", "us", "s"},
     "1/s": {"(m/min)/mm"},
@@ -73,13 +73,16 @@ def test_values_are_shown_in_units_that_people_use(archive: Archive) -> None:
 
 def test_first_display_unit_is_the_one_that_most_variables_have(archive: Archive) -> None:
     """FMPy's plots show all values of a unit in its first display unit: axis positions are in mm then, not in um."""
-    shown = [each[0].attrib for each in archive.variables().values() if each[0].tag == "Real"]
+    shown = [
+        {**each[0].attrib, "signal": each.attrib["causality"] != "parameter"}
+        for each in archive.variables().values()
+        if each[0].tag == "Real"
+    ]
     for unit in archive.description.iterfind("UnitDefinitions/Unit"):
         names = [display.attrib["name"] for display in unit.iterfind("DisplayUnit")]
-        used = [
-            sum(each["unit"] == unit.attrib["name"] and each.get("displayUnit") == n for each in shown) for n in names
-        ]
-        assert used == sorted(used, reverse=True)
-        assert 0 not in used
+        having = [[e for e in shown if e["unit"] == unit.attrib["name"] and e.get("displayUnit") == n] for n in names]
+        used = [(sum(each["signal"] for each in those), len(those)) for those in having]
+        assert used == sorted(used, reverse=True)  # signals first: they are what is plotted
+        assert all(total for _, total in used)
         if unit.attrib["name"] in ("m", "s"):
             assert names[0] in ("mm", "ms"), names

@@ -222,7 +222,8 @@ def settings_of(loaded: scenario.Scenario, axis: str, drive: Path | None, fricti
         f"machine.axes.{axis}.{name}=" + str({
             "fmu": str(path),
             "inputs": {signal.name: other_name(signal.name) for signal in role.inputs},
-            "outputs": {signal.name: other_name(signal.name) for signal in role.outputs},
+            # x_m is recorded where it is named; the shipped drive, without errors of measuring, does not show it.
+            "outputs": {signal.name: other_name(signal.name) for signal in role.outputs if signal.name != "x_m"},
             "parameters": {other_name(key): value for key, value in parameters.items()},
         }).replace("True", "true").replace("False", "false")
         for name, (path, role, parameters) in given.items() if path is not None

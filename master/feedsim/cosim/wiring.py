@@ -107,7 +107,8 @@ def check(connections: Iterable[Connection], instances: Mapping[str, Archive], f
         if not any(end.instance in foreign for end in (connection.target, connection.source)):
             problems += _faults(connection, instances)
     if problems:
-        raise InputError("the units cannot be wired:\n  " + "\n  ".join(problems))
+        files = ", ".join(dict.fromkeys(str(archive.path) for archive in instances.values()))
+        raise InputError(f"{files}: the units cannot be wired:\n  " + "\n  ".join(problems))
 
 
 def _faults(connection: Connection, instances: Mapping[str, Archive]) -> list[str]:

@@ -119,14 +119,16 @@ def _text(value: bool | int | float) -> str:
 def _display_units(rows: Iterable[Row]) -> dict[str, list[str]]:
     """unit -> its display units; a unit is not its own display unit.
 
-    Units in order of their first use, display units with the one of most variables first: there are importers that show
-    all values of a unit in its first one (FMPy's plots).
+    Units in order of their first use, display units with the one of most signals first, then of most parameters: there
+    are importers that show all values of a unit in its first one (FMPy's plots), and signals are what is plotted.
     """
     found: dict[str, Counter[str]] = {}
+    plotted: Counter[tuple[str, str]] = Counter()
     for row in rows:
         found.setdefault(row.unit, Counter())[row.display_unit] += 1
-    return {
-        unit: [name for name, _ in names.most_common() if name != unit]  # equally many: in order of their first use
+        plotted[row.unit, row.display_unit] += row.causality != "parameter"
+    return {  # equally many: in order of their first use
+        unit: sorted((n for n in names if n != unit), key=lambda n: (-plotted[unit, n], -names[n]))
         for unit, names in found.items()
     }
 

@@ -15,7 +15,7 @@ from feedsim.cli.options import Command, Option, by_name
 from feedsim.cli.pack import PACKED
 from feedsim.cli.terminal import announce_archive, progress_bar
 from feedsim.errors import InputError
-from feedsim.outputs import check_file
+from feedsim.outputs import check_file, same
 from feedsim.owned import TemporaryFolder
 
 if TYPE_CHECKING:
@@ -38,9 +38,11 @@ def pack(options: Namespace) -> None:
     from feedsim.structure.table_check import table_mismatch
 
     described = load_described(options.machine)
-    inputs = [options.machine, *(file for _, file in described.files), *filter(None, [options.base])]
-    check_file(options.out, inputs, ours=PACKED, what="unit")
     machine = scenario.load_machine(options.machine)
+    # The archive that the machine file names as its plant, and one that is packed in place, are made anew here.
+    made = [path for path in (machine.plant, options.base) if path is not None]
+    read = [file for _, file in described.files if not any(same(file, each) for each in made)]
+    check_file(options.out, [options.machine, *read], ours=PACKED, what="unit")
     announce_archive(options.base, "the packed plant's trial")
     base = options.base or cosim.fmus_directory() / "plant.fmu"
     pose = _pose_of(machine, options.at)

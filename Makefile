@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case pictures pose-study identification-study identification-accuracy lock ansys clean
+.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs pictures pose-study identification-study identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -135,8 +135,8 @@ $(foreach unit,$(UNITS),$(eval fmus/$(unit).fmu $(BUILD)/fmus-all/$(unit).fmu: \
 
 # Made anew they are the same, byte for byte.
 DIST := dist
-release: $(ALL_FMUS) $(VENV)/.run $(ZIG_HERE) ## wheels, source archive, archives in one file, bill of materials and sums, into dist/
-	PYTHONPATH=src/distribution $(PY) -m feedsim_distribution.release --archives $(BUILD)/fmus-all --out $(DIST)
+release: docs $(ALL_FMUS) $(VENV)/.run $(ZIG_HERE) ## wheels, source archive, archives in one file, bill of materials and sums, into dist/
+	PYTHONPATH=src/distribution $(PY) -m feedsim_distribution.release --archives $(BUILD)/fmus-all --site $(BUILD)/site --out $(DIST)
 
 # --- run -----------------------------------------------------------------------------------------------------------
 
@@ -207,6 +207,12 @@ bench: fmus $(VENV)/.importers ## measure everything, other simulators too; tabl
 
 worst-case: fmus $(VENV)/.run ## worst-case time of a unit's doStep, for real-time targets
 	$(PY) benchmarks/worst_case.py
+
+docs: $(VENV)/.dev $(VARIABLES) ## build the documentation as a site that opens from disk, into build/site
+	rm -rf $(BUILD)/site
+	$(PY) docs/site/stage.py $(BUILD)/site-source
+	$(PY) -m sphinx -q -W --keep-going -b html -c docs/site -d $(BUILD)/site-trees $(BUILD)/site-source $(BUILD)/site
+	@echo "open $(BUILD)/site/index.html"
 
 pictures: fmus $(VENV)/.run ## draw README's and docs' pictures anew (docs/images; ARGS=--all: that of the large study too)
 	$(PY) docs/pictures.py $(ARGS)

@@ -106,6 +106,7 @@ def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: s
         "identify-drive": ["a"],
         "pack": ["a", "--out", "b.fmu"],
         "page": ["a", "--out", "b.html"],
+        "docs": ["--path"],
     }
     given = example(name) if name in EXAMPLES else [*name.split(), *(arguments | record)[name]]
     done = without(EVERY, *given, cwd=folder)

@@ -1,4 +1,4 @@
-"""What this installation has besides its Python files: archives and native cycle loop, scenarios and machines.
+"""What this installation has besides its Python files: archives and native loop, scenarios, machines, documentation.
 
 May use: nothing. Start reading at shipped().
 """
@@ -22,6 +22,14 @@ def checkout() -> Path | None:
 def shipped(name: str) -> Path:
     """The folder `name` ("fmus", "scenarios"): of the checkout, where make fills it, else inside the package."""
     return (checkout() or PACKAGE / INSIDE) / name
+
+
+def documentation() -> Path | None:
+    """First page of the documentation: of the site, or of its sources in a checkout that has not built it; None where
+    this installation has neither."""
+    root = checkout()
+    pages = [root / "build/site/index.html", root / "docs/index.md"] if root else [PACKAGE / INSIDE / "site/index.html"]
+    return next((page for page in pages if page.is_file()), None)
 
 
 def mend(what: str) -> str:

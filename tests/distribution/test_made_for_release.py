@@ -32,8 +32,12 @@ def made(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr(shipped, "zig", toolchain.find_compiler)
         patch.setattr(shipped, "zig_for_pages", lambda: None)  # this machine's, if it has one
         patch.setattr(shipped, "TAGS", {HERE: shipped.TAGS[HERE]})
+        site = folder / "site"  # what a build of the pages leaves, in small
+        (site / "how-to").mkdir(parents=True)
+        for name in ("index.html", "how-to/page.html", ".buildinfo"):
+            (site / name).write_text(f"<p>{name}</p>")
         for name in ("first", "second"):
-            release.write(folder / name, fmus)
+            release.write(folder / name, fmus, site)
     return folder
 
 
@@ -46,6 +50,13 @@ def test_the_same_again(made: Path) -> None:
     assert first == {path.name: path.read_bytes() for path in (made / "second").iterdir()}
     assert len(first) == 8
     assert first["requirements.lock"] == (ROOT / "requirements.lock").read_bytes()
+
+
+def test_wheels_hold_the_documentation(made: Path) -> None:
+    for path in (made / "first").glob("*.whl"):
+        with zipfile.ZipFile(path) as opened:
+            pages = [name for name in opened.namelist() if name.startswith("feedsim/shipped/site/")]
+        assert pages == ["feedsim/shipped/site/how-to/page.html", "feedsim/shipped/site/index.html"]
 
 
 def test_sums_are_of_every_file(made: Path) -> None:

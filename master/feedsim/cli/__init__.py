@@ -23,6 +23,7 @@ from feedsim.cli import (
     circle,
     compare,
     compensate,
+    docs,
     example,
     files,
     frf,
@@ -71,7 +72,7 @@ examples:
 COMMANDS = (
     example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, replay.IDENTIFY_DRIVE,
     replay.REPLAY, compensate.COMMAND, circle.COMMAND, show.COMMAND, pack.COMMAND, page.COMMAND, run.SSP, sweep.COMMAND,
-    compare.COMMAND, files.SCHEMA, files.CONVERT,
+    compare.COMMAND, files.SCHEMA, files.CONVERT, docs.COMMAND,
 )  # fmt: skip
 
 

@@ -123,7 +123,7 @@ class Trace(TimeColumns):
         return Trace, (self.time, dict(self.columns), dict(self.units))
 
     def select(self, patterns: Iterable[str]) -> "Trace":
-        """Columns whose name matches any of the glob patterns ("Z.*", "*.x_a"), in their present order.
+        """Columns whose name matches any of the glob patterns (``"Z.*"``, ``"*.x_a"``), in their present order.
 
         InputError for a pattern that matches nothing.
         """

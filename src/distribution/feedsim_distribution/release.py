@@ -44,12 +44,14 @@ An FMU is a program: to run it is to run its library with your rights. Licence: 
 """
 
 
-def write(folder: Path, archives: Path) -> list[Path]:
-    """Write all artefacts into `folder`; `archives`: folder with the archives for all platforms."""
+def write(folder: Path, archives: Path, site: Path) -> list[Path]:
+    """Write all artefacts into `folder`; archives: for all platforms; site: folder of the documentation."""
     folder.mkdir(parents=True, exist_ok=True)
     version = str(table()["version"])
     notes = _notes(version)
-    names = [wheel.write(folder, shipped.for_platform(platform, shipped.zig(), archives)) for platform in _platforms()]
+    names = [
+        wheel.write(folder, shipped.for_platform(platform, shipped.zig(), archives, site)) for platform in _platforms()
+    ]
     names.append(sdist.write(folder))
     made = {
         f"feedsim-fmus-{version}.zip": _units(archives, version),
@@ -112,10 +114,11 @@ def _notes(version: str) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description="Write everything that is handed out of this version.")
     parser.add_argument("--archives", type=Path, required=True, help="folder of the archives for all platforms")
+    parser.add_argument("--site", type=Path, required=True, help="folder of the documentation as a site")
     parser.add_argument("--out", type=Path, required=True, help="folder to write into")
     options = parser.parse_args()
     try:
-        for path in write(options.out, options.archives):
+        for path in write(options.out, options.archives, options.site):
             print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
     except PackagerError as error:
         print(f"error: {error}", file=sys.stderr)

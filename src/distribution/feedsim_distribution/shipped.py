@@ -1,4 +1,4 @@
-"""What a wheel holds besides Python: the archives, the native cycle loop, scenarios and machines."""
+"""What a wheel holds besides Python: archives, native cycle loop, scenarios and machines, documentation."""
 
 import platform
 import sys
@@ -39,17 +39,29 @@ def for_this_machine(compiler: Sequence[str]) -> Shipped:
     return Shipped(_archives(compiler, None) | _loop(compiler, None) | _page(None) | _plain(compiler), tag)
 
 
-def for_platform(name: str, compiler: Sequence[str], archives: Path | None = None) -> Shipped:
+def for_platform(name: str, compiler: Sequence[str], archives: Path | None = None, site: Path | None = None) -> Shipped:
     """For another machine, by zig: archives for all platforms, native loop for one, or none at all for "any".
 
-    archives: folder that has them already, for all platforms.
+    archives: folder that has them already, for all platforms. site: folder of the documentation that `make docs` built.
     """
     if name not in (*TAGS, ANY):
         raise InputError(f"platform {name}: no wheel is made for it (known: {', '.join(TAGS)}, {ANY})")
     held = _archives(compiler, targets.named("all")) if archives is None else _placed(taken(archives))
     loop = {} if name == ANY else _loop(compiler, targets.ALL[name])
     page = _page(zig_for_pages())
-    return Shipped(held | loop | page | _plain(compiler), TAGS.get(name, ANY))
+    return Shipped(held | loop | page | _documentation(site) | _plain(compiler), TAGS.get(name, ANY))
+
+
+def _documentation(site: Path | None) -> dict[str, bytes]:
+    """The pages of the site, without what only the next build of it would read."""
+    if site is None:
+        return {}
+    if not (site / "index.html").is_file():
+        raise InputError(f"{site}: has no index.html; make docs builds the documentation")
+    pages = sorted(
+        path for path in site.rglob("*") if path.is_file() and path.name not in (".buildinfo", "objects.inv")
+    )
+    return {f"{PLACE}site/{path.relative_to(site).as_posix()}": path.read_bytes() for path in pages}
 
 
 def taken(folder: Path) -> dict[str, bytes]:

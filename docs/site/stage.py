@@ -1,0 +1,82 @@
+"""Lay the pages of the site out in one folder: the documents as they are, and the reference made from its sources.
+
+    python docs/site/stage.py build/site-source
+
+May use feedsim. Start reading at main(): a page is a Markdown text by its place on the site. A link that leads to a
+file of the repository that is no page becomes the file's name.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import reference
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+# Documents that lie outside docs/: where they stand on the site.
+ELSEWHERE = {
+    ROOT / "CONTRIBUTING.md": "contributing.md",
+    ROOT / "CHANGELOG.md": "changelog.md",
+    ROOT / "README.md": "index.md",
+    ROOT / "SECURITY.md": "security.md",
+    DOCS / "README.md": "index.md",
+    **{ROOT / "src" / unit / "README.md": f"units/{unit.removesuffix('_fmu')}.md"
+       for unit in ("plant_fmu", "controller_fmu", "friction_fmu", "setpoint_fmu", "machine_fmu", "exchange", "page")},
+}  # fmt: skip
+_LINK = re.compile(r"(?P<text>!?\[(?:[^\[\]]|\[[^\]]*\])*\])\((?P<target>[^)#\s]+)(?P<anchor>#[^)\s]*)?\)")
+
+
+def place(document: Path) -> str | None:
+    """Where a document of the repository stands on the site; None: it is no page."""
+    if document in ELSEWHERE:
+        return ELSEWHERE[document]
+    if document.is_relative_to(DOCS) and document.suffix == ".md":
+        return document.relative_to(DOCS).as_posix()
+    return None
+
+
+def relinked(text: str, document: Path) -> str:
+    """The text with its links as they are on the site."""
+    here = Path(place(document) or "")
+
+    def link(found: re.Match[str]) -> str:
+        shown, target, anchor = found["text"], found["target"], found["anchor"] or ""
+        if "://" in target or target.startswith("mailto:"):
+            return found[0]
+        file = (document.parent / target).resolve()
+        page = place(file)
+        if page is None and file.is_relative_to(DOCS / "images"):
+            page = file.relative_to(DOCS).as_posix()
+        if page is None:
+            name = file.relative_to(ROOT).as_posix() if file.is_relative_to(ROOT) else target
+            words = shown[1:-1].strip("`")
+            return f"`{name}`" if words in (target, file.name, name) else f"{shown[1:-1]} (`{name}`)"
+        return f"{shown}({os.path.relpath(page, here.parent)}{anchor})".replace(os.sep, "/")
+
+    parts = re.split(r"(^ *```.*?^ *```)", text, flags=re.DOTALL | re.MULTILINE)
+    return "".join(part if position % 2 else _LINK.sub(link, part) for position, part in enumerate(parts))
+
+
+def main(folder: Path) -> None:
+    """Write the sources of the site into `folder`, which is made anew."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    shutil.copytree(DOCS / "images", folder / "images")
+    documents = [path for path in sorted(DOCS.rglob("*.md")) if path.name != "README.md"]
+    for document in [*documents, *(path for path in ELSEWHERE if path.is_file() and path.name != "README.md"),
+                     *(path for path in ELSEWHERE if path.parent.parent.name == "src" and path.is_file())]:  # fmt: skip
+        target = folder / str(place(document))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(relinked(document.read_text(encoding="utf-8"), document), encoding="utf-8")
+    for name, text in reference.pages().items():
+        (folder / "reference").mkdir(exist_ok=True)
+        (folder / "reference" / f"{name}.md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]).resolve())

@@ -1,0 +1,114 @@
+"""The documentation as a site: no warning, opens from disk, asks nobody, every link leads somewhere."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+pytest.importorskip("sphinx", reason="Sphinx is not installed (requirements-dev.lock)")
+ROOT = Path(__file__).resolve().parents[1]
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+LARGEST = 10e6  # bytes of all pages: what a wheel can carry
+
+
+class Page(HTMLParser):
+    """Names of a page's places, its links, and what it would load."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.names: set[str] = set()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.images_without_text = 0
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = {name: value or "" for name, value in attrs}
+        self.names |= {values[name] for name in ("id", "name") if name in values}
+        if tag == "a" and "href" in values:
+            self.links.append(values["href"])
+        if tag in ("script", "img", "iframe") and "src" in values:
+            self.loaded.append(values["src"])
+        if tag == "link" and values.get("rel") in ("stylesheet", "icon", "preload"):
+            self.loaded.append(values["href"])
+        if tag == "img" and not values.get("alt"):
+            self.images_without_text += 1
+
+
+@pytest.fixture(scope="module")
+def site(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    stage = [sys.executable, ROOT / "docs" / "site" / "stage.py", folder / "source"]
+    build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "-c", ROOT / "docs" / "site",
+             "-d", folder / "trees", folder / "source", folder / "site"]  # fmt: skip
+    for command in (stage, build):
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "site"
+
+
+@pytest.fixture(scope="module")
+def pages(site: Path) -> dict[Path, Page]:
+    return {path.resolve(): Page(path) for path in site.rglob("*.html")}
+
+
+def test_every_document_is_a_page(pages: dict[Path, Page], site: Path) -> None:
+    names = {path.relative_to(site.resolve()).as_posix() for path in pages}
+    for document in (ROOT / "docs").rglob("*.md"):
+        if document.name != "README.md":
+            assert document.relative_to(ROOT / "docs").with_suffix(".html").as_posix() in names, document
+    assert {"units/plant.html", "contributing.html", "reference/commands.html", "glossary.html"} <= names
+
+
+def test_links_lead_somewhere(pages: dict[Path, Page]) -> None:
+    lost = []
+    for path, page in pages.items():
+        for link in page.links:
+            target, _, anchor = link.partition("#")
+            if "://" in target or target.startswith("mailto:"):
+                continue
+            file = (path.parent / unquote(target)).resolve() if target else path
+            if not file.is_file() or (anchor and file in pages and unquote(anchor) not in pages[file].names):
+                lost.append(f"{path.name}: {link}")
+    assert not lost
+
+
+def test_pages_ask_nobody_and_are_not_too_large(pages: dict[Path, Page], site: Path) -> None:
+    assert not [source for page in pages.values() for source in page.loaded if "://" in source or source[:2] == "//"]
+    assert sum(path.stat().st_size for path in site.rglob("*") if path.is_file()) < LARGEST
+
+
+def test_pictures_have_words(pages: dict[Path, Page]) -> None:
+    assert not [path.name for path, page in pages.items() if page.images_without_text]
+
+
+def test_equations_are_set(site: Path) -> None:
+    page = (site / "figures.html").read_text(encoding="utf-8")
+    assert page.count("<math") > 20
+    assert not re.search(r"\\(frac|sum|max|mathrm|left)", re.sub(r"<annotation.*?</annotation>", "", page, flags=re.S))
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)")
+def test_the_search_finds_pages_from_disk(site: Path) -> None:
+    """In a real browser, which asks for nothing but files of the site."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    asked: list[str] = []
+    with playwright.sync_playwright() as api:
+        browser = api.chromium.launch(executable_path=CHROMIUM, args=["--headless", "--no-sandbox", "--disable-gpu"])
+        page = browser.new_page()
+        page.on("request", lambda request: asked.append(request.url))
+        for word, target in (("backlash", "how-to/why-not-round"), ("ballbar", "how-to/ballbar"), ("K_v", "glossary")):
+            page.goto((site / "search.html").as_uri() + f"?q={word}")
+            page.wait_for_function(
+                "part => [...document.querySelectorAll('ul.search li a')].some(each => each.href.includes(part))",
+                arg=target, timeout=30_000,
+            )  # fmt: skip
+        browser.close()
+    assert not [url for url in asked if not url.startswith(("file:", "data:"))]

@@ -120,7 +120,7 @@ def test_a_run_says_who_and_when(fault: str, native: bool, place: Callable[[str]
     nothing_left(folder)
 
 
-@pytest.mark.parametrize("fault", ["crash", "exit 0", "loop", "loading"])
+@pytest.mark.parametrize("fault", FAULTS)
 def test_commands_end_with_3(fault: str, place: Callable[[str], Path], fmus: Path) -> None:
     """A scenario, and the same as an SSP file."""
     folder, (_, how, rows) = place(fault), FAULTS[fault]
@@ -134,9 +134,17 @@ def test_commands_end_with_3(fault: str, place: Callable[[str], Path], fmus: Pat
         assert {*(folder / "temporary").iterdir()} == before
 
 
-@pytest.mark.parametrize("fault", ["abort", "exit 0", "sleep"])
+def test_measured_responses_have_the_limit_of_the_scenario(place: Callable[[str], Path], fmus: Path) -> None:
+    folder = place("sleep")
+    words = ["--friction", "--realisations", "1", "--offset-speed", "5 rad/s", "--band", "2Hz..100Hz"]
+    done = feedsim("frf", "s.yaml", *words, "--out", "out", fmus=fmus, cwd=folder)
+    assert done.returncode == 3, done.stderr
+    assert FAULTS["sleep"][1] in done.stderr
+
+
+@pytest.mark.parametrize("fault", FAULTS)
 def test_a_study_goes_on(fault: str, place: Callable[[str], Path], fmus: Path) -> None:
-    """The run that fails is a row with its message; the others are made."""
+    """The run that fails is a row with its message; the others are made, where the unit can be loaded at all."""
     folder = place(fault)
     (folder / "study.yaml").write_text(
         "name: st\nscenario: s.yaml\nsampling: {method: grid}\nfigures: [X.overshoot]\n"
@@ -145,10 +153,11 @@ def test_a_study_goes_on(fault: str, place: Callable[[str], Path], fmus: Path) -
     text = (folder / "s.yaml").read_text().replace("set:", "evaluate: [{kind: positioning, axis: X}]\nset:")
     (folder / "s.yaml").write_text(text)
     done = feedsim("sweep", "study.yaml", "--workers", "1", "--out", "out", "--quiet", fmus=fmus, cwd=folder)
-    assert done.returncode == 0, done.stderr
+    _, how, begins = FAULTS[fault]
+    assert done.returncode == (0 if begins else 3), done.stderr
     table = (folder / "out" / "table.csv").read_text()
-    assert table.count(FAULTS[fault][1].split(";")[0]) == 1
-    assert "unit friction_X, t = 0.05 s" in table
+    assert table.count(how.split(";")[0]) == (1 if begins else 3)
+    assert ("unit friction_X, t = 0.05 s" if begins else "faulty.fmu") in table
 
 
 # A process that executes another maker's unit itself: FMPy's logger is then that unit's for all others, too.

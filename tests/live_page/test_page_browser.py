@@ -252,6 +252,8 @@ def test_without_scripts_the_scenario_is_shown_as_written(browser: Any, files: d
         assert opened.page.locator("#contour-XZ svg.plot").is_visible()
         assert opened.page.locator("#figures tbody tr").count() > 10
         assert opened.page.locator("#knobs").is_hidden()
+        # Nothing stands beside the picture then: it has the width of the page.
+        assert opened.page.locator("#contour-XZ").bounding_box()["width"] > 700
 
 
 @pytest.mark.parametrize("width", [360, 800, 1600])

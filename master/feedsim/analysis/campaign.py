@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from feedsim.analysis.estimate import measured
 from feedsim.cosim.excite import Measurement, measure, usual_rms
 from feedsim.nc.excitation import Excitation, binary_sequence, multisine
-from feedsim.scenario import Machine
+from feedsim.scenario import Coupling, Machine
 from feedsim.trace.response import FrequencyResponse
 
 Signal = Literal["multisine", "prbs"]
@@ -92,11 +92,13 @@ Progress = Callable[[str, int, int], None]
 
 
 def run_campaign(
-    machine: Machine, axes: Sequence[str], plan: Plan, *, fmus: Path | None = None, progress: Progress | None = None
-) -> Campaign:
+    machine: Machine, axes: Sequence[str], plan: Plan, *, fmus: Path | None = None, progress: Progress | None = None,
+    call_limit: float = Coupling().call_limit,
+) -> Campaign:  # fmt: skip
     """Measure the responses of `axes`, one after the other.
 
-    progress: called with what is being measured, cycles done and cycles in all.
+    progress: called with what is being measured, cycles done and cycles in all. call_limit: time [s] after which a call
+    of another maker's unit is ended.
 
     Raises:
         InputError: as cosim.excite.measure: an argument out of range, a limit was met.
@@ -110,7 +112,7 @@ def run_campaign(
     wall_time = simulated = 0.0
     for axis, inject, pairs in _inputs(machine, axes, plan):
         measurements = [
-            _measure(machine, axis, inject, plan, realisation, fmus, progress)
+            _measure(machine, axis, inject, plan, realisation, fmus, progress, call_limit)
             for realisation in range(plan.realisations)
         ]
         found = measured(measurements, pairs)
@@ -171,8 +173,9 @@ def _inputs(machine: Machine, axes: Sequence[str], plan: Plan) -> Iterator[tuple
 
 
 def _measure(
-    machine: Machine, axis: str, inject: str, plan: Plan, realisation: int, fmus: Path | None, progress: Progress | None
-) -> Measurement:
+    machine: Machine, axis: str, inject: str, plan: Plan, realisation: int, fmus: Path | None,
+    progress: Progress | None, call_limit: float,
+) -> Measurement:  # fmt: skip
     rms = plan.rms if plan.rms is not None and inject == plan.inject else usual_rms(machine, axis, inject)
     what = inject if inject.startswith("tool.") else f"{axis}.{inject}"
 
@@ -191,4 +194,5 @@ def _measure(
         settle=plan.settle,
         fmus=fmus,
         progress=tell,
+        call_limit=call_limit,
     )

@@ -47,7 +47,7 @@ def frf(options: Namespace) -> None:
     from feedsim.findings import severity
     from feedsim.linear.judgement import judge
     from feedsim.report import frf as report
-    from feedsim.scenario import load_subject
+    from feedsim.scenario import Coupling, load_subject
     from feedsim.structure.table_check import table_mismatch
 
     subject = load_subject(options.subject, options.overrides)
@@ -83,7 +83,10 @@ def frf(options: Namespace) -> None:
         campaign = None
         if not (options.no_measure or result.unstable_poles):
             announce(machine, options.fmus)
-            campaign = run_campaign(machine, axes, plan, fmus=options.fmus, progress=progress)
+            coupling = subject.scenario.coupling if subject.scenario is not None else Coupling()
+            campaign = run_campaign(
+                machine, axes, plan, fmus=options.fmus, progress=progress, call_limit=coupling.call_limit
+            )
         figures = linear.figures(result)
         if not options.tool:
             figures = {name: figure for name, figure in figures.items() if not name.startswith("tool.")}

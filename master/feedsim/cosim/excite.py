@@ -90,6 +90,7 @@ def measure(
     fmus: Path | None = None,
     progress: Progress | None = None,
     native: bool | None = None,
+    call_limit: float = Coupling().call_limit,
 ) -> Measurement:
     """Excite the machine and record its steady response.
 
@@ -107,6 +108,7 @@ def measure(
         fmus: folder of the archives; default :func:`fmus_directory`.
         progress: called now and then with (cycles done, cycles in all).
         native: whether the native cycle loop is to work; see :func:`~feedsim.cosim.run.run`.
+        call_limit: time [s] after which a call of another maker's unit is ended.
 
     Raises:
         InputError: an argument that does not fit the machine, the travel is too short, a drive met a limit, so that the
@@ -116,7 +118,7 @@ def measure(
     fmus = fmus or fmus_directory()
     given = (machine, axis, excitation, inject, friction, offset_speed, periods, settle, fmus, native)
     if any_foreign(machine, fmus):
-        return worker.call(_measured, *given, limit=Coupling().call_limit, progress=progress)
+        return worker.call(_measured, *given, limit=call_limit, progress=progress)
     return _measured(*given, progress=progress)
 
 

@@ -57,7 +57,7 @@ class Mark:
 
 
 class Watched:
-    """The mark of this process, and who is to be told which operations its numbers speak of."""
+    """The mark of this process, and who needs to know which operations its numbers stand for."""
 
     def __init__(self) -> None:
         self.mark: Mark | None = None

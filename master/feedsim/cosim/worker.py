@@ -152,7 +152,10 @@ class _Worker:
             how = f"was ended by {name} ({signal.strsignal(-code) or 'unknown'})"
         else:
             how = f"ended the process by itself, with exit status {code}"
-        raise SimulationError(f"{where} {how}; the fault is in that unit's own program")
+        raise SimulationError(
+            f"{where} {how}; the fault is in that unit's own program: its maker needs this message, and a debugger "
+            "shows where it stops"
+        )
 
     def _where(self, operations: tuple[float, Sequence[tuple[str, str, float]]]) -> str:
         """Which unit, in what, when; what a sentence begins with."""

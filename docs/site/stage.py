@@ -59,7 +59,8 @@ def relinked(text: str, document: Path) -> str:
         return f"{shown}({os.path.relpath(page, here.parent)}{anchor})".replace(os.sep, "/")
 
     parts = re.split(r"(^ *```.*?^ *```)", text, flags=re.DOTALL | re.MULTILINE)
-    return "".join(part if position % 2 else _LINK.sub(link, part) for position, part in enumerate(parts))
+    shown = [part if position % 2 else _LINK.sub(link, part) for position, part in enumerate(parts)]
+    return "".join(shown).replace("```csv\n", "```text\n")  # Pygments knows no tables
 
 
 def main(folder: Path) -> None:

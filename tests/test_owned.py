@@ -10,6 +10,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
@@ -194,6 +195,32 @@ def test_temporary_folders_go_with_their_process(tmp_path: Path, monkeypatch: py
             assert set(tmp_path.iterdir()) == {*there, own}
     assert set(tmp_path.iterdir()) == there
     assert (tmp_path / "mine" / "file").exists()
+
+
+def test_a_signal_at_any_line_leaves_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(owned.tempfile, "tempdir", str(tmp_path))  # type: ignore[attr-defined]
+    interrupted, at = True, 0
+    while interrupted:
+        at, interrupted, left = at + 1, False, at
+
+        def trace(frame: FrameType, event: str, given: object) -> object:
+            nonlocal left
+            if frame.f_code.co_filename == owned.__file__ and event == "line":
+                left -= 1
+                if left < 0:
+                    raise SystemExit(143)
+            return trace
+
+        sys.settrace(trace)
+        try:
+            with TemporaryFolder() as folder:
+                (folder / "file").touch()
+        except SystemExit:
+            interrupted = True
+        finally:
+            sys.settrace(None)
+        assert not list(tmp_path.iterdir()), f"interrupted at line {at} of those executed"
+    assert at > 20
 
 
 def test_a_file_that_was_not_finished_goes_with_the_next(tmp_path: Path) -> None:

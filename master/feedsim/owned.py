@@ -13,6 +13,7 @@ import hashlib
 import os
 import platform
 import re
+import secrets
 import shlex
 import shutil
 import stat
@@ -30,7 +31,8 @@ from typing import Self
 from feedsim.errors import OutputError
 
 PREFIX = "feedsim-"  # of folders for temporary files
-_NAME = re.compile(rf"{PREFIX}[a-z0-9_]{{8}}")  # as tempfile makes them
+_LETTERS, _LENGTH = "abcdefghijklmnopqrstuvwxyz0123456789_", 8  # of their names behind it, as tempfile has them
+_NAME = re.compile(rf"{PREFIX}[{_LETTERS}]{{{_LENGTH}}}")
 LOCK = ".feedsim.lock"  # in a folder that belongs to a process
 WRITING = 2.0  # s for which processes that are just being ended may still write into a folder that is removed
 YOUNG = 60.0  # s within which a folder without a lock may be one that is just being made
@@ -235,23 +237,33 @@ class TemporaryFolder:
         try:
             parent = within or Path(tempfile.gettempdir())
             while True:
-                self.path = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+                self.path = parent / (PREFIX + "".join(secrets.choice(_LETTERS) for _ in range(_LENGTH)))
+                held: list[int] = []
+                # Ahead of the folder: a signal may end the program between any two steps, and nobody may close it.
+                self._end = weakref.finalize(self, _remove, self.path, held, os.getpid())
                 try:
-                    file = os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o600)
-                except FileNotFoundError:  # taken for one that a killed process has left, while it was empty
+                    self.path.mkdir(0o700)
+                except FileExistsError:  # another's
+                    self._end.detach()
                     continue
-                if locked(file) is not False and _is(self.path / LOCK, file):
+                try:
+                    held.append(os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o600))
+                except FileNotFoundError:  # taken for one that a killed process has left, while it was empty
+                    self._end.detach()
+                    continue
+                if locked(held[0]) is not False and _is(self.path / LOCK, held[0]):
                     break
-                os.close(file)
+                self._end.detach()
+                os.close(held[0])
         except OSError as error:
             where = f"{within}: a folder" if within else "a folder for temporary files (TMPDIR)"
             raise OutputError(f"{where} cannot be made: {error.strerror or error}") from error
-        # Also when a signal ends the program, or when nobody closes it.
-        self._end = weakref.finalize(self, _remove, str(self.path), file, os.getpid())
 
     def close(self) -> None:
         """Remove it with all that is in it."""
-        self._end()
+        if (known := self._end.peek()) is not None:
+            _remove(*known[2])  # not by calling it, which forgets the folder first: a signal may end this half-way
+            self._end.detach()
 
     def __enter__(self) -> Path:
         return self.path
@@ -260,14 +272,15 @@ class TemporaryFolder:
         self.close()
 
 
-def _remove(folder: str, file: int, owner: int) -> None:
+def _remove(folder: Path, held: list[int], owner: int) -> None:
     """A process that was forked off leaves its parent's folders alone."""
     if os.getpid() != owner:
         return
     until = time.monotonic() + WRITING
-    while not _emptied(Path(folder)) and time.monotonic() < until:
+    while not _emptied(folder) and time.monotonic() < until:
         time.sleep(_LOOK)
-    os.close(file)  # ahead of the rest: Windows does not remove what is open
+    while held:  # ahead of the rest: Windows does not remove what is open
+        os.close(held.pop())
     shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -1,0 +1,124 @@
+"""Pages are written as docs/style.md asks: short sentences, short lines, none of the words listed there."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from statistics import median
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "docs" / "site"))
+import prose  # noqa: E402  (a tool of the documentation, in no package)
+
+PAGES = sorted(
+    path
+    for pattern in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "docs/**/*.md", "src/*/README.md")
+    for path in ROOT.glob(pattern)
+)
+# Pages of before the style: none is added, each leaves when it is rewritten.
+NOT_YET = {
+    "CONTRIBUTING.md",
+    "SECURITY.md",
+    "docs/architecture.md",
+    "docs/comparing.md",
+    "docs/compensation.md",
+    "docs/effects.md",
+    "docs/fe-import.md",
+    "docs/figures.md",
+    "docs/identification.md",
+    "docs/importing.md",
+    "docs/page.md",
+    "docs/performance.md",
+    "docs/platforms.md",
+    "docs/position-dependence.md",
+    "docs/real-machine.md",
+    "docs/replay.md",
+    "docs/reports.md",
+    "docs/scenarios.md",
+    "docs/ssp.md",
+    "docs/structure.md",
+    "docs/sweeps.md",
+    "docs/theory.md",
+    "docs/traces.md",
+    "docs/user-guide.md",
+    "src/controller_fmu/README.md",
+    "src/exchange/README.md",
+    "src/friction_fmu/README.md",
+    "src/machine_fmu/README.md",
+    "src/page/README.md",
+    "src/plant_fmu/README.md",
+    "src/setpoint_fmu/README.md",
+}
+MEDIAN = 14  # words of a sentence
+
+
+def named(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if named(page) not in NOT_YET], ids=named)
+def test_page_keeps_to_the_style(page: Path) -> None:
+    assert prose.faults(page.read_text(encoding="utf-8"), own=page == prose.STYLE) == []
+
+
+def test_the_list_only_shrinks() -> None:
+    assert {named(page) for page in PAGES} >= NOT_YET
+    done = [name for name in NOT_YET if not prose.faults((ROOT / name).read_text(encoding="utf-8"))]
+    assert not done, "these keep to the style: take them off the list"
+
+
+def test_sentences_are_short_in_the_middle() -> None:
+    lengths = [
+        words
+        for page in PAGES
+        if named(page) not in NOT_YET
+        for words in prose.lengths(page.read_text(encoding="utf-8"))
+    ]
+    assert median(lengths) <= MEDIAN
+
+
+def test_readme_fits_on_two_screens() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
+
+
+LONG = "So it is " + "an ox or a cow " * 6 + "we see."  # 35 words, which fit a line
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "part"),
+    [
+        (f"# A\n\n{LONG}\n", "3", "words"),
+        (f"- short\n- {LONG}\n", "2", "words"),
+        ("One.\n\nIt cannot be had here.\n", "3", "'be had'"),
+        ("```\ncode\n```\n" + "a " * 61 + "\n", "4", "characters"),
+    ],
+)
+def test_what_is_wrong_is_found_with_its_line(text: str, line: str, part: str) -> None:
+    found = prose.faults(text)
+    assert [fault for fault in found if fault.startswith(f"{line}:") and part in fault]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"```\n{LONG}\n```\n",
+        f"| {LONG} |\n",
+        f"# {LONG}\n",
+        f"<!-- {LONG} -->\n",
+        f"$$\n{LONG}\n$$\n",
+        f"`{LONG}`\n",
+        "See Fig. 2 of the paper. " * 4,
+        "`be had` is code.\n",
+    ],
+)
+def test_what_is_no_prose_is_free(text: str) -> None:
+    assert prose.faults(text) == []
+
+
+def test_sentences_are_told_apart() -> None:
+    assert prose.sentences("See Eq. 3, e.g. `a. B`. It says *so.* And [a link. Two](b.md)?") == [
+        "See Eq 3, e.g CODE", "It says *so", "And a link", "Two?",
+    ]  # fmt: skip
+    assert prose.words("a - b, $x$ |") == 3

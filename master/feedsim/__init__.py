@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from feedsim.front.comparison import compare
     from feedsim.front.overlay import Overlay, show
     from feedsim.front.result import Result
+    from feedsim.jobs.circle import circle
     from feedsim.scenario import Machine, Scenario, load_machine
     from feedsim.scenario.load import load as load_scenario
     from feedsim.trace import Trace
@@ -44,6 +45,7 @@ _HOMES = {
     "Scenario": "scenario",
     "SimulationError": "errors",
     "Trace": "trace",
+    "circle": "jobs.circle",
     "compare": "front.comparison",
     "evaluate": "analysis",
     "example": "examples:copy",
@@ -60,7 +62,7 @@ _HOMES = {
 
 __all__ = [
     "FeedsimError", "Figure", "InputError", "Machine", "OutputError", "Overlay", "Result", "Run", "Scenario",
-    "SimulationError", "Trace", "compare", "evaluate", "example", "frf", "identify", "load", "load_machine",
+    "SimulationError", "Trace", "circle", "compare", "evaluate", "example", "frf", "identify", "load", "load_machine",
     "load_scenario", "read_trace", "run", "show", "sweep",
 ]  # fmt: skip
 

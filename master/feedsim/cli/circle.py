@@ -5,9 +5,8 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, QUIET, Command, Option, lengths, names, out, quantity
-from feedsim.cli.terminal import finish, results_in
-from feedsim.errors import InputError
+from feedsim.cli.options import FIGURES, QUIET, Command, Option, names, out, pairs
+from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Take a recorded circle apart: servo mismatch, squareness, scale, lost motion, reversal peaks, pitch
 errors, each with interval and share of G, in words. Files are CSV with units in the header, with positions of both axes
@@ -21,36 +20,23 @@ EPILOG = """examples:
 
 
 def circle(options: Namespace) -> None:
-    """Read, take apart, write."""
-    from feedsim.analysis.circle import diagnose
-    from feedsim.analysis.circle.records import read_circle
-    from feedsim.report import circle as report
+    """feedsim circle."""
+    from feedsim.jobs.circle import circle
 
-    axes = options.axes
-    if len(axes) != 2 or axes[0] == axes[1]:
-        raise InputError(f"--axes {','.join(axes)}: two different axes of the plane are needed, for example --axes X,Z")
-    directory: Path = options.out or Path("results") / f"circle_{options.records[0].stem}"
-    radius = None if options.radius is None else quantity("radius", options.radius, "m", "150 mm", positive=True)
-    feed = None if options.feed is None else quantity("feed", options.feed, "m/s", "1000 mm/min", positive=True)
-    centre = lengths("centre", options.centre, "POSITION", "10mm")
-    pitch = lengths("pitch", options.pitch, "LENGTH", "10mm", positive=True)
-    for option, named in (("centre", centre), ("pitch", pitch)):
-        if other := [axis for axis in named if axis not in axes]:
-            raise InputError(f"--{option}: {other[0]} is no axis of the plane; --axes says {', '.join(axes)}")
-    if centre and len(centre) != 2:
-        raise InputError(f"--centre: is given of {' and '.join(centre)} alone; give it of {axes[0]} and {axes[1]}")
-    with results_in(directory, report.check_writable, options.records):
-        recorded = read_circle(
+    out: Path = options.out or Path("results") / f"circle_{options.records[0].stem}"
+    with watching(options.quiet) as watch:
+        result = circle(
             options.records,
-            (axes[0], axes[1]),
-            radius=radius,
-            feed=feed,
-            centre=(centre[axes[0]], centre[axes[1]]) if centre else None,
-            pitch=pitch,
+            options.axes,
+            radius=options.radius,
+            feed=options.feed,
+            centre=pairs("centre", options.centre, "AXIS=POSITION is needed, e.g. X=10mm"),
+            pitch=pairs("pitch", options.pitch, "AXIS=LENGTH is needed, e.g. X=10mm"),
+            out=out,
+            figures=options.figures,
+            watch=watch,
         )
-        diagnosis = diagnose(recorded.circle, [turn.path for turn in recorded.turns], centred=recorded.centred)
-        report.write(recorded, diagnosis, options.records, directory, drawn=options.figures)
-    finish(options.quiet, recorded.doubts, *report.lines(diagnosis, recorded), f"-> {directory / 'report.html'}")
+    finish(options.quiet, result.findings, *result.lines, f"-> {out / 'report.html'}")
 
 
 COMMAND = Command(
@@ -70,4 +56,5 @@ COMMAND = Command(
     ),
     description=DESCRIPTION,
     epilog=EPILOG,
+    job="circle",
 )

@@ -65,7 +65,7 @@ class Command:
     """A command of the command line, or a group of commands.
 
     action: takes the parsed options, returns an exit code or None for 0. epilog: of a description whose lines are kept.
-    needs: the extras without which it is not begun.
+    needs: the extras without which it is not begun. job: the public function of Python that it calls.
     """
 
     name: str
@@ -76,6 +76,7 @@ class Command:
     epilog: str | None = None
     commands: Sequence[Command] = ()
     needs: Sequence[str] = ("run",)
+    job: str = ""
 
     def add_to(self, commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         """Add it to a command line."""
@@ -190,6 +191,11 @@ def by_name(
                 raise InputError(f"{name or 'that of all axes'} is given twice")
             found[name] = read(name, value)
     return found
+
+
+def pairs(option: str, texts: Sequence[str], needed: str, *, common: bool = False) -> dict[str, str]:
+    """Name -> text of texts NAME=TEXT; needed, common, errors: as of :func:`by_name`."""
+    return by_name(option, texts, needed, lambda _, text: text, common=common)
 
 
 def lengths(option: str, texts: Sequence[str], value: str, example: str, *, positive: bool = False) -> dict[str, float]:

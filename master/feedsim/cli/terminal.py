@@ -10,7 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from feedsim.arguments import as_options
 from feedsim.findings import WRONG, Note, ranked, severity
+from feedsim.jobs.watch import Watch
 from feedsim.owned import claimed
 
 if TYPE_CHECKING:
@@ -40,6 +42,28 @@ class Progress:
     def of(self, what: str) -> Any:
         """The same for those who tell how much is done, and not of what."""
         return lambda done, total: self(what, done, total)
+
+
+class TerminalWatch(Watch):
+    """Shows what a job reports: a progress bar, and sentences on standard error."""
+
+    def __init__(self, bar: Any) -> None:
+        self._bar = bar
+        self._progress = Progress(bar)
+
+    def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
+        """How many of its steps are done, of how many."""
+        self._progress(what, done, total, before, note)
+
+    def announce(self, sentence: str) -> None:
+        """Whose programs the job executes."""
+        with self._bar.external_write_mode(file=sys.stderr):
+            print(f"feedsim: {sentence}", file=sys.stderr)
+
+    def note(self, sentence: str) -> None:
+        """What the job will replace."""
+        with self._bar.external_write_mode(file=sys.stderr):
+            warn([Note(sentence)])
 
 
 class _Standard(io.FileIO):
@@ -81,6 +105,18 @@ def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Ite
 
     with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
         yield Progress(bar)
+
+
+@contextmanager
+def watching(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterator[TerminalWatch]:
+    """Who watches a job for the person at the terminal; arguments of jobs are options to that person."""
+    from tqdm import tqdm
+
+    with (
+        tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar,
+        as_options(),
+    ):
+        yield TerminalWatch(bar)
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from feedsim.report.content import Bullets, Report, Section, Tile, tile_value
 from feedsim.report.formatting import counted, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, hashed, inputs_part, quantity, software
-from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.run import circle_plots
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
 from feedsim.report.style import BLUE, MUTED, VERMILLION, Array
@@ -45,25 +44,9 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (REPORT, SUMMARY), inputs, kind="circle")
 
 
-def write(
-    recorded: RecordedCircle,
-    diagnosis: Diagnosis,
-    files: Sequence[Path],
-    directory: Path | str,
-    *,
-    drawn: Sequence[str] = (),
-) -> tuple[Path, ...]:
-    """Write summary.json, report.html and figures; returns the paths. Raises OutputError."""
-    figures = figures_of(recorded, diagnosis)
-    report = report_of(recorded, diagnosis, figures, files)
-    return write_report(
-        directory, report, partial(summary, recorded, diagnosis, figures, files), {}, drawn, kind="circle"
-    )
-
-
-def lines(diagnosis: Diagnosis, recorded: RecordedCircle) -> list[str]:
-    """What the command says in the end."""
-    return [f"{axis_letters(diagnosis.circle.axes)}: {answer(diagnosis)}", *(f"  {note}" for note in recorded.notes)]
+def answers(diagnosis: Diagnosis) -> list[str]:
+    """Why the circle is not round, in a sentence."""
+    return [f"{axis_letters(diagnosis.circle.axes)}: {answer(diagnosis)}"]
 
 
 def figures_of(recorded: RecordedCircle, diagnosis: Diagnosis) -> dict[str, Figure]:
@@ -108,7 +91,7 @@ def report_of(
     return Report(
         f"Recorded circle {prefix}",
         f"{', '.join(file.name for file in files)} · {counted(len(recorded.turns), 'turn')}",
-        answer=[f"{prefix}: {answer(diagnosis)}"],
+        answer=answers(diagnosis),
         warnings=list(recorded.doubts),
         tiles=tiles,
         main=[
@@ -165,7 +148,7 @@ def summary(
     prefix = axis_letters(circle.axes)
     return {
         "format": FORMAT,
-        "answer": [f"{prefix}: {answer(diagnosis)}"],
+        "answer": answers(diagnosis),
         "figures": figures_part(figures),
         "diagnosis": {prefix: diagnosis_part(diagnosis)},
         "circle": {

@@ -1,0 +1,92 @@
+"""Arguments of jobs: how messages spell them, and how values with units are read from them.
+
+A job is called from Python, ``circle(..., radius="150 mm")``, and by a command, ``--radius "150 mm"``. A message about
+a wrong argument spells it as the caller did. May use: units, errors. Start reading at spelt() and quantity().
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TypeVar
+
+from feedsim.errors import InputError
+
+T = TypeVar("T")
+Value = float | str  # a number in SI units, or a text with a unit
+
+_AS_OPTIONS = ContextVar("as_options", default=False)
+
+
+@contextmanager
+def as_options() -> Iterator[None]:
+    """A block in which messages spell arguments as options: ``--fixed-value`` for ``fixed_value``."""
+    before = _AS_OPTIONS.set(True)
+    try:
+        yield
+    finally:
+        _AS_OPTIONS.reset(before)
+
+
+def spelt(name: str) -> str:
+    """The argument as its caller writes it.
+
+    >>> spelt("position_cycle")
+    'position_cycle'
+    """
+    return f"--{name.replace('_', '-')}" if _AS_OPTIONS.get() else name
+
+
+@contextmanager
+def given(name: str, value: object) -> Iterator[None]:
+    """Put argument and value in front of the message of an InputError that the block raises: "--delay 3 kg: ..."."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{spelt(name)} {value}: {error}") from None
+
+
+def quantity(name: str, value: Value, unit: str, example: str = "", *, positive: bool = False) -> float:
+    """The value of an argument in `unit`; a number has that unit already. positive: above 0. Raises InputError."""
+    with given(name, value):
+        return amount(value, unit, example, positive=positive)
+
+
+def amount(value: Value, unit: str, example: str = "", *, positive: bool = False) -> float:
+    """As :func:`quantity`, of a value that is a part of an argument."""
+    if isinstance(value, str):
+        from feedsim import units
+
+        number = units.parse(value, unit, example)
+    else:
+        number = float(value)
+        if not math.isfinite(number):
+            raise InputError(f"a finite number in {unit} is needed")
+    if positive and number <= 0:
+        raise InputError(f"more than zero is needed, e.g. {example}")
+    return number
+
+
+def by_name(name: str, values: Mapping[str, Value], read: Callable[[str, Value], T]) -> dict[str, T]:
+    """Key -> what `read` makes of key and value. Raises InputError, which names argument, key and value."""
+    found: dict[str, T] = {}
+    for key, value in values.items():
+        with given(name, f"{key}={value}" if key else value):
+            found[key] = read(key, value)
+    return found
+
+
+def lengths(name: str, values: Mapping[str, Value], example: str, *, positive: bool = False) -> dict[str, float]:
+    """Axis -> length [m]. Raises InputError as :func:`by_name`."""
+    return by_name(name, values, lambda _, value: amount(value, "m", example, positive=positive))
+
+
+def listed(names: str | Sequence[str]) -> tuple[str, ...]:
+    """Names of a list, or of a text with commas.
+
+    >>> listed("X, Z")
+    ('X', 'Z')
+    """
+    return tuple(part.strip() for part in names.split(",") if part.strip()) if isinstance(names, str) else tuple(names)

@@ -1,0 +1,144 @@
+"""Why a recorded circle is not round."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import Diagnosis, Figure
+from feedsim.analysis.circle import diagnose
+from feedsim.analysis.circle.records import RecordedCircle, read_circle
+from feedsim.arguments import Value, lengths, listed, quantity, spelt
+from feedsim.errors import InputError
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch
+from feedsim.report import circle as page
+from feedsim.report.content import Report
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CircleResult(Result):
+    """A recorded circle taken apart.
+
+    recorded: turns, axes, radius [m], speed [m/s]. diagnosis: the causes, each with interval and share of G. records:
+    the files.
+    """
+
+    recorded: RecordedCircle
+    diagnosis: Diagnosis
+    records: Sequence[Path]
+
+    kind = "circle"
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """The records."""
+        return self.records
+
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """As of a run: "XY.G", "XY.squareness", ..."""
+        return page.figures_of(self.recorded, self.diagnosis)
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """What is the matter with the records."""
+        return self.recorded.doubts
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """Why the circle is not round."""
+        return page.answers(self.diagnosis)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answer, and how the files were read."""
+        return [*self.answers, *(f"  {note}" for note in self.recorded.notes)]
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.recorded, self.diagnosis, self.figures, self.records)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.recorded, self.diagnosis, self.figures, self.records, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, inputs)
+
+
+def circle(
+    records: File | Sequence[File],
+    axes: str | Sequence[str] = ("X", "Y"),
+    *,
+    radius: Value | None = None,
+    feed: Value | None = None,
+    centre: Mapping[str, Value] | None = None,
+    pitch: Mapping[str, Value] | None = None,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> CircleResult:
+    """Take a recorded circle apart: servo mismatch, squareness, scale, lost motion, reversal peaks, pitch errors.
+
+    Args:
+        records: CSV files with one direction or both: positions of both axes, or angle and deviation of a ballbar.
+        axes: first and second axis of the plane.
+        radius: programmed [m]; needed where the files have deviations alone. Values may be texts, "150 mm".
+        feed: path speed [m/s]; needed where the files have no time.
+        centre: axis -> programmed position of the centre [m]; fitted where it is not given.
+        pitch: axis -> length [m] with which an error repeats.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        figures, force: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: wrong arguments, or files that hold no circle.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> paths = fs.run("xz_circle.yaml").save("circle")
+    >>> result = fs.circle("circle/result.csv", "X,Z", radius="15 mm", centre={"X": "785 mm", "Z": 0.1})
+    >>> result.figures["XZ.servo_mismatch"].unit
+    'ms'
+    """
+    plane = listed(axes)
+    if len(plane) != 2 or plane[0] == plane[1]:
+        option = spelt("axes")
+        raise InputError(
+            f"{option} {','.join(plane)}: two different axes of the plane are needed, for example {option} X,Z"
+        )
+    files = [Path(file) for file in ([records] if isinstance(records, str | Path) else records)]
+    about = lengths("centre", centre or {}, "10mm")
+    pitches = lengths("pitch", pitch or {}, "10mm", positive=True)
+    for name, values in (("centre", about), ("pitch", pitches)):
+        if other := [axis for axis in values if axis not in plane]:
+            raise InputError(
+                f"{spelt(name)}: {other[0]} is no axis of the plane; {spelt('axes')} says {', '.join(plane)}"
+            )
+    if about and len(about) != 2:
+        raise InputError(
+            f"{spelt('centre')}: is given of {' and '.join(about)} alone; give it of {plane[0]} and {plane[1]}"
+        )
+    r = None if radius is None else quantity("radius", radius, "m", "150 mm", positive=True)
+    v = None if feed is None else quantity("feed", feed, "m/s", "1000 mm/min", positive=True)
+    with kept(out, page.check_writable, watch, files, force=force):
+        recorded = read_circle(
+            files,
+            (plane[0], plane[1]),
+            radius=r,
+            feed=v,
+            centre=(about[plane[0]], about[plane[1]]) if about else None,
+            pitch=pitches,
+        )
+        diagnosis = diagnose(recorded.circle, [turn.path for turn in recorded.turns], centred=recorded.centred)
+        result = CircleResult(recorded, diagnosis, files)
+        if out is not None:
+            result.save(out, figures=figures, force=force)
+    return result

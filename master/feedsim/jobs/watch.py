@@ -1,0 +1,28 @@
+"""Who watches a job: hears how far it is, and what is to be known before it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+
+class Watch:
+    """Nobody: every word is lost. The command line has one that shows them.
+
+    >>> Watch().progress("reading", 1, 3)
+    """
+
+    def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
+        """`done` of `total` steps of `what`; before: steps that an earlier call of the job has done."""
+
+    def of(self, what: str) -> Callable[[int, int], None]:
+        """The same for work that reports (done, total) and not what it is."""
+        return lambda done, total: self.progress(what, done, total)
+
+    def announce(self, sentence: str) -> None:
+        """Whose programs the job executes besides those of feedsim."""
+
+    def note(self, sentence: str) -> None:
+        """What the job will replace."""
+
+
+SILENT = Watch()

@@ -4,6 +4,7 @@ Messages say what is wrong, where (file:line if there is one), the actual value,
 """
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 
 class FeedsimError(Exception):
@@ -82,3 +83,12 @@ def nearest(word: str, known: Sequence[str]) -> str:
 
     same = [name for name in known if name.lower() == word.lower()]
     return next(iter(same or get_close_matches(word, known, n=1, cutoff=0.6)), "")
+
+
+def no_such_file(path: str | Path) -> str:
+    """Message about a file that is not there, with the one beside it that was most likely meant."""
+    try:
+        near = nearest(Path(path).name, [other.name for other in Path(path).parent.iterdir()])
+    except (OSError, ValueError):
+        near = ""
+    return f"no such file: {path}" + (f"; did you mean {Path(path).parent / near}?" if near else "")

@@ -28,7 +28,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from feedsim import units
-from feedsim.errors import InputError, nearest
+from feedsim.errors import InputError, nearest, no_such_file
 from feedsim.variables import Variable
 
 # Studies check a scenario for every run, most of whose texts are those of the run before.
@@ -225,7 +225,7 @@ class ExistingFile:
             path = Path(value)
             if not path.is_file():
                 other = " (it is a folder)" if path.is_dir() else " (it is a pipe or a device)" if path.exists() else ""
-                raise fault(f"no such file: {value}{other}")
+                raise fault(f"no such file: {value}{other}" if other else no_such_file(value))
             return path
 
         return core_schema.with_info_plain_validator_function(

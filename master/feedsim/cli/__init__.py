@@ -23,6 +23,7 @@ from feedsim.cli import (
     circle,
     compare,
     compensate,
+    completion,
     docs,
     example,
     files,
@@ -36,7 +37,10 @@ from feedsim.cli import (
     show,
     sweep,
 )
-from feedsim.cli.terminal import prepare_streams
+from feedsim.cli.grammar import Parser
+from feedsim.cli.kinds import meant
+from feedsim.cli.start import START
+from feedsim.cli.terminal import painted, prepare_streams
 from feedsim.owned import remove_orphans
 
 EPILOG = """exit codes:
@@ -73,19 +77,21 @@ COMMANDS = (
     example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, replay.IDENTIFY_DRIVE,
     replay.REPLAY, compensate.COMMAND, circle.COMMAND, show.COMMAND, pack.COMMAND, page.COMMAND, run.SSP, sweep.COMMAND,
     compare.COMMAND, files.SCHEMA, files.CONVERT, docs.COMMAND,
+    completion.COMMAND,
 )  # fmt: skip
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     """The command line's grammar."""
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="feedsim",
         description="Simulate machine-tool feed drives with non-linear friction.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     top.add_argument("--version", action="version", version=f"feedsim {_version()}")
-    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    top.set_defaults(known=COMMANDS)
+    commands = top.add_subparsers(dest="command", metavar="COMMAND")
     for command in COMMANDS:
         command.add_to(commands)
     return top
@@ -101,6 +107,9 @@ def _version() -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     options = parser().parse_args(arguments)
+    if options.command is None:
+        print(START, end="")
+        return 0
     # Small matrices by the thousand: threads for linear algebra only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -119,12 +128,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if sys.stdout is not None:  # closed by a reader that has gone
             sys.stdout.flush()
     except FeedsimError as error:
-        print(f"feedsim: {error}", file=sys.stderr)
+        _say(_kind_meant(options) if error.exit_code == 2 else "", error)
         return error.exit_code
     except ModuleNotFoundError as error:
         if (told := missing(error, options.called)) is None:
             raise
-        print(f"feedsim: {told}", file=sys.stderr)
+        _say("", told)
         return told.exit_code
     except KeyboardInterrupt:
         print("feedsim: interrupted", file=sys.stderr)
@@ -140,6 +149,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout = None
         return 4
     return code if isinstance(code, int) else 0
+
+
+def _kind_meant(options: argparse.Namespace) -> str:
+    """What is to be said in place of a refusal, where the file is of a kind that another command takes."""
+    command = options.called.removeprefix("feedsim ")
+    return meant(command, (getattr(options, name) for name in options.arguments))
+
+
+def _say(sentence: str, error: object) -> None:
+    print(painted(f"feedsim: {sentence or error}", "red", sys.stderr), file=sys.stderr)
 
 
 def _end_cleanly_on_signals() -> None:

@@ -51,9 +51,10 @@ class Group:
             option.add_to(group)
 
 
-def _flat(options: Sequence[Option | Group]) -> Iterator[Option]:
+def flat(options: Sequence[Option | Group]) -> Iterator[Option]:
+    """Options and arguments, those of groups included."""
     for option in options:
-        yield from _flat(option.options) if isinstance(option, Group) else (option,)
+        yield from flat(option.options) if isinstance(option, Group) else (option,)
 
 
 WRITES = ("--out", "--report")  # options that name what a command writes
@@ -78,7 +79,7 @@ class Command:
     needs: Sequence[str] = ("run",)
     job: str = ""
 
-    def add_to(self, commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    def add_to(self, commands: argparse._SubParsersAction[Any]) -> None:
         """Add it to a command line."""
         kept = argparse.RawDescriptionHelpFormatter if self.epilog else argparse.HelpFormatter
         parser = commands.add_parser(
@@ -86,14 +87,15 @@ class Command:
         )
         for option in self.options:
             option.add_to(parser)
-        if any(option.typed in WRITES for option in _flat(self.options)):
+        arguments = tuple(option.typed for option in flat(self.options) if not option.typed.startswith("-"))
+        if any(option.typed in WRITES for option in flat(self.options)):
             FORCE.add_to(parser)
         if self.commands:
             own = parser.add_subparsers(dest=f"{self.name}_command", metavar="COMMAND", required=True)
             for command in self.commands:
                 command.add_to(own)
         else:
-            parser.set_defaults(action=self.action, needs=self.needs, called=parser.prog)
+            parser.set_defaults(action=self.action, needs=self.needs, called=parser.prog, arguments=arguments)
 
 
 def folder(text: str) -> Path:

@@ -137,13 +137,22 @@ def results_in(
         yield
 
 
+COLOURS = {"red": 31, "yellow": 33}
+
+
+def painted(text: str, colour: str, stream: Any) -> str:
+    """The text in a colour where a stream is a terminal that shows some, and NO_COLOR (no-color.org) is not set."""
+    plain = not colour or bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
+    return text if plain or not stream.isatty() else f"\x1b[{COLOURS[colour]}m{text}\x1b[0m"
+
+
 def warn(warnings: Iterable[str]) -> None:
-    """Say on standard error what the user should know before believing the results; what is wrong first, and in red."""
+    """Say on standard error what the user should know before believing the results; what is wrong first."""
     for each in ranked(warnings):
-        kind = {"wrong": WRONG, "doubt": "warning: ", "note": "note: "}[severity(each)]
-        line = f"feedsim: {kind}{each}"
-        red = kind == WRONG and sys.stderr.isatty() and "NO_COLOR" not in os.environ
-        print(f"\x1b[31m{line}\x1b[0m" if red else line, file=sys.stderr)
+        kind, colour = {"wrong": (WRONG, "red"), "doubt": ("warning: ", "yellow"), "note": ("note: ", "")}[
+            severity(each)
+        ]
+        print(painted(f"feedsim: {kind}{each}", colour, sys.stderr), file=sys.stderr)
 
 
 def announce(
@@ -173,4 +182,5 @@ def finish(quiet: bool, warnings: Iterable[str], *lines: str) -> None:
     warnings = ranked(warnings)
     warn(warnings)
     if not quiet:
-        print(*(WRONG + each for each in warnings[:1] if severity(each) == "wrong"), *lines, sep="\n")
+        wrong = [painted(WRONG + each, "red", sys.stdout) for each in warnings[:1] if severity(each) == "wrong"]
+        print(*wrong, *lines, sep="\n")

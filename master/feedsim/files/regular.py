@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
 
-from feedsim.errors import InputError
+from feedsim.errors import InputError, no_such_file
 
 # What else a name may stand for, in words.
 _OTHERS = (
@@ -36,7 +36,7 @@ def opened(path: Path, *, pipes: bool = False) -> Iterator[BufferedReader]:
                 os.set_blocking(number, True)
             yield file
     except FileNotFoundError:
-        raise InputError(f"no such file: {path}") from None
+        raise InputError(no_such_file(path)) from None
     except IsADirectoryError:
         raise InputError(f"{path} is a folder, not a file") from None
     except OSError as error:

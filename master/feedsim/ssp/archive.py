@@ -10,7 +10,7 @@ from pathlib import Path
 
 from feedsim.cosim import untrusted
 from feedsim.cosim.untrusted import Allowance
-from feedsim.errors import InputError
+from feedsim.errors import InputError, no_such_file
 from feedsim.trace.files import written_whole
 
 STRUCTURE = "SystemStructure.ssd"
@@ -80,7 +80,7 @@ def read(path: Path) -> Iterator[Files]:
     if folder:
         raise InputError(f"{path} is a folder, not an SSP file")
     if not there:
-        raise InputError(f"no such file: {path}")
+        raise InputError(no_such_file(path))
     if not regular:
         raise InputError(f"{path} is no regular file, and no SSP file")
     with untrusted.readable(f"{path}: not a readable SSP, which is a zip file"):

@@ -18,7 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from feedsim.errors import InputError, few
+from feedsim.errors import InputError, few, no_such_file
 from feedsim.scenario import Base
 from feedsim.scenario.study import Parameter, Study
 from feedsim.sweep.design import Design
@@ -184,7 +184,7 @@ def read(file: Path) -> bytes:
     try:
         return file.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"no such file: {file}") from None
+        raise InputError(no_such_file(file)) from None
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror}") from None
 

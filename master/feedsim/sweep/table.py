@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.errors import InputError, OutputError
+from feedsim.errors import InputError, OutputError, no_such_file
 from feedsim.extras import need
 from feedsim.fields import did_you_mean
 from feedsim.scenario.study import Parameter
@@ -203,7 +203,7 @@ def read_table(path: str | Path) -> Table:
             raise InputError(f"{path}: no {STEM}.csv and no {STEM}.parquet in this folder")
         path = max(found, key=lambda file: file.stat().st_mtime_ns)
     if not path.is_file():
-        raise InputError(f"no such file: {path}")
+        raise InputError(no_such_file(path))
     return _read_parquet(path) if path.suffix == ".parquet" else _read_csv(path)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim import units
-from feedsim.errors import InputError
+from feedsim.errors import InputError, no_such_file
 from feedsim.extras import need
 from feedsim.trace.response import FrequencyResponse, quotient_unit
 
@@ -84,7 +84,7 @@ def _sets(path: Path) -> list[Mapping[str, Any]]:
     """Functions of the file; other datasets are left alone."""
     pyuff = need("pyuff", "a universal file")
     if not path.is_file():
-        raise InputError(f"no such file: {path}")
+        raise InputError(no_such_file(path))
     try:
         file = pyuff.UFF(str(path))
         kinds = [int(kind) for kind in file.get_set_types()]

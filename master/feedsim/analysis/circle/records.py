@@ -43,6 +43,8 @@ TIMES = ("time", "t", "zeit", "temps")
 TURNED_ROUND = math.radians(10)
 # A full turn may lack this share of it; files often end one sample ahead of the full turn.
 CLOSED = 0.01
+# An axis that moves by less than this share of what the others do rests.
+RESTING = 0.05
 # Turns whose feeds differ by more than this share are of different circles: path lag and peaks grow with the feed.
 SAME_FEED = 0.02
 # A turn needs so many samples for its parts to be told apart.
@@ -245,6 +247,7 @@ def _of_positions(
     radius: float | None,
 ) -> tuple[list[RecordedTurn], float]:
     x, y = positions
+    _refuse_resting(recording, positions, axes)
     about, mean = fitted_circle(x, y)
     for _ in range(2):  # the first fit may hold a way to the circle; the second one holds full turns alone
         u, w = x - about[0], y - about[1]
@@ -258,6 +261,20 @@ def _of_positions(
     u, w = x - about[0], y - about[1]
     angle, deviation = np.arctan2(w, u), np.hypot(u, w) - nominal
     return _named(recording, angle, deviation, _time(recording), nominal, axes), mean
+
+
+def _refuse_resting(recording: Recording, positions: tuple[Array, Array], axes: tuple[str, str]) -> None:
+    """InputError where an axis of the plane rests while two others move; it names those."""
+    spans = {axis: float(np.ptp(values)) for axis, values in zip(axes, positions, strict=True)}
+    for name in recording.names:
+        letter = re.fullmatch(r"([A-Za-z][A-Za-z0-9]?)(\.x_a)?", name)
+        if letter and letter[1] not in spans and _is(recording, name, "m"):
+            spans[letter[1]] = float(np.ptp(_values(recording, name, "m")))
+    moving = [axis for axis, span in spans.items() if span > RESTING * max(spans.values())]
+    if (rests := [axis for axis in axes if axis not in moving]) and len(moving) == 2:
+        raise InputError(
+            f"{recording.path}: axis {rests[0]} rests; {moving[0]} and {moving[1]} move: --axes {','.join(moving)}"
+        )
 
 
 def _of_angles(

@@ -1,0 +1,155 @@
+"""Which kind of file a command takes, said where it was given another one.
+
+May use: errors, files. Start with meant(), which the command line asks about a command that has refused its input.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+HEAD = 4096  # bytes of a file that are read to see what it is
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file or folder: what it is called, the commands that take it, the likeliest first, what shows it."""
+
+    name: str
+    commands: tuple[str, ...]
+    is_one: Callable[[Path], bool]
+
+
+def _keys(path: Path) -> set[str]:
+    """Keys of the first level of a YAML file; none of a file that is none."""
+    from feedsim.errors import InputError
+    from feedsim.files.source import read
+
+    if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
+        return set()
+    try:
+        data = read(path).data
+    except InputError:
+        return set()
+    return {str(key) for key in data} if isinstance(data, dict) else set()
+
+
+def _keyed(some: set[str], *, none: set[str]) -> Callable[[Path], bool]:
+    def is_one(path: Path) -> bool:
+        keys = _keys(path)
+        return bool(keys & some) and not keys & none
+
+    return is_one
+
+
+def _ends(*endings: str) -> Callable[[Path], bool]:
+    return lambda path: path.is_file() and path.suffix.lower() in endings
+
+
+def _holds(*names: str) -> Callable[[Path], bool]:
+    return lambda path: path.is_dir() and any((path / name).is_file() for name in names)
+
+
+def _modes(path: Path) -> bool:
+    return _table(path) and _first(path).startswith("mode,frequency")
+
+
+def _table(path: Path) -> bool:
+    return path.is_file() and path.suffix.lower() in (".csv", ".txt") and not _first(path).startswith("{")
+
+
+def _first(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return file.read(HEAD).decode("utf-8-sig", "replace").partition("\n")[0]
+    except OSError:
+        return ""
+
+
+def _capture(path: Path) -> bool:
+    if path.suffix.lower() != ".json" or not path.is_file():
+        return False
+    return _first(path).lstrip().startswith("{") and not _summary(path)
+
+
+def _summary(path: Path) -> bool:
+    if path.suffix.lower() != ".json" or not path.is_file() or path.stat().st_size > 50_000_000:
+        return False
+    try:
+        content: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and bool({"scenario", "files", "feedsim"} & {*content})
+
+
+_RUN = ("run", "validate", "frf", "compensate", "pack", "page", "ssp", "machine info", "machine show", "machine build",
+        "machine pack")  # fmt: skip
+_RECORDS = ("identify", "circle", "show", "compare", "convert", "identify-drive", "replay")
+KINDS = (
+    Kind("a study", ("sweep", "validate"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),
+    Kind("a scenario", _RUN, _keyed({"motions"}, none={"sampling", "parameters"})),
+    Kind(
+        "a structure file",
+        ("machine info", "machine build", "machine show"),
+        _keyed({"damping", "bodies", "matrices"}, none={"cycles", "motions"}),
+    ),
+    Kind(
+        "a machine file",
+        ("machine info", "machine show", "machine build", "machine pack", "frf", "pack"),
+        _keyed({"axes"}, none={"motions", "bodies", "sampling"}),
+    ),
+    Kind(
+        "the folder of a machine",
+        ("machine info", "machine show", "machine build", "machine pack", "frf", "pack"),
+        _holds("machine.yaml", "structure.yaml"),
+    ),
+    Kind("results of a study", ("show",), _holds("study.json")),
+    Kind("a folder of results", ("show", "compare"), _holds("summary.json", "result.csv")),
+    Kind("an SSP file", ("run", "validate"), _ends(".ssp")),
+    Kind("a unit for simulators (FMU)", (), _ends(".fmu")),
+    Kind("a table of modes, which a machine file names", (), _modes),
+    Kind("a record", _RECORDS, _table),
+    Kind("a record", ("identify", "convert", "identify-drive", "replay"), _ends(".mat")),
+    Kind("a record", ("identify-drive", "replay", "identify", "convert"), _capture),
+)
+
+
+def kind(path: Path) -> Kind | None:
+    """What a file or folder is, as far as its names and its beginning show; None: nothing that is known here."""
+    try:
+        return next((each for each in KINDS if each.is_one(path)), None)
+    except OSError:
+        return None
+
+
+def taken(command: str) -> list[str]:
+    """Names of the kinds that a command takes."""
+    return [*dict.fromkeys(each.name for each in KINDS if command in each.commands)]
+
+
+def meant(command: str, values: Iterable[Any]) -> str:
+    """A sentence for a command that was given a file of a kind that it does not take; "" where none was.
+
+    command: its name, such as "machine info". values: of its arguments, single ones and lists.
+    """
+    own = taken(command)
+    for path in _paths(values) if own else ():
+        found = kind(path)
+        if found is not None and command not in found.commands:
+            other = f", which feedsim {found.commands[0]} takes" if found.commands else ""
+            return f"{path} is {found.name}{other}; feedsim {command} takes {_either(own)}"
+    return ""
+
+
+def _paths(values: Iterable[Any]) -> Iterator[Path]:
+    for value in values:
+        for one in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(one, str | Path) and str(one):
+                yield Path(one)
+
+
+def _either(names: list[str]) -> str:
+    return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))

@@ -1,0 +1,180 @@
+"""What a person types who does not know the command line yet: nothing, misspelt names, files of another kind."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from command_helpers import feedsim, feedsim_process
+from feedsim.cli import COMMANDS
+from feedsim.cli.completion import SHELLS, places
+from feedsim.cli.kinds import KINDS, kind
+from feedsim.cli.terminal import painted
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("typed") / "scenarios"
+    shutil.copytree(ROOT / "scenarios", place)
+    (place / "results").mkdir()
+    (place / "results" / "summary.json").write_text('{"scenario": {}}')
+    (place / "model.fmu").write_bytes(b"PK")
+    return place
+
+
+def test_alone_it_shows_what_a_person_may_want(fmus: Path, tmp_path: Path) -> None:
+    done = feedsim_process(fmus=fmus, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    typed = [line.split() for line in done.stdout.splitlines() if line.startswith("  feedsim ")]
+    names = {command.name for command in COMMANDS}
+    assert {words[1] for words in typed} <= names
+    wants = [line for line in done.stdout.splitlines()[1:] if line and not line.startswith((" ", "feedsim"))]
+    assert len(wants) == 4
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("rnu xz_circle.yaml", "no command 'rnu'; did you mean run?"),
+        ("machine infoo machines/test_centre", "no command 'infoo'; did you mean info?"),
+        ("schema scenaro", "no kind 'scenaro'; did you mean scenario?"),
+        ("run xz_circle.yaml --ou x", "no option --ou; did you mean --out?"),
+        ("run xz_circle.yaml --o=x", "no option --o; did you mean --out? feedsim run --help"),
+        ("run xz_circle.yaml --quite", "no option --quite; did you mean --quiet?"),
+        ("ssp xz_circle.yaml --ouut c.ssp", "no option --ouut; did you mean --out?"),
+        ("run xz_circle.yaml z_positioning.yaml", "not understood: z_positioning.yaml"),
+        ("run xz_circel.yaml", "no such file: xz_circel.yaml; did you mean xz_circle.yaml?"),
+        ("frf machines/test_center", "no such file: machines/test_center; did you mean machines/test_centre?"),
+        ("run nothing_of_the_kind", "no such file: nothing_of_the_kind"),
+    ],
+)
+def test_nearest_names(typed: str, said: str, fmus: Path, folder: Path) -> None:
+    done = feedsim(*typed.split(), fmus=fmus, cwd=folder)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not (folder / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("sweep xz_circle.yaml", "xz_circle.yaml is a scenario, which feedsim run takes; feedsim sweep takes a study"),
+        ("run studies/z_stop.yaml", "studies/z_stop.yaml is a study, which feedsim sweep takes"),
+        ("circle xz_circle.yaml", "xz_circle.yaml is a scenario, which feedsim run takes; feedsim circle takes a"),
+        ("identify machines/test_centre", "machines/test_centre is the folder of a machine, which feedsim machine"),
+        ("run machines/test_centre/machine.yaml", "machine.yaml is a machine file, which feedsim machine info takes"),
+        ("frf machines/test_centre/structure.yaml", "structure.yaml is a structure file, which"),
+        ("run machines/test_centre/modes.csv", "modes.csv is a table of modes, which a machine file names; feedsim"),
+        ("compensate results", "results is a folder of results, which feedsim show takes; feedsim compensate takes"),
+        ("run model.fmu", "model.fmu is a unit for simulators (FMU); feedsim run takes a scenario or an SSP file"),
+        ("run recordings/z_setpoint.csv", "z_setpoint.csv is a record, which feedsim identify takes"),
+    ],
+)
+def test_files_of_another_kind(typed: str, said: str, fmus: Path, folder: Path) -> None:
+    done = feedsim(*typed.split(), fmus=fmus, cwd=folder)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_every_shipped_file_is_of_the_kind_that_it_is() -> None:
+    scenarios = ROOT / "scenarios"
+    for path, name in [
+        *((path, "a study") for path in (scenarios / "studies").glob("*.yaml")),
+        *((path, "a scenario") for path in scenarios.glob("*.yaml")),
+        *((path, "a machine file") for path in scenarios.glob("machines/*/machine.yaml")),
+        *((path, "a structure file") for path in scenarios.glob("machines/*/structure.yaml")),
+    ]:
+        found = kind(path)
+        assert found is not None, path
+        assert found.name == name, path
+
+
+def test_kinds_name_commands_that_there_are() -> None:
+    names = {place.command for place in places(COMMANDS)}
+    for each in KINDS:
+        assert set(each.commands) <= names
+
+
+def test_a_circle_of_axes_that_rest_names_those_that_move(fmus: Path, tmp_path: Path) -> None:
+    t = np.linspace(0, 4, 4001)
+    table = np.column_stack([t, 50 * np.cos(np.pi * t), 0 * t + 20, 50 * np.sin(np.pi * t)])
+    np.savetxt(tmp_path / "r.csv", table, "%.9g", ",", header="time [s],X.x_a [mm],Y.x_a [mm],Z.x_a [mm]", comments="")
+    done = feedsim("circle", "r.csv", fmus=fmus, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == "feedsim: r.csv: axis Y rests; X and Z move: --axes X,Z\n"
+    assert feedsim("circle", "r.csv", "--axes", "X,Z", fmus=fmus, cwd=tmp_path).returncode == 0
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_colours_are_for_terminals_that_show_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    assert painted("wrong", "red", Terminal()) == "\x1b[31mwrong\x1b[0m"
+    assert painted("wrong", "red", io.StringIO()) == painted("wrong", "", Terminal()) == "wrong"
+    monkeypatch.setenv("TERM", "dumb")
+    assert painted("wrong", "red", Terminal()) == "wrong"
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert painted("wrong", "red", Terminal()) == "wrong"
+
+
+# What stands on the command line, the last word of it unfinished -> what is offered, and something that is not.
+COMPLETED = [
+    (["ru"], "run", "frf"),
+    (["machine", ""], "pack", "run"),
+    (["machine", "pack", "--po"], "--poses", "--inputs"),
+    (["pack", "--in"], "--inputs", "--poses"),
+    (["run", "a.yaml", "--fo"], "--force", "--runs"),
+    (["schema", "st"], "structure", "scenario"),
+    (["example", "xz"], "xz_circle", "one_axis"),
+]
+ASKED = {
+    "bash": "source {script}\nCOMP_WORDS=(feedsim {words}); COMP_CWORD={last}; _feedsim\n"
+    "printf '%s\\n' \"${{COMPREPLY[@]}}\"",
+    "fish": "source {script}; complete --do-complete 'feedsim {line}'",
+}
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+@pytest.mark.parametrize(("words", "there", "absent"), COMPLETED)
+def test_completion(shell: str, words: list[str], there: str, absent: str, fmus: Path, tmp_path: Path) -> None:
+    if shutil.which(shell) is None:
+        pytest.skip(f"no {shell} on this machine")
+    done = feedsim("completion", shell, fmus=fmus, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    script = tmp_path / "completion"
+    script.write_text(done.stdout)
+    subprocess.run([shell, "-n", script], check=True)
+    offered = {line.split("\t")[0] for line in _offered(shell, script, words, tmp_path).splitlines()}
+    assert there in offered
+    assert absent not in offered
+
+
+def _offered(shell: str, script: Path, words: list[str], folder: Path) -> str:
+    """What a shell offers. zsh's own functions only work in its editor: what they are handed is looked at instead."""
+    last = words[-1] or "''"
+    values: dict[str, Any] = {"script": script, "words": " ".join([*words[:-1], last]), "last": len(words)}
+    if shell == "zsh":
+        code = (
+            "compdef() {{ }}\n_describe() {{ local list=${{@[-1]}}; print -rl -- ${{(@)${{(P@)list}}%%:*}} }}\n"
+            "_files() {{ }}\ncompadd() {{ shift; print -rl -- $@ }}\nsource {script}\n"
+            "words=(feedsim {words}); CURRENT=$(( {last} + 1 )); PREFIX={prefix}; _feedsim"
+        ).format(**values, prefix=last)
+        done = subprocess.run(["zsh", "-f", "-c", code], capture_output=True, text=True, cwd=folder, check=True)
+        return "\n".join(line for line in done.stdout.splitlines() if line.startswith(words[-1]))
+    code = ASKED[shell].format(**values, line=" ".join(words))
+    return subprocess.run([shell, "-c", code], capture_output=True, text=True, cwd=folder, check=True).stdout

@@ -216,6 +216,7 @@ docs: $(VENV)/.dev $(VARIABLES) ## build the documentation as a site that opens 
 
 pictures: fmus $(VENV)/.run ## draw README's and docs' pictures anew (docs/images; ARGS=--all: that of the large study too)
 	$(PY) docs/pictures.py $(ARGS)
+	$(PY) docs/diagrams.py
 
 pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full model (some minutes; docs/position-dependence.md)
 	$(PY) benchmarks/pose_grid.py

@@ -40,7 +40,6 @@ NOT_YET = {
     "docs/ssp.md",
     "docs/structure.md",
     "docs/sweeps.md",
-    "docs/theory.md",
     "docs/traces.md",
     "docs/user-guide.md",
     "src/controller_fmu/README.md",

@@ -34,6 +34,7 @@ ORDER = [
     "trace",
     "files",
     "fields",
+    "control",
     "variables",
     "arguments",
     "units",

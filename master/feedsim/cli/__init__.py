@@ -17,6 +17,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from importlib.metadata import PackageNotFoundError, version
 
 from feedsim.cli import (
@@ -123,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         drawn = ["figures"] if getattr(options, "figures", ()) else []
         ask(options.called, *options.needs, *drawn)
-        with replacing(getattr(options, "force", False)):
+        with replacing(getattr(options, "force", False)), _in_words_of(getattr(options, "control", "")):
             code = options.action(options)
         if sys.stdout is not None:  # closed by a reader that has gone
             sys.stdout.flush()
@@ -149,6 +150,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout = None
         return 4
     return code if isinstance(code, int) else 0
+
+
+def _in_words_of(control: str) -> AbstractContextManager[None]:
+    """Reports in the names of a control; without one their code is not loaded."""
+    if not control:
+        return nullcontext()
+    from feedsim.report.control import control_names
+
+    return control_names(control)
 
 
 def _kind_meant(options: argparse.Namespace) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, QUIET, Command, Option, names, out, pairs
+from feedsim.cli.options import CONTROL, FIGURES, QUIET, Command, Option, names, out, pairs
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Take a recorded circle apart: servo mismatch, squareness, scale, lost motion, reversal peaks, pitch
@@ -52,6 +52,7 @@ COMMAND = Command(
         Option("--pitch", "AXIS=LENGTH", "look for an error that repeats with it", many=True),
         out("circle_<name of the first file>"),
         FIGURES,
+        CONTROL,
         QUIET,
     ),
     description=DESCRIPTION,

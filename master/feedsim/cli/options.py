@@ -130,6 +130,13 @@ FIGURES = Option(
 )  # fmt: skip
 
 
+CONTROLS = ("sinumerik", "twincat", "heidenhain", "linuxcnc")
+CONTROL = Option(
+    "--control", "NAME", f"show parameters in the names and units of a control, too: {', '.join(CONTROLS)} (default: "
+    "the one that the machine file names)", choices=CONTROLS, default="",
+)  # fmt: skip
+
+
 def typed(text: str) -> str:
     """What was typed, also under a locale of few characters, such as C: it is taken for UTF-8 there."""
     try:

@@ -8,7 +8,7 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, names, out, quantity, settings
+from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET, Command, Option, names, out, quantity, settings
 from feedsim.cli.terminal import announce, finish, progress_bar, results_in
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ REPLAY = Command(
     (
         _RECORD,
         Option("--machine", "MACHINE-or-SCENARIO", "the machine that follows the record", type=Path, required=True),
-        _AXES, _COLUMNS, _WINDOW, out("replay_<name of the record>"), FIGURES,
+        _AXES, _COLUMNS, _WINDOW, out("replay_<name of the record>"), FIGURES, CONTROL,
         settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,
     ),
     REPLAY_DESCRIPTION,
@@ -183,7 +183,7 @@ IDENTIFY_DRIVE = Command(
                "cycle of the position loop of rigid axes, e.g. '2 ms' (default: the control cycle, as where the "
                "drive closes that loop itself, or that of the record's rows where the record speaks for it)"),
         Option("--name", "NAME", "of the machine that is written (default: name of the record)"),
-        out("drive_<name of the record>"), FIGURES,
+        out("drive_<name of the record>"), FIGURES, CONTROL,
         settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,
     ),
     DRIVE_DESCRIPTION,

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, out, settings
+from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET, Command, Option, out, settings
 from feedsim.cli.terminal import announce, finish, progress_bar, results_in, warn
 from feedsim.errors import InputError, OutputError
 from feedsim.outputs import archive_with, check_file
@@ -181,7 +181,7 @@ RUN = Command(
     "run",
     "run a scenario or an SSP; write result.csv, summary.json, report.html and figures",
     run,
-    (*SUBJECT, out("<name of the scenario file>"), FIGURES, PAGE, QUIET),
+    (*SUBJECT, out("<name of the scenario file>"), FIGURES, PAGE, CONTROL, QUIET),
     epilog=TRUST,
 )
 VALIDATE = Command(

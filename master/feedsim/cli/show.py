@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, QUIET, Command, Option, out
+from feedsim.cli.options import CONTROL, FIGURES, QUIET, Command, Option, out
 from feedsim.cli.terminal import finish, results_in
 
 DESCRIPTION = """Lay results of feedsim run, recorded CSV files and runs of studies over each other: contours of
@@ -45,6 +45,7 @@ COMMAND = Command(
         ),
         out("show"),
         FIGURES,
+        CONTROL,
         QUIET,
     ),
     description=DESCRIPTION,

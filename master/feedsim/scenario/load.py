@@ -15,6 +15,7 @@ from feedsim.files import changes
 from feedsim.files.checked import check, fetch, read_checked, read_group
 from feedsim.files.problems import describe, in_order
 from feedsim.files.source import Place, Source, read
+from feedsim.scenario.control_keys import translate, translated
 from feedsim.scenario.machine import Friction, Machine
 from feedsim.scenario.model import Scenario, contradictions
 
@@ -72,6 +73,7 @@ class Draft:
         """Apply further settings."""
         for key, value in settings:
             with _collecting(self.faults):
+                key, value = translated(key, value)
                 for place in changes.apply(self.source, Scenario, key, value):
                     self.changed.append((place, value.mark(()).where))
                     fetch(self.source, Scenario, place, self.faults)
@@ -111,6 +113,7 @@ def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Settin
             source.put(("machine",), value)
     own = tuple(_own_settings(source, faults))
     fetch(source, Scenario, (), faults)
+    translate(source, ("machine", "axes"), faults)
     others = tuple((key, value) for key, value in outside if key != "machine")
     texts = (*(f"{key}={_text(value.data)}" for key, value in settings), *overrides)
     return Draft(path, source, own, others, texts, faults)
@@ -131,9 +134,10 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
     source = read_group(path)
     faults: list[str] = []
     fetch(source, Machine, (), faults)
+    translate(source, ("axes",), faults)
     for text in overrides:
         with _collecting(faults):
-            key, value = changes.option(text, Path())
+            key, value = translated(*changes.option(text, Path()))
             for place in changes.apply(source, Machine, key.removeprefix("machine."), value):
                 fetch(source, Machine, place, faults)
     machine = check(source, Machine, faults)

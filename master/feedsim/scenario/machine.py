@@ -348,6 +348,9 @@ class Machine(Model):
 
     name: StrictStr = Field(description="Name in reports")
     note: StrictStr = Field(default="", description="Remark shown wherever the machine's numbers are shown")
+    control: Literal["sinumerik", "twincat", "heidenhain", "linuxcnc"] | None = Field(
+        default=None, description="Control that the machine has; reports show parameters in its names and units, too"
+    )
     modes: File = Field(description="Table of the structure's modes (CSV), relative to this file")
     structure: File | None = Field(
         default=None, description="Structure file that the modes were computed from (feedsim machine build)"

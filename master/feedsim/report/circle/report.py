@@ -17,6 +17,7 @@ from feedsim.analysis.circularity import axis_letters
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
 from feedsim.report.content import Bullets, Report, Section, Tile, tile_value
+from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, hashed, inputs_part, quantity, software
@@ -98,6 +99,7 @@ def report_of(
             picture(circle, recorded, diagnosis),
             diagnosis_section(prefix, diagnosis),
             sections.figures_section(figures),
+            control_section(),
             Section("How the files were read", [Bullets(recorded.notes)]),
         ],
         provenance=sections.provenance_section(rows, hashed([("record", file) for file in files])),

@@ -16,13 +16,14 @@ from feedsim.replay.drive import APART, DriveFound
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
 from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.control import control_section
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
 from feedsim.report.replay.plots import pictures_of
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.sections import figures_footer, figures_section, provenance_section
 from feedsim.report.style import remarked
-from feedsim.scenario import Subject
+from feedsim.scenario import Machine, Subject
 from feedsim.trace import Mark
 
 MACHINE, MODES = "machine.yaml", "modes.csv"
@@ -115,6 +116,13 @@ def write(report: DriveReport, directory: Path | str, *, drawn: Sequence[str] = 
     )
 
 
+def machine_of(report: DriveReport) -> Machine:
+    """The machine with all axes that were identified."""
+    drives = report.found.drives
+    machine = next(iter(drives.values())).machine
+    return machine.model_copy(update={"axes": {axis: one.machine.axes[axis] for axis, one in drives.items()}})
+
+
 def report_of(report: DriveReport) -> Report:
     """Content of the report."""
     pictures = []
@@ -142,6 +150,7 @@ def report_of(report: DriveReport) -> Report:
             *pictures,
             *(_parts(axis, one) for axis, one in drives.items() if one.parts),
             figures_section(report.figures),
+            control_section(machine_of(report)),
         ],
         provenance=provenance_section(rows, hashed(_files(report))),
         footer=figures_footer(

@@ -12,6 +12,7 @@ from feedsim.analysis import Figure
 from feedsim.identify import Provenance
 from feedsim.replay.compare import Comparison
 from feedsim.report.content import Report, Section, Table, Tile, tile_value
+from feedsim.report.control import control_section
 from feedsim.report.formatting import typeset
 from feedsim.report.provenance import figures_part, hashed, inputs_part, machine_part, quantity, software
 from feedsim.report.replay.plots import pictures_of
@@ -91,7 +92,13 @@ def report_of(replayed: Replayed) -> Report:
         notes=[note for note in (*replayed.subject.notes, *(source.note for source in replayed.sources)) if note],
         answer=answers(replayed),
         tiles=list(_tiles(replayed.figures)),
-        main=[*pictures, figures_section(replayed.figures), _events(replayed), parameters_section(machine)],
+        main=[
+            *pictures,
+            figures_section(replayed.figures),
+            _events(replayed),
+            control_section(machine),
+            parameters_section(machine),
+        ],
         provenance=provenance_section(rows, hashed(_files(replayed))),
         footer=figures_footer("Values in full precision: summary.json; time series: replay.csv.", "docs/replay.md"),
     )

@@ -24,6 +24,7 @@ from feedsim.cosim import Run
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
 from feedsim.report.content import Paragraph, Report, Section, Span, Table, Tile, tile_value
+from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, duration, number, typeset
 from feedsim.report.partial import PARTIAL, Partial
 from feedsim.report.picture import Picture
@@ -163,6 +164,7 @@ def report_of(
             motions_section(run),
             loads_section(run),
             pose_section(run.pose),
+            control_section(machine),
         ],
         provenance=provenance(run),
         footer=sections.figures_footer(footer) if figures else footer,

@@ -17,6 +17,7 @@ from feedsim.analysis.side_by_side import SUMMARY as OF_RESULT
 from feedsim.analysis.side_by_side import Source, differing
 from feedsim.report import sections
 from feedsim.report.content import Bullets, Report, Section, Table, Text, code
+from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, display_unit, minus, scale, shown
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
@@ -118,6 +119,7 @@ def report_of(sources: Sequence[Source]) -> Report:
             _stops(sources),
             _figures(sources),
             _parameters(sources),
+            control_section(changes=dict(differing(sources))),
             _alignment(sources),
             Section("What each says of itself", [Bullets([f"{s.name}: {line}" for s in sources for line in s.answer])])
             if any(source.answer for source in sources)

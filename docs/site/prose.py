@@ -20,7 +20,7 @@ LONGEST_SENTENCE = 30  # words
 LONGEST_LINE = 120  # characters
 _FENCE = re.compile(r"^ *(`{3,}|~{3,}|:{3,})")
 _ITEM = re.compile(r"^ *(?:[-*+]|\d+\.) +")
-_SHORT = re.compile(r"\b(e\.g|i\.e|Figs?|Eqs?|Nos?|vs|approx|[A-Z])\.(?=\s)")
+_SHORT = re.compile(r"(?<![\w-])(e\.g|i\.e|Figs?|Eqs?|Nos?|vs|approx|[A-Z])\.(?=\s)")
 _ENDS = re.compile(r"[.!?][\"')*_\]]*\s+(?=[\"'(*_\[]*[A-Z0-9$])")
 
 

@@ -30,6 +30,7 @@ from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_de
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
+from feedsim.replay.start import Begin
 from feedsim.replay.tuning import BOUNDS, FINAL, ROUGH, Problem, Rows, Tuned, together
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
@@ -57,6 +58,9 @@ BETTER = 2.0  # of the logarithm of the likelihood: what predicts hardly better 
 BLOCK = 0.05  # [s]: residuals further apart than that are taken to be independent
 VAGUE = 0.5  # relative half width of an interval beyond which a value is not determined
 APART = 2.0  # of the logarithm of the likelihood: below it two cycles are as likely as one another
+POOR = 0.3  # share of the torque, or of the lag, that a fit may leave
+ONE_WAY = 0.15  # share of the mean torque to which the constant load has to be known where the axis moves one way
+SHAPE = 0.25  # standard deviation of the friction, of itself, where only its usual shape separates it from the load
 HIDDEN = 0.8  # share of the usual deviation that is left: the record has not told it
 
 
@@ -97,7 +101,7 @@ def identify_drive(
     records: Sequence[Record],
     *,
     structure_known: bool,
-    start: Mapping[str, float],
+    begin: Begin | None = None,
     other_cycle: float | None = None,
     progress: Progress = lambda what, done, total: None,
     fmus: Path | None = None,
@@ -108,34 +112,38 @@ def identify_drive(
         machine: begins with its values; its cycles, structure and what is not identified stay.
         each: the stretch that is fitted. records: all stretches, for the regression.
         structure_known: the inertia is that of the machine's modes, and the friction has the parts that it has there.
-        start: what the record alone says (start.py), in place of the machine's values.
+        begin: what the record alone says, in place of the machine's values: a fit begins at each of its starts, and
+            the best goes on.
         other_cycle: of the position loop [s], in place of the machine's, that what was found is held against.
 
     Raises:
-        InputError: a record without motion; no start that the units can run.
+        InputError: a record without motion; no start that the units can run; a result that leaves a large part of the
+            record.
     """
     taps = _told(setpoint_delay, records)
     speed = _told(speed_setpoint, records)
-    top = float(np.max(np.abs(each.speed))) / each.I_P
+    # Of all records, as the regressions are.
+    top = max(float(np.max(np.abs(np.diff(one.angle)))) / one.interval for one in records if one.angle is not None)
     exact_delay = taps is not None and taps.rms <= EXACT_DELAY * top * each.record.interval
     exact_gain = speed is not None and speed.rms <= EXACT_GAIN * top
     J = checked_modes(machine).J_tot(each.axis)
-    values = start_of(machine, each.axis) | dict(start)
-    if speed is not None and speed.K_v > 0:
-        values["K_v"] = speed.K_v
-    if (weight := feedforward_of(records)) is not None:
-        values["k_ffw"] = weight
     total = taps.delay if taps is not None and exact_delay else None
-    if taps is not None:
-        values["T_sym"] = min(values["T_sym"], taps.delay)
-        values["T_dyn"] = taps.delay - values["T_sym"]
+    candidates = [start_of(machine, each.axis) | dict(start) for start in (begin.starts if begin is not None else [{}])]
+    for values in candidates:
+        if speed is not None and speed.K_v > 0:
+            values["K_v"] = speed.K_v
+        if (weight := feedforward_of(records)) is not None:
+            values["k_ffw"] = weight
+        if taps is not None:
+            values["T_sym"] = min(values["T_sym"], taps.delay)
+            values["T_dyn"] = taps.delay - values["T_sym"]
     rows = np.flatnonzero(each.moving)
     if len(rows) < LEAST_ROWS:
         raise InputError(
             f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least {LEAST_ROWS} are needed"
         )
     problem = Problem(
-        machine, each, Replay(machine, {each.axis: each}, fmus=fmus), values, total, J,
+        machine, each, Replay(machine, {each.axis: each}, fmus=fmus), candidates[0], total, J,
         {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0}, rows,
     )  # fmt: skip
     driven = each.record.driven
@@ -151,12 +159,13 @@ def identify_drive(
     parts: dict[str, float] = {}
     chosen: tuple[str, ...] = ()
     if structure_known:
-        own = {name for name, block in BLOCKS.items() if driven and _has(values, block)}
+        own = {name for name, block in BLOCKS.items() if driven and _has(problem.start, block)}
         chosen = tuple(name for name in BLOCKS if name in own)
         free += [name for part in chosen for name in BLOCKS[part]]
         found = _first(problem, free)
     else:
-        chosen, parts, found = _parts(problem, free, progress)
+        found = _best_start(problem, free, candidates)
+        chosen, parts, found = _parts(problem, found, progress)
     progress("last fit", 1 + len(BLOCKS), 2 + len(BLOCKS))
     for _ in range(MOST_TURNS):
         before = problem.weights
@@ -164,6 +173,7 @@ def identify_drive(
         found = problem.fitted(found.names, found.values, found, FINAL)
         if all(abs(problem.weights[channel] / weight - 1) < SETTLED for channel, weight in before.items()):
             break
+    _refuse_poor(each, found)
     found = problem.exact(found, central=True)
     unseen = _left_out(problem, found, np.array_split(np.arange(len(rows)), FOLDS))
     predicted = unseen[0] * problem.weights["position"], unseen[1] * problem.weights["torque"]
@@ -172,6 +182,8 @@ def identify_drive(
     estimates = _estimates(
         problem, found, unseen, taps if exact_delay else None, speed if exact_gain else None, structure_known
     )
+    if begin is not None and begin.one_way:
+        estimates = _one_way(each, estimates, begin.one_way)
     likelier = {} if other_cycle is None else {other_cycle: _likelier(problem, found, other_cycle)}
     return DriveFound(
         each.axis, estimates, taps, speed, problem.machine_of(found.values), parts, chosen,
@@ -255,13 +267,79 @@ def _first(problem: Problem, free: Sequence[str]) -> Tuned:
     return found
 
 
-def _parts(
-    problem: Problem, free: Sequence[str], progress: Progress
-) -> tuple[tuple[str, ...], dict[str, float], Tuned]:
+def _best_start(problem: Problem, free: Sequence[str], candidates: Sequence[dict[str, float]]) -> Tuned:
+    """The likeliest of first fits from several starts; the problem has that start, and its weights, then.
+
+    Raises InputError: the units can run none of them.
+    """
+    weights = problem.weights
+    best: tuple[float, dict[str, float], dict[str, float], Tuned] | None = None
+    failed: InputError | None = None
+    for start in candidates:
+        problem.start, problem.weights = start, dict(weights)
+        try:
+            found = _first(problem, free)
+        except InputError as error:
+            failed = error
+            continue
+        # Weights are of each fit's own residuals: fits are compared by those, and by how far the start is away.
+        left = _independent(problem, len(problem.rows)) * (log(rms(found.position)) + log(rms(found.torque)))
+        left += 0.5 * float(np.sum(found.residuals[2 * len(problem.rows) :] ** 2))
+        if best is None or left < best[0]:
+            best = left, start, problem.weights, found
+    if best is None:
+        assert failed is not None
+        raise failed
+    _, problem.start, problem.weights, found = best
+    return found
+
+
+def _refuse_poor(each: AxisRecord, found: Tuned) -> None:
+    """Raises InputError: the fit leaves so much that its parameters are those of no axis."""
+    signal = {
+        "torque": (rms(found.torque), rms(each.record.torque[each.moving]), 1.0, "N.m", "torque"),
+        "position": (rms(found.position), rms((each.setpoint - each.position)[each.moving]), 1e6, "um",
+                     "distance of the position behind its setpoint"),
+    }  # fmt: skip
+    for channel, (left, whole, scale, unit, meaning) in signal.items():
+        if (channel == "position" or each.record.driven) and left > POOR * whole:
+            raise InputError(
+                f"{each.record.name}, axis {each.axis}: the best fit leaves {scale * left:.3g} {unit} rms of a "
+                f"{meaning} of {scale * whole:.3g} {unit} rms while the axis moves; at most {100 * POOR:.0f} % are "
+                "allowed. No drive is identified: check signs, units and pitch, give a longer window with motion in "
+                "both directions, or a machine to begin with (--machine)"
+            )
+
+
+def _one_way(each: AxisRecord, estimates: Mapping[str, Estimate], told: str) -> dict[str, Estimate]:
+    """Estimates of which constant load and Coulomb friction are known as their sum.
+
+    What separates them then is the usual shape of friction, no measurement. Where the torque is mostly that sum and
+    they are hardly separated, no machine follows from the record.
+
+    Raises InputError: so it is.
+    """
+    further = SHAPE * estimates["F_C"].value
+    estimates = {
+        name: replace(one, sigma=hypot(one.sigma, further)) if name in ("M_0", "F_C") else one
+        for name, one in estimates.items()
+    }
+    torque = each.record.torque[each.moving]
+    mean, half = abs(float(np.mean(torque))), NORMAL_95 * estimates["M_0"].sigma
+    if mean > float(np.std(torque)) and half > ONE_WAY * mean:
+        raise InputError(
+            f"{each.record.name}, axis {each.axis}: {told}; M_0 by itself is known to +-{half:.2g} N.m only, and at "
+            f"most +-{ONE_WAY * mean:.2g} N.m are allowed. No drive is identified: give a window with motion in both "
+            "directions, or a machine whose friction and load are known (--machine)"
+        )
+    undetermined = {name: replace(estimates[name], status="undetermined", reason=told) for name in ("M_0", "F_C")}
+    return {**estimates, **undetermined}
+
+
+def _parts(problem: Problem, found: Tuned, progress: Progress) -> tuple[tuple[str, ...], dict[str, float], Tuned]:
     """Parts of the friction law that the record asks for: chosen, the gain of each, and a fit with them."""
     gains: dict[str, float] = {}
     chosen: list[str] = []
-    found = _first(problem, free)
     while len(chosen) < len(BLOCKS):
         progress("cross-validation", 1 + len(chosen), 2 + len(BLOCKS))
         # As near to its end as what it is compared with.

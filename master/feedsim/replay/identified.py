@@ -24,7 +24,7 @@ from feedsim.replay.machine_files import (
     machine_files,
     simple_drive,
 )
-from feedsim.replay.start import limits, start_values
+from feedsim.replay.start import Begin, limits, start_values
 from feedsim.scenario import Friction, Machine, load_machine
 
 OF_MACHINE = "of the machine"
@@ -67,7 +67,7 @@ def identify_drives(
     """
     files: dict[str, str] = {}
     rigid: dict[str, RigidAxis] = {}
-    begins = {axis: _begin(each) if machine is None else {} for axis, each in records.items()}
+    begins = {axis: _begin(each) if machine is None else None for axis, each in records.items()}
     interval = next(iter(records.values())).record.interval
 
     def drives(cycle: float) -> dict[str, DriveFound]:
@@ -77,10 +77,11 @@ def identify_drives(
             def tell(what: str, done: int, total: int, axis: str = axis) -> None:
                 progress(f"{axis}: {what}", done, total)
 
-            axes = {axis: rigid_axis(each, begins[axis])} if machine is None else {}
+            begin = begins[axis]
+            axes = {axis: rigid_axis(each, begin.starts[0])} if begin is not None else {}
             with _begun(machine, name, note, axes, interval, cycle) as own:
                 found[axis] = identify_drive(
-                    own, each, read[axis].records, structure_known=machine is not None, start=begins[axis],
+                    own, each, read[axis].records, structure_known=machine is not None, begin=begin,
                     other_cycle=_other(cycle, interval) if machine is None else None, progress=tell, fmus=fmus,
                 )  # fmt: skip
         return found
@@ -94,13 +95,13 @@ def identify_drives(
     for axis, one in found.items():
         each, begin = records[axis], begins[axis]
         drive, friction = one.machine.shipped_drive(axis, "a drive file"), friction_of(one, axis)
-        if machine is not None:
+        if begin is None:
             files[drive_file(axis)] = drive_text(drive, one.estimates, OF_MACHINE, head)
             files[friction_file(axis)] = friction_axis_text(axis, friction, one.estimates, head)
         else:
             values = friction | {"J": one.estimates["J"].value, "M_0": one.machine.axes[axis].M_0}
             rigid[axis] = replace(
-                rigid_axis(each, begin), drive=drive, values=values, estimates=one.estimates, head=head
+                rigid_axis(each, begin.starts[0]), drive=drive, values=values, estimates=one.estimates, head=head
             )  # fmt: skip
     if rigid:
         files = machine_files(name, note, rigid, interval, cycle)
@@ -110,7 +111,7 @@ def identify_drives(
     return DrivesFound(found, comparisons, files)
 
 
-def _begin(each: AxisRecord) -> Mapping[str, float]:
+def _begin(each: AxisRecord) -> Begin:
     """What the record alone says of an axis. InputError: it has no torque, or does not accelerate."""
     if not each.record.driven:
         raise InputError(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import pi
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, pi
 
 import numpy as np
 
 from feedsim.errors import InputError
 from feedsim.identify.inertia import inertia
+from feedsim.identify.result import NORMAL_95
 from feedsim.replay.closed_loop import AxisRecord
 
 BANDWIDTH = 50.0  # [Hz] of a speed loop to begin with: K_p = 2 pi f J
@@ -16,26 +18,78 @@ INTEGRAL = 10e-3  # [s] T_n to begin with
 PRESLIDING = 5e-6  # [m] of travel after which friction is full
 ZONE = 0.06  # [rad] width of an engaging zone
 RESERVE = 1.5  # what the machine may do beyond what the record shows
+# Shares of the mean torque that friction may have of it, where the record does not separate it from the constant load.
+SHARES = (0.05, 0.15, 0.4)
+LEAST_TRAVEL = 0.01  # rad: a motor that turns less tells no drive
+SEPARATED = 0.5  # relative half width of F_C below which the rigid line separates friction from the constant load
 # A torque limit that is not known must not act: gentle moves tell nothing of the torque of rapid ones.
 NO_LIMIT = 20.0
 
 
-def start_values(each: AxisRecord) -> dict[str, float]:
-    """Parameters of drive and friction to begin a fit with, by the rigid line of the record.
+@dataclass(frozen=True)
+class Begin:
+    """Where fits of an axis begin.
 
-    Raises InputError: the axis does not accelerate.
+    starts: parameters of drive and friction, a fit each. one_way: what the record tells of constant load and friction
+    where it does not separate them, in words; empty where it does.
     """
-    line = {name: each.value for name, each in inertia([each.record]).estimates.items()}
+
+    starts: Sequence[Mapping[str, float]]
+    one_way: str = ""
+
+
+def start_values(each: AxisRecord) -> Begin:
+    """Parameters of drive and friction to begin fits with, by the rigid line of the record.
+
+    Motion in one direction tells the sum of constant load and friction alone, and little motion in the other one hardly
+    more. Then friction has several shares of that torque, each of which is a start: from a wrong one a fit does not
+    come back.
+
+    Raises InputError: the axis does not move or does not accelerate.
+    """
+    if float(np.ptp(each.setpoint[each.rows])) < LEAST_TRAVEL * each.I_P:
+        raise InputError(
+            f"{each.record.name}, axis {each.axis}: the setpoint moves by "
+            f"{1e6 * float(np.ptp(each.setpoint[each.rows])):.3g} um; a drive is told by motion of "
+            f"{1e6 * LEAST_TRAVEL * each.I_P:.3g} um at least"
+        )
+    rows = np.flatnonzero(each.rows)
+    found = inertia([each.record.between(int(rows[0]), int(rows[-1]) + 1)])
+    line = {name: one.value for name, one in found.estimates.items()}
     J = line["J"]
     if not J > 0:
         raise InputError(
             f"{each.record.name}: the inertia comes out as {J:.3g} kg.m2; the torque's sign or unit is wrong"
         )
-    torque = float(np.sqrt(np.mean(each.record.torque[each.moving] ** 2)))
-    F_C = max(line["F_C"], 0.01 * torque)
+    moving = each.moving
+    torque = float(np.sqrt(np.mean(each.record.torque[moving] ** 2)))
+    least = 0.01 * torque
+    spread = {name: NORMAL_95 * one.sigma for name, one in found.estimates.items() if one.status == "estimated"}
+    J_sigma = found.J.sigma / J
+    if max(spread["F_C"], spread.get("M_0", inf)) <= SEPARATED * line["F_C"]:
+        return Begin([_values(each, J, J_sigma, line["M_0"], max(line["F_C"], least), line["sigma_2"])])
+    # The direction in which it moves further.
+    way = -1.0 if float(np.sum(each.speed[moving])) < 0 else 1.0
+    there = moving & (way * each.speed > 0)
+    n = float(np.mean(each.speed[there])) / each.I_P
+    load = line["M_0"] + way * line["F_C"] + line["sigma_2"] * n
+    starts = [_values(each, J, J_sigma, load - way * share * abs(load), share * abs(load)) for share in SHARES]
+    if way * load > 0:  # friction alone may do it
+        starts.append(_values(each, J, J_sigma, 0.0, max(abs(load), least)))
+    if line["F_C"] > 0 and "M_0" in spread:
+        starts.append(_values(each, J, J_sigma, line["M_0"], max(line["F_C"], least), line["sigma_2"]))
+    sign = "+" if way > 0 else "-"
+    told = f"motion in one direction tells M_0 {sign} friction alone: {load:.3g} N.m at {1e3 * n * each.I_P:.3g} mm/s"
+    return Begin(starts, told)
+
+
+def _values(
+    each: AxisRecord, J: float, J_sigma: float, M_0: float, F_C: float, sigma_2: float = 0.0
+) -> dict[str, float]:
+    """All values to begin with. J_sigma: deviation of the inertia's logarithm by which a fit may leave it."""
     top = float(np.max(np.abs(each.speed))) / each.I_P
     return {
-        "J": J, "M_0": line["M_0"], "F_C": F_C, "sigma_2": max(line["sigma_2"], 0.1 * F_C / top),
+        "J": J, "J_sigma": J_sigma, "M_0": M_0, "F_C": F_C, "sigma_2": max(sigma_2, 0.1 * F_C / top),
         "K_p": 2 * pi * BANDWIDTH * J, "K_i": 2 * pi * BANDWIDTH * J / INTEGRAL,
         "sigma_0": F_C * each.I_P / PRESLIDING, "sigma_1": 1e-4 * F_C * each.I_P / PRESLIDING, "v_s": 1e-2 * top,
         "W": ZONE, "gamma": 1.0, "excess": 0.0, "F_log": 0.0, "asymmetry": 0.0,

@@ -26,7 +26,7 @@ from feedsim.trace.trace import Array
 Rows = NDArray[np.int64]
 
 # Deviations of the logarithm (of the value itself where it is not in LOGARITHMIC) about the start: what is usual. The
-# inertia begins with the rigid line's, which accelerations tell well.
+# inertia begins with the rigid line's, which accelerations tell well; where they do not, its deviation is that line's.
 LOGARITHMIC = ("J", "K_p", "K_i", "K_v", "omega_0", "D", "F_C", "sigma_0", "sigma_1", "sigma_2", "v_s", "W")
 USUAL = {
     "J": 0.05, "K_p": 1.0, "K_i": 1.5, "K_v": 1.0, "omega_0": 0.7, "D": 0.5, "F_C": 0.7, "sigma_0": 1.5,
@@ -165,6 +165,8 @@ class Problem:
 
     def usual(self, name: str) -> float:
         """Deviation from the start that is usual, of the logarithm or of the value."""
+        if name == "J":
+            return max(USUAL["J"], self.start.get("J_sigma", 0.0))
         return USUAL[name] if name in USUAL else 2.0 * self.start["F_C"] if name == "F_log" else 5 * self.start["F_C"]
 
     def at(self, name: str, away: float) -> float:

@@ -92,7 +92,12 @@ def ticks(axis: Axis, span: Range, most: float) -> Iterator[tuple[float, str]]:
             break
         step = finer
     for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1):
-        yield k * step, minus(powers(f"{k * step:.6g}"))
+        yield k * step, minus(powers(f"{k * step:.{_digits(k * step, step)}g}"))
+
+
+def _digits(at: float, step: float) -> int:
+    """As many as tell a tick from the next one."""
+    return max(6, math.floor(math.log10(abs(at) or step)) - math.floor(math.log10(step) + 1e-9) + 1)
 
 
 def _marked(span: Range, step: float) -> int:

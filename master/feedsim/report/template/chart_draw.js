@@ -75,10 +75,52 @@ function ticks(axis, low, high, most) {
     less = finer(step, turns);
     if (!less || (marked(step) > 1 && marked(less) > most + 2)) break;
   }
-  const found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push({ at: k * step, text: number(k * step) });
+  return marks_of(axis, low, high, step);
+}
+
+// Ticks a step apart, with as many digits as the step asks for. Where these are many, what they all have in common
+// stands at the axis, and the ticks say what is added to it.
+function marks_of(axis, low, high, step) {
+  const found = [], digits = at => Math.max(6, Math.floor(Math.log10(Math.abs(at) || step)) - Math.floor(Math.log10(step) + 1e-9) + 1);
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push({ at: k * step });
+  if (Math.max(...found.map(each => digits(each.at))) <= MANY) for (const each of found) each.text = number(each.at, digits(each.at));
+  else {
+    const whole = 10 ** Math.ceil(Math.log10(high - low) - 1e-9), common = Math.floor(low / whole + 1e-9) * whole, part = high - common;
+    const [factor, unit] = (FINER[axis.unit] || []).find(([factor]) => part * factor >= 1) || (FINER[axis.unit] || [[1, axis.unit]]).at(-1);
+    for (const each of found) each.text = number(Math.round((each.at - common) / step) * step * factor, 4);
+    found.common = `${number(common, Math.floor(Math.log10(Math.abs(common) || 1)) - Math.floor(Math.log10(whole) + 1e-9) + 1)}${unit_of(axis)}`;
+    found.unit = unit;
+  }
   return found;
 }
+
+// Ticks along the abscissa whose words do not touch: fewer of them, in the end every second one without its word.
+// end: where the last word has to stop.
+function apart(found_of, across, most, end = Infinity) {
+  const touching = all => {
+    const words = all.filter(each => each.text), middle = each => Math.min(across(each.at), end - 3.6 * each.text.length);
+    return words.some((each, k) => k && Math.abs(middle(each) - middle(words[k - 1])) < 3.5 * (each.text.length + words[k - 1].text.length) + 6);
+  };
+  let found = found_of(most);
+  while (most > 2 && touching(found)) found = found_of(--most);
+  for (let k = 0; k < 3 && touching(found); k++) found.filter(each => each.text).forEach((each, i) => { if (i % 2) each.text = ""; });
+  return found;
+}
+const MANY = 7; // digits of a tick
+const FINER = { m: [[1, "m"], [1e3, "mm"], [1e6, "µm"], [1e9, "nm"]], mm: [[1, "mm"], [1e3, "µm"], [1e6, "nm"]], "µm": [[1, "µm"], [1e3, "nm"]],
+  s: [[1, "s"], [1e3, "ms"], [1e6, "µs"], [1e9, "ns"]], ms: [[1, "ms"], [1e3, "µs"], [1e6, "ns"]], Hz: [[1, "Hz"], [1e3, "mHz"], [1e6, "µHz"]] };
+
+// What stands along an axis: quantity and unit, or what its ticks are added to.
+function title_of(axis, found) {
+  return found.common ? `${axis.label} − ${found.common}${found.unit ? ` [${found.unit}]` : ""}` : label_of(axis);
+}
+
+// A range that a zoom asks for, no narrower than its numbers have digits for.
+function wide_enough([low, high], axis) {
+  const least = axis.log || axis.names.length ? 0 : NARROWEST * Math.max(Math.abs(low), Math.abs(high));
+  return high - low >= least ? [low, high] : [(low + high - least) / 2, (low + high + least) / 2];
+}
+const NARROWEST = 4e-9; // against the largest value: 4 nm of 1 m
 
 // First row whose abscissa is not below; x ascending.
 function row_at(x, value) {
@@ -144,6 +186,7 @@ function range_of(panel, curves, values, span) {
   if (low > high) return panel.y.span || (panel.y.log ? [0.1, 10] : [-1, 1]);
   if (panel.y.log) return [low / 1.3, high * 1.3];
   if (panel.y.symlog) return [low * 1.21, high * 1.21];
+  if (high > low) [low, high] = wide_enough([low, high], panel.y);
   const room = 0.07 * (high - low) || 0.05 * Math.abs(high) || 1;
   return [low - (low === 0 && curves.some(each => each.filled) ? 0 : room), high + room];
 }
@@ -203,7 +246,7 @@ class Taken {
         covered += this.cells[Math.floor((b - inner.y) / 4) * this.across + Math.floor((a - inner.x) / 4)] || 0;
       return far + (covered ? 120 + 10 * covered : 0);
     };
-    const costs = places.map(cost), best = places[costs.indexOf(Math.min(...costs))] || { x: inner.x + 4, y: inner.y + 12 };
+    const costs = places.map(cost), best = places[costs.indexOf(costs.reduce((least, each) => Math.min(least, each), Infinity))] || { x: inner.x + 4, y: inner.y + 12 };
     this.box(best.x, best.y - 10, wide, tall);
     return best;
   }
@@ -227,7 +270,8 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   const title = panel.y.names.length ? 0 : Math.max(0, Math.min(inner.x, box.width - 7.4 * panel.title.length));
   headed(panel.title, title, box.width - title, part);
   const widest = Math.max(74, widest_of(panel.x.names, 7, 14));
-  for (const tick of ticks(panel.x, span[0], span[1], Math.max(2, Math.floor(inner.width / widest)))) {
+  const along = apart(most => ticks(panel.x, span[0], span[1], most), across, Math.max(2, Math.floor(inner.width / widest)), box.width);
+  for (const tick of along) {
     const at = across(tick.at).toFixed(1);
     make("line", { x1: at, x2: at, y1: inner.y, y2: bottom, stroke: colour("grid"), "stroke-width": tick.text ? 0.8 : 0.35 }, part);
     const seen = Math.min(at, box.width - 3.6 * tick.text.length); // the last one stays inside
@@ -238,20 +282,22 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
     make("line", { x1: inner.x, x2: right, y1: at, y2: at, stroke: colour("grid"), "stroke-width": tick.text ? 0.8 : 0.35 }, part);
     if (tick.text) make("text", { x: inner.x - 6, y: +at + 4, "text-anchor": "end", fill: colour("ink") }, part, tick.text);
   }
-  make("text", { x: Math.min(inner.x + inner.width / 2, box.width - 3.4 * label_of(panel.x).length), y: bottom + 34, "text-anchor": "middle", fill: colour("ink") }, part, label_of(panel.x));
+  make("text", { x: Math.min(inner.x + inner.width / 2, box.width - 3.4 * title_of(panel.x, along).length), y: bottom + 34, "text-anchor": "middle", fill: colour("ink") }, part, title_of(panel.x, along));
   if (!panel.y.names.length)
-    make("text", { transform: `translate(13 ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, label_of(panel.y));
+    make("text", { transform: `translate(13 ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, title_of(panel.y, heights));
   if (panel.x.also) {
     const [label, unit, factor] = panel.x.also, named = { label, unit, log: panel.x.log, names: [] };
-    for (const tick of ticks(named, span[0] * factor, span[1] * factor, Math.max(2, Math.floor(inner.width / 74))))
+    const found = apart(most => ticks(named, span[0] * factor, span[1] * factor, most), at => across(at / factor), Math.max(2, Math.floor(inner.width / 74)));
+    for (const tick of found)
       if (tick.text) make("text", { x: across(tick.at / factor), y: inner.y - 5, "text-anchor": "middle", fill: colour("ink") }, part, tick.text);
-    make("text", { x: inner.x + inner.width / 2, y: inner.y - 20, "text-anchor": "middle", fill: colour("ink") }, part, label_of(named));
+    make("text", { x: inner.x + inner.width / 2, y: inner.y - 20, "text-anchor": "middle", fill: colour("ink") }, part, title_of(named, found));
   }
   if (panel.y.also) {
     const [label, unit, factor] = panel.y.also, named = { label, unit, log: panel.y.log, names: [] };
-    for (const tick of ticks(named, height[0] * factor, height[1] * factor, Math.max(2, Math.floor(tall / 34))))
+    const found = ticks(named, height[0] * factor, height[1] * factor, Math.max(2, Math.floor(tall / 34)));
+    for (const tick of found)
       if (tick.text) make("text", { x: right + 6, y: up(tick.at / factor) + 4, fill: colour("ink") }, part, tick.text);
-    make("text", { transform: `translate(${box.width - 5} ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, label_of(named));
+    make("text", { transform: `translate(${box.width - 5} ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, title_of(named, found));
   }
   const clip = make("clipPath", { id }, part);
   make("rect", { x: inner.x, y: inner.y, width: inner.width, height: inner.height }, clip);
@@ -313,7 +359,7 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
     const wide = width_of(level.text), places = [];
     if (level.upright) for (let y = inner.y + 12; y < bottom - 4; y += 13) places.push({ x: at + 4, y, far: y - inner.y }, { x: at - 4 - wide, y, far: y - inner.y + 3 });
     else {
-      const ends = level.ends ? level.ends.map(across) : [inner.x, right], last = Math.max(Math.min(ends[1], right) - 4 - wide, inner.x + 4);
+      const ends = level.ends ? level.ends.map(end => Math.min(Math.max(across(end), inner.x), right)) : [inner.x, right], last = Math.max(Math.min(ends[1], right) - 4 - wide, inner.x + 4);
       for (let x = last; x >= Math.min(ends[0] + 4, last); x -= 12) for (const k of [0, 1, 2])
         places.push({ x, y: at - 4 - 12 * k, far: 0.2 * (last - x) + 12 * k }, { x, y: at + 12 + 12 * k, far: 0.2 * (last - x) + 12 * k + 3 });
     }

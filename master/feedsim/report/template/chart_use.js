@@ -4,15 +4,36 @@ const DATA = JSON.parse(document.getElementById("feedsim-data").textContent);
 const KEYS = "Drag to zoom, double-click to go back. Keys: arrows move the cursor, page up and down change the panel, + and − zoom, 0 goes back.";
 const arrays = new Map();
 
-// Curves of the page: 32-bit floats, about a number of their own.
+// Curves of the page (embedded.py): blocks of rows in whole steps from the block's middle, or 32-bit floats (0 rows). steps:
+// of the blocks; in_one: rows of each.
 function values(k) {
   if (!arrays.has(k)) {
-    const [about, text] = DATA.arrays[k], raw = atob(text), bytes = new Uint8Array(raw.length);
+    const [rows, text] = DATA.arrays[k], raw = atob(text), bytes = new Uint8Array(raw.length);
     for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-    const floats = new Float32Array(bytes.buffer);
-    arrays.set(k, about ? Float64Array.from(floats, each => each + about) : floats);
+    let found = new Float32Array(rows ? 0 : bytes.buffer);
+    if (rows) {
+      let count = 0; // of the blocks: 16 bytes each, and 4 bytes a row
+      while (16 * count + 4 * rows * count < raw.length) count++;
+      const heads = new Float64Array(bytes.buffer, 0, 2 * count), whole = new Int32Array(bytes.buffer, 16 * count);
+      found = new Float64Array(whole.length);
+      for (let i = 0; i < whole.length; i++) {
+        const block = 2 * Math.floor(i / rows);
+        found[i] = whole[i] === -(2 ** 31) ? NaN : heads[block] + heads[block + 1] * whole[i];
+      }
+      found.steps = heads.filter((each, i) => i % 2);
+      found.in_one = rows;
+    }
+    arrays.set(k, found);
   }
   return arrays.get(k);
+}
+
+// Digits of a row that count: as many as its array has, and no more than a share of what is seen needs.
+function counting(k, row, seen = 0) {
+  const own = values(k), value = Math.abs(own[row]), size = Math.floor(Math.log10(value));
+  const step = own.steps && own.steps[Math.floor(row / own.in_one)], known = own instanceof Float32Array ? value * 2 ** -23 : step && step !== 1 ? step : 0;
+  const finest = Math.max(known, value * 1e-13, seen * 1e-5);
+  return Number.isFinite(size) ? Math.min(15, Math.max(seen ? 6 : 1, size - Math.floor(Math.log10(finest)) + 1)) : 6;
 }
 
 function element(name, attributes, parent, text = null) {
@@ -23,9 +44,12 @@ function element(name, attributes, parent, text = null) {
   return found;
 }
 
+const written_at = (k, row, [low, high]) => number(values(k)[row], counting(k, row, high - low));
+
 class Live {
   constructor(figure) {
     this.figure = figure;
+    figure.live = this; // for who would steer a chart from outside
     this.stem = figure.id;
     this.chart = DATA.charts[this.stem];
     this.hidden = new Set();
@@ -75,7 +99,7 @@ class Live {
     this.chart.panels.forEach((panel, k) => {
       if (panel.kind !== "polar") return;
       const label = element("label", { class: "magnify" }, tools, "magnification ");
-      this.slider = element("input", { type: "range", min: "-3", max: "5", step: "0.25", value: "0", "aria-label": "magnification of the radius deviation" }, label);
+      this.slider = element("input", { type: "range", min: "-3", max: String(this.most_doublings(panel)), step: "0.25", value: "0", "aria-label": "magnification of the radius deviation" }, label);
       this.times = element("output", {}, label);
       this.slider.addEventListener("input", () => {
         this.reaches[k] = panel.ring * panel.rings / 2 ** Number(this.slider.value);
@@ -86,6 +110,18 @@ class Live {
     tool("PNG", "save the picture as PNG", () => this.save_png());
     tool("SVG", "save the picture as SVG", () => this.save("svg", new Blob([this.picture()], { type: "image/svg+xml" })));
     tool("CSV", "save the curves as CSV", () => this.save("csv", new Blob([this.csv()], { type: "text/csv" })));
+  }
+
+  // How often the deviations may be doubled: until half of a curve has left the rings, or one has come near the centre.
+  most_doublings(panel) {
+    const gap = RING_GAPS[panel.rings] * panel.rings;
+    const needed = panel.curves.map(curve => {
+      const sizes = Array.from(values(curve.y)).filter(Number.isFinite).map(Math.abs).sort((a, b) => a - b);
+      const inwards = -values(curve.y).reduce((least, each) => Number.isFinite(each) ? Math.min(least, each) : least, 0);
+      return sizes.length ? Math.max(sizes[sizes.length >> 1] / (1 + 0.16), inwards * gap / 0.9) : 0;
+    });
+    const most = Math.log2(panel.ring * panel.rings / Math.max(...needed, 1e-9));
+    return Math.min(5, Math.max(0, Math.floor(4 * most) / 4));
   }
 
   sample(curve, x, y, parent) {
@@ -125,9 +161,10 @@ class Live {
     this.draw();
   }
 
-  // Zoom a panel, and those that are linked with it along their abscissae.
+  // Zoom a panel, and those that are linked with it along their abscissae; no further than the curves have digits.
   zoom(k, x, y) {
-    const linked = this.chart.panels[k].linked;
+    const own = this.chart.panels[k], linked = own.linked;
+    [x, y] = [x && wide_enough(x, own.x), y && wide_enough(y, own.y)];
     this.chart.panels.forEach((panel, j) => {
       if (j === k) this.zooms[j] = { x, y };
       else if (linked && panel.linked === linked) this.zooms[j] = { x, y: null };
@@ -225,11 +262,11 @@ class Live {
         }
         if (row < 0 || !spot) continue;
         make("circle", { cx: box.x + spot[0], cy: box.y + spot[1], r: 3.4, fill: colour(curve.colour), stroke: colour("ground"), "stroke-width": 1 }, this.over);
-        if (panel.kind === "polar") { if (j === k) lines.push([curve, `${number(ys[row])} µm`, panel.title]); continue; }
+        if (panel.kind === "polar") { if (j === k) lines.push([curve, `${written_at(curve.y, row, [-each.reach, each.reach])} µm`, panel.title]); continue; }
         const loop = !curve.ascending || curve.dots, name = axis => axis.names.length ? axis.names[Math.round(xs[row])] : null;
-        const value = panel.y.names.length ? panel.y.names[Math.round(ys[row])] ?? "" : `${number(ys[row])}${unit_of(panel.y)}`;
-        lines.push([curve, loop ? `${value} at ${name(panel.x) ?? number(xs[row]) + unit_of(panel.x)}` : value, panel.y.label]);
-        if (!loop && j === k && !head) head = `${panel.x.label} ${name(panel.x) ?? number(xs[row], 7) + unit_of(panel.x)}`;
+        const value = panel.y.names.length ? panel.y.names[Math.round(ys[row])] ?? "" : `${written_at(curve.y, row, each.height)}${unit_of(panel.y)}`;
+        lines.push([curve, loop ? `${value} at ${name(panel.x) ?? written_at(curve.x, row, each.span) + unit_of(panel.x)}` : value, panel.y.label]);
+        if (!loop && j === k && !head) head = `${panel.x.label} ${name(panel.x) ?? written_at(curve.x, row, each.span) + unit_of(panel.x)}`;
       }
     });
     if (own.kind === "polar") head = `angle ${number(x, 4)}°`;
@@ -331,13 +368,14 @@ class Live {
       for (const curve of panel.curves) {
         if (this.hidden.has(curve.name)) continue;
         const [x, y] = panel.kind === "polar" ? ["angle [rad]", "radius deviation [µm]"] : [label_of(panel.x), label_of(panel.y)];
-        if (curve.x !== last) columns.push([x, values(last = curve.x)]);
-        columns.push([[panel.title, curve.name, y].filter(each => each).join(", "), values(curve.y)]);
+        if (curve.x !== last) columns.push([x, values(last = curve.x), last]);
+        columns.push([[panel.title, curve.name, y].filter(each => each).join(", "), values(curve.y), curve.y]);
       }
     });
     const rows = [columns.map(([name]) => quoted(name)).join(",")];
-    const cell = value => value === undefined || Number.isNaN(value) ? "" : typeof value === "string" ? quoted(value) : String(Number(value.toPrecision(9)));
-    for (let k = 0, n = Math.max(0, ...columns.map(([, column]) => column.length)); k < n; k++) rows.push(columns.map(([, column]) => cell(column[k])).join(","));
+    const cell = (value, array, row) => value === undefined || Number.isNaN(value) ? "" : typeof value === "string" ? quoted(value)
+      : String(array === null ? value : Number(value.toPrecision(counting(array, row))));
+    for (let k = 0, n = Math.max(0, ...columns.map(([, column]) => column.length)); k < n; k++) rows.push(columns.map(([, column, array = null]) => cell(column[k], array, k)).join(","));
     return rows.join("\n") + "\n";
   }
 

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from feedsim.front.overlay import Overlay, show
     from feedsim.front.result import Result
     from feedsim.jobs.circle import circle
+    from feedsim.jobs.compensate import compensate
+    from feedsim.jobs.identify_drive import identify_drive
+    from feedsim.jobs.replay import replay
     from feedsim.scenario import Machine, Scenario, load_machine
     from feedsim.scenario.load import load as load_scenario
     from feedsim.trace import Trace
@@ -47,14 +50,17 @@ _HOMES = {
     "Trace": "trace",
     "circle": "jobs.circle",
     "compare": "front.comparison",
+    "compensate": "jobs.compensate",
     "evaluate": "analysis",
     "example": "examples:copy",
     "frf": "front.calls",
     "identify": "front.calls",
+    "identify_drive": "jobs.identify_drive",
     "load": "front.calls",
     "load_machine": "scenario",
     "load_scenario": "scenario:load",
     "read_trace": "trace:read_csv",
+    "replay": "jobs.replay",
     "run": "front.calls",
     "show": "front.overlay",
     "sweep": "front.calls",
@@ -62,8 +68,9 @@ _HOMES = {
 
 __all__ = [
     "FeedsimError", "Figure", "InputError", "Machine", "OutputError", "Overlay", "Result", "Run", "Scenario",
-    "SimulationError", "Trace", "circle", "compare", "evaluate", "example", "frf", "identify", "load", "load_machine",
-    "load_scenario", "read_trace", "run", "show", "sweep",
+    "SimulationError", "Trace", "circle", "compare", "compensate", "evaluate", "example", "frf",
+    "identify", "identify_drive", "load", "load_machine", "load_scenario", "read_trace", "replay", "run",
+    "show", "sweep",
 ]  # fmt: skip
 
 

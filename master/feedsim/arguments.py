@@ -6,15 +6,18 @@ a wrong argument spells it as the caller did. May use: units, errors. Start read
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 from feedsim.errors import InputError
 
 T = TypeVar("T")
+V = TypeVar("V")
 Value = float | str  # a number in SI units, or a text with a unit
 
 _AS_OPTIONS = ContextVar("as_options", default=False)
@@ -69,7 +72,7 @@ def amount(value: Value, unit: str, example: str = "", *, positive: bool = False
     return number
 
 
-def by_name(name: str, values: Mapping[str, Value], read: Callable[[str, Value], T]) -> dict[str, T]:
+def by_name(name: str, values: Mapping[str, V], read: Callable[[str, V], T]) -> dict[str, T]:
     """Key -> what `read` makes of key and value. Raises InputError, which names argument, key and value."""
     found: dict[str, T] = {}
     for key, value in values.items():
@@ -81,6 +84,28 @@ def by_name(name: str, values: Mapping[str, Value], read: Callable[[str, Value],
 def lengths(name: str, values: Mapping[str, Value], example: str, *, positive: bool = False) -> dict[str, float]:
     """Axis -> length [m]. Raises InputError as :func:`by_name`."""
     return by_name(name, values, lambda _, value: amount(value, "m", example, positive=positive))
+
+
+Changes = Mapping[str, Any] | Sequence[str] | str | None
+
+
+def settings(changes: Changes) -> list[str]:
+    """Changes of a file as texts KEY=VALUE, which they are behind ``--set``; also of one text.
+
+    >>> settings({"coupling.substeps": 2}), settings("coupling.substeps=2")
+    (['coupling.substeps=2'], ['coupling.substeps=2'])
+    """
+    if changes is None:
+        return []
+    if isinstance(changes, str):
+        return [changes]
+    if not isinstance(changes, Mapping):
+        return [*changes]
+    return [f"{key}={_text(value)}" for key, value in changes.items()]
+
+
+def _text(value: Any) -> str:
+    return str(value) if isinstance(value, str | Path) else json.dumps(value, ensure_ascii=False)
 
 
 def listed(names: str | Sequence[str]) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import pytest
 
 import feedsim as fs
 from feedsim.cli import COMMANDS
-from feedsim.cli.options import WRITES, Command, _flat
+from feedsim.cli.options import WRITES, Command, flat
 
 OF_THE_TERMINAL = {"quiet"}  # what only a terminal needs: no progress bar and no summary
 OF_PYTHON = {"watch"}
@@ -27,8 +27,8 @@ def test_options_and_parameters_are_the_same(command: Command) -> None:
     job = fs
     for name in command.job.split("."):
         job = getattr(job, name)
-    typed = {option.typed.removeprefix("--").replace("-", "_") for option in _flat(command.options)}
-    if any(option.typed in WRITES for option in _flat(command.options)):
+    typed = {option.typed.removeprefix("--").replace("-", "_") for option in flat(command.options)}
+    if any(option.typed in WRITES for option in flat(command.options)):
         typed.add("force")
     parameters = inspect.signature(job).parameters
     assert typed - OF_THE_TERMINAL == set(parameters) - OF_PYTHON

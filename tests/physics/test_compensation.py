@@ -17,8 +17,8 @@ from feedsim.cosim.feedforward import friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.findings import severity
+from feedsim.jobs.compensate import CompensateResult
 from feedsim.linear.drive import LinearDrive
-from feedsim.report import compensate as report
 from feedsim.report.compensate.report import rows_of
 from feedsim.scenario import Axis, Machine, Scenario
 from scenario_helpers import default_machine
@@ -186,7 +186,7 @@ def test_table_runs_are_those_of_the_whole_program(done: Compensation, fmus: Pat
 
 
 def test_results_have_the_table(done: Compensation, tmp_path: Path) -> None:
-    report.write(done, {}, tmp_path / "out")
+    CompensateResult(done, {}).save(tmp_path / "out")
     with (tmp_path / "out" / "compensation.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [(row["compensation"], row["error"], row["unit of the error"]) for row in rows] == [

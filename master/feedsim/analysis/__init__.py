@@ -18,12 +18,12 @@ from feedsim.analysis.evaluate import (
     evaluate,
     tasks,
 )
-from feedsim.analysis.figures import Figure, Figures
+from feedsim.analysis.figures import Figure, Figures, Named
 from feedsim.analysis.positioning import Approach, deviation, positioning
 from feedsim.analysis.positioning_accuracy import Accuracy
 
 __all__ = [
     "Accuracy", "AccuracyTask", "Approach", "CircleTask", "Contour", "Diagnosis", "Figure", "Figures", "Glitch",
-    "PositioningTask", "Result", "Task", "Turn", "answer", "check", "circularity", "contour", "deviation", "diagnoses",
-    "doubts", "evaluate", "positioning", "tasks",
+    "Named", "PositioningTask", "Result", "Task", "Turn", "answer", "check", "circularity", "contour", "deviation",
+    "diagnoses", "doubts", "evaluate", "positioning", "tasks",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from feedsim.errors import InputError
 from feedsim.trace import Trace
+from feedsim.trace.trace import suggest
 
 Array = NDArray[np.float64]
 
@@ -22,8 +23,12 @@ SAME_INSTANT = 1e-6
 class Figure:
     """One derived number. ``value`` is NaN where the trace does not contain what the definition asks for.
 
+    ``float(figure)`` is its value.
+
     >>> import feedsim as fs
     >>> figure = fs.run("z_positioning.yaml").figures["Z.overshoot"]
+    >>> float(figure) == figure.value
+    True
     >>> print(figure, "-", figure.meaning)  # doctest: +ELLIPSIS
     3.13... um - ...
     """
@@ -32,11 +37,26 @@ class Figure:
     unit: str
     meaning: str
 
+    def __float__(self) -> float:
+        return self.value
+
     def __str__(self) -> str:
         return f"{self.value:.4g} {self.unit}" if math.isfinite(self.value) else "not determined"
 
 
 Figures = Mapping[str, Figure]
+
+
+class Named(dict[str, Figure]):
+    """Figures by name; a name that is none raises a KeyError that says which is the nearest.
+
+    >>> Named({"Z.overshoot": Figure(3.1, "um", "")})["Z.overshot"]
+    Traceback (most recent call last):
+    KeyError: "no figure 'Z.overshot'; did you mean 'Z.overshoot'?"
+    """
+
+    def __missing__(self, name: str) -> Figure:
+        raise KeyError(f"no figure {name!r}{suggest(name, self)}")
 
 
 def column(trace: Trace, name: str, purpose: str) -> Array:

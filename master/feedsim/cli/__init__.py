@@ -114,6 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Small matrices by the thousand: threads for linear algebra only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+    from feedsim.arguments import as_options
     from feedsim.errors import FeedsimError
     from feedsim.extras import ask, missing
     from feedsim.outputs import replacing
@@ -124,7 +125,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         drawn = ["figures"] if getattr(options, "figures", ()) else []
         ask(options.called, *options.needs, *drawn)
-        with replacing(getattr(options, "force", False)), _in_words_of(getattr(options, "control", "")):
+        spoken = _in_words_of(getattr(options, "control", ""))
+        with as_options(), replacing(getattr(options, "force", False)), spoken:
             code = options.action(options)
         if sys.stdout is not None:  # closed by a reader that has gone
             sys.stdout.flush()

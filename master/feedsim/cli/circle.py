@@ -34,6 +34,7 @@ def circle(options: Namespace) -> None:
             pitch=pairs("pitch", options.pitch, "AXIS=LENGTH is needed, e.g. X=10mm"),
             out=out,
             figures=options.figures,
+            control=options.control,
             watch=watch,
         )
     finish(options.quiet, result.findings, *result.lines, f"-> {out / 'report.html'}")

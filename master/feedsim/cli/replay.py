@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Sequence
-from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET, Command, Option, names, out, quantity, settings
-from feedsim.cli.terminal import announce, finish, progress_bar, results_in
-
-if TYPE_CHECKING:
-    from feedsim.scenario import Machine
-    from feedsim.trace import Mark
+from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET, Command, Option, out, settings
+from feedsim.cli.terminal import finish, watching
 
 REPLAY_DESCRIPTION = """Run the position setpoints of a record through the simulated axes, in closed loop, and show
 what is left of position, torque and speed setpoint: over time, as figures, as a spectrum and over the position."""
@@ -35,116 +28,55 @@ DRIVE_EPILOG = """examples:
 
 
 def replay(options: Namespace) -> None:
-    """Read, run, compare, write."""
-    from feedsim.files.columns import load_columns
-    from feedsim.replay.closed_loop import read_axes, windowed
-    from feedsim.replay.compare import replayed
-    from feedsim.report import replay as report
-    from feedsim.report.replay.report import Replayed
-    from feedsim.scenario import load_subject
+    """feedsim replay."""
+    from feedsim.jobs.replay import replay
 
-    subject = load_subject(options.machine, options.overrides)
-    machine = subject.machine
-    axes = _axes(options.axes, machine)
-    mapping = load_columns(options.columns) if options.columns is not None else None
-    directory: Path = options.out or Path("results") / f"replay_{options.record.stem}"
-    marks = _marks(options.record)
-    window = _window(options, marks)
-    inputs = [options.record, *(file for _, file in subject.files), machine.modes]
-    with (
-        progress_bar(options.quiet) as progress,
-        results_in(directory, report.check_writable, inputs, [*options.overrides, *_given(options)]),
-    ):
-        progress("reading", 0, 3)
-        read = read_axes(options.record, axes, machine, mapping)
-        records = {axis: windowed(axis, each, window) for axis, each in read.items()}
-        announce(machine, options.fmus)
-        progress("replay", 1, 3)
-        comparisons = list(replayed(machine, records, options.fmus).values())
-        progress("report", 2, 3)
-        sources = [each.provenance for each in read.values()]
-        found = [finding for each in comparisons for finding in each.findings]
-        told = dict.fromkeys([*found, *(text for source in sources for text in source.warnings)])
-        done = Replayed(
-            comparisons, subject, sources, marks, dict(text.split("=", 1) for text in _given(options)),
-            list(told),
-        )  # fmt: skip
-        report.write(done, directory, drawn=options.figures)
-    finish(options.quiet, done.warnings, *report.summary_lines(done, directory))
-
-
-def _given(options: Namespace) -> list[str]:
-    """What was asked for, by option, without paths."""
-    return [f"{name}={text}" for name in ("axes", "window") if (text := getattr(options, name))]
-
-
-def _axes(text: str | None, machine: Machine | None) -> tuple[str, ...]:
-    from feedsim.errors import InputError
-    from feedsim.fields import no_axis
-
-    if text is None:
-        if machine is None:
-            raise InputError("--axes: which axes of the record are meant? For example --axes X,Y")
-        return tuple(machine.axes)
-    found = names(text)
-    for axis in found if machine is not None else ():
-        if machine is not None and axis not in machine.axes:
-            raise InputError(f"--axes {text}: {no_axis(axis, machine.axes)}")
-    if not found or len(set(found)) < len(found):
-        raise InputError(f"--axes {text}: names of axes are needed, each once, such as X,Y")
-    return found
-
-
-def _window(options: Namespace, marks: Sequence[Mark]) -> tuple[float, float] | None:
-    from feedsim.replay.window import window
-
-    return window(options.window, marks) if options.window is not None else None
-
-
-def _marks(path: Path) -> Sequence[Mark]:
-    from feedsim.trace import read_recording
-
-    return read_recording(path).marks
+    out: Path = options.out or Path("results") / f"replay_{options.record.stem}"
+    with watching(options.quiet) as watch:
+        result = replay(
+            options.record,
+            options.machine,
+            options.axes,
+            columns=options.columns,
+            window=options.window,
+            set=options.overrides,
+            fmus=options.fmus,
+            out=out,
+            figures=options.figures,
+            control=options.control,
+            watch=watch,
+        )
+    head = f"{result.replayed.subject.machine.name} on {options.record.name} -> {out / 'report.html'}"
+    finish(options.quiet, result.findings, head, *result.lines)
 
 
 def identify_drive(options: Namespace) -> None:
-    """Read, identify, run what was found on the record, write."""
-    from feedsim.files.columns import load_columns
-    from feedsim.replay.closed_loop import read_axes, windowed
-    from feedsim.replay.identified import identify_drives
-    from feedsim.report.replay import drive as report
-    from feedsim.scenario import load_subject
+    """feedsim identify-drive."""
+    from feedsim.jobs.identify_drive import identify_drive
 
-    subject = load_subject(options.machine, options.overrides) if options.machine is not None else None
-    machine = subject.machine if subject is not None else None
-    axes = _axes(options.axes, machine)
-    mapping = load_columns(options.columns) if options.columns is not None else None
-    directory: Path = options.out or Path("results") / f"drive_{options.record.stem}"
-    marks = _marks(options.record)
-    window = _window(options, marks)
-    inputs = [options.record, *(file for _, file in (subject.files if subject is not None else ()))]
-    name = options.name or options.record.stem
-    cycle = quantity("position-cycle", options.position_cycle, "s", "1 ms") if options.position_cycle else None
-    with (
-        progress_bar(options.quiet) as progress,
-        results_in(directory, report.check_writable(axes), inputs, [*options.overrides, *_given(options)]),
-    ):
-        progress("reading", 0, 1)
-        read = read_axes(options.record, axes, machine, mapping)
-        records = {axis: windowed(axis, each, window) for axis, each in read.items()}
-        if machine is not None:
-            announce(machine, options.fmus)
-        found = identify_drives(
-            read, records, machine, report.head(options.record, window, date.today().isoformat()), name,
-            report.note(options.record), progress, options.fmus, cycle,
-        )  # fmt: skip
-        sources = [each.provenance for each in read.values()]
-        done = report.DriveReport(
-            found, sources, subject, name, dict(text.split("=", 1) for text in _given(options)),
-            marks,
-        )  # fmt: skip
-        report.write(done, directory, drawn=options.figures)
-    finish(options.quiet, done.warnings, *report.summary_lines(done, directory))
+    out: Path = options.out or Path("results") / f"drive_{options.record.stem}"
+    with watching(options.quiet) as watch:
+        result = identify_drive(
+            options.record,
+            options.axes,
+            options.machine,
+            columns=options.columns,
+            window=options.window,
+            position_cycle=options.position_cycle,
+            name=options.name,
+            set=options.overrides,
+            fmus=options.fmus,
+            out=out,
+            figures=options.figures,
+            control=options.control,
+            watch=watch,
+        )
+    found = result.drives.found
+    head = f"drive of {', '.join(found.drives)} from {options.record.name} -> {out / 'report.html'}"
+    written = (
+        [f"  feedsim replay RECORD --machine {out} replays records on it"] if "machine.yaml" in found.files else []
+    )
+    finish(options.quiet, result.findings, head, *result.lines, *written)
 
 
 _RECORD = Option("record", "RECORD", "CSV or MAT file, or a capture of a SINUMERIK (.json) (docs/traces.md)", type=Path)
@@ -169,6 +101,7 @@ REPLAY = Command(
     ),
     REPLAY_DESCRIPTION,
     REPLAY_EPILOG,
+    job="replay",
 )  # fmt: skip
 IDENTIFY_DRIVE = Command(
     "identify-drive",
@@ -188,4 +121,5 @@ IDENTIFY_DRIVE = Command(
     ),
     DRIVE_DESCRIPTION,
     DRIVE_EPILOG,
+    job="identify_drive",
 )  # fmt: skip

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feedsim.arguments import as_options
 from feedsim.findings import WRONG, Note, ranked, severity
 from feedsim.jobs.watch import Watch
 from feedsim.owned import claimed
@@ -109,13 +108,10 @@ def progress_bar(quiet: bool, unit: str = "", *, shortened: bool = False) -> Ite
 
 @contextmanager
 def watching(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterator[TerminalWatch]:
-    """Who watches a job for the person at the terminal; arguments of jobs are options to that person."""
+    """Who watches a job for the person at the terminal. unit, shortened: as of :func:`progress_bar`."""
     from tqdm import tqdm
 
-    with (
-        tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar,
-        as_options(),
-    ):
+    with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
         yield TerminalWatch(bar)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from feedsim import cosim
 from feedsim.analysis import linear, responses
+from feedsim.arguments import Changes, settings
 from feedsim.cosim import Progress
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.cosim.plant import plant_modes
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from feedsim.identify.result import Identification
 
 File = str | Path
-Changes = Mapping[str, Any] | Sequence[str] | None
 
 
 def load(file: File, set: Changes = None) -> Scenario:
@@ -38,7 +37,7 @@ def load(file: File, set: Changes = None) -> Scenario:
     >>> fs.load("xz_circle.yaml", {"motions.0.radius": "20 mm"}).motions[0].radius
     0.02
     """
-    return load_scenario(file, _texts(set))
+    return load_scenario(file, settings(set))
 
 
 def run(scenario: File | Scenario, *, set: Changes = None, progress: Progress | None = None, **options: Any) -> Result:
@@ -59,7 +58,7 @@ def run(scenario: File | Scenario, *, set: Changes = None, progress: Progress | 
     if is_ssp(Path(scenario)):
         from feedsim import ssp
 
-        with ssp.opened(Path(scenario), _texts(set)) as found:
+        with ssp.opened(Path(scenario), settings(set)) as found:
             made = {"program": found.program, "fmus": found.fmus}
             result = _run(found.scenario, progress, made | options)
             return replace(result, warnings=found.told(result.warnings))
@@ -111,7 +110,7 @@ def sweep(study: File, directory: File, *, set: Changes = None, runs: int | None
     >>> len(table), int(table.ok.sum())
     (2, 2)
     """
-    return run_study(load_study(study, _texts(set), runs=runs), Path(directory), **options)
+    return run_study(load_study(study, settings(set), runs=runs), Path(directory), **options)
 
 
 def frf(
@@ -131,7 +130,7 @@ def frf(
     >>> any(name.startswith("Z.n_a/") for name in response)
     True
     """
-    machine = subject if isinstance(subject, Machine) else load_subject(subject, _texts(set)).machine
+    machine = subject if isinstance(subject, Machine) else load_subject(subject, settings(set)).machine
     if isinstance(subject, Machine) and set:
         raise InputError("set: changes are for a file; a machine that is loaded has its own")
     if unknown := [axis for axis in axes or () if axis not in machine.axes]:
@@ -140,16 +139,3 @@ def frf(
     modes, _ = plant_modes(machine)
     system = linear.LinearSystem(machine, modes)
     return responses.closed_form(system, linear.names(chosen, tool=tool), responses.frequencies(machine, modes, band))
-
-
-def _texts(changes: Changes) -> list[str]:
-    """As behind --set."""
-    if changes is None:
-        return []
-    if not isinstance(changes, Mapping):
-        return [*changes]
-    return [f"{key}={_text(value)}" for key, value in changes.items()]
-
-
-def _text(value: Any) -> str:
-    return str(value) if isinstance(value, str | Path) else json.dumps(value, ensure_ascii=False)

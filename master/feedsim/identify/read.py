@@ -82,14 +82,14 @@ class _Drive:
 
 
 def read_records(
-    path: str | Path,
+    file: str | Path | Recording,
     mapping: Columns | None = None,
     axis: str | None = None,
     machine: Machine | None = None,
     *,
     driven: bool = True,
 ) -> Recorded:
-    """Read a CSV or MAT file.
+    """Read a CSV or MAT file, or take what :func:`feedsim.trace.read_recording` has read of one.
 
     mapping: which columns are what; None: by their names (feedsim's own, else those of docs/traces.md).
     axis: default that of the mapping, else the machine's only one, else the only one of feedsim's own names.
@@ -104,8 +104,8 @@ def read_records(
     is not even, pitch or torque constant that is needed and not given, a sign or unit wrong beyond doubt (signs.py,
     magnitudes.py).
     """
-    path = Path(path)
-    recording = read_recording(path)
+    recording = file if isinstance(file, Recording) else read_recording(file)
+    path = recording.path
     named = _axis(mapping, axis, machine)
     chosen = choose(recording, mapping, named, machine.axes if machine else (), driven=driven)
     if machine is not None and chosen.axis and chosen.axis not in machine.axes:

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from feedsim.analysis import Diagnosis, Figure
+from feedsim.analysis import Diagnosis, Figure, Named
 from feedsim.analysis.circle import diagnose
 from feedsim.analysis.circle.records import RecordedCircle, read_circle
 from feedsim.arguments import Value, lengths, listed, quantity, spelt
@@ -42,7 +42,7 @@ class CircleResult(Result):
     @cached_property
     def figures(self) -> Mapping[str, Figure]:
         """As of a run: "XY.G", "XY.squareness", ..."""
-        return page.figures_of(self.recorded, self.diagnosis)
+        return Named(page.figures_of(self.recorded, self.diagnosis))
 
     @property
     def findings(self) -> Sequence[str]:
@@ -83,6 +83,7 @@ def circle(
     out: File | None = None,
     figures: Sequence[str] = (),
     force: bool = False,
+    control: str = "",
     watch: Watch = SILENT,
 ) -> CircleResult:
     """Take a recorded circle apart: servo mismatch, squareness, scale, lost motion, reversal peaks, pitch errors.
@@ -95,7 +96,7 @@ def circle(
         centre: axis -> programmed position of the centre [m]; fitted where it is not given.
         pitch: axis -> length [m] with which an error repeats.
         out: folder that the result is written to; None: :meth:`Result.save` does it.
-        figures, force: as of :meth:`Result.save`.
+        figures, force, control: as of :meth:`Result.save`.
         watch: who hears how far the job is.
 
     Raises:
@@ -140,5 +141,5 @@ def circle(
         diagnosis = diagnose(recorded.circle, [turn.path for turn in recorded.turns], centred=recorded.centred)
         result = CircleResult(recorded, diagnosis, files)
         if out is not None:
-            result.save(out, figures=figures, force=force)
+            result.save(out, figures=figures, force=force, control=control)
     return result

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -85,13 +86,16 @@ class Result(ABC):
             raise InputError(f"a result of kind {self.kind} has no picture")
         return self.pictures[0]
 
-    def save(self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False) -> tuple[Path, ...]:
+    def save(
+        self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False, control: str = ""
+    ) -> tuple[Path, ...]:
         """Write report.html, summary.json and all files; returns the paths.
 
         figures: kinds of files that the pictures are drawn as, "png" and "svg". force: files in `folder` that feedsim
-        did not write may be replaced. All is written or nothing. Raises OutputError.
+        did not write may be replaced. control: parameters in the names and units of a control, "sinumerik", too. All is
+        written or nothing. Raises OutputError.
         """
-        with replacing(force or forced()):
+        with replacing(force or forced()), _in_words_of(control):
             self.check_writable(Path(folder), self.inputs)
             return write_report(
                 folder, self.report(), self.summary, self.files(), figures, kind=self.kind, own=self.own
@@ -105,3 +109,12 @@ class Result(ABC):
     def _repr_html_(self) -> str:
         page = escape(html(self.report(), self.kind), quote=True)
         return f"<iframe style='width:100%;height:{HEIGHT}px;border:0' srcdoc=\"{page}\"></iframe>"
+
+
+def _in_words_of(control: str) -> AbstractContextManager[None]:
+    """Reports in the names of a control; without one their code is not loaded."""
+    if not control:
+        return nullcontext()
+    from feedsim.report.control import control_names
+
+    return control_names(control)

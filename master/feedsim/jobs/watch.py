@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from feedsim.scenario import Coupling, Machine
 
 
 class Watch:
@@ -26,3 +31,14 @@ class Watch:
 
 
 SILENT = Watch()
+
+
+def announce(watch: Watch, machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> None:
+    """Announce the programs that a run of the machine executes besides those of feedsim.
+
+    coupling: of the run, where a scenario has it.
+    """
+    from feedsim import cosim
+
+    for sentence in cosim.executed(machine, fmus, coupling):
+        watch.announce(sentence)

@@ -3,3 +3,7 @@
 May use identify (records, the position loop), cosim, nc, scenario and trace.
 Start with closed_loop.py: a record's setpoints through the units; then compare.py, what is left, and drive.py.
 """
+
+from feedsim.called import called
+
+called(__name__)

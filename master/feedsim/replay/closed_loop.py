@@ -27,6 +27,7 @@ from feedsim.motions.profile import speed_change
 from feedsim.nc import Program
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.loads import MotorLoad, SlideLoad
+from feedsim.trace import Recording, read_recording
 from feedsim.trace.trace import Array
 
 Mask = NDArray[np.bool_]
@@ -79,12 +80,13 @@ class AxisRecord:
 
 
 def read_axes(
-    path: Path, axes: Sequence[str], machine: Machine | None = None, mapping: Columns | None = None
+    file: Path | Recording, axes: Sequence[str], machine: Machine | None = None, mapping: Columns | None = None
 ) -> dict[str, Recorded]:
     """The record of each axis. InputError: as read_records; no position setpoint, or no position."""
+    recording = file if isinstance(file, Recording) else read_recording(file)
     found: dict[str, Recorded] = {}
     for axis in axes:
-        read = read_records(path, mapping, axis, machine, driven=False)
+        read = read_records(recording, mapping, axis, machine, driven=False)
         missing = [
             name
             for name, role in (("position setpoint", "setpoint"), ("position", "angle"))
@@ -93,8 +95,8 @@ def read_axes(
         if missing:
             columns = ", ".join(f"{role} {name!r}" for role, name in read.provenance.columns.items())
             raise InputError(
-                f"{path}, axis {axis}: no {' and no '.join(missing)} is read ({columns}); a replay needs both; name "
-                "them in a mapping file: setpoint: {column: ..., unit: mm}"
+                f"{recording.path}, axis {axis}: no {' and no '.join(missing)} is read ({columns}); a replay needs "
+                "both; name them in a mapping file: setpoint: {column: ..., unit: mm}"
             )
         found[axis] = read
     return found

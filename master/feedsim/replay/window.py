@@ -25,22 +25,17 @@ def window(text: str, marks: Sequence[Mark]) -> tuple[float, float]:
     """
     begin, dots, end = (part.strip() for part in text.partition(".."))
     if not begin or (dots and not end) or (not dots and _TIME.match(begin)):
-        raise InputError(
-            f"--window {text}: BEGIN..END is needed, such as '0.5 s..2 s', or the name of a block of the record"
-        )
-    first, last = _span(begin, text, marks)[0], _span(end or begin, text, marks)[1]
+        raise InputError("BEGIN..END is needed, such as '0.5 s..2 s', or the name of a block of the record")
+    first, last = _span(begin, marks)[0], _span(end or begin, marks)[1]
     if not first < last:
-        raise InputError(f"--window {text}: the begin is not ahead of the end")
+        raise InputError("the begin is not ahead of the end")
     return first, last
 
 
-def _span(part: str, whole: str, marks: Sequence[Mark]) -> tuple[float, float]:
+def _span(part: str, marks: Sequence[Mark]) -> tuple[float, float]:
     """Begin and end [s] of a part of what was typed."""
     if _TIME.match(part):
-        try:
-            at = units.parse(part, "s", "0.5 s")
-        except InputError as error:
-            raise InputError(f"--window {whole}: {error}") from None
+        at = units.parse(part, "s", "0.5 s")
         return at, at
     counted = _COUNTED.fullmatch(part)
     name, number = (counted[1], int(counted[2])) if counted else (part, None)
@@ -49,12 +44,11 @@ def _span(part: str, whole: str, marks: Sequence[Mark]) -> tuple[float, float]:
         there = "; ".join(dict.fromkeys(_short(mark.text) for mark in marks)) if len(marks) <= MOST_TOLD else ""
         known = f"there is {there}" if there else _known(marks)
         how_often = f"{name!r} begins {len(found)} of them" if found else f"none begins with {name!r}"
-        raise InputError(f"--window {whole}: of the {len(marks)} blocks of the record {how_often}; {known}")
+        raise InputError(f"of the {len(marks)} blocks of the record {how_often}; {known}")
     if number is None and len(found) > 1:
         times = ", ".join(f"{marks[i].time:.6g} s" for i in found[:MOST_TOLD])
         raise InputError(
-            f"--window {whole}: {len(found)} blocks of the record begin with {name!r}, at {times}; say which, for "
-            f"example {name} #2"
+            f"{len(found)} blocks of the record begin with {name!r}, at {times}; say which, for example {name} #2"
         )
     i = found[(number or 1) - 1]
     return marks[i].time, marks[i + 1].time if i + 1 < len(marks) else math.inf

@@ -4,6 +4,20 @@ May use the report's core, the run's report and the analyses.
 Start with report.py.
 """
 
-from feedsim.report.compensate.report import check_writable, summary_line, write
+from feedsim.report.compensate.report import (
+    FEEDFORWARD,
+    RESULT,
+    TABLE,
+    UNCOMPENSATED,
+    answers,
+    check_writable,
+    report_of,
+    summary,
+    summary_line,
+    table_csv,
+)
 
-__all__ = ["check_writable", "summary_line", "write"]
+__all__ = [
+    "FEEDFORWARD", "RESULT", "TABLE", "UNCOMPENSATED", "answers", "check_writable", "report_of", "summary",
+    "summary_line", "table_csv",
+]  # fmt: skip

@@ -1,11 +1,10 @@
-"""The report on a friction compensation: curves, compensation.csv, summary.json, report.html, figures, whole or not."""
+"""The report on a friction compensation: its page, summary.json and compensation.csv."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +13,12 @@ from feedsim.analysis.compensation import Compensation, Quality
 from feedsim.report.compensate.plots import pictures_of
 from feedsim.report.content import Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import display_unit, minus, powers, typeset
-from feedsim.report.picture import Picture
 from feedsim.report.provenance import InputFile, axis_parameters, hashed, inputs_part, quantity
-from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.run.report import motions_section, provenance
 from feedsim.report.run.report import summary as summary_of_run
 from feedsim.report.sections import figures_footer, figures_section, files_table
 from feedsim.report.style import remarked
-from feedsim.trace import write_csv
 
 RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE = "result.csv", "uncompensated.csv", "feedforward.csv", "compensation.csv"
 
@@ -36,32 +33,11 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, REPORT, SUMMARY), inputs, kind="compensate")
 
 
-def write(
-    compensation: Compensation, files: Mapping[str, Path], directory: Path | str, *, drawn: Sequence[str] = ()
-) -> tuple[Path, ...]:
-    """Write the runs with (result.csv) and without compensation, feedforward.csv, compensation.csv (where there is a
-    table), summary.json, report.html and figures; returns the paths.
-
-    files: axis -> file that its compensation's friction comes from. Files of an earlier run are replaced. Raises
-    OutputError.
-    """
-    curves: dict[str, Content] = {
-        RESULT: partial(write_csv, trace=compensation.after.trace),
-        UNCOMPENSATED: partial(write_csv, trace=compensation.before.trace),
-        FEEDFORWARD: partial(write_csv, trace=compensation.feedforward),
-    }
-    if compensation.table:
-        curves[TABLE] = table_csv(compensation)
-    machine = compensation.scenario.machine
-    with remarked(f"{machine.name}. {machine.note}"):
-        pictures = pictures_of(compensation)
-    report = report_of(compensation, files, pictures)
-    return write_report(directory, report, partial(summary, compensation, files), curves, drawn, kind="compensate")
-
-
-def report_of(compensation: Compensation, files: Mapping[str, Path], pictures: Sequence[Picture]) -> Report:
+def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:
     """Content of the report. files: axis -> file of its compensation's friction."""
     scenario = compensation.scenario
+    with remarked(f"{scenario.machine.name}. {scenario.machine.note}"):
+        pictures = pictures_of(compensation)
     return Report(
         f"Friction compensation: {scenario.name}",
         f"{scenario.machine.name} · torque feedforward on {', '.join(compensation.frictions)}",

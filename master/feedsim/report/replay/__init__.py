@@ -3,7 +3,3 @@
 May use the report's core and what `feedsim.replay` found.
 Start with report.py.
 """
-
-from feedsim.report.replay.report import check_writable, summary_lines, write
-
-__all__ = ["check_writable", "summary_lines", "write"]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import Figure
+from feedsim.arguments import spelt
 from feedsim.findings import Note
 from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
@@ -20,7 +21,7 @@ from feedsim.report.control import control_section
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
 from feedsim.report.replay.plots import pictures_of
-from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.sections import figures_footer, figures_section, provenance_section
 from feedsim.report.style import remarked
 from feedsim.scenario import Machine, Subject
@@ -72,7 +73,9 @@ class DriveReport:
                      "with the rest, and may be others"] = None  # fmt: skip
             for cycle, likelier in one.other_cycles.items():
                 own = one.machine.cycles.T_pos
-                cycles = f"position cycles of {1e3 * own:g} ms (taken) and {1e3 * cycle:g} ms (--position-cycle)"
+                cycles = (
+                    f"position cycles of {1e3 * own:g} ms (taken) and {1e3 * cycle:g} ms ({spelt('position_cycle')})"
+                )
                 if likelier > APART:
                     told[f"axis {axis}: of {cycles} the record speaks for the latter"] = None
                 elif likelier > -APART:
@@ -82,14 +85,10 @@ class DriveReport:
         return list(told)
 
 
-def check_writable(axes: Sequence[str]) -> Callable[..., None]:
-    """What raises OutputError unless the results can be written to a directory without an input being lost."""
+def check_writable(axes: Sequence[str], directory: Path, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless results of the axes can be written to a directory without an input being lost."""
     own = [file for axis in axes for file in (drive_file(axis), friction_file(axis))]
-
-    def check(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-        check_place(directory, (MACHINE, MODES, *own, REPORT, SUMMARY), inputs, kind="identify-drive")
-
-    return check
+    check_place(directory, (MACHINE, MODES, *own, REPORT, SUMMARY), inputs, kind="identify-drive")
 
 
 def head(record: Path, window: tuple[float, float] | None, day: str) -> list[str]:
@@ -102,18 +101,6 @@ def head(record: Path, window: tuple[float, float] | None, day: str) -> list[str
 def note(record: Path) -> str:
     """Of the machine that is written."""
     return f"Identified from {record.name}. Axes are rigid; what the record does not show is assumed (see the files)."
-
-
-def write(report: DriveReport, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
-    """Write the files that were made, summary.json, report.html and figures; returns the paths. Raises OutputError."""
-    return write_report(
-        directory,
-        report_of(report),
-        lambda names: summary(report, names),
-        report.found.files,
-        drawn,
-        kind="identify-drive",
-    )
 
 
 def machine_of(report: DriveReport) -> Machine:
@@ -241,9 +228,9 @@ def answers(report: DriveReport) -> list[str]:
     return lines
 
 
-def summary_lines(report: DriveReport, directory: Path) -> list[str]:
+def summary_lines(report: DriveReport) -> list[str]:
     """For the terminal: parameters with intervals, and what is left, by axis."""
-    lines = [f"drive of {', '.join(report.found.drives)} from {report.sources[0].file.name} -> {directory / REPORT}"]
+    lines = []
     for each in report.comparisons:
         one = report.found.drives[each.axis]
         lines.append(f"  axis {each.axis}")
@@ -257,6 +244,4 @@ def summary_lines(report: DriveReport, directory: Path) -> list[str]:
         lines.append(
             f"    of every quarter of the motion by a fit to the others: {1e6 * one.predicted[0]:.4g} um{torque}"
         )
-    if MACHINE in report.found.files:
-        lines.append(f"  feedsim replay RECORD --machine {directory} replays records on it")
     return lines

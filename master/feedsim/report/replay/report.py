@@ -1,10 +1,9 @@
-"""The report of a replay: replay.csv, summary.json, report.html and figures, written whole or not at all."""
+"""The report of a replay: its page, summary.json and replay.csv."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,11 @@ from feedsim.report.control import control_section
 from feedsim.report.formatting import typeset
 from feedsim.report.provenance import figures_part, hashed, inputs_part, machine_part, quantity, software
 from feedsim.report.replay.plots import pictures_of
-from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.sections import figures_footer, figures_section, parameters_section, provenance_section
 from feedsim.report.style import remarked
 from feedsim.scenario import Subject
-from feedsim.trace import Mark, Trace, write_csv
+from feedsim.trace import Mark, Trace
 
 REPLAY = "replay.csv"
 LEADING = {
@@ -54,12 +53,6 @@ class Replayed:
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
     check_place(directory, (REPLAY, REPORT, SUMMARY), inputs, kind="replay")
-
-
-def write(replayed: Replayed, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
-    """Write replay.csv, summary.json, report.html and figures; returns the paths. Raises OutputError."""
-    files: dict[str, Content] = {REPLAY: partial(write_csv, trace=trace_of(replayed.comparisons))}
-    return write_report(directory, report_of(replayed), partial(summary, replayed), files, drawn, kind="replay")
 
 
 def trace_of(comparisons: Sequence[Comparison]) -> Trace:
@@ -157,9 +150,3 @@ def answers(replayed: Replayed) -> list[str]:
             text += f"; speed setpoint {own['speed_setpoint_rms']} rms"
         lines.append(text)
     return lines
-
-
-def summary_lines(replayed: Replayed, directory: Path) -> list[str]:
-    """For the terminal: what is left, by axis."""
-    head = f"{replayed.subject.machine.name} on {replayed.sources[0].file.name} -> {directory / REPORT}"
-    return [head, *(f"  {line}" for line in answers(replayed))]

@@ -1,0 +1,175 @@
+"""A circle without and with friction compensation by torque feedforward."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from feedsim import analysis, nc
+from feedsim import scenario as scenarios
+from feedsim.analysis import compensation
+from feedsim.analysis.compensation import Compensation, check_moves, lags_of, moving_axes
+from feedsim.arguments import Changes, Value, amount, by_name, settings, spelt
+from feedsim.errors import InputError
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.report import compensate as page
+from feedsim.report.content import Report
+from feedsim.report.provenance import input_paths
+from feedsim.report.results import Content
+from feedsim.scenario.load import read_friction
+from feedsim.trace import write_csv
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CompensateResult(Result):
+    """A circle without and with compensation.
+
+    compensation: both runs, the feedforward, what errors cost. frictions: axis -> file that the friction of its
+    compensation comes from.
+    """
+
+    compensation: Compensation
+    frictions: Mapping[str, Path]
+
+    kind = "compensate"
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files of the scenario, and those of the frictions."""
+        return [*input_paths(self.compensation.scenario), *self.frictions.values()]
+
+    @property
+    def figures(self) -> Mapping[str, analysis.Figure]:
+        """ "before.G", "after.glitch_X", ..., "X.delay"."""
+        return analysis.Named(self.compensation.figures)
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """What is to be known before the result is believed."""
+        return self.compensation.warnings
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """What the compensation takes away, and what its errors would leave of that."""
+        return page.answers(self.compensation)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """G and glitches before and after."""
+        return [f"  {page.summary_line(self.compensation)}"]
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.compensation, self.frictions)
+
+    def files(self) -> Mapping[str, Content]:
+        """The runs with (result.csv) and without compensation, the feedforward, the table where there is one."""
+        done = self.compensation
+        curves: dict[str, Content] = {
+            page.RESULT: partial(write_csv, trace=done.after.trace),
+            page.UNCOMPENSATED: partial(write_csv, trace=done.before.trace),
+            page.FEEDFORWARD: partial(write_csv, trace=done.feedforward),
+        }
+        return curves | ({page.TABLE: page.table_csv(done)} if done.table else {})
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.compensation, self.frictions, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, inputs)
+
+
+def compensate(
+    scenario: File,
+    *,
+    friction: Mapping[str, File] | None = None,
+    delay: Value | Mapping[str, Value] | None = None,
+    table: bool = True,
+    set: Changes = None,
+    fmus: File | None = None,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> CompensateResult:
+    """Run a circle without and with friction compensation of every axis that moves.
+
+    A friction model, driven by the speed setpoint with the lag of the axis, gives a torque that is added to the torque
+    setpoint.
+
+    Args:
+        scenario: file with a circle.
+        friction: axis -> file of the parameters that its compensation uses; the machine's own for the other axes.
+        delay: of the feedforward behind the speed setpoint [s], of all axes or axis -> delay; of the drive's parameters
+            where it is not given. Values may be texts, "4.2 ms". In a mapping "" is all axes.
+        table: with the runs that show what errors of the delay and of the parameters cost.
+        set: changes of the scenario, as behind ``--set``.
+        fmus: folder of the archives.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        figures, force: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, no circle, an axis that rests, a drive whose lag is not known.
+        SimulationError: a unit failed.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> result = fs.compensate("xz_circle.yaml", table=False)
+    >>> float(result.figures["before.G"]) > 5 * float(result.figures["after.G"])
+    True
+    """
+    changes = settings(set)
+    plan = scenarios.load(scenario, changes)
+    program = nc.plan(plan)
+    compensation.circle_task(plan, program)
+    files = by_name("friction", friction or {}, lambda axis, file: _file(axis, file, program))
+    sets = {axis: read_friction(file) for axis, file in files.items()}
+    delays = _delays(delay, program)
+    _check_lags(plan, [axis for axis in moving_axes(program) if axis not in delays])
+    archives = None if fmus is None else Path(fmus)
+    with kept(out, page.check_writable, watch, [*input_paths(plan), *files.values()], changes, force=force):
+        announce(watch, plan.machine, archives, plan.coupling)
+        done = compensation.compensate(
+            plan, program, frictions=sets, delays=delays, table=table, fmus=archives, progress=watch.progress
+        )
+        result = CompensateResult(done, files)
+        if out is not None:
+            result.save(out, figures=figures, force=force)
+    return result
+
+
+def _file(axis: str, file: File, program: nc.Program) -> Path:
+    check_moves(axis, program)
+    return Path(file)
+
+
+def _delays(delay: Value | Mapping[str, Value] | None, program: nc.Program) -> dict[str, float]:
+    """Axis -> delay [s]; one without an axis is that of all, and one with it counts more."""
+
+    def read(axis: str, value: Value) -> float:
+        if axis:
+            check_moves(axis, program)
+        return amount(value, "s", "4.2 ms")
+
+    values = delay if isinstance(delay, Mapping) else {} if delay is None else {"": delay}
+    read_ones = by_name("delay", values, read)
+    common = dict.fromkeys(moving_axes(program), read_ones.pop("")) if "" in read_ones else {}
+    return common | read_ones
+
+
+def _check_lags(plan: scenarios.Scenario, axes: Sequence[str]) -> None:
+    """Raise InputError, with the argument that helps, where the drive does not give the delay."""
+    try:
+        lags_of(plan, axes)
+    except InputError as error:
+        option = spelt("delay")
+        helps = f"{option} AXIS=VALUE" if option.startswith("--") else f"{option}={{axis: value}}"
+        raise InputError(f"{error} ({helps})", error.problems) from None

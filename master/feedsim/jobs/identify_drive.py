@@ -1,0 +1,143 @@
+"""Drive, inertia and friction of axes from a record of their control, in closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import Figure, Named
+from feedsim.arguments import Changes, Value, quantity
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.records import Asked
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.replay.identified import identify_drives
+from feedsim.report.content import Report
+from feedsim.report.replay import drive as page
+from feedsim.report.replay.drive import DriveReport
+from feedsim.report.results import Content
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DriveResult(Result):
+    """Drives of axes, identified.
+
+    drives: what was found of every axis, its files, and the record beside a run of it. inputs_read: the files.
+    """
+
+    drives: DriveReport
+    inputs_read: Sequence[Path]
+
+    kind = "identify-drive"
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Record and files of the machine."""
+        return self.inputs_read
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """How near a run of what was found comes to the record: "X.position_rms", ..."""
+        return Named(self.drives.figures)
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """What is to be known before the result is believed."""
+        return self.drives.warnings
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """How near what was found comes to the record, how far it is to be trusted, and what to do next."""
+        return page.answers(self.drives)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Parameters with intervals, and how far a run of them is from the record, by axis."""
+        return page.summary_lines(self.drives)
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.drives)
+
+    def files(self) -> Mapping[str, Content]:
+        """A machine folder, or, where the machine was given, drive and friction of its axes."""
+        return self.drives.found.files
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.drives, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(tuple(self.drives.found.drives), folder, inputs)
+
+
+def identify_drive(
+    record: File,
+    axes: str | Sequence[str] | None = None,
+    machine: File | None = None,
+    *,
+    columns: File | None = None,
+    window: str | None = None,
+    position_cycle: Value | None = None,
+    name: str | None = None,
+    set: Changes = None,
+    fmus: File | None = None,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    control: str = "",
+    watch: Watch = SILENT,
+) -> DriveResult:
+    """Identify the drive of axes: delay of the setpoint, position loop, speed controller, inertia and friction.
+
+    Args:
+        record: CSV or MAT file, or a control's capture.
+        axes: of the record; None: all of the machine.
+        machine: machine or scenario whose structure and friction are known; None: rigid axes, with what the record
+            has of them.
+        columns: mapping file, which columns of the record are what.
+        window: the part that counts, by times or by blocks of the record's program: "0.5 s..2 s", "N7..N20", "N7".
+        position_cycle: cycle [s] of the position loop of rigid axes; None: the control cycle, as where the drive closes
+            that loop itself, or that of the record's rows where the record speaks for it. Also a text, "2 ms".
+        name: of the machine that is written; None: that of the record.
+        set: changes of the machine, as behind ``--set``.
+        fmus: folder of the archives.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        figures, force, control: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, no such axis, no such window, a record that does not excite an axis.
+        SimulationError: a unit failed.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> fs.identify_drive("log.csv", "Z", "machines/nowhere")
+    Traceback (most recent call last):
+    feedsim.errors.InputError: no such file: machines/nowhere
+    """
+    asked = Asked.of(record, machine, axes, columns, window, set)
+    path = asked.recording.path
+    title = name or path.stem
+    cycle = quantity("position_cycle", position_cycle, "s", "1 ms") if position_cycle else None
+    archives = None if fmus is None else Path(fmus)
+    with kept(out, partial(page.check_writable, asked.axes), watch, asked.inputs, asked.told, force=force):
+        watch.progress("reading", 0, 1)
+        records = asked.records
+        if asked.machine is not None:
+            announce(watch, asked.machine, archives)
+        head = page.head(path, asked.window, date.today().isoformat())
+        found = identify_drives(
+            asked.read, records, asked.machine, head, title, page.note(path), watch.progress, archives, cycle
+        )
+        sources = [each.provenance for each in asked.read.values()]
+        done = DriveReport(found, sources, asked.subject, title, asked.settings, asked.marks)
+        result = DriveResult(done, asked.inputs)
+        if out is not None:
+            result.save(out, figures=figures, force=force, control=control)
+    return result

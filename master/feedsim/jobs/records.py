@@ -1,0 +1,106 @@
+"""A record of a control and the machine that goes with it, as replays and identifications of drives read them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from feedsim.arguments import Changes, given, listed, settings, spelt
+from feedsim.errors import InputError
+from feedsim.fields import no_axis
+from feedsim.files.columns import Columns, load_columns
+from feedsim.identify import Recorded
+from feedsim.jobs.folder import File
+from feedsim.replay.closed_loop import AxisRecord, read_axes, windowed
+from feedsim.replay.window import window as window_of
+from feedsim.scenario import Machine, Subject, load_subject
+from feedsim.trace import Mark, Recording, read_recording
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A recording, the axes of it, and the part that counts.
+
+    window: begin and end [s]; None: all. settings: what was asked for by argument, as the user wrote it, without paths.
+    changes: of the machine.
+    """
+
+    recording: Recording
+    subject: Subject | None
+    axes: tuple[str, ...]
+    mapping: Columns | None
+    window: tuple[float, float] | None
+    settings: Mapping[str, str]
+    changes: Sequence[str]
+
+    @classmethod
+    def of(
+        cls,
+        record: File,
+        machine: File | None,
+        axes: str | Sequence[str] | None,
+        columns: File | None,
+        window: str | None,
+        changes: Changes,
+    ) -> Asked:
+        """Read machine, mapping and recording. Raises InputError: a faulty file, no such axis, no such window."""
+        texts = settings(changes)
+        subject = load_subject(machine, texts) if machine is not None else None
+        chosen = _axes(axes, subject.machine if subject is not None else None)
+        mapping = load_columns(columns) if columns is not None else None
+        recording = read_recording(record)
+        part = None
+        if window is not None:
+            with given("window", window):
+                part = window_of(window, recording.marks)
+        text = axes if isinstance(axes, str) else ",".join(axes or ())
+        asked = {name: value for name, value in (("axes", text), ("window", window or "")) if value}
+        return cls(recording, subject, chosen, mapping, part, asked, texts)
+
+    @property
+    def machine(self) -> Machine | None:
+        """The machine, where one is given."""
+        return self.subject.machine if self.subject is not None else None
+
+    @property
+    def marks(self) -> Sequence[Mark]:
+        """Events of the record, such as blocks of its program."""
+        return self.recording.marks
+
+    @property
+    def inputs(self) -> list[Path]:
+        """Files that are read."""
+        return [self.recording.path, *(file for _, file in (self.subject.files if self.subject is not None else ()))]
+
+    @property
+    def told(self) -> list[str]:
+        """All that was asked for, as texts."""
+        return [*self.changes, *(f"{name}={text}" for name, text in self.settings.items())]
+
+    @cached_property
+    def read(self) -> Mapping[str, Recorded]:
+        """Axis -> all of its record."""
+        return read_axes(self.recording, self.axes, self.machine, self.mapping)
+
+    @cached_property
+    def records(self) -> dict[str, AxisRecord]:
+        """Axis -> the stretch of its record that holds the window."""
+        return {axis: windowed(axis, each, self.window) for axis, each in self.read.items()}
+
+
+def _axes(axes: str | Sequence[str] | None, machine: Machine | None) -> tuple[str, ...]:
+    option = spelt("axes")
+    if axes is None:
+        if machine is None:
+            raise InputError(f"{option}: which axes of the record are meant? For example {option} X,Y")
+        return tuple(machine.axes)
+    found = listed(axes)
+    text = axes if isinstance(axes, str) else ",".join(axes)
+    for axis in found if machine is not None else ():
+        if machine is not None and axis not in machine.axes:
+            raise InputError(f"{option} {text}: {no_axis(axis, machine.axes)}")
+    if not found or len({*found}) < len(found):
+        raise InputError(f"{option} {text}: names of axes are needed, each once, such as X,Y")
+    return found

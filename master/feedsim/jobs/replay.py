@@ -1,0 +1,143 @@
+"""The setpoints of a record through the simulated axes, beside what was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import Figure, Named
+from feedsim.arguments import Changes
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.records import Asked
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.replay.compare import replayed
+from feedsim.report.content import Report
+from feedsim.report.replay import report as page
+from feedsim.report.replay.report import Replayed
+from feedsim.report.results import Content
+from feedsim.trace import Trace, write_csv
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReplayResult(Result):
+    """A record beside the simulated machine that follows its setpoints.
+
+    replayed: every axis with its channels, recorded and simulated. inputs_read: the files.
+    """
+
+    replayed: Replayed
+    inputs_read: Sequence[Path]
+
+    kind = "replay"
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Record, mapping and files of the machine."""
+        return self.inputs_read
+
+    @property
+    def trace(self) -> Trace:
+        """Record and simulation side by side, "Z.x_a_recorded" and "Z.x_a_simulated", in SI units."""
+        return page.trace_of(self.replayed.comparisons)
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """ "Z.position_rms", "Z.torque_rms", ..."""
+        return Named(self.replayed.figures)
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """What is to be known before the result is believed."""
+        return self.replayed.warnings
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """How far the simulation is from the record, a line per axis."""
+        return page.answers(self.replayed)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answers."""
+        return [f"  {line}" for line in self.answers]
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.replayed)
+
+    def files(self) -> Mapping[str, Content]:
+        """Record and simulation as CSV."""
+        return {page.REPLAY: partial(write_csv, trace=self.trace)}
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.replayed, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, inputs)
+
+
+def replay(
+    record: File,
+    machine: File,
+    axes: str | Sequence[str] | None = None,
+    *,
+    columns: File | None = None,
+    window: str | None = None,
+    set: Changes = None,
+    fmus: File | None = None,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    control: str = "",
+    watch: Watch = SILENT,
+) -> ReplayResult:
+    """Run the position setpoints of a record through the simulated axes, in closed loop, and compare.
+
+    Args:
+        record: CSV or MAT file, or a control's capture.
+        machine: machine or scenario that follows the record.
+        axes: of the record; None: all of the machine.
+        columns: mapping file, which columns of the record are what.
+        window: the part that counts, by times or by blocks of the record's program: "0.5 s..2 s", "N7..N20", "N7".
+        set: changes of the machine, as behind ``--set``.
+        fmus: folder of the archives.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        figures, force, control: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, no such axis, no such window, no setpoint or no position in the record.
+        SimulationError: a unit failed.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> paths = fs.run("z_positioning.yaml").save("positioned")
+    >>> result = fs.replay("positioned/result.csv", "machines/test_centre", "Z")
+    >>> result.figures["Z.position_rms"].unit
+    'um'
+    """
+    asked = Asked.of(record, machine, axes, columns, window, set)
+    assert asked.subject is not None
+    own = asked.subject.machine
+    archives = None if fmus is None else Path(fmus)
+    inputs = [*asked.inputs, own.modes]
+    with kept(out, page.check_writable, watch, inputs, asked.told, force=force):
+        watch.progress("reading", 0, 3)
+        records = asked.records
+        announce(watch, own, archives)
+        watch.progress("replay", 1, 3)
+        comparisons = list(replayed(own, records, archives).values())
+        watch.progress("report", 2, 3)
+        sources = [each.provenance for each in asked.read.values()]
+        found = [finding for each in comparisons for finding in each.findings]
+        findings = dict.fromkeys([*found, *(text for source in sources for text in source.warnings)])
+        done = Replayed(comparisons, asked.subject, sources, asked.marks, asked.settings, [*findings])
+        result = ReplayResult(done, inputs)
+        if out is not None:
+            result.save(out, figures=figures, force=force, control=control)
+    return result

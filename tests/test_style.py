@@ -36,7 +36,6 @@ NOT_YET = {
     "docs/reports.md",
     "docs/ssp.md",
     "docs/structure.md",
-    "docs/sweeps.md",
     "docs/traces.md",
     "src/controller_fmu/README.md",
     "src/exchange/README.md",

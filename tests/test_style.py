@@ -22,8 +22,6 @@ NOT_YET = {
     "CONTRIBUTING.md",
     "SECURITY.md",
     "docs/architecture.md",
-    "docs/comparing.md",
-    "docs/compensation.md",
     "docs/effects.md",
     "docs/fe-import.md",
     "docs/identification.md",

@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs pictures pose-study identification-study identification-accuracy lock ansys clean
+.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -213,6 +213,9 @@ docs: $(VENV)/.dev $(VARIABLES) ## build the documentation as a site that opens 
 	$(PY) docs/site/stage.py $(BUILD)/site-source
 	$(PY) -m sphinx -q -W --keep-going -b html -c docs/site -d $(BUILD)/site-trees $(BUILD)/site-source $(BUILD)/site
 	@echo "open $(BUILD)/site/index.html"
+
+docs-test: fmus $(VENV)/.dev ## execute every command of the pages and compare what they print (ten minutes)
+	$(PY) docs/site/commands.py
 
 pictures: fmus $(VENV)/.run ## draw README's and docs' pictures anew (docs/images; ARGS=--all: that of the large study too)
 	$(PY) docs/pictures.py $(ARGS)

@@ -16,12 +16,19 @@ const [file, asked] = process.argv.slice(2, 4).map(name => JSON.parse(require("f
 const plain = value => Array.from(value);
 work_of(file).then(async work => {
   const found = [];
-  for (const { state, axis, keep } of asked) {
+  for (const { state, axis, keep, frequency } of asked) {
     try {
+      if (frequency) {
+        const system = work.linear(state), gain = {};
+        for (const each of system.axes) gain[each] = system.position_reference(each, frequency);
+        found.push({ gain, loops: await judge(work.linear(state, work.judged_plant), file.machine.locked) });
+        continue;
+      }
       const run = await work.run(state), trace = {};
       for (const name of keep || []) trace[name] = plain(run.trace[name]);
       const loop = axis ? await work.bode(state, axis) : null;
-      found.push({ figures: run.figures, warnings: run.warnings, trace, loop, segments: run.segments,
+      const causes = work.causes(state, run), warnings = await work.warnings(state, run);
+      found.push({ causes, figures: run.figures, warnings, trace, loop, segments: run.segments,
                    rows: keep ? plain(run.rows) : [] });
     } catch (error) { found.push({ problem: String(error.message || error) }); }
   }
@@ -33,7 +40,10 @@ work_of(file).then(async work => {
 
 
 def answers(data: dict[str, Any], asked: list[dict[str, Any]], folder: Path) -> list[dict[str, Any]]:
-    """What the page's worker computes for states of its knobs: figures, warnings, columns to `keep`, `axis`'s loop."""
+    """What the page's worker computes for states of its knobs: figures, warnings, columns to `keep`, `axis`'s loop.
+
+    With `frequency` [Hz]: its loops as judged, and x_a/x_s of the axes there, alone.
+    """
     assert NODE is not None
     (folder / "data.json").write_text(json.dumps(data))
     (folder / "asked.json").write_text(json.dumps(asked))

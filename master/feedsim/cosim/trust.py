@@ -57,7 +57,7 @@ def foreseen(
 ) -> tuple[str, ...]:
     """What the parameters and the loads alone tell a user to doubt, a sentence each."""
     return (
-        *control(scenario.machine, loops, program), *_stability(scenario, modes),
+        *control(scenario.machine, loops, program), *exchange_stability(scenario, modes),
         *_unbalanced_loads(scenario, loads), *_sizes_of_loads(scenario.machine, program, loads),
     )  # fmt: skip
 
@@ -138,7 +138,7 @@ def _gain(kind: str, value: float) -> str:
     return f"{name} = {units.convert(value, unit, shown):.4g} {shown}"
 
 
-def _stability(scenario: Scenario, modes: Modes) -> list[str]:
+def exchange_stability(scenario: Scenario, modes: Modes) -> list[str]:
     """Explicit exchange needs a friction slope well below 2 J_inf/h."""
     scheme = SCHEMES[scenario.coupling.scheme]
     step = scenario.machine.cycles.T_c / scenario.coupling.substeps
@@ -316,7 +316,7 @@ def pose_use(machine: Machine, program: Program, system: System) -> PoseUse:
     followed = {axis.axis for axis in grid}
     change = pose_change(machine, {axis: reached for axis, reached in ranges.items() if axis not in followed})
     left = tuple(
-        sentence for axis in grid if axis.axis in ranges for sentence in _left(axis, ranges[axis.axis], machine)
+        sentence for axis in grid if axis.axis in ranges for sentence in left_grid(axis, ranges[axis.axis], machine)
     )
     doubt = None if grid else table_mismatch(machine)  # a plant that follows has modes of its own
     doubts = () if doubt is None else (doubt,)
@@ -330,7 +330,7 @@ def _grid(system: System) -> tuple[GridAxis, ...]:
     return read_grid(file, system.plant_axes) if file.is_file() else ()
 
 
-def _left(axis: GridAxis, reached: tuple[float, float], machine: Machine) -> list[str]:
+def left_grid(axis: GridAxis, reached: tuple[float, float], machine: Machine) -> list[str]:
     """The outermost cells reach on without end, but their modes are those of their centres."""
     travel = machine.axes[axis.axis].travel
     first, last = axis.reach

@@ -100,6 +100,15 @@ def judge(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
     return _judged_axes(driven, held, machine.cycles, modes)
 
 
+def locked_modes(machine: Machine, modes: Modes) -> tuple[Floats, Floats, Floats]:
+    """Modes of a machine of shipped drives with its motors held: frequency (N,) [rad/s], damping ratio (N,), and the
+    peak of each in an open-loop gain (N,) per K_v [s]."""
+    drives = tuple(LinearDrive(machine.shipped_drive(name, "a page"), machine.cycles, axis.I_P)
+                   for name, axis in machine.axes.items())  # fmt: skip
+    axes = tuple(machine.axes)
+    return _Sampled(axes, drives, (None,) * len(axes), ModalPlant.of(modes, axes)).locked()
+
+
 class _Bristles(NamedTuple):
     """All that the loops know of an axis's friction: stiffness [N.m/rad] and dampings [N.m.s/rad] where it sticks."""
 
@@ -260,7 +269,13 @@ class _Sampled:
         return _about(omega, damping, seen * driven / np.maximum(2 * damping * omega, GROWTH))
 
     def _locked_resonances(self) -> Floats:
-        """The same of the position loops: modes with the motors held, which stiff speed loops come close to.
+        """The same of the position loops."""
+        omega, damping, peak = self.locked()
+        return _about(omega, damping, max(drive.drive.K_v for drive in self.drives) * peak)
+
+    def locked(self) -> tuple[Floats, Floats, Floats]:
+        """Modes with the motors held, which stiff speed loops come close to: frequency (N,) [rad/s], damping ratio
+        (N,), and its peak in an open-loop gain (N,) per K_v [s].
 
         With the motors' angles phi given, modal coordinates are q = R phi + N p, N the null space of the shapes at the
         rotors: p'' + N' Omega^2 N p = -N' Omega^2 R phi; the scales see p, and K_v/s makes phi of what they see.
@@ -274,8 +289,7 @@ class _Sampled:
         damping = (shapes**2).T @ plant.damping
         moved = np.abs(shapes.T @ (stiffness[:, None] * np.linalg.pinv(plant.rotor).T)).max(axis=1)
         seen = (np.abs(shapes.T @ plant.scale) / self._leads).max(axis=1)
-        K_v = max(drive.drive.K_v for drive in self.drives)
-        return _about(omega, damping, K_v * seen * moved / np.maximum(2 * damping * omega, GROWTH) / omega**2)
+        return omega, damping, seen * moved / np.maximum(2 * damping * omega, GROWTH) / omega**2
 
     @property
     def _leads(self) -> Floats:

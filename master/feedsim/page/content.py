@@ -18,26 +18,37 @@ from typing import Any
 
 import numpy as np
 
+from feedsim.analysis.circle.robust import student
 from feedsim.cosim import fmus_directory
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.one_unit import parameters
+from feedsim.cosim.plant import plant_modes
 from feedsim.cosim.recording import LIMITS
+from feedsim.cosim.run import check as run_check
 from feedsim.cosim.system import plant_parameters
+from feedsim.cosim.trust import control, exchange_stability
 from feedsim.cosim.whole import open_whole
 from feedsim.errors import InputError
+from feedsim.linear.judgement import SHOWS, judge, locked_modes
 from feedsim.motions.circular import Circle, Circular
 from feedsim.motions.dwell import Dwell
 from feedsim.motions.move import Move, Straight
 from feedsim.nc import Program
-from feedsim.page import module
+from feedsim.page import module, reach
 from feedsim.page.knobs import Knob, chosen
-from feedsim.scenario import CircleTest, Positioning, Scenario
+from feedsim.scenario import CircleTest, Machine, Positioning, Scenario
+from feedsim.scenario.coupling import SCHEMES
+from feedsim.structure import Modes, checked_modes
 
 # Longer runs take a phone more than a second or two at every turn of a knob.
 LONGEST = 60.0  # s
 MOST_CYCLES = 1_000_000
+# [1/s]: with no larger K_v does a page look closely at modes with the motors held.
+MOST_K_V = 1e4
 PER_AXIS = ("x_a", "n_a", "x_e", "M_a", "M_fr")
 TOOL = ("tcp.x_X", "tcp.x_Y", "tcp.x_Z")
+# Of so many degrees of freedom and more, the page has a series for Student's quantile, as feedsim.analysis has.
+FEW = 20
 KINDS = {"Real": "r", "Integer": "i", "Boolean": "b"}
 
 
@@ -66,11 +77,12 @@ def content(scenario: Scenario, program: Program, wanted: Sequence[str] = (), fm
         code = module.read(folder, archive.guid)
         resources = archive.directory / "resources"
         files = {path.name: path.read_bytes() for path in sorted(resources.iterdir()) if path.is_file()}
-        described = _machine(scenario, archive)
+        described = _machine(scenario, archive) | _judged(scenario, program, folder, resources)
         data = {
             "name": scenario.name, "note": machine.note, "machine_name": machine.name, "guid": archive.guid,
-            "module": _packed(code), "files": {name: _packed(file) for name, file in files.items()},
-            "machine": described, "parameters": [[*_reference(archive, name), value] for name, value in values.items()],
+            "module": packed(code), "files": {name: packed(file) for name, file in files.items()},
+            "machine": described,
+            "parameters": [[*_reference(archive, name), value, name] for name, value in values.items()],
             "knobs": [_knob(knob, archive) for knob in knobs],
             "motions": [motion.model_dump() for motion in scenario.motions] if planned else [],
             "evaluate": [item.model_dump(include={"kind", "axis", "band", "motion", "turn"}) for item in evaluated],
@@ -123,8 +135,36 @@ def _machine(scenario: Scenario, archive: Archive) -> dict[str, Any]:
         "signs": {name: axis.display_sign for name, axis in machine.axes.items()},
         "feeds": [_reference(archive, f"{axis}.{name}")[0] for axis in axes for name in ("x_s", "n_ffw")],
         "every": round(scenario.recording.interval / cycles.T_c), "signals": signals, "flags": list(LIMITS),
+        "students": [student(free) for free in range(2, FEW)],
         "references": {name: _reference(archive, name) for name in names}, "longest": LONGEST,
     }  # fmt: skip
+
+
+def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path) -> dict[str, Any]:
+    """What the page needs to say what it warns of: modes, and what its knobs have nothing to do with."""
+    machine, coupling = scenario.machine, scenario.coupling
+    modes, here = checked_modes(machine), plant_modes(machine)[0]
+    omega, damping, peak = (each.tolist() for each in locked_modes(machine, modes))
+    said = {
+        *control(machine, judge(machine, modes), program), *exchange_stability(scenario, modes),
+        *reach.sentences(machine, program, resources),
+    }  # fmt: skip
+    ahead = [warning for warning in run_check(scenario, program, fmus=folder) if warning not in said]
+    tables = {} if machine.plant is None else {"table": _table(modes, machine), "pose": _table(here, machine)}
+    scheme = SCHEMES[coupling.scheme]
+    return {
+        "reach": reach.described(machine, program, resources), "modes": tables,
+        "warnings": [str(warning) for warning in ahead],
+        "locked": [list(each) for each in zip(omega, damping, peak, strict=True) if MOST_K_V * each[2] > SHOWS],
+        "scheme": {"name": scheme.name, "stable_share": scheme.stable_share, "substeps": coupling.substeps},
+    }  # fmt: skip
+
+
+def _table(modes: Modes, machine: Machine) -> dict[str, Any]:
+    """Modes as the page has them from a table of its own."""
+    rows = {kind: [modes.ports[f"{kind}_{axis}"].tolist() for axis in machine.axes] for kind in ("n", "x")}
+    omega = (2 * np.pi * modes.frequency).tolist()
+    return {"omega_0": omega, "damping": modes.damping.tolist(), "rotor": rows["n"], "scale": rows["x"]}
 
 
 def _reference(archive: Archive, name: str) -> list[Any]:
@@ -144,7 +184,7 @@ def _knob(knob: Knob, archive: Archive) -> dict[str, Any]:
 
 def _given(scenario: Scenario, program: Program) -> dict[str, Any]:
     """Setpoints that are carried along."""
-    return {"rows": _packed(rows(scenario, program).tobytes()), "segments": segments(program)}
+    return {"rows": packed(rows(scenario, program).tobytes()), "segments": segments(program)}
 
 
 def rows(scenario: Scenario, program: Program) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -186,6 +226,6 @@ def _circle(circle: Circular) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _packed(file: bytes) -> str:
+def packed(file: bytes) -> str:
     """Compressed, base64; the same from the same bytes."""
     return base64.b64encode(gzip.compress(file, 9, mtime=0)).decode("ascii")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
@@ -15,15 +16,19 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from feedsim.analysis import CircleTask, Figure, PositioningTask, evaluate, tasks
+from feedsim.analysis import CircleTask, Diagnosis, Figure, PositioningTask, evaluate, tasks
+from feedsim.analysis.circle import answer, swinging
 from feedsim.cosim import Run
 from feedsim.errors import InputError
-from feedsim.page.content import Content, content
+from feedsim.page.content import Content, content, packed
 from feedsim.page.scripts import showing, styles, text, worker
 from feedsim.report.chart.still import still
+from feedsim.report.content import Table
+from feedsim.report.formatting import typeset
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
+from feedsim.report.run.diagnosis import diagnosis_section
 from feedsim.report.style import PALETTE
 from feedsim.trace.files import written_whole
 
@@ -58,10 +63,11 @@ def html(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
     scenario, machine = run.scenario, run.scenario.machine
     shown = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]
     moved = [axis for axis in machine.axes if any(axis in segment.axes for segment in run.program.segments)]
+    figures = evaluate(run)
     planes = [list(task.turn.axes) for task in shown if isinstance(task, CircleTask)]
     data = held.data | {
         "axes": list(machine.axes), "moved": moved, "plane": planes[0] if planes else None,
-        "signs": held.data["machine"]["signs"],
+        "signs": held.data["machine"]["signs"], "written": _written(figures),
     }  # fmt: skip
     # The axis whose loop is shown at first stands last: that of the circle's ordinate, or the one that moves.
     order = [axis for axis in machine.axes if axis not in moved] + moved
@@ -72,7 +78,7 @@ def html(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
         "notes": "\n".join(f'<p class="note">{escape(note)}</p>' for note in _notes(run, held)),
         "knobs": "\n".join(_groups(held.data["knobs"])), "pictures": "\n".join(_pictures(run, shown)),
         "axes": "".join(f"<option{' selected' * (axis == order[-1])}>{escape(axis)}</option>" for axis in order),
-        "figures": _table(evaluate(run)), "footer": _footer(held), "worker": worker(), "script": script,
+        "figures": _table(figures), "footer": _footer(held), "worker": packed(worker().encode()), "script": script,
         "charts": _json({"charts": {}, "arrays": [], "palette": {n: c for n, c, _ in PALETTE} | {"ground": "#ffffff"}}),
         "data": _json(data | {"axes": order}),
     }  # fmt: skip
@@ -128,9 +134,11 @@ def _row(k: int, knob: Mapping[str, Any]) -> str:
 def _pictures(run: Run, shown: Sequence[CircleTask | PositioningTask]) -> Iterable[str]:
     signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
     for task in shown:
-        end = re.sub(r"[^A-Za-z0-9]+", "-", task.prefix)
+        end = _slug(task.prefix)
         if isinstance(task, CircleTask):
             yield _figure(contour_picture(run.trace, task.turn, f"contour-{end}", task.back))
+            if (diagnosis := task.diagnosis(run.trace)) is not None:
+                yield _why(task.prefix, end, diagnosis)
             if (torque := torque_picture(run.trace, task.turn, signs, f"torque-{end}")) is not None:
                 yield _figure(torque, bare=True)
         else:
@@ -141,6 +149,29 @@ def _pictures(run: Run, shown: Sequence[CircleTask | PositioningTask]) -> Iterab
             yield _figure(stop)
 
 
+def _slug(prefix: str) -> str:
+    return re.sub(r"[^A-Za-z0-9]+", "-", prefix)
+
+
+def _why(prefix: str, end: str, diagnosis: Diagnosis) -> str:
+    """Why a circle is not round: the answer, and a row for every cause."""
+    table = next(part for part in diagnosis_section(prefix, diagnosis).parts if isinstance(part, Table))
+    kinds = {"l": "", "r": ' class="number"', "p": ' class="meaning"'}
+    marks = [kinds[letter] for letter in table.columns]
+    heads = "".join(f'<th scope="col"{mark}>{escape(head)}</th>' for mark, head in zip(marks, table.heads, strict=True))
+    rows = "".join(
+        f"<tr>{''.join(f'<td{mark}>{escape(str(cell))}</td>' for mark, cell in zip(marks, row, strict=True))}</tr>"
+        for row in table.rows
+    )
+    words = " ".join(filter(None, [answer(diagnosis), swinging(diagnosis)]))
+    return (
+        f'<section id="why-{end}" aria-labelledby="why-head-{end}"><h2 id="why-head-{end}">{escape(prefix)}: why the '
+        f'circle is not round</h2><p class="answer">{escape(typeset(words))}</p><details><summary>All causes, their '
+        f'amounts and shares</summary><div class="scroll"><table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody>'
+        "</table></div></details></section>"
+    )
+
+
 def _figure(picture: Picture, *, bare: bool = False) -> str:
     """bare: without a still picture, which would make the page half as large again."""
     kept = "" if bare or picture.chart is None else still(picture.chart, picture.stem, picture.title)
@@ -149,6 +180,11 @@ def _figure(picture: Picture, *, bare: bool = False) -> str:
         f'<figure id="{picture.stem}"{" class=needs" * bare} data-title="{title}"><h2>{title}</h2>'
         f'<div class="scroll still">{kept}</div></figure>'
     )
+
+
+def _written(figures: Mapping[str, Figure]) -> dict[str, tuple[float | None, str]]:
+    """Figures of the scenario as written, for the page's comparisons."""
+    return {name: (each.value if math.isfinite(each.value) else None, each.unit) for name, each in figures.items()}
 
 
 def _table(figures: Mapping[str, Figure]) -> str:

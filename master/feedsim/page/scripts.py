@@ -7,8 +7,11 @@ from importlib import resources
 
 from feedsim.report.page import drawing, style
 
-COMPUTING = ("unit.js", "plan.js", "figures.js", "bode.js", "work.js")
-SHOWING = ("figures.js", "pictures.js", "lessons.js", "page.js")
+COMPUTING = (
+    "packed.js", "unit.js", "plan.js", "figures.js", "algebra.js", "circle_model.js", "circle_diagnosis.js", "signs.js",
+    "circle_words.js", "linear.js", "judgement.js", "bode.js", "work.js",
+)  # fmt: skip
+SHOWING = ("packed.js", "figures.js", "signs.js", "pictures.js", "lessons.js", "page.js")
 
 
 @cache

@@ -141,6 +141,45 @@ def pose_change(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> 
         return PoseChange(axes, str(error).partition("\n")[0])
 
 
+@dataclass(frozen=True, eq=False)
+class ModesOverAxis:
+    """Modes of interest (M,) while one axis moves and all others stay at the pose.
+
+    Attributes:
+        frequency: at the pose (M,) [Hz]. moving: what moves in each, at the pose.
+        position: of the axis (P,) [m], rising. there: what each mode has become (P, M) [Hz].
+    """
+
+    frequency: Floats
+    moving: tuple[str, ...]
+    position: tuple[float, ...]
+    there: Floats
+
+    @property
+    def largest(self) -> float:
+        """The largest relative change [1]."""
+        return float(np.abs(self.there / self.frequency - 1).max(initial=0.0))
+
+
+def over_axis(machine: Machine, axis: str, positions: Sequence[float]) -> ModesOverAxis | None:
+    """What :func:`pose_change` would find at ends of a motion (P,) [m]; None where no structure file tells of them."""
+    if machine.structure is None:
+        return None
+    try:
+        pose = _Pose(machine.structure, state_of(machine.structure), tuple(machine.pose.items()))
+        if axis not in assembler_of(pose.structure, pose.state).structure.axes:
+            return None
+        solution, frequency = _middle(pose)[1], _middle(pose)[1].modes.frequency
+        own = np.flatnonzero(_seen(solution) & (frequency > 0) & (frequency <= LOOKED_AT))
+        there = [
+            _end(pose, axis, None if abs(x - machine.pose[axis]) <= NEAR else round(x, DECIMALS)) for x in positions
+        ]
+    except (OSError, FeedsimError):
+        return None
+    moving = tuple(str(solution.moving[mode]) for mode in own.tolist())
+    return ModesOverAxis(frequency[own], moving, tuple(positions), np.array([each.frequency[own] for each in there]))
+
+
 def warnings(change: PoseChange) -> tuple[str, ...]:
     """A sentence for each axis that moves far enough for the modes to be others."""
     sentences = []

@@ -142,7 +142,7 @@ function turns_of(item, segments) {
 function contour(trace, turn, names = turn.axes.map(axis => `${axis}.x_a`)) {
   let [first, last] = rows_within(trace.time, turn.begin, turn.end);
   if (trace.time[last - 1] >= turn.end) last--;
-  const [x, y] = names.map((name, i) => trace[name].slice(first, last).map(each => each - turn.centre[i]));
+  const time = trace.time.slice(first, last), [x, y] = names.map((name, i) => trace[name].slice(first, last).map(each => each - turn.centre[i]));
   const angle = x.map((each, k) => Math.atan2(y[k], each)), deviation = x.map((each, k) => Math.hypot(each, y[k]) - turn.radius), middle = median(deviation);
   const glitches = [0, 1, 2, 3].map(quarter => {
     let peak = -1;
@@ -153,26 +153,30 @@ function contour(trace, turn, names = turn.axes.map(axis => `${axis}.x_a`)) {
     const axis = turn.axes[quarter % 2];
     return { name: axis + (quarter < 2 ? "+" : "-"), axis, angle: angle[peak], deviation: deviation[peak], height: deviation[peak] - middle };
   });
-  return { angle, deviation, median: middle, glitches };
+  return { time, angle, deviation, median: middle, glitches };
 }
 const modulo = (value, by) => ((value % by) + by) % by;
 
-// Range of the distance from the centre of the least-squares circle; Gauss-Newton, four passes.
-function least_squares_deviation({ angle, deviation }, radius) {
+// Centre of the least-squares circle; Gauss-Newton, four passes.
+function fitted_centre({ angle, deviation }, radius) {
   const x = angle.map((each, k) => (radius + deviation[k]) * Math.cos(each)), y = angle.map((each, k) => (radius + deviation[k]) * Math.sin(each));
   let p = 0, q = 0;
-  const away = k => Math.hypot(x[k] - p, y[k] - q);
   for (let pass = 0; pass < 4; pass++) {
     const A = [[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]];
     for (let k = 0; k < x.length; k++) {
-      const d = away(k), row = [(x[k] - p) / d, (y[k] - q) / d, 1];
+      const d = Math.hypot(x[k] - p, y[k] - q), row = [(x[k] - p) / d, (y[k] - q) / d, 1];
       for (let i = 0; i < 3; i++) { for (let j = 0; j < 3; j++) A[i][j] += row[i] * row[j]; A[i][3] += row[i] * (d - radius); }
     }
     for (let i = 0; i < 3; i++) for (let j = 0; j < 3; j++) if (j !== i) { const f = A[j][i] / A[i][i]; for (let k = 0; k < 4; k++) A[j][k] -= f * A[i][k]; }
     p += A[0][3] / A[0][0];
     q += A[1][3] / A[1][1];
   }
-  const far = x.map((_, k) => away(k));
+  return [p, q];
+}
+
+// Range of the distance from it.
+function least_squares_deviation({ angle, deviation }, radius) {
+  const [p, q] = fitted_centre({ angle, deviation }, radius), far = angle.map((each, k) => Math.hypot((radius + deviation[k]) * Math.cos(each) - p, (radius + deviation[k]) * Math.sin(each) - q));
   return largest(far) - least(far);
 }
 
@@ -208,15 +212,34 @@ function figures_of(trace, tasks) {
   const found = {};
   for (const task of tasks) {
     const own = task.kind === "positioning" ? positioning(trace, task) : circularity(trace, task.turn);
-    if (task.back) for (const [name, figure] of Object.entries(circularity(trace, task.back))) own[`clockwise.${name}`] = figure;
+    if (task.back) {
+      Object.assign(own, bidirectional(trace, task.turn, task.back));
+      for (const [name, figure] of Object.entries(circularity(trace, task.back))) own[`clockwise.${name}`] = figure;
+    }
     for (const name in own) found[`${task.prefix}.${name}`] = own[name];
+  }
+  return found;
+}
+
+// Why circles are not round: of every one its cause figures, what was found, and in words. known: see diagnosed().
+function causes_of(trace, tasks, figures, known) {
+  const found = {};
+  for (const { kind, prefix, turn, back } of tasks) {
+    const diagnosis = kind === "circle" ? diagnosed(trace, back ? [turn, back] : [turn], known) : null;
+    if (!diagnosis) continue;
+    const own = Object.fromEntries(Object.entries(figures).filter(([name]) => name.startsWith(`${prefix}.`)).map(([name, figure]) => [name.slice(prefix.length + 1), figure]));
+    found[prefix] = {
+      figures: Object.fromEntries(Object.entries(cause_figures(diagnosis)).map(([name, figure]) => [`${prefix}.${name}`, figure])), answer: answer_of(diagnosis), swinging: swinging_words(diagnosis),
+      rows: diagnosis.terms.map(term => cause_row(diagnosis, term)),
+      doubts: misleading(diagnosis, own).map(sentence => `${prefix}: ${sentence}`),
+    };
   }
   return found;
 }
 
 // What a run's own limits tell a reader to doubt, in the words of feedsim run (feedsim.cosim.trust).
 function limit_warnings(machine, trace) {
-  const found = [], percent = value => { const text = Number(value.toPrecision(2)); return text >= 1e-4 || !text ? String(text) : text.toExponential().replace(/e([-+])(\d)$/, "e$10$2"); };
+  const found = [], percent = value => general(value, 2);
   for (const axis of machine.axes) for (const limit of machine.flags) {
     const flags = trace[`${axis}.${limit}`], share = flags.reduce((sum, each) => sum + (each ? 1 : 0), 0) / flags.length;
     if (share > 0) found.push(`axis ${axis}: ${limit.replace("_", " ")} in ${percent(100 * share)} % of the recorded instants`);

@@ -3,6 +3,7 @@ const circle_of = held => held.evaluate.find(each => each.kind === "circle") && 
 const key_of = (axis, name) => `machine.axes.${axis}.${name}`;
 const has = (held, axes, names) => axes.every(axis => names.every(name => held.knobs.some(knob => knob.key === key_of(axis, name))));
 const figure_of = (view, end) => { const name = Object.keys(view.found.figures).find(each => each.endsWith(end) && !each.includes("tool.") && !each.includes("clockwise.")); return view.found.figures[name][0]; };
+const written_of = (held, end) => held.written[Object.keys(held.written).find(each => each.endsWith(end))][0];
 const um = value => `${value.toFixed(1)} µm`;
 
 // Of a turn: half the difference of its radii at 45° and 135°, what axes of unequal delay make.
@@ -29,7 +30,7 @@ const LESSONS = [
     turn: held => ["F_C", "F_S", "sigma_0"].map(name => key_of(held.plane[1], `friction.${name}`)),
     text: ({ plane: [, b] }) => [`Where ${b} reverses, its friction changes sign. The drive needs a moment to turn its torque over; meanwhile the axis stands, and the contour leaves the circle.`,
       `Halve the friction of ${b} (F_C, then F_S) and see what becomes of the glitch. Then put it back and make the bristles softer (sigma_0): the change of sign takes a longer way.`],
-    look: (held, view) => { const at = figure_of(view, `glitch_${held.plane[1]}`), first = view.first.figures[Object.keys(view.first.figures).find(each => each.endsWith(`.glitch_${held.plane[1]}`))][0];
+    look: (held, view) => { const at = figure_of(view, `glitch_${held.plane[1]}`), first = written_of(held, `.glitch_${held.plane[1]}`);
       return { done: at < 0.6 * first, text: `The glitch of ${held.plane[1]} is ${um(at)}, at first ${um(first)}.` }; },
     after: "Less friction to turn over, a smaller glitch. On a real machine friction is what it is: the last lesson turns the drive.",
   },
@@ -39,7 +40,7 @@ const LESSONS = [
     start: (held, of) => Object.fromEntries(compensation_of(held).map(key => [key, 2.5 * of(key)])),
     turn: held => compensation_of(held),
     text: () => ["The control adds a pulse at every reversal, and too large a one: the contour dents inwards where it bulged before.", "Turn the compensation back until bulge and dent are equally small."],
-    look: (held, view) => { const G = figure_of(view, ".G"), first = view.first.figures[Object.keys(view.first.figures).find(each => each.endsWith(".G"))][0]; return { done: G < 1.1 * first, text: `G is ${um(G)}.` }; },
+    look: (held, view) => { const G = figure_of(view, ".G"), first = written_of(held, ".G"); return { done: G < 1.1 * first, text: `G is ${um(G)}.` }; },
     after: "Too much compensation is worse than none: the dent is as high as the bulge was, and steeper.",
   },
   {
@@ -59,7 +60,7 @@ const LESSONS = [
     turn: held => ["K_v", "K_p", "T_n"].map(name => key_of(held.plane[1], `drive.${name}`)),
     text: ({ plane: [, b] }) => [`A stiffer drive turns its torque over sooner: K_v and K_p of ${b} up, T_n down, and the glitch shrinks. The open position loop below shows what that costs.`,
       `Bring the glitch of ${b} to two thirds, and keep 6 dB and 30° of margin.`],
-    look: (held, view) => { const b = held.plane[1], at = figure_of(view, `glitch_${b}`), first = view.first.figures[Object.keys(view.first.figures).find(each => each.endsWith(`.glitch_${b}`))][0], { loop } = view;
+    look: (held, view) => { const b = held.plane[1], at = figure_of(view, `glitch_${b}`), first = written_of(held, `.glitch_${b}`), { loop } = view;
       if (!loop || loop.axis !== b || !loop.frequency.length) return { done: false, text: `The glitch of ${b} is ${um(at)}; show the frequency response of ${b} to see its margins.` };
       const dB = 20 * Math.log10(loop.gain_margin), kept = !loop.growing && dB >= 6 && loop.phase_margin >= 30;
       return { done: kept && at < 0.667 * first, text: `The glitch of ${b} is ${um(at)}, at first ${um(first)}; margins ${dB.toFixed(1)} dB and ${loop.phase_margin.toFixed(0)}°${kept ? "" : ": too little"}.` }; },

@@ -1,7 +1,7 @@
 // The page: knobs, states, what the worker answers, figures, exports. Charts are made by pictures.js and drawn as in reports.
 const HELD = JSON.parse(document.getElementById("feedsim-page").textContent), KNOBS = HELD.knobs;
 const by = id => document.getElementById(id), START = KNOBS.map(knob => knob.value);
-const view = { state: [...START], undo: [], redo: [], found: null, loop: null, kept: null, kept_loop: null, first: null, lesson: null, step: 0 };
+const view = { state: [...START], undo: [], redo: [], found: null, causes: {}, loop: null, kept: null, kept_loop: null, lesson: null, step: 0 };
 const STEPS = 400; // of a slider
 
 // --- values -------------------------------------------------------------------------------------------------------------
@@ -23,9 +23,7 @@ function value_at(knob, place) {
 
 // --- the worker: the newest state wins ----------------------------------------------------------------------------------
 
-const blob = new Blob([by("feedsim-worker").textContent], { type: "text/javascript" });
-const worker = new Worker(URL.createObjectURL(blob));
-let asked = 0, busy = false, again = false, ready = false, chosen_axis = HELD.axes[HELD.axes.length - 1];
+let worker = null, asked = 0, busy = false, again = false, ready = false, chosen_axis = HELD.axes[HELD.axes.length - 1];
 
 function ask() {
   if (!ready || busy) { again = true; return; }
@@ -34,12 +32,24 @@ function ask() {
   worker.postMessage({ id: ++asked, state: view.state, axis: chosen_axis });
 }
 
-worker.onmessage = ({ data }) => {
+function answered({ data }) {
   if (data.failed) return tell(`This machine cannot be computed here: ${data.failed}`, true);
   if (data.ready) { ready = true; by("page").classList.add("alive"); return ask(); }
   if (data.id !== asked) return;
   if (data.share !== undefined) { by("progress").value = data.share; return; }
   by("progress").value = 1;
+  if (data.causes) {
+    view.causes = data.causes;
+    for (const each of Object.values(data.causes)) Object.assign(view.found.figures, each.figures);
+    show_causes();
+    show_figures();
+    lesson_look();
+    return;
+  }
+  if (data.warnings) {
+    view.found.warnings = data.warnings;
+    return show_warnings();
+  }
   if (data.loop) {
     view.loop = data.loop;
     show_loop();
@@ -50,13 +60,21 @@ worker.onmessage = ({ data }) => {
   if (data.problem) tell(`With these values there is no run: ${data.problem}`, true);
   else {
     view.found = data.found;
-    view.first = view.first || data.found;
+    view.causes = null;
     show();
   }
   document.documentElement.dataset.shown = String(asked); // of the answers, for those who wait
   if (again) ask();
-};
-worker.onerror = event => tell(`The worker has stopped: ${event.message}`, true);
+}
+
+// Its script is packed, so that a mail takes the page.
+async function begin_worker() {
+  const script = new Blob([await unpacked(by("feedsim-worker").textContent)], { type: "text/javascript" });
+  worker = new Worker(URL.createObjectURL(script));
+  worker.onmessage = answered;
+  worker.onerror = event => tell(`The worker has stopped: ${event.message}`, true);
+  worker.postMessage({ data: HELD });
+}
 
 // --- what is seen -------------------------------------------------------------------------------------------------------
 
@@ -113,20 +131,40 @@ function show_loop() {
 }
 
 function show_warnings() {
-  const list = [...(view.found ? view.found.warnings : [])];
-  if (view.loop && view.loop.growing) list.unshift(`axis ${view.loop.axis}: the loops are unstable with these values: an impulse at its setpoint grows`);
+  const list = view.found ? view.found.warnings.map(typeset) : [];
   by("warnings").replaceChildren(...list.map(text => { const item = document.createElement("li"); item.textContent = text; return item; }));
   by("warned").hidden = !list.length;
 }
 
 const four = (value, unit) => Number.isFinite(value) ? `${number(value, 4)} ${unit.replace("um", "µm").replace("N.m", "N·m")}` : "not determined";
 
+// Of every circle why it is not round, once that is known.
+function show_causes() {
+  for (const [prefix, { answer, swinging, rows }] of Object.entries(view.causes)) {
+    const section = by(`why-${slug(prefix)}`);
+    if (!section) continue;
+    section.querySelector(".answer").textContent = typeset([answer, swinging].filter(each => each).join(" "));
+    section.querySelector("tbody").replaceChildren(...rows.map(cells => {
+      const row = document.createElement("tr");
+      cells.forEach((text, k) => element("td", { class: ["", "number", "number", "number", "meaning"][k] }, row, text));
+      return row;
+    }));
+  }
+  for (const section of document.querySelectorAll("section[id^=why-]")) section.classList.toggle("stale", !Object.keys(view.causes).some(prefix => section.id === `why-${slug(prefix)}`));
+}
+
+// Names of figures in the order of a run: those of causes, which come later, behind those of their circle.
+function figure_names({ figures, tasks }) {
+  const known = [...new Set([...Object.keys(figures), ...(view.causes ? [] : Object.keys(HELD.written))])];
+  return tasks.flatMap(({ prefix }) => known.filter(name => name.startsWith(`${prefix}.`)));
+}
+
 function show_figures() {
-  const { found, kept, first } = view, rows = [], heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"];
-  for (const [name, [value, unit]] of Object.entries(found.figures)) {
+  const { found, kept } = view, first = { figures: HELD.written }, rows = [], heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"];
+  for (const name of figure_names(found)) {
     const row = document.createElement("tr"), cell = (text, tag = "td") => element(tag, tag === "td" ? { class: "number" } : { scope: "row" }, row, text);
     cell(name, "th");
-    cell(four(value, unit));
+    cell(found.figures[name] ? four(...found.figures[name]) : "…");
     for (const other of [...(kept ? [kept] : []), first]) cell(other.figures[name] ? four(...other.figures[name]) : "–");
     rows.push(row);
   }
@@ -285,4 +323,4 @@ by("lessons-part").hidden = !offered.length;
 
 view.state = from_address();
 sync();
-worker.postMessage({ data: HELD });
+begin_worker().catch(error => tell(`This browser cannot compute the machine: ${error.message}`, true));

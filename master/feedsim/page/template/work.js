@@ -4,7 +4,7 @@
 function applied(data, state) {
   const motions = structuredClone(data.motions), own = new Map(data.parameters.map(each => [each[0], each]));
   data.knobs.forEach((knob, k) => {
-    for (const [reference, kind] of knob.sets || []) own.set(reference, [reference, kind, state[k]]);
+    for (const [reference] of knob.sets || []) { const [, kind, , name] = own.get(reference); own.set(reference, [reference, kind, state[k], name]); }
     if (knob.motion.length) {
       const [index, ...path] = knob.motion, last = path.pop();
       path.reduce((part, name) => part[name], motions[index])[last] = state[k];
@@ -18,6 +18,15 @@ class Work {
     this.data = data;
     this.given = given; // setpoints that the page carries: where it does not plan
     this.unit = new Unit(module, files, data.guid);
+    const { machine } = data, table = name => machine.modes[name] ? machine.modes[name] : mode_table(new TextDecoder().decode(files["modes.csv"]), machine.axes);
+    this.plant = new ModalPlant(table("pose"), machine.cycles.T_c);
+    this.judged_plant = machine.modes.table ? new ModalPlant(table("table"), machine.cycles.T_c) : this.plant;
+  }
+
+  // Drives and structure of a state as one linear system.
+  linear(state, plant = this.plant) {
+    const own = new Map(applied(this.data, state).parameters.map(([, , value, name]) => [name, value]));
+    return new LinearSystem(this.data.machine, name => own.get(name), plant);
   }
 
   async run(state, between) {
@@ -33,16 +42,24 @@ class Work {
     return { trace, rows, segments, tasks, figures: figures_of(trace, tasks), warnings: limit_warnings(machine, trace) };
   }
 
+  // Why the circles of a run are not round.
+  causes(state, { trace, tasks, figures }) {
+    const { machine } = this.data, system = this.linear(state), gain = {}, circle = tasks.find(each => each.kind === "circle");
+    if (!circle) return {};
+    for (const axis of circle.axes) gain[axis] = system.position_reference(axis, 1 / (circle.turn.end - circle.turn.begin));
+    return causes_of(trace, tasks, figures, { pitch: Object.fromEntries(machine.axes.map(axis => [axis, 2 * Math.PI * machine.I_P[axis]])), gain, students: machine.students });
+  }
+
+  // All that a run warns of; null where the newest knob has ended it.
+  async warnings(state, found, between) {
+    const { machine } = this.data, system = this.linear(state, this.judged_plant), own = new Map(applied(this.data, state).parameters.map(([, , value, name]) => [name, value]));
+    const loops = await judge(system, machine.locked, between);
+    return loops && [...machine.warnings, ...loop_warnings(loops), ...exchange_warnings(machine, name => own.get(name), this.judged_plant.table), ...reach_warnings(machine, found.rows), ...found.warnings];
+  }
+
   bode(state, axis, between) {
     return bode(this.unit, this.data.machine, applied(this.data, state).parameters, axis, between);
   }
-}
-
-async function unpacked(text) {
-  const raw = atob(text), bytes = new Uint8Array(raw.length);
-  for (let k = 0; k < raw.length; k++) bytes[k] = raw.charCodeAt(k);
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 async function work_of(data) {

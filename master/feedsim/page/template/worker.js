@@ -9,17 +9,20 @@ onmessage = async ({ data: asked }) => {
     try { work = await work_of(asked.data); postMessage({ ready: true }); } catch (error) { postMessage({ failed: String(error.message || error) }); }
     return;
   }
-  const { id, state, axis } = asked, on = async share => { postMessage({ id, share }); await breath(); return id === newest; };
+  const { id, state, axis } = asked, latest = async () => { await breath(); return id === newest; }, on = async share => { postMessage({ id, share }); return latest(); };
   newest = id;
-  await breath();
-  if (id !== newest) return;
+  if (!(await latest())) return;
   try {
     const found = await work.run(state, on);
-    if (found) postMessage({ id, found });
+    if (!found) return;
+    postMessage({ id, found });
+    if (!(await latest())) return;
+    postMessage({ id, causes: work.causes(state, found) });
+    const warnings = await work.warnings(state, found, latest);
+    if (!warnings) return;
+    postMessage({ id, warnings });
   } catch (error) { postMessage({ id, problem: String(error.message || error) }); }
-  if (id !== newest || !axis) return;
-  await breath();
-  if (id !== newest) return;
+  if (!axis || !(await latest())) return;
   try {
     const loop = await work.bode(state, axis, on);
     if (loop) postMessage({ id, loop });

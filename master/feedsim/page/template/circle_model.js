@@ -1,0 +1,252 @@
+// The model of a circle that is not round and its robust fit: feedsim.analysis.circle (model.py, robust.py) once more, of turns of
+// which both axes' positions are known. What is fitted, and why, stands there; a test holds both to the same digits.
+const RADIANS = Math.PI / 180;
+const MODEL = {
+  AHEAD: 2, BEHIND: [30, 45, 60], CALM: 0.05, NEXT: 4, TAIL: 2, TAIL_FLOOR: 10e-9, DECAYS: [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 21, 25, 30], FALLEN: 2, BLOCK: 6, PASSES: 6, PITCHES: 2,
+  MOST: 8000, BIWEIGHT: 4.685, SETTLED: 1e-13, UNUSUAL: 0.6745,
+};
+
+const sign_of = value => value > 0 ? 1 : value < 0 ? -1 : 0;
+const concatenated = parts => { const found = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0)); let at = 0; for (const part of parts) { found.set(part, at); at += part.length; } return found; };
+const split_like = (values, parts) => { let at = 0; return parts.map(part => values.slice(at, at += part.length)); };
+const enough_pitches = (circle, axis) => axis in circle.pitch && 2 * circle.radius >= MODEL.PITCHES * circle.pitch[axis];
+
+// circle: {axes, radius, speed, pitch}; paths: {angle, deviation, sense, phase}.
+function fit_circle(circle, paths, students) {
+  let found = null;
+  for (const degrees of MODEL.BEHIND) {
+    found = fit_windowed(circle, paths, degrees * RADIANS, students);
+    if (calm(found)) break;
+  }
+  return found;
+}
+
+function fit_windowed(circle, paths, window, students) {
+  const both = new Set(paths.map(path => path.sense)).size === 2, count = paths.reduce((sum, path) => sum + path.angle.length, 0);
+  let values = {}, tails = { columns: [], spread: [] }, residual = null, undone, parts, windows, names, matrix, robust, kept, blocks;
+  for (let number = 0; number < MODEL.PASSES; number++) {
+    undone = paths.map(path => undo(circle, path, values));
+    parts = undone.map((each, k) => columns_of(circle, each, paths[k].sense, both));
+    windows = undone.map((each, k) => windows_of(each, paths[k].sense, window));
+    names = Object.keys(parts[0]);
+    matrix = names.map(name => concatenated(parts.map(part => part[name])));
+    const deviation = concatenated(undone.map(each => each.deviation)), which = concatenated(windows.map(each => each.which)), since = concatenated(windows.map(each => each.since));
+    if (number === 2) {
+      const around = usual(undone.map(each => each.angle), split_like(residual, paths.map(path => path.angle)), windows.map(each => each.which));
+      tails = tails_of(undone, paths, left_of(residual, which, since, window, around), window, count);
+    }
+    const rows = rows_where(which, each => each < 0), taken = column => Float64Array.from(rows, k => column[k]);
+    blocks = numbered(taken(concatenated(undone.map((each, k) => each.angle.map(angle => 1000 * k + Math.floor(angle / (MODEL.BLOCK * RADIANS)))))));
+    kept = [...matrix, ...tails.columns].map(taken);
+    robust = robust_fit(kept, taken(deviation), tails.spread, blocks);
+    const step = robust.values.slice(0, names.length);
+    values = Object.fromEntries(names.map((name, i) => [name, (values[name] || 0) + step[i]]));
+    const made = combined(matrix, step, count);
+    residual = deviation.map((each, k) => each - made[k]);
+    if (number > 1 && largest(step.map(Math.abs)) < MODEL.SETTLED) { robust.rows = rows; break; }
+    robust.rows = rows;
+  }
+  const tail = combined(tails.columns, robust.values.slice(names.length), count);
+  // Positions of a run are not rounded: what rounding of a record adds is no part of it here.
+  const { covariance, quantile: student } = covariance_of(kept, Float64Array.from(robust.rows, k => residual[k] - tail[k]), robust, tails.spread, blocks, students);
+  return {
+    names, values: names.map(name => values[name]), covariance, student, angle: undone.map(each => each.angle), residual: split_like(residual, paths.map(path => path.angle)), window, noise: robust.noise,
+    reversal: windows.map(each => each.which), since: windows.map(each => each.since), tail: split_like(tail, paths.map(path => path.angle)), columns: parts,
+    left_out: circle.axes.filter(axis => axis in circle.pitch && !enough_pitches(circle, axis)), of: name => names.includes(name) ? values[name] : 0,
+  };
+}
+
+const rows_where = (values, fits) => { const found = []; for (let k = 0; k < values.length; k++) if (fits(values[k], k)) found.push(k); return found; };
+
+// Half of the interval of a term; of an amplitude with two parts, along its direction.
+function half_of(found, ...names) {
+  const rows = names.map(name => found.names.indexOf(name)), part = rows.map(row => found.values[row]), length = rows.length === 2 ? Math.hypot(...part) : 0;
+  const along = length > 0 ? part.map(each => each / length) : rows.map(() => 1 / Math.sqrt(rows.length));
+  let sum = 0;
+  rows.forEach((i, a) => rows.forEach((j, b) => { sum += along[a] * found.covariance[i][j] * along[b]; }));
+  return found.student * Math.sqrt(Math.max(sum, 0));
+}
+
+// Standard deviation of the model's own deviation where it is known least well, behind the reversals.
+function rest_error(found) {
+  let worst = 0;
+  const row = new Float64Array(found.names.length), covariance = found.covariance;
+  found.reversal.forEach((which, p) => {
+    const columns = found.names.map(name => found.columns[p][name]);
+    for (let k = 0; k < which.length; k++) {
+      if (which[k] < 0) continue;
+      for (let i = 0; i < row.length; i++) row[i] = columns[i][k];
+      let sum = 0;
+      for (let i = 0; i < row.length; i++) for (let j = 0; j < row.length; j++) sum += row[i] * covariance[i][j] * row[j];
+      worst = Math.max(worst, sum);
+    }
+  });
+  return Math.sqrt(worst);
+}
+
+function undo(circle, path, values) {
+  const of = name => values[name] || 0, R = circle.radius, r = of("radius") / R, k = of("scale") / R, q = (of("squareness") + path.sense * of("servo")) / R;
+  const a = 1 + r + k, d = 1 + r - k, determinant = a * d - q * q, turned = [Math.atan2(q, a), Math.atan2(d, q)], n = path.angle.length;
+  const x = path.angle.map((each, i) => (R + path.deviation[i]) * Math.cos(each)), y = path.angle.map((each, i) => (R + path.deviation[i]) * Math.sin(each));
+  const p = [x.map(each => each - of("offset_0")), y.map(each => each - of("offset_1"))], angle = p[0].map((each, i) => Math.atan2(p[1][i], each));
+  for (const [name, [axis, displacement]] of Object.entries(displacements(circle, angle, [x, y], path.sense, turned))) {
+    const value = of(name);
+    if (value) for (let i = 0; i < n; i++) p[axis][i] -= value * displacement[i];
+  }
+  const deviation = new Float64Array(n), plain = new Float64Array(n);
+  for (let i = 0; i < n; i++) {
+    const u = (d * p[0][i] - q * p[1][i]) / determinant, v = (a * p[1][i] - q * p[0][i]) / determinant;
+    plain[i] = Math.atan2(v, u);
+    deviation[i] = Math.hypot(u, v) - R;
+  }
+  return { positions: [x, y], angle: plain, deviation, turned };
+}
+
+function displacements(circle, angle, positions, sense, turned) {
+  const found = {};
+  for (const i of [0, 1]) found[`lost_${i}`] = [i, angle.map(each => 0.5 * sense * sign_of(Math.sin(each - turned[i])))];
+  circle.axes.forEach((axis, i) => {
+    if (!enough_pitches(circle, axis)) return;
+    const rate = 2 * Math.PI / circle.pitch[axis];
+    found[`pitch_${i}_cos`] = [i, positions[i].map(each => Math.cos(rate * each))];
+    found[`pitch_${i}_sin`] = [i, positions[i].map(each => Math.sin(rate * each))];
+  });
+  return found;
+}
+
+function columns_of(circle, undone, sense, both) {
+  const { angle } = undone, along = [angle.map(Math.cos), angle.map(Math.sin)], oblique = angle.map(each => Math.sin(2 * each));
+  const found = { offset_0: along[0], offset_1: along[1], radius: angle.map(() => 1), scale: angle.map(each => Math.cos(2 * each)), squareness: oblique };
+  if (both) found.servo = oblique.map(each => sense * each);
+  for (const [name, [axis, displacement]] of Object.entries(displacements(circle, angle, undone.positions, sense, undone.turned))) found[name] = displacement.map((each, k) => along[axis][k] * each);
+  return found;
+}
+
+function windows_of(undone, sense, window) {
+  const n = undone.angle.length, which = new Float64Array(n).fill(-1), since = new Float64Array(n).fill(Infinity);
+  for (let k = 0; k < 4; k++) {
+    const at = undone.turned[k % 2] + (k > 1 ? Math.PI : 0);
+    for (let i = 0; i < n; i++) {
+      const passed = modulo(sense * (undone.angle[i] - at) + Math.PI, 2 * Math.PI) - Math.PI;
+      if (passed >= -MODEL.AHEAD * RADIANS && passed < window) { which[i] = k; since[i] = passed; }
+    }
+  }
+  return { which, since };
+}
+
+// Standard deviation of the means over NEXT of what is left between the windows.
+function usual(angles, residuals, reversals) {
+  const around = [];
+  angles.forEach((angle, p) => {
+    const rows = rows_where(reversals[p], each => each < 0), { sums, counts } = by_block(numbered(rows.map(k => Math.floor(angle[k] / (MODEL.NEXT * RADIANS)))), rows.map(k => residuals[p][k]));
+    sums.forEach((sum, k) => around.push(sum / counts[k]));
+  });
+  return absolute_median(around) / MODEL.UNUSUAL;
+}
+
+// What the peak at each half axis leaves at the end of its window, and the angle in which that falls to 1/e.
+function left_of(residual, which, since, window, around) {
+  const width = MODEL.FALLEN * RADIANS, decays = MODEL.DECAYS.map(each => each * RADIANS), found = [[0, 0], [0, 0], [0, 0], [0, 0]];
+  for (const axis of [0, 1]) {
+    const sizes = {}, errors = {};
+    for (const k of [axis, axis + 2]) {
+      const own = rows_where(which, (each, i) => each === k && since[i] > 0), { sums, counts } = by_block(own.map(i => Math.floor(since[i] / width)), own.map(i => residual[i] / Math.cos(since[i])));
+      let means = sums.map((sum, i) => sum / Math.max(counts[i], 1));
+      const top = means.reduce((best, each, i) => Math.abs(each) > Math.abs(means[best]) ? i : best, 0);
+      if (!means.length || Math.abs(means[top]) <= MODEL.NEXT * around) continue;
+      const sense = sign_of(means[top]);
+      means = means.map(each => sense * each);
+      let first = top;
+      while (first < means.length && !(means[first] < 0.5 * means[top])) first++;
+      if (means.length - first < 3) continue;
+      const middle = mean(means.slice(first)), left = means.slice(first).map(each => each - middle);
+      sizes[k] = [];
+      errors[k] = [];
+      for (const decay of decays) {
+        const raw = left.map((_, i) => Math.exp((window - (first + i + 0.5) * width) / decay)), level = mean(raw), tail = raw.map(each => each - level), size = dot(tail, left) / dot(tail, tail);
+        sizes[k].push(size);
+        errors[k].push(mean(left.map((each, i) => (each - size * tail[i]) ** 2)));
+      }
+    }
+    const sums = decays.map((_, i) => Object.values(errors).reduce((sum, each) => sum + each[i], 0)), best = sums.indexOf(least(sums));
+    for (const k in sizes) if (sizes[k][best] > Math.sqrt(errors[k][best])) found[k] = [sizes[k][best], decays[best]];
+  }
+  return found;
+}
+
+function tails_of(undone, paths, left, window, count) {
+  const columns = [], spread = [];
+  left.forEach(([size, decay], k) => {
+    if (size < MODEL.TAIL_FLOOR) return;
+    const wave = k % 2 === 0 ? Math.cos : Math.sin;
+    columns.push(concatenated(undone.map((each, p) => each.angle.map(angle => {
+      const since = modulo(paths[p].sense * (angle - each.turned[k % 2] - (k > 1 ? Math.PI : 0)), 2 * Math.PI);
+      return since < Math.PI ? Math.abs(wave(angle)) * Math.exp((window - since) / decay) : 0;
+    }))));
+    spread.push(MODEL.TAIL * size);
+  });
+  return { columns, spread };
+}
+
+// Whether the peaks have died away where their windows end, as far as noise and what else is left let one see.
+function calm(found) {
+  const off = found.residual.map((residual, p) => residual.map((each, k) => each - found.tail[p][k])), around = usual(found.angle, off, found.reversal);
+  return found.angle.every((angle, p) => [0, 1, 2, 3].every(k => {
+    const own = rows_where(found.reversal[p], each => each === k);
+    if (!own.length) return true;
+    const last = angle[own.reduce((best, i) => found.since[p][i] > found.since[p][best] ? i : best, own[0])];
+    const next = rows_where(found.reversal[p], (each, i) => each < 0 && Math.abs(modulo(angle[i] - last + Math.PI, 2 * Math.PI) - Math.PI) < MODEL.NEXT * RADIANS);
+    if (!next.length) return true;
+    return Math.abs(mean(next.map(i => off[p][i]))) <= Math.max(MODEL.CALM * largest(own.map(i => Math.abs(off[p][i]))), 4 * around);
+  }));
+}
+
+// --- the fit ----------------------------------------------------------------------------------------------------------
+
+// What is known of the last values beforehand, an inverse covariance, times `factor`, added to a matrix.
+function with_known(matrix, spread, factor) {
+  const first = matrix.length - spread.length;
+  spread.forEach((each, i) => { matrix[first + i][first + i] += factor / each ** 2; });
+  return matrix;
+}
+
+function robust_fit(columns, deviation, spread, blocks) {
+  const n = deviation.length;
+  let weights = new Float64Array(n).fill(1), slopes = weights, shared = 0, values = null, noise = 0;
+  for (let pass = 0; pass < MODEL.PASSES; pass++) {
+    const weighted = deviation.map((each, k) => weights[k] * each);
+    values = times(pseudo_inverse(with_known(normal_matrix(columns, weights), spread, shared ** 2)), columns.map(column => dot(column, weighted)));
+    const made = combined(columns, values, n), off = deviation.map((each, k) => each - made[k]);
+    noise = absolute_median(off) / MODEL.UNUSUAL;
+    if (noise < MODEL.SETTLED) break;
+    const reach = MODEL.BIWEIGHT * noise;
+    if (spread.length) {
+      const { sums } = by_block(blocks, off.map(each => Math.min(Math.max(each, -reach), reach)));
+      shared = Math.max(noise, Math.sqrt(dot(sums, sums) / n));
+    }
+    let most = 0;
+    const before = weights, inner = off.map(each => Math.max(1 - (each / reach) ** 2, 0));
+    weights = inner.map((each, k) => { most = Math.max(most, Math.abs(each ** 2 - before[k])); return each ** 2; });
+    slopes = inner.map(each => each * (5 * each - 4));
+    if (most < 0.01) break;
+  }
+  return { values, weights, slopes, noise, shared };
+}
+
+// Covariance of the free values, and Student's quantile for intervals of 95 %.
+function covariance_of(columns, residual, robust, spread, blocks, students) {
+  const terms = columns.length, own = terms - spread.length, known = with_known(Array.from({ length: terms }, () => new Float64Array(terms)), spread, robust.shared ** 2);
+  const inverse = pseudo_inverse(with_known(normal_matrix(columns, robust.slopes), spread, robust.shared ** 2), 1e-15), influence = residual.map((each, k) => robust.weights[k] * each);
+  const sums = columns.map(column => by_block(blocks, column.map((each, k) => influence[k] * each)).sums), count = sums[0].length, free = Math.max(count - own, 2);
+  const around = inner => product(product(inverse, inner), inverse), single = around(normal_matrix(columns, influence.map(each => each ** 2))), blockwise = around(normal_matrix(sums)), besides = around(known);
+  const part = count / free, scale = single.map((row, i) => Math.sqrt(Math.max(row[i] / Math.max(blockwise[i][i] * part, 1e-300), 1)));
+  return { covariance: blockwise.map((row, i) => row.map((each, j) => scale[i] * each * part * scale[j] + robust.shared ** 2 * besides[i][j])), quantile: student(free, students) };
+}
+
+// Quantile 0.975 of Student's distribution; of few degrees of freedom from a table that the page carries (from 2 on).
+function student(free, students) {
+  if (free - 2 < students.length) return students[free - 2];
+  const z = 1.959963984540054;
+  return [z, (z ** 3 + z) / 4, (5 * z ** 5 + 16 * z ** 3 + 3 * z) / 96, (3 * z ** 7 + 19 * z ** 5 + 17 * z ** 3 - 15 * z) / 384, (79 * z ** 9 + 776 * z ** 7 + 1482 * z ** 5 - 1920 * z ** 3 - 945 * z) / 92160]
+    .reduce((sum, term, k) => sum + term / free ** k, 0);
+}

@@ -215,6 +215,7 @@ LESSONS = {
     "xz_circle": {
         "Servo mismatch": {"machine.axes.Z.drive.K_v": 200 / 3},
         "quadrant glitch": {"machine.axes.Z.friction.F_C": 0.5, "machine.axes.Z.friction.F_S": 0.7},
+        "Compensation, and too much": {"machine.axes.Z.drive.backlash_compensation.value": 0.0},
         "Margin against glitch": {"machine.axes.Z.drive.K_v": 110.0, "machine.axes.Z.drive.T_n": 0.008},
     },
     "z_positioning": {"Overshoot": {"machine.axes.Z.drive.T_sym": 0.003528}},

@@ -13,7 +13,7 @@ from feedsim.cosim import fmus_directory
 from feedsim.errors import InputError
 from feedsim.page import module
 from feedsim.page.content import content
-from live_page.test_page_numbers import SAME
+from live_page.test_page_numbers import SAME, settings
 from machine_helpers import write_machine, write_scenario
 from page_helpers import NODE, answers
 
@@ -63,6 +63,29 @@ def test_motions_that_a_page_does_not_plan_are_carried_along(tmp_path: Path) -> 
     assert "sine" in " ".join(held.left_out)
     page = answers(held.data, [{"state": [k["value"] for k in held.data["knobs"]], "keep": ["X.x_a"]}], tmp_path)[0]
     assert np.abs(np.array(page["trace"]["X.x_a"]) - cosim.run(given).trace["X.x_a"]).max() <= SAME
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)")
+def test_effects_are_knobs_whether_the_machine_has_them_or_not(tmp_path: Path) -> None:
+    """One of each kind, turned on in the page, against a run with the page's own settings."""
+    file, indirect = SCENARIOS / "one_axis.yaml", ["machine.axes.X.drive.measuring={indirect: true}"]
+    wanted = {
+        "cogging_1.amplitude": 0.4, "ripple_2.amplitude": 0.03, "measuring.linear": 2e-5, "encoder.eccentricity": 1e-3,
+        "periodic_error_1.amplitude": 1e-6, "backlash_compensation.value": 7e-6, "X.play": 9e-6,
+        "measuring.indirect": "true", "leadscrew_compensation.e_1": 3e-6, "leadscrew_compensation.spacing": 0.1,
+        "geometry.E_XX": 4e-5,
+    }  # fmt: skip
+    given = scenario.load(file, indirect)
+    data = content(given, nc.plan(given), list(wanted)).data
+    state = [next(v for end, v in wanted.items() if knob["key"].endswith(end)) for knob in data["knobs"]]
+    assert len(state) == len(wanted)
+    keep = ["X.x_a", "tcp.x_X"]
+    page = answers(data, [{"state": state, "keep": keep}], tmp_path)[0]
+    run = cosim.run(scenario.load(file, [*indirect, *settings(data, state)]))
+    for column in keep:
+        assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= SAME
+    assert np.abs(run.trace["X.x_a"] - cosim.run(given).trace["X.x_a"]).max() > 1e-6
+    assert not [knob for knob in content(given, nc.plan(given)).data["knobs"] if "cogging" in knob["key"]]
 
 
 @pytest.mark.parametrize(

@@ -177,7 +177,7 @@ def _knob(knob: Knob, archive: Archive) -> dict[str, Any]:
     return {
         "key": knob.key, "group": knob.group, "name": knob.name, "text": knob.text, "value": knob.value,
         "unit": knob.unit, "shown": knob.shown, "factor": knob.factor, "low": knob.low, "high": knob.high, **bounds,
-        "sets": [_reference(archive, name) for name in knob.sets], "motion": list(knob.motion),
+        "sets": [[*_reference(archive, name), name] for name in knob.sets], "motion": list(knob.motion),
         "choices": list(knob.choices),
     }  # fmt: skip
 

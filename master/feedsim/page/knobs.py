@@ -7,7 +7,7 @@ or a field of a motion. Names, units, ranges and descriptions are those of the u
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any
@@ -17,7 +17,8 @@ from feedsim.cosim.roles import controller_parameters
 from feedsim.errors import InputError
 from feedsim.motions.circular import Circle
 from feedsim.motions.move import Move
-from feedsim.scenario import Scenario
+from feedsim.scenario import Machine, Scenario
+from feedsim.scenario.machine import EFFECTS
 from feedsim.variables import Variable
 
 # Shown where nobody chooses, of every axis that a motion moves.
@@ -25,6 +26,19 @@ USUAL = {
     "drive": ("K_v", "T_sym", "k_ffw", "K_p", "T_n"),
     "friction": ("F_S", "F_C", "W", "gamma", "sigma_0"),
 }
+# Of effects and corrections of the control: what the machine has of them, and this one, which every drive has.
+CORRECTION = "backlash_compensation.value"
+# Switches that need nothing else to be given.
+SWITCHES = ("symmetry_lag", "ramp_speed_setpoint", "measuring.indirect")
+SWITCHED = ("false", "true")
+# What is worth trying of a parameter that is 0, by its units: a quarter of the slider's reach.
+TRIED = {
+    ("m", "um"): 5e-6, ("m", "nm"): 50e-9, ("m", "mm"): 0.1, ("N.m", "N.m"): 0.2, ("1", "%"): 0.01, ("1", "1"): 50e-6,
+    ("rad", "deg"): math.pi / 4, ("rad", "mrad"): 1e-3, ("s", "ms"): 1e-3, ("1/m", "1/m"): 1e-4,
+    ("1/m^2", "1/m^2"): 1e-3,
+}  # fmt: skip
+# How an effect lies and runs; how large it is, is tried.
+SETTINGS = ("order", "phase", "period", "first", "spacing", "seed", "ramp")
 # Parameters that the machine's cycles and axes fix, and those that are no matter of trying.
 FIXED = ("T_c", "T_pos", "I_P")
 # How far a slider goes about the scenario's value; a number may be typed beyond, within the table's range.
@@ -70,13 +84,14 @@ def chosen(scenario: Scenario, wanted: Sequence[str], *, planned: bool) -> list[
     Raises:
         InputError: a pattern fits none; it lists what there is.
     """
-    known = [*(_of_motions(scenario) if planned else []), *_of_axes(scenario)]
+    machine = scenario.machine
+    known = [*(_of_motions(scenario) if planned else []), *_of_axes(machine), *_of_guides(machine)]
     if not wanted:
         moved = {axis for motion in scenario.motions for axis in motion.axes} or set(scenario.machine.axes)
         usual = {
             f"machine.axes.{axis}.{part}.{name}" for axis in moved for part, names in USUAL.items() for name in names
-        }
-        return [knob for knob in known if knob.motion or knob.key in usual]
+        } | {f"machine.axes.{axis}.drive.{CORRECTION}" for axis in moved}
+        return [knob for knob in known if knob.motion or knob.key in usual or _is_on(knob)]
     lost = [pattern for pattern in wanted if not any(fits(knob, pattern) for knob in known)]
     if lost:
         raise InputError.of(
@@ -91,22 +106,49 @@ def fits(knob: Knob, pattern: str) -> bool:
     return fnmatchcase(knob.key, pattern) or fnmatchcase(knob.key, f"*.{pattern}")
 
 
-def _of_axes(scenario: Scenario) -> list[Knob]:
-    machine, found = scenario.machine, []
-    for axis in machine.axes:
-        parts: Mapping[str, Mapping[str, Any]] = {
-            "drive": controller_parameters(machine, axis),
-            "friction": machine.shipped_friction(axis, "machine.fmu").parameters(),
-        }
-        for part, unit in (("drive", "controller"), ("friction", "friction")):
+def _is_on(knob: Knob) -> bool:
+    """Whether a knob is an effect that the machine has."""
+    parts = knob.key.split(".")
+    effect = parts[1] == "geometry" or parts[-1] == "play" or any(part in EFFECTS for part in parts)
+    return effect and knob.value not in (0.0, "false") and (knob.choices != () or parts[-1] not in SETTINGS)
+
+
+def _of_axes(machine: Machine) -> list[Knob]:
+    found = []
+    for axis, described in machine.axes.items():
+        group = f"axis {axis}"
+        own = controller_parameters(machine, axis)
+        drive: dict[str, Any] = {**own, **{name: start for name, start in _effects().items() if name not in own}}
+        friction = machine.shipped_friction(axis, "machine.fmu").parameters()
+        for part, values, unit in (("drive", drive, "controller"), ("friction", friction, "friction")):
             table = variables.parameters(unit)
-            found += [
-                _number(f"machine.axes.{axis}.{part}.{name}", f"axis {axis}", name, float(value), table[name],
-                        (f"{axis}.{part}.{name}",))
-                for name, value in parts[part].items()
-                if name in table and table[name].kind == "REAL" and name not in FIXED
-            ]  # fmt: skip
+            for name, value in values.items():
+                key, sets = f"machine.axes.{axis}.{part}.{name}", (f"{axis}.{part}.{name}",)
+                if name in SWITCHES:
+                    found.append(Knob(key, group, name, table[name].short, SWITCHED[bool(value)], sets=sets,
+                                      choices=SWITCHED))  # fmt: skip
+                elif name in table and table[name].kind == "REAL" and name not in FIXED:
+                    found.append(_number(key, group, name, float(value), table[name], sets))
+        if machine.shipped_drive(axis, "machine.fmu").indirect:
+            key, reach = f"machine.axes.{axis}.play", REACH * (described.play or TRIED["m", "um"])
+            found.append(Knob(key, group, "play", "play between motor and slide", described.play, "m", "um", 1e6, 0.0,
+                              reach, 0.0, 1.0, (f"{axis}.play",)))  # fmt: skip
     return found
+
+
+def _effects() -> dict[str, Any]:
+    """Parameters of all effects of a drive, as they are where a machine has none."""
+    table = variables.parameters("controller")
+    return {name: row.start for name, row in table.items() if name.partition(".")[0] in EFFECTS}
+
+
+def _of_guides(machine: Machine) -> list[Knob]:
+    given = machine.geometry.parameters() if machine.geometry is not None else {}
+    table = variables.parameters("plant")
+    return [
+        _number(f"machine.{name}", "guides", name, float(given.get(name.partition(".")[2], 0.0)), row, (name,))
+        for name, row in table.items() if name.startswith("geometry.")
+    ]  # fmt: skip
 
 
 def _number(key: str, group: str, name: str, value: float, table: Variable, sets: tuple[str, ...]) -> Knob:
@@ -120,10 +162,10 @@ def _number(key: str, group: str, name: str, value: float, table: Variable, sets
 
 def _ends(value: float, table: Variable) -> tuple[float, float]:
     """Ends of a slider: the table's where the value is not lost between them, else some times the value."""
-    size = abs(value) or abs(float(table.start)) or 1.0
+    size = abs(value) or abs(float(table.start)) or TRIED.get((table.unit, table.display_unit), 1.0)
     if math.isfinite(table.minimum) and table.maximum <= 2 * REACH * size:
         return table.minimum, table.maximum
-    low = value / REACH if value > 0 else min(0.0, REACH * value)
+    low = value / REACH if value > 0 else -REACH * size
     return max(table.minimum, low), min(table.maximum, REACH * size)
 
 

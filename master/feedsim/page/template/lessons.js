@@ -2,7 +2,9 @@
 const circle_of = held => held.evaluate.find(each => each.kind === "circle") && held.plane, stop_axis = held => (held.evaluate.find(each => each.kind === "positioning") || {}).axis;
 const key_of = (axis, name) => `machine.axes.${axis}.${name}`;
 const has = (held, axes, names) => axes.every(axis => names.every(name => held.knobs.some(knob => knob.key === key_of(axis, name))));
-const figure_of = (view, end) => { const name = Object.keys(view.found.figures).find(each => each.endsWith(end) && !each.includes("tool.") && !each.includes("clockwise.")); return view.found.figures[name][0]; };
+// null while the figure is not known: causes come after the pictures.
+const figure_of = (view, end) => { const name = Object.keys(view.found.figures).find(each => each.endsWith(end) && !each.includes("tool.") && !each.includes("clockwise.")); return name ? view.found.figures[name][0] : null; };
+const COMPENSATION = "drive.backlash_compensation.value";
 const written_of = (held, end) => held.written[Object.keys(held.written).find(each => each.endsWith(end))][0];
 const um = value => `${value.toFixed(1)} µm`;
 
@@ -35,13 +37,15 @@ const LESSONS = [
     after: "Less friction to turn over, a smaller glitch. On a real machine friction is what it is: the last lesson turns the drive.",
   },
   {
-    title: "Friction compensation, and too much of it",
-    fits: held => circle_of(held) && compensation_of(held).length > 0,
-    start: (held, of) => Object.fromEntries(compensation_of(held).map(key => [key, 2.5 * of(key)])),
-    turn: held => compensation_of(held),
-    text: () => ["The control adds a pulse at every reversal, and too large a one: the contour dents inwards where it bulged before.", "Turn the compensation back until bulge and dent are equally small."],
-    look: (held, view) => { const G = figure_of(view, ".G"), first = written_of(held, ".G"); return { done: G < 1.1 * first, text: `G is ${um(G)}.` }; },
-    after: "Too much compensation is worse than none: the dent is as high as the bulge was, and steeper.",
+    title: "Compensation, and too much of it",
+    fits: held => circle_of(held) && has(held, held.plane.slice(1), [COMPENSATION]),
+    start: held => ({ [key_of(held.plane[1], COMPENSATION)]: 10e-6 }),
+    turn: held => [key_of(held.plane[1], COMPENSATION)],
+    text: ({ plane: [, b] }) => [`Somebody has seen a glitch where ${b} reverses and taken it for backlash: the control now adds half of 10 µm to the setpoint of ${b}, with the direction of its motion. The figure glitch_${b} has become smaller.`,
+      `But look at the contour beside the reversals, and at what the diagnosis says: the axis does not lose motion there, it gains it, and G is larger than without. Turn the backlash compensation of ${b} back until no motion is gained.`],
+    look: (held, view) => { const b = held.plane[1], at = figure_of(view, `.lost_motion_${b}`), G = um(figure_of(view, ".G")), glitch = um(figure_of(view, `.glitch_${b}`));
+      return { done: at !== null && Math.abs(at) < 1, text: `glitch_${b} ${glitch}, G ${G}${at === null ? "" : `, ${b} ${at > 0 ? "loses" : "gains"} ${um(Math.abs(at))}`}.` }; },
+    after: "A compensation takes away what it is made for. Friction needs one of its own (docs/compensation.md), and too much of that dents the contour just so.",
   },
   {
     title: "Overshoot and ringing: a stop that is too eager",
@@ -67,6 +71,3 @@ const LESSONS = [
     after: "The margin is of this structure and this pose. Elsewhere the machine may be softer: docs/position-dependence.md.",
   },
 ];
-
-// Knobs of a friction compensation, where the machine has one.
-const compensation_of = held => held.knobs.filter(knob => /comp/i.test(knob.key) && typeof knob.value === "number" && knob.value > 0).map(knob => knob.key);

@@ -4,7 +4,8 @@
 function applied(data, state) {
   const motions = structuredClone(data.motions), own = new Map(data.parameters.map(each => [each[0], each]));
   data.knobs.forEach((knob, k) => {
-    for (const [reference] of knob.sets || []) { const [, kind, , name] = own.get(reference); own.set(reference, [reference, kind, state[k], name]); }
+    const value = knob.choices.length && knob.sets.length ? Number(state[k] === "true") : state[k];
+    for (const [reference, kind, name] of knob.sets) if (own.has(reference) || state[k] !== knob.value) own.set(reference, [reference, kind, value, name]);
     if (knob.motion.length) {
       const [index, ...path] = knob.motion, last = path.pop();
       path.reduce((part, name) => part[name], motions[index])[last] = state[k];

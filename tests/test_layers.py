@@ -21,6 +21,7 @@ ORDER = [
     "sweep",
     "replay",
     "identify",
+    "tune",
     "analysis",
     "compare",
     "ssp",

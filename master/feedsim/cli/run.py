@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +16,8 @@ from feedsim.errors import InputError, OutputError
 from feedsim.outputs import archive_with, check_file
 
 if TYPE_CHECKING:
+    from feedsim.analysis import Diagnosis, Figure
+    from feedsim.cosim import Run
     from feedsim.nc import Program
     from feedsim.report.partial import Partial
     from feedsim.scenario import Scenario
@@ -48,6 +50,7 @@ def run(options: Namespace) -> None:
         analysis.check(plan, program)  # an evaluation that cannot be made should not be found out after the run
         if options.page:
             content(plan, program, fmus=fmus)  # nor a page
+        _check_trial(options, directory)
         with (
             results_in(directory, report.check_writable, report.input_paths(plan), options.overrides),
             _rows_kept(report.growing(directory)) as recorded,
@@ -64,12 +67,38 @@ def run(options: Namespace) -> None:
             page = html(result, fmus=fmus) if options.page else ""
             report.write(result, figures, directory, recorded, causes, drawn=options.figures, page=page)
     warnings = (*result.warnings, *analysis.doubts(figures, causes))
+    trial = _trial(options, result, figures, causes, directory)
     finish(
         options.quiet,
         warnings,
         *report.answers(result, figures, causes),
+        *trial,
         f"{plan.name}: {report.summary_line(result, figures)} -> {directory}",
     )
+
+
+def _check_trial(options: Namespace, directory: Path) -> None:
+    """--try: of a scenario file, with room for the second run and the overlay."""
+    from feedsim.files.source import is_ssp
+    from feedsim.front import tried
+
+    if options.trial:
+        if is_ssp(options.scenario):
+            raise InputError(f"--try: {options.scenario} is an SSP file; values are changed in scenario files")
+        tried.check_writable(directory)
+
+
+def _trial(
+    options: Namespace, result: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis], directory: Path
+) -> tuple[str, ...]:
+    """What --try says."""
+    from feedsim.front import tried
+
+    if not options.trial:
+        return ()
+    with progress_bar(options.quiet, " cycles", shortened=True) as progress:
+        named = progress.of(f"{result.scenario.name}, tried")
+        return tried.tried(result, figures, causes, directory, fmus=options.fmus, progress=named).lines
 
 
 @contextmanager
@@ -172,6 +201,10 @@ read a file outside of it."""
 PAGE = Option(
     "--page", "", "leave the machine as a page that computes beside the report, which links it (docs/page.md)"
 )
+TRY = Option(
+    "--try", "", "run again with the values that the report proposes, and lay both runs over each other",
+    dest="trial", action="store_true",
+)  # fmt: skip
 SUBJECT = (
     FMUS,
     Option("scenario", "SCENARIO", "scenario file (docs/scenarios.md), or SSP (docs/ssp.md)", type=Path),
@@ -181,7 +214,7 @@ RUN = Command(
     "run",
     "run a scenario or an SSP; write result.csv, summary.json, report.html and figures",
     run,
-    (*SUBJECT, out("<name of the scenario file>"), FIGURES, PAGE, CONTROL, QUIET),
+    (*SUBJECT, out("<name of the scenario file>"), FIGURES, PAGE, CONTROL, TRY, QUIET),
     epilog=TRUST,
 )
 VALIDATE = Command(

@@ -44,8 +44,13 @@ def control_section(
 
     changes: parameter of a machine file -> value of every source, where the report is about those.
     """
-    control = _ASKED.get() or (machine.control or "" if machine is not None else "")
+    control = asked(machine)
     return section(control, machine, changes) if control else None
+
+
+def asked(machine: Machine | None = None) -> str:
+    """The control whose names are asked for, or that the machine file names; "" without one."""
+    return _ASKED.get() or (machine.control or "" if machine is not None else "")
 
 
 def section(control: str, machine: Machine | None, changes: Mapping[str, Sequence[str]] | None = None) -> Section:

@@ -16,6 +16,7 @@ from feedsim.analysis.circle_figures import about, both_directions, cause_figure
 from feedsim.analysis.circularity import axis_letters
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
+from feedsim.report.changes import changes_section
 from feedsim.report.content import Bullets, Report, Section, Tile, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, typeset
@@ -25,6 +26,7 @@ from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.run import circle_plots
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
 from feedsim.report.style import BLUE, MUTED, VERMILLION, Array
+from feedsim.tune import of_circle
 
 FORMAT = 1
 COLOURS = {1: BLUE, -1: VERMILLION}  # by the sense of the turn
@@ -99,6 +101,7 @@ def report_of(
             picture(circle, recorded, diagnosis),
             diagnosis_section(prefix, diagnosis),
             sections.figures_section(figures),
+            changes_section(of_circle(diagnosis, None, None)),
             control_section(),
             Section("How the files were read", [Bullets(recorded.notes)]),
         ],

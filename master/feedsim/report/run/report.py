@@ -23,6 +23,7 @@ from feedsim.analysis import (
 from feedsim.cosim import Run
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
+from feedsim.report.changes import changes_part, changes_section
 from feedsim.report.content import Paragraph, Report, Section, Span, Table, Tile, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, duration, number, typeset
@@ -46,6 +47,7 @@ from feedsim.report.run.pose import pose_part, pose_section
 from feedsim.report.run.words import accuracy_words, moved_words, stop_words
 from feedsim.scenario import Level, Logging
 from feedsim.trace import Trace, write_csv
+from feedsim.tune import of_run
 from feedsim.units import show
 
 RESULT, LOG, PAGE = "result.csv", "log.csv", "machine.html"
@@ -159,6 +161,7 @@ def report_of(
         main=[
             *pictures,
             *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
+            changes_section(of_run(run, causes), machine),
             *accuracy_sections(run),
             sections.figures_section(figures),
             motions_section(run),
@@ -303,6 +306,7 @@ def summary(
         "answer": answers(run, figures, causes),
         "warnings": [*run.warnings, *doubts(figures, causes)],
         "figures": figures_part(figures),
+        "changes": changes_part(of_run(run, causes)),
         "circles": _circles(run, causes),
         "diagnosis": {prefix: diagnosis_part(diagnosis) for prefix, diagnosis in causes.items()},
         "scenario": {

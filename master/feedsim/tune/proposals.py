@@ -1,0 +1,309 @@
+"""Which parameter to change, from what to what: from the causes of a circle, and from what the machine file holds.
+
+A proposal belongs to a cause. Of the parameters that make the cause the one is proposed that makes most of it by the
+closed forms. Nothing is changed here: whoever asks may try a proposal in a second run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from feedsim.analysis import Diagnosis, PositioningTask, tasks
+from feedsim.analysis.circle import Term
+from feedsim.analysis.circle.words import worth_telling
+from feedsim.cosim import Run
+from feedsim.errors import FeedsimError
+from feedsim.linear.judgement import Loop, judge
+from feedsim.scenario import Drive, Machine
+from feedsim.structure import Modes, checked_modes
+from feedsim.tune.closed_forms import axis_lag, feedforward_lag, loop_lag, model_gain
+
+# Off the neutral value by less than this share of it, or this time, a T_sym is neutral: rounding of what was typed.
+NEUTRAL_SHARE, NEUTRAL = 0.02, 20e-6
+# Off the value of the reference model by less than this share, a K_p fits it: an inertia is not known better.
+FITS = 0.1
+# Margins that a proposed gain keeps.
+GAIN_MARGIN, PHASE_MARGIN = 8.0, 40.0  # [dB], [deg]
+SHORTEST = 1e-3  # T_n [s] below which none is proposed
+ROUNDS = 6  # of halving the range of T_n on a logarithmic scale: 3 % of its value
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A parameter to change.
+
+    Attributes:
+        cause: what it takes away, in words. axis, parameter: such as "Z", "drive.K_v".
+        present, proposed: SI; None: only the direction is known. unit: SI unit.
+        reason: why this value. direction: "higher" or "lower".
+        margins: before and after, of the axis: least gain margin [dB] and phase margin [deg]; None where not asked.
+    """
+
+    cause: str
+    axis: str
+    parameter: str
+    present: float | None
+    proposed: float | None
+    unit: str
+    reason: str
+    direction: str = ""
+    margins: tuple[tuple[float, float], tuple[float, float]] | None = None
+
+    @property
+    def key(self) -> str:
+        """Of a scenario."""
+        return f"machine.axes.{self.axis}.{self.parameter}"
+
+    @property
+    def setting(self) -> str:
+        """KEY=VALUE, as behind --set; "" where there is no value."""
+        return "" if self.proposed is None else f"{self.key}={self.proposed!r} {self.unit}"
+
+
+def of_circle(
+    diagnosis: Diagnosis, machine: Machine | None, modes: Modes | None, *, searched: bool = False
+) -> list[Proposal]:
+    """Proposals for the causes of a circle, in the order of the causes; each parameter once.
+
+    machine, modes: None where nothing is known of the machine, so that directions are all there is. searched: values
+    that take a search within margins are found, which takes seconds.
+    """
+    found: dict[str, Proposal] = {}
+    for term in worth_telling(diagnosis):
+        proposals = _unknown(diagnosis, term) if machine is None or modes is None else _of(
+            diagnosis, term, machine, modes, searched
+        )  # fmt: skip
+        for each in proposals:
+            found.setdefault(each.key, each)
+    return list(found.values())
+
+
+def of_drives(machine: Machine, modes: Modes, axes: Sequence[str], cause: str) -> list[Proposal]:
+    """What does not fit together within the drives of some axes: T_sym beside neutral, K_p beside its model."""
+    found = []
+    for axis in axes:
+        drive = machine.axes[axis].drive
+        if isinstance(drive, Drive):
+            found += [*_neutral(machine, modes, axis, drive, cause), *_fitting(machine, modes, axis, drive, cause)]
+    return found
+
+
+def of_run(run: Run, causes: Mapping[str, Diagnosis], *, searched: bool = False) -> list[Proposal]:
+    """Proposals of a run: for the causes of its circles, and for the axes of its stops.
+
+    causes: prefix of a circle's figures -> why it is not round. searched: as of :func:`of_circle`. Drives of other
+    makers have none, nor have machines whose modes cannot be read any more.
+    """
+    machine = run.scenario.machine
+    if machine.foreign_units:
+        return []
+    try:
+        modes = checked_modes(machine)
+    except FeedsimError:
+        return []
+    found: dict[str, Proposal] = {}
+    for diagnosis in causes.values():
+        for each in of_circle(diagnosis, machine, modes, searched=searched):
+            found.setdefault(each.key, each)
+    for task in tasks(run.scenario, run.program):
+        if isinstance(task, PositioningTask):
+            for each in of_drives(machine, modes, [task.approach.axis], f"stops of {task.approach.axis}"):
+                found.setdefault(each.key, each)
+    return list(found.values())
+
+
+def changed(machine: Machine, axis: str, values: Mapping[str, float]) -> Machine:
+    """A machine with other values of an axis's drive, name -> SI."""
+    own = machine.axes[axis]
+    return machine.model_copy(
+        update={
+            "axes": {
+                **machine.axes,
+                axis: own.model_copy(update={"drive": own.drive.model_copy(update=dict(values))}),
+            }
+        }
+    )
+
+
+def least_margins(loops: Sequence[Loop], axis: str) -> tuple[float, float]:
+    """Least gain margin [dB] and phase margin [deg] of an axis's loops; minus infinity where one is unstable."""
+    own = [loop for loop in loops if loop.axis == axis]
+    if not own:
+        return math.inf, math.inf
+    if any(loop.unstable or loop.growing for loop in own):
+        return -math.inf, -math.inf
+    return min(20 * math.log10(loop.gain_margin) for loop in own), min(loop.phase_margin for loop in own)
+
+
+def _of(diagnosis: Diagnosis, term: Term, machine: Machine, modes: Modes, searched: bool) -> Iterator[Proposal]:
+    axes = diagnosis.circle.axes
+    drives = {axis: machine.axes[axis].drive for axis in axes if axis in machine.axes}
+    if len(drives) < 2 or not all(isinstance(drive, Drive) for drive in drives.values()):
+        return
+    match term.key:
+        case "servo":
+            yield from _servo(axes, term.value, machine, modes)
+        case "radius" | "scale":
+            cause = "mean radius" if term.key == "radius" else "unlike amplitudes"
+            yield from of_drives(machine, modes, axes, cause)
+            yield from _without_feedforward(machine, axes, cause)
+        case "peaks":
+            drive = machine.axes[term.axis].drive
+            assert isinstance(drive, Drive)
+            cause = f"reversal peaks of {term.axis}"
+            yield from _fitting(machine, modes, term.axis, drive, cause)
+            if term.value > 0:
+                yield from _shorter(machine, modes, term.axis, drive, cause, searched)
+        case "lost_motion":
+            yield from _backlash(machine, term)
+
+
+def _servo(axes: tuple[str, str], value: float, machine: Machine, modes: Modes) -> Iterator[Proposal]:
+    """Of a servo mismatch: the parameter that makes most of it, and T_dyn of the early axis, which hides all of it."""
+    late, early = axes if value > 0 else axes[::-1]
+    cause = f"servo mismatch: {late} is {abs(value) * 1e3:.3g} ms later than {early}"
+    L, E = machine.axes[late].drive, machine.axes[early].drive
+    assert isinstance(L, Drive)
+    assert isinstance(E, Drive)
+    neutral = {axis: loop_lag(machine.axes[axis].drive, machine.cycles, modes.J_tot(axis)) for axis in axes}  # type: ignore[arg-type]
+    parts: list[tuple[float, Proposal]] = []
+    missing = feedforward_lag(L) - feedforward_lag(E)
+    if missing > 0:
+        parts.append((missing, _feedforward(machine, modes, late, early, L, E, cause)))
+    off = {axis: drive.T_sym - neutral[axis] for axis, drive in ((late, L), (early, E))}
+    worst = max(off, key=lambda axis: abs(off[axis]))
+    if off[late] - off[early] > NEUTRAL:
+        parts.append((off[late] - off[early], _symmetry(worst, machine.axes[worst].drive, neutral[worst], cause)))  # type: ignore[arg-type]
+    loops = L.T_dyn + neutral[late] - E.T_dyn - neutral[early]
+    if loops > NEUTRAL:
+        parts.append((loops, _matching(early, E, E.T_dyn + loops, late, cause)))
+    yield from (each for _, each in sorted(parts, key=lambda part: -part[0]))
+    if axis_lag(L) - axis_lag(E) < 0.5 * abs(value):  # the drives as the file has them do not explain it
+        yield _matching(early, E, E.T_dyn + abs(value), late, cause)
+
+
+def _feedforward(machine: Machine, modes: Modes, late: str, early: str, L: Drive, E: Drive, cause: str) -> Proposal:
+    if L.k_ffw != E.k_ffw or E.k_ffw >= 1:
+        k = max(E.k_ffw, L.k_ffw) if L.k_ffw != E.k_ffw else 1.0
+        return Proposal(
+            cause, late, "drive.k_ffw", L.k_ffw, k, "1", f"as {early} has it; missing feedforward delays by "
+            "(1 - k_ffw)/K_v", "higher" if k > L.k_ffw else "lower",
+        )  # fmt: skip
+    K_v = (1 - L.k_ffw) / feedforward_lag(E)
+    before, after = (
+        least_margins(judge(each, modes), late) for each in (machine, changed(machine, late, {"K_v": K_v}))
+    )
+    reason = f"without feedforward an axis is 1/K_v late: as much as {early} is"
+    if after[0] < GAIN_MARGIN or after[1] < PHASE_MARGIN:
+        K_v = (1 - E.k_ffw) / feedforward_lag(L)
+        before, after = (
+            least_margins(judge(each, modes), early) for each in (machine, changed(machine, early, {"K_v": K_v}))
+        )
+        reason = f"{late} has no margin for a higher K_v, so {early} is made as slow"
+        return Proposal(cause, early, "drive.K_v", E.K_v, K_v, "1/s", reason, "lower", (before, after))
+    return Proposal(cause, late, "drive.K_v", L.K_v, K_v, "1/s", reason, "higher", (before, after))
+
+
+def _symmetry(axis: str, drive: Drive, neutral: float, cause: str) -> Proposal:
+    return Proposal(
+        cause, axis, "drive.T_sym", drive.T_sym, neutral, "s", "the lag of its speed loop: with it the following error "
+        "of slow motions is 0", "higher" if neutral > drive.T_sym else "lower",
+    )  # fmt: skip
+
+
+def _matching(axis: str, drive: Drive | None, proposed: float, late: str, cause: str) -> Proposal:
+    present = drive.T_dyn if drive is not None else None
+    return Proposal(
+        cause, axis, "drive.T_dyn", present, proposed, "s", f"dynamic matching: {axis} then waits for {late}", "higher"
+    )
+
+
+def _neutral(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str) -> Iterator[Proposal]:
+    neutral = loop_lag(drive, machine.cycles, modes.J_tot(axis))
+    if (
+        drive.k_ffw > 0
+        and 0 < neutral < math.inf
+        and abs(drive.T_sym - neutral) > max(NEUTRAL, NEUTRAL_SHARE * neutral)
+    ):
+        yield _symmetry(axis, drive, neutral, cause)
+
+
+def _fitting(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str) -> Iterator[Proposal]:
+    K_p = model_gain(drive, modes.J_tot(axis))
+    if K_p is None or abs(drive.K_p / K_p - 1) <= FITS:
+        return
+    before, after = (
+        least_margins(judge(each, modes), axis) for each in (machine, changed(machine, axis, {"K_p": K_p}))
+    )
+    reason = "J omega_0/(2 D), which the reference model stands for"
+    direction = "higher" if K_p > drive.K_p else "lower"
+    yield Proposal(cause, axis, "drive.K_p", drive.K_p, K_p, "N.m.s/rad", reason, direction, (before, after))
+
+
+def _without_feedforward(machine: Machine, axes: Sequence[str], cause: str) -> Iterator[Proposal]:
+    for axis in axes:
+        drive = machine.axes[axis].drive
+        if isinstance(drive, Drive) and drive.k_ffw < 1:
+            reason = "path lag makes circles smaller, by r omega^2/(2 K_v^2) without feedforward"
+            yield Proposal(cause, axis, "drive.k_ffw", drive.k_ffw, 1.0, "1", reason, "higher")
+
+
+def _shorter(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str, searched: bool) -> Iterator[Proposal]:
+    """A shorter T_n: the integral part answers friction sooner, as far as margins allow."""
+    if not drive.speed_integrator or drive.T_n is None or drive.T_n <= SHORTEST:
+        return
+    reason = f"shortest with {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg left in every loop of {axis}"
+    if not searched:
+        reason = f"as short as margins of {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg allow; --try finds the value"
+        yield Proposal(cause, axis, "drive.T_n", drive.T_n, None, "s", reason, "lower")
+        return
+    before = least_margins(judge(machine, modes), axis)
+    low, high, after = math.log(SHORTEST), math.log(drive.T_n), before
+    for _ in range(ROUNDS):
+        middle = 0.5 * (low + high)
+        there = least_margins(judge(changed(machine, axis, {"T_n": math.exp(middle)}), modes), axis)
+        if there[0] >= GAIN_MARGIN and there[1] >= PHASE_MARGIN:
+            high, after = middle, there
+        else:
+            low = middle
+    T_n = math.exp(high)
+    if T_n < 0.95 * drive.T_n:
+        yield Proposal(cause, axis, "drive.T_n", drive.T_n, T_n, "s", reason, "lower", (before, after))
+
+
+def _backlash(machine: Machine, term: Term) -> Iterator[Proposal]:
+    drive = machine.axes[term.axis].drive
+    if not isinstance(drive, Drive):
+        return
+    present = getattr(drive, "backlash_compensation", None)
+    value = present.value if present is not None else 0.0
+    cause = f"lost motion of {term.axis}"
+    yield Proposal(
+        cause, term.axis, "drive.backlash_compensation.value", value, value + term.value, "m",
+        "the step at the reversals", "higher" if term.value > 0 else "lower",
+    )  # fmt: skip
+
+
+def _unknown(diagnosis: Diagnosis, term: Term) -> Iterator[Proposal]:
+    """What a circle alone tells: directions, and amounts that need no machine."""
+    first, second = diagnosis.circle.axes
+    if term.key == "servo":
+        late, early = (first, second) if term.value > 0 else (second, first)
+        cause = f"servo mismatch: {late} is {abs(term.value) * 1e3:.3g} ms later than {early}"
+        reason = f"a higher K_v or more feedforward makes {late} sooner"
+        yield Proposal(cause, late, "drive.K_v", None, None, "1/s", reason, "higher")
+        yield Proposal(
+            cause, early, "drive.T_dyn", None, None, "s",
+            f"or {early} waits: {abs(term.value) * 1e3:.3g} ms more", "higher",
+        )  # fmt: skip
+    elif term.key == "peaks" and term.value > 0:
+        reason = "the integral part answers friction sooner; or friction compensation"
+        yield Proposal(f"reversal peaks of {term.axis}", term.axis, "drive.T_n", None, None, "s", reason, "lower")
+    elif term.key == "lost_motion":
+        yield Proposal(
+            f"lost motion of {term.axis}", term.axis, "drive.backlash_compensation.value", None, None, "m",
+            f"{abs(term.value) * 1e6:.3g} um {'more' if term.value > 0 else 'less'}",
+            "higher" if term.value > 0 else "lower",
+        )  # fmt: skip

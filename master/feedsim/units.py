@@ -25,7 +25,7 @@ from feedsim_packager import units as algebra
 SYMBOLS = (
     "m", "km", "dm", "cm", "mm", "um", "nm", "in", "s", "ms", "us", "ns", "min", "h", "kg", "g", "t", "A", "mA",
     "rad", "mrad", "urad", "rev", "deg", "arcsec", "rpm", "Hz", "kHz", "N", "mN", "kN", "Pa", "MPa", "GPa", "Nm",
-    "V", "mV", "kV", "Ohm", "mOhm", "H", "mH", "uH", "Wb", "percent",
+    "V", "mV", "kV", "Ohm", "mOhm", "H", "mH", "uH", "Wb", "W", "percent",
 )  # fmt: skip
 # Other spellings of the same.
 ALIASES = {
@@ -78,6 +78,7 @@ KINDS = {
     "V/A": ("voltage per current", "17.28 V/A"),
     "H": ("inductance", "5 mH"),
     "Wb": ("flux linkage", "0.27 Wb"),
+    "W": ("power", "10 W"),
     "1/A": ("1/current", "1 1/A"),
 }
 

@@ -11,7 +11,8 @@
  *   STRING  (symbol, causality, variability, start, description)
  *
  * REAL_OF, INTEGER_OF and BOOLEAN_OF take a group first: REAL_OF(tool, F_X, ...) is the FMI variable "tool.F_X" and the
- * field tool_F_X. AXIS_REAL and AXIS_BOOLEAN are rows of the axis block: "X.M_a" for axis X.
+ * field tool_F_X. AXIS_REAL and AXIS_BOOLEAN are rows of the axis block: "X.M_a" for axis X; AXIS_REAL_OF(guide, F_C,
+ * ...) is "X.guide.F_C".
  *
  * - causality: parameter | input | output | local
  * - variability: fixed | tunable | discrete | continuous
@@ -59,6 +60,8 @@
     SCALAR_ROW(STRING, s, #s, c, v, 0, start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", "", text)
 #define AXIS_REAL(s, c, v, start, unit, display, min, max, depends, text)                                              \
     AXIS_ROW(REAL, s, #s, c, v, start, #start, unit, display, min, #min, max, #max, depends, text)
+#define AXIS_REAL_OF(g, s, c, v, start, unit, display, min, max, depends, text)                                        \
+    AXIS_ROW(REAL, g##_##s, #g "." #s, c, v, start, #start, unit, display, min, #min, max, #max, depends, text)
 #define AXIS_BOOLEAN(s, c, v, start, depends, text)                                                                    \
     AXIS_ROW(BOOLEAN, s, #s, c, v, start, #start, "", "", NO_MIN, "NO_MIN", NO_MAX, "NO_MAX", depends, text)
 

@@ -10,6 +10,8 @@
 #include "../plant_fmu/cells.c"
 #include "../plant_fmu/derive.c"
 #include "../plant_fmu/geometry.c"
+#include "../plant_fmu/guide.c"
+#include "../plant_fmu/guide_law.c"
 #include "../plant_fmu/load.c"
 #include "../plant_fmu/modal.c"
 #include "../plant_fmu/model.c"

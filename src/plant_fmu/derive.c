@@ -7,6 +7,7 @@
 #include "cells.h"
 #include "files.h"
 #include "hash.h"
+#include "numbers.h"
 #include "plant.h"
 
 static const double pi = 3.14159265358979323846;
@@ -28,6 +29,7 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     unit_free(unit, plant->modal);
     unit_free(unit, plant->systems);
     unit_free(unit, plant->memory);
+    plant->mobility = NULL;
     plant->modal = modal;
     plant->systems = systems;
     plant->memory = memory;
@@ -101,9 +103,20 @@ static void plant_derive_errors(Unit *unit, Plant *plant) {
                                  .third = {{0, v->geometry_E_XY_third, v->geometry_E_XZ_third},
                                            {v->geometry_E_YX_third, 0, v->geometry_E_YZ_third},
                                            {v->geometry_E_ZX_third, v->geometry_E_ZY_third, 0}}};
+    const double arms[3] = {v->geometry_arm_X, v->geometry_arm_Y, v->geometry_arm_Z};
+    const double first[3][3] = {{v->geometry_E_AX_first, v->geometry_E_BX_first, v->geometry_E_CX_first},
+                                {v->geometry_E_AY_first, v->geometry_E_BY_first, v->geometry_E_CY_first},
+                                {v->geometry_E_AZ_first, v->geometry_E_BZ_first, v->geometry_E_CZ_first}};
+    const double second[3][3] = {{v->geometry_E_AX_second, v->geometry_E_BX_second, v->geometry_E_CX_second},
+                                 {v->geometry_E_AY_second, v->geometry_E_BY_second, v->geometry_E_CY_second},
+                                 {v->geometry_E_AZ_second, v->geometry_E_BZ_second, v->geometry_E_CZ_second}};
+    for (int j = 0; j < 3; j++) {
+        geometry_arms(&plant->geometry, j, first[j], second[j], arms);
+    }
     double most = 0;
     for (size_t i = 0; i < unit_axes(unit); i++) {
-        most = fmax(most, unit_axis(unit, i)->play);
+        const AxisBlock *axis = unit_axis(unit, i);
+        most = fmax(most, fmax(axis->play, axis->hysteresis_value));
     }
     for (int i = 0; i < 9; i++) {
         const Geometry *g = &plant->geometry;
@@ -113,11 +126,70 @@ static void plant_derive_errors(Unit *unit, Plant *plant) {
     plant->errors = most > 0;
 }
 
+/* Friction at the guides. */
+static bool plant_derive_guides(Unit *unit, Plant *plant) {
+    const size_t axes = unit_axes(unit);
+    if (plant->guides == NULL) {
+        unit_free(unit, plant->v_free);
+        double *numbers = plant->v_free = unit_alloc(unit, axes + 2 * axes * axes, sizeof *numbers);
+        plant->guides = numbers != NULL ? unit_alloc(unit, axes, sizeof *plant->guides) : NULL;
+        if (plant->guides == NULL) {
+            return false;
+        }
+        plant->held = numbers + axes;
+        plant->ramp = plant->held + axes * axes;
+    }
+    plant->guided = false;
+    for (size_t i = 0; i < axes; i++) {
+        const AxisBlock *v = unit_axis(unit, i);
+        Guide *guide = &plant->guides[i];
+        char text[2][NUMBER_TEXT_SIZE];
+        guide->on = v->guide_F_S > 0 || v->guide_F_C > 0;
+        plant->guided = plant->guided || guide->on;
+        if (guide->on && !(v->guide_F_C > 0 && v->guide_F_S >= v->guide_F_C)) {
+            return unit_fail(unit,
+                             "parameter '%s.guide.F_S' is %s N and '%s.guide.F_C' is %s N; the static friction force "
+                             "F_S must not be below the Coulomb friction force F_C, which must be above 0; both 0: no "
+                             "friction at the guide",
+                             unit_axis_name(unit, i), number_text(text[0], v->guide_F_S), unit_axis_name(unit, i),
+                             number_text(text[1], v->guide_F_C));
+        }
+        guide->contact = (Contact){.lugre = {.sigma_0 = v->guide_sigma_0,
+                                             .sigma_1 = v->guide_sigma_1,
+                                             .sigma_2 = v->guide_sigma_2,
+                                             .F_C = v->guide_F_C,
+                                             .F_S = v->guide_F_S,
+                                             .v_s = v->guide_v_s,
+                                             .beta = v->guide_beta,
+                                             .F_log = v->guide_F_log,
+                                             .v_log = v->guide_v_log,
+                                             .asymmetry = v->guide_asymmetry},
+                                   .W = v->guide_W,
+                                   .gamma = v->guide_gamma};
+        const double place[GUIDE_PLACES] = {v->guide_place_0, v->guide_place_1, v->guide_place_2, v->guide_place_3,
+                                            v->guide_place_4, v->guide_place_5, v->guide_place_6, v->guide_place_7,
+                                            v->guide_place_8, v->guide_place_9, v->guide_place_10};
+        guide->placed = false;
+        guide->place_first = v->guide_place_first;
+        guide->place_spacing = v->guide_place_spacing;
+        for (size_t k = 0; k < GUIDE_PLACES; k++) {
+            guide->place[k] = place[k];
+            guide->placed = guide->placed || fabs(place[k]) > 0;
+        }
+        guide->warm_time = v->guide_warm_time;
+        guide->warm_power = v->guide_warm_power;
+    }
+    return true;
+}
+
 /* A file is read once for an instance as long as modes_file keeps its value: a state that is restored must find the
  * table it was made with, whatever has become of the file. */
 bool plant_derive(Unit *unit) {
     Plant *plant = unit_derived(unit);
     plant_derive_errors(unit, plant);
+    if (!plant_derive_guides(unit, plant)) {
+        return false;
+    }
     const char *path = unit_scalars(unit)->modes_file;
     if (plant->ready && strcmp(plant->table, path) == 0) {
         return true;

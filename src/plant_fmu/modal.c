@@ -228,6 +228,39 @@ void modal_advance(const Modal *modal, size_t inputs, const double *UNALIASED u,
     }
 }
 
+void modal_add(const Modal *modal, size_t port, double f, double df, double *UNALIASED q_end, double *UNALIASED v_end) {
+    const size_t size = modal->size;
+    const double *UNALIASED c = modal->update, *UNALIASED b = modal->shape + port * size;
+    for (size_t k = 0; k < size; k += MODAL_LANES, c += COEFFICIENTS * MODAL_LANES) {
+        Lanes b_k, c_f, c_df, end;
+        lanes_read(&b_k, b + k);
+        for (int half = 0; half < 2; half++) {
+            Lanes push = {{{0}}};
+            double *UNALIASED x = half == 0 ? q_end : v_end;
+            const double *UNALIASED own = c + 4 * half * MODAL_LANES;
+            lanes_read(&c_f, own + 2 * MODAL_LANES);
+            lanes_read(&c_df, own + 3 * MODAL_LANES);
+            lanes_add_scaled(&push, &c_f, f);
+            lanes_add_scaled(&push, &c_df, df);
+            lanes_read(&end, x + k);
+            lanes_add_product(&end, &b_k, &push);
+            lanes_write(x + k, &end);
+        }
+    }
+}
+
+void modal_mobility(const Modal *modal, size_t at, size_t from, double *held, double *ramp) {
+    const size_t size = modal->size;
+    *held = *ramp = 0;
+    for (size_t k = 0; k < size; k++) {
+        const size_t lane = k % MODAL_LANES;
+        const double *c = modal->update + (k - lane) * COEFFICIENTS + lane;
+        const double shapes = modal->shape[at * size + k] * modal->shape[from * size + k];
+        *held += shapes * c[6 * MODAL_LANES];
+        *ramp += shapes * c[7 * MODAL_LANES];
+    }
+}
+
 double modal_sum(const Modal *modal, size_t port, const double *UNALIASED q) {
     const size_t size = modal->size;
     const double *UNALIASED b = modal->shape + port * size;

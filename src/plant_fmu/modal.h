@@ -27,6 +27,8 @@
 #define modal_set_mode PREFIXED(modal_set_mode)
 #define modal_prepare PREFIXED(modal_prepare)
 #define modal_advance PREFIXED(modal_advance)
+#define modal_add PREFIXED(modal_add)
+#define modal_mobility PREFIXED(modal_mobility)
 #define modal_sum PREFIXED(modal_sum)
 #define modal_acceleration PREFIXED(modal_acceleration)
 #define modal_kinetic_energy PREFIXED(modal_kinetic_energy)
@@ -72,6 +74,13 @@ void modal_prepare(Modal *modal, double h);
  * the start of the step and their change du[inputs] over it. */
 void modal_advance(const Modal *modal, size_t inputs, const double *u, const double *du, const double *q,
                    const double *v, double *q_end, double *v_end);
+
+/* Add to the end of a step, (q_end, v_end), what a further input f at `port`, changing by df over the step, does. */
+void modal_add(const Modal *modal, size_t port, double f, double df, double *q_end, double *v_end);
+
+/* Speed at the port `at` at the end of a step by an input of 1 at the port `from`: *held, and *ramp by one that rises
+ * from 0 to 1 over the step. */
+void modal_mobility(const Modal *modal, size_t at, size_t from, double *held, double *ramp);
 
 /* Displacement at a port from q; with v in place of q the speed there. */
 double modal_sum(const Modal *modal, size_t port, const double *q);

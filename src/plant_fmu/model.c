@@ -1,11 +1,11 @@
 /* plant: the mechanical structure of a machine with its feed drives, reduced to modes.
  *
  *   q_k'' + 2 zeta_k omega_k q_k' + omega_k^2 q_k = f_k                                per mode k, mass-normalised
- *   f_k   = sum over axes A of (n_kA (M_a - M_fr - M_0) + x_kA F_a) + sum over directions d of tcp_kd F_d
- *   n_a   = n_fr = sum over k of n_kA q_k'             rotor against stator [rad/s]
- *   x_a   = x_0 + sum over k of x_kA q_k               slide against rail, at the linear scale [m]
- *   tool.x_d = sum over k of tcp_kd q_k                tool against workpiece [m]; with play and geometry: geometry.h
- *   tcp.x_d  = tool.x_d + x_0 of the axis named d      tool centre point [m]
+ *   f_k   = sum over axes A of (n_kA (M_a - M_fr - M_0) + x_kA (F_a - guide.F_fr)) + sum over directions d of tcp_kd
+ * F_d n_a   = n_fr = sum over k of n_kA q_k'             rotor against stator [rad/s] x_a   = x_0 + sum over k of x_kA
+ * q_k               slide against rail, at the linear scale [m] tool.x_d = sum over k of tcp_kd q_k                tool
+ * against workpiece [m]; with play and geometry: geometry.h tcp.x_d  = tool.x_d + x_0 of the axis named d      tool
+ * centre point [m]
  *
  *   M_a motor torque, M_fr friction torque, M_0 constant load [N.m]; F_a force on the slide, F_d on the tool [N];
  * omega_k = 2 pi frequency; n_kA, x_kA, tcp_kd: mode shapes at the ports, columns of the mode table (modes.h)
@@ -110,9 +110,19 @@ static double *plant_ways(const Plant *plant, double *state) {
 /* Play of the drives, at the end of a step that leads from one place of the state to the other. */
 static void plant_play(Unit *unit, const Plant *plant, const double *before, double *ways) {
     const double *x = plant->y + plant_slides(plant);
-    for (size_t i = 0; i < plant->axes; i++) {
-        ways[i] = geometry_play(before[i], x[i], unit_axis(unit, i)->play);
-        ways[plant->axes + i] = ways[i] - x[i];
+    const size_t axes = plant->axes;
+    for (size_t i = 0; i < axes; i++) {
+        const AxisBlock *axis = unit_axis(unit, i);
+        double *wound = &ways[2 * axes + i], way = x[i];
+        *wound = before[2 * axes + i];
+        if (axis->hysteresis_value > 0) {
+            /* Where the structure was: what stands behind `before`, less what play and hysteresis had made of it. */
+            const double was = before[i] - before[axes + i];
+            *wound = geometry_hysteresis(*wound, x[i] - was, axis->hysteresis_way);
+            way -= axis->hysteresis_value / 2 * (*wound / axis->hysteresis_way);
+        }
+        ways[i] = geometry_play(before[i], way, axis->play);
+        ways[axes + i] = ways[i] - x[i];
     }
 }
 
@@ -176,6 +186,72 @@ static void plant_positions(Unit *unit, const Plant *plant, const double *displa
     }
 }
 
+/* --- friction at the guides -----------------------------------------------------------------------------------------
+ */
+
+/* Of each axis, behind the ways of a state. */
+static GuideState *plant_guides(const Plant *plant, double *state) {
+    return (GuideState *)(void *)(plant_ways(plant, state) + 3 * plant->axes);
+}
+
+/* How the slides give way to their friction, for a step of h. */
+static void plant_prepare_guides(Plant *plant, const Modal *modal, double h) {
+    if (plant->mobility == modal && plant->mobility_h == h) {
+        return;
+    }
+    const size_t axes = plant->axes, slides = plant_slides(plant);
+    for (size_t i = 0; i < axes * axes; i++) {
+        modal_mobility(modal, slides + i / axes, slides + i % axes, &plant->held[i], &plant->ramp[i]);
+    }
+    plant->mobility = modal;
+    plant->mobility_h = h;
+}
+
+/* Behind a step that the structure took without it: its end with the friction. False where a force is no finite
+ * number. */
+static bool plant_step_guides(Plant *plant, const Modal *modal, double *state, double *end, double h) {
+    const size_t axes = plant->axes, slides = plant_slides(plant), ports = plant_ports(plant);
+    double *q_end = end + ports, *v_end = q_end + plant->size;
+    const GuideState *start = plant_guides(plant, state);
+    GuideState *guides = plant_guides(plant, end);
+    plant_prepare_guides(plant, modal, h);
+    for (size_t i = 0; i < axes; i++) {
+        plant->v_free[i] = plant->guides[i].on ? modal_sum(modal, slides + i, v_end) : 0;
+    }
+    if (!guide_step(axes, plant->guides, plant->v_free, plant->held, plant->ramp, start, guides, h)) {
+        return false;
+    }
+    for (size_t i = 0; i < axes; i++) {
+        if (plant->guides[i].on) {
+            modal_add(modal, slides + i, -start[i].F, start[i].F - guides[i].F, q_end, v_end);
+            end[slides + i] -= guides[i].F;
+        }
+    }
+    return true;
+}
+
+/* Behind a crossing from cell to cell: speeds as the new modes have them. */
+static void plant_follow_guides(const Plant *plant, const Modal *modal, double *end) {
+    const double *v_end = end + plant_ports(plant) + plant->size;
+    for (size_t i = 0; i < plant->axes; i++) {
+        plant_guides(plant, end)[i].v = modal_sum(modal, plant_slides(plant) + i, v_end);
+    }
+}
+
+static void plant_show_guides(Unit *unit, const Plant *plant, double *state) {
+    for (size_t i = 0; i < plant->axes; i++) {
+        const GuideState *guide = &plant_guides(plant, state)[i];
+        AxisBlock *axis = unit_axis(unit, i);
+        axis->guide_F_fr = guide->F;
+        axis->guide_z = guide->contact.z;
+        axis->guide_E_fr = guide->work;
+        axis->guide_warmth = guide->warmth;
+    }
+}
+
+/* --- start and step, with all of it ---------------------------------------------------------------------------------
+ */
+
 static void plant_start(Unit *unit) {
     Plant *plant = unit_derived(unit);
     double *u = plant_state(unit), *q = u + plant_ports(plant), *v = q + plant->size;
@@ -185,6 +261,10 @@ static void plant_start(Unit *unit) {
     plant_measure(plant, &plant->modal[0], q, v, plant->y); /* at rest, whatever the cell */
     plant_measure_tool(plant, &plant->modal[0], q, plant->y);
     plant_positions(unit, plant, plant->y + plant_slides(plant), plant->x);
+    for (size_t i = 0; i < plant->axes; i++) {
+        plant_guides(plant, plant_state(unit))[i].x = unit_axis(unit, i)->x_0;
+    }
+    plant_show_guides(unit, plant, plant_state(unit));
     head->table_hash = plant->table_hash;
     head->cell = plant->cells > 1 ? cells_find(&plant->poses, plant->x) : 0;
     plant_show(unit, plant, plant->y);
@@ -256,6 +336,9 @@ static bool plant_step(Unit *unit, double t, double h) {
     }
     modal_prepare(modal, h);
     modal_advance(modal, active, u, du, state + ports, state + ports + size, q_end, v_end);
+    if (plant->guided && !plant_step_guides(plant, modal, state, end, h)) {
+        return unit_fail(unit, "a friction force at a guide would be no finite number at the end of the step");
+    }
     if (!plant_measure(plant, modal, q_end, v_end, plant->y) ||
         (plant->cells > 1 && !plant_follow(unit, plant, q_end, v_end))) {
         return unit_fail(unit, "an output would be no finite number at the end of the step");
@@ -267,6 +350,15 @@ static bool plant_step(Unit *unit, double t, double h) {
             return unit_fail(unit, "an output would be no finite number at the end of the step");
         }
         plant_measure_tool(plant, &plant->modal[plant_head(unit)->cell], q_end, plant->y);
+    }
+    if (plant->guided) {
+        if (plant->cells > 1) {
+            plant_follow_guides(plant, &plant->modal[plant_head(unit)->cell], end);
+        }
+        for (size_t i = 0; i < plant->axes; i++) {
+            plant_guides(plant, end)[i].x = unit_axis(unit, i)->x_0 + plant->y[plant_slides(plant) + i];
+        }
+        plant_show_guides(unit, plant, end);
     }
     plant_head(unit)->place = place;
     plant_show(unit, plant, plant->y);
@@ -292,8 +384,15 @@ static void plant_show_late(Unit *unit) {
 /* Speed of an axis's slide: that of the structure there, unless play lets it stand. */
 static double plant_slide_speed(Unit *unit, const Plant *plant, const Modal *modal, size_t axis) {
     double *state = plant_state(unit);
-    const double speed = modal_sum(modal, plant_slides(plant) + axis, state + plant_ports(plant) + plant->size);
-    const double half = unit_axis(unit, axis)->play / 2, apart = plant_ways(plant, state)[plant->axes + axis];
+    double speed = modal_sum(modal, plant_slides(plant) + axis, state + plant_ports(plant) + plant->size);
+    const AxisBlock *own = unit_axis(unit, axis);
+    const double half = own->play / 2, h = own->hysteresis_value, w = own->hysteresis_way;
+    double apart = plant_ways(plant, state)[plant->axes + axis];
+    if (h > 0) {
+        const double wound = plant_ways(plant, state)[2 * plant->axes + axis];
+        apart += h / 2 * (wound / w);
+        speed *= (speed > 0 ? wound < w : wound > -w) ? 1 - h / (2 * w) : 1;
+    }
     const double limit = half * (1 - 1e-9); /* the way is a difference of positions, rounded */
     return half > 0 && !(speed > 0 ? apart <= -limit : apart >= limit) ? 0 : speed;
 }
@@ -346,6 +445,8 @@ static double plant_output_derivative(Unit *unit, unsigned vr) {
     case AXIS_VR_n_a:
     case AXIS_VR_n_fr:
         return modal_acceleration(modal, axis, ports, u, q, v);
+    case AXIS_VR_guide_F_fr:
+        return plant_guides(plant, plant_state(unit))[axis].slope;
     case AXIS_VR_x_a:
         return plant->errors ? plant_slide_speed(unit, plant, modal, axis)
                              : modal_sum(modal, plant_slides(plant) + axis, v);

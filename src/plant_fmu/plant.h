@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "geometry.h"
+#include "guide.h"
 #include "modal.h"
 #include "modes.h"
 #include "poses.h"
@@ -47,16 +48,26 @@ typedef struct Plant {
 
     bool errors; /* play or geometry: what follows counts */
     Geometry geometry;
+
+    bool guided; /* friction at a guide: what follows counts */
+    Guide *guides;
+    double *v_free;        /* [axes] speeds of the slides without it */
+    double *held, *ramp;   /* [axes][axes] mobilities of the slides, for */
+    const Modal *mobility; /* this modal system */
+    double mobility_h;     /* and this step */
 } Plant;
 
 /* State block: this head, then two places by turns for inputs at the end of the last step [ports], q [size], v [size],
- * and with play or geometry, ways of the slides since the start and what play takes off or adds [axes] each: a step
- * leaves its result in the other one, which counts once it is known to be sound. */
+ * with play or geometry, ways of the slides since the start, what play takes off or adds, and the wind-up of the
+ * hysteresis [axes] each, and a
+ * GuideState per axis: a step leaves its result in the other one, which counts once it is known to be sound. */
 typedef struct StateHead {
     uint64_t table_hash; /* mode table that the state belongs to */
     uint64_t cell;       /* whose modes q and v belong to */
     uint64_t place;      /* that counts, 0 or 1 */
 } StateHead;
+
+enum { GUIDE_DOUBLES = sizeof(GuideState) / sizeof(double) };
 
 /* The first of the ports at the slides. */
 static inline size_t plant_slides(const Plant *plant) {
@@ -68,7 +79,7 @@ static inline size_t plant_ports(const Plant *plant) {
 }
 
 static inline size_t plant_state_doubles(const Plant *plant) {
-    return plant_ports(plant) + 2 * (plant->size + plant->axes);
+    return plant_ports(plant) + 2 * plant->size + (3 + GUIDE_DOUBLES) * plant->axes;
 }
 
 /* --- load.c: the archive */

@@ -99,7 +99,7 @@ def parameters(machine: Machine, coupling: Coupling, *, built_in: bool) -> Mappi
         "motion.built_in": built_in,
     }
     for name, axis in machine.axes.items():
-        friction = machine.shipped_friction(name, f"{UNIT}.fmu").parameters()
+        friction = axis.friction_at_motor
         values |= {f"{name}.drive.{key}": value for key, value in controller_parameters(machine, name).items()}
         values |= {f"{name}.friction.{key}": value for key, value in friction.items()}
         values[f"{name}.M_0"] = axis.M_0

@@ -70,7 +70,7 @@ def filled(machine: Machine, axis: str, role: Role, archive: Archive) -> RoleUni
     described = getattr(machine.axes[axis], role.name)
     if isinstance(described, ForeignUnit):
         return foreign(role, axis, described, archive)
-    parameters = controller_parameters(machine, axis) if role is DRIVE else described.parameters()
+    parameters = controller_parameters(machine, axis) if role is DRIVE else machine.axes[axis].friction_at_motor
     signals = {name: Alias(name) for name in archive.variables}
     return RoleUnit(role, axis, archive, signals, parameters)
 

@@ -219,6 +219,61 @@ class Drive(_Effects):
 _SWITCHES = {"T_n": ("speed_integrator", True), "omega_0": ("reference_model", True), "D": ("reference_model", True)}
 
 
+if TYPE_CHECKING:
+
+    class _GuideParameters(ParameterGroup):
+        F_C: float
+        F_S: float
+
+else:
+    _GuideParameters = group("plant/axis", "guide", "Friction between slide and rail")
+
+
+if TYPE_CHECKING:
+    Hysteresis = ParameterGroup
+else:
+    Hysteresis = group("plant/axis", "hysteresis", "Elastic hysteresis between motor and slide")
+
+
+class Guide(_GuideParameters):
+    """Friction between slide and rail: a share of the axis's friction, or a law of its own in N and m/s; over position
+    and with warmth it may change."""
+
+    share: Annotated[float, Quantity("1", minimum=0, maximum=1, example="30 %")] | None = Field(
+        default=None, description="Share of the axis's friction that acts at the guide; the rest stays at the motor"
+    )
+
+    @field_validator("share")
+    @classmethod
+    def _alone(cls, share: float | None, info: ValidationInfo) -> float | None:
+        if share is not None and info.data:
+            given = [
+                name for name in info.data if name in _AT_GUIDE and info.data[name] != cls.model_fields[name].default
+            ]
+            if given:
+                raise fault(f"share goes together with no parameter of its own; {given[0]} is given besides")
+        return share
+
+    @field_validator("F_S", check_fields=False)
+    @classmethod
+    def _static_at_least_coulomb(cls, F_S: float, info: ValidationInfo) -> float:
+        F_C = info.data.get("F_C", 0.0)
+        if F_S < F_C or (F_S > 0 and F_C <= 0):
+            raise fault(
+                f"F_S {F_S:.9g} N is smaller than F_C {F_C:.9g} N, or F_C is missing; static friction is at least "
+                "Coulomb friction, which is above 0"
+            )
+        return F_S
+
+
+# Powers of the lead I_P by which a parameter of friction is divided on its way from motor to guide.
+_AT_GUIDE = {
+    "sigma_0": 2, "sigma_1": 2, "sigma_2": 2, "F_C": 1, "F_S": 1, "F_log": 1, "v_s": -1, "v_log": -1, "W": -1,
+    "beta": 0, "asymmetry": 0, "gamma": 0,
+}  # fmt: skip
+_SHARED = ("sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "F_log")
+
+
 class ForeignDrive(ForeignUnit):
     """Another maker's unit as drive of an axis."""
 
@@ -253,6 +308,10 @@ class Axis(Model):
     play: Annotated[float, Quantity("m", minimum=0, maximum=1, example="10 um")] = Field(
         default=0.0, description="Play between motor and slide, without dynamics; for axes measured indirectly"
     )
+    hysteresis: Hysteresis | None = Field(
+        default=None, description="Elastic hysteresis between motor and slide, without dynamics"
+    )
+    guide: Guide | None = Field(default=None, description="Friction between slide and rail, beside that at the motor")
     display_sign: Literal[1, -1] = Field(default=1, description="Sign of torque and current in figures, nowhere else")
     drive: Annotated[Annotated[Drive, Tag(SHIPPED)] | Annotated[ForeignDrive, Tag(FOREIGN)], Discriminator(filled)] = (
         Field(description="Parameters of the shipped drive, or another unit (fmu) with its variables")
@@ -272,6 +331,36 @@ class Axis(Model):
     def I_P(self) -> float:
         """Lead, pitch / (2 pi) [m/rad]."""
         return self.pitch / (2 * pi)
+
+    @property
+    def friction_at_motor(self) -> dict[str, Parameter]:
+        """Parameters of the shipped unit `friction`: those of the axis, without what is at the guide."""
+        assert isinstance(self.friction, Friction)
+        values = self.friction.parameters()
+        share = self.guide.share if self.guide is not None else None
+        if share is None:
+            return values
+        least = {name: each.minimum for name, each in variables.parameters("friction").items()}
+        return values | {name: max(float(values[name]) * (1 - share), least[name]) for name in _SHARED}
+
+    @property
+    def friction_at_guide(self) -> dict[str, Parameter]:
+        """Parameters of the plant's group `guide`; empty without friction there.
+
+        A share of friction in N.m and rad at a lead I_P [m/rad] is friction in N and m: forces F = M/I_P, stiffness
+        and damping over I_P^2, angles and their speeds times I_P; its torque at constant speed is F I_P again.
+        """
+        if self.guide is None:
+            return {}
+        if self.guide.share is None:
+            return {name: value for name, value in self.guide.parameters().items() if name != "share"}
+        if not isinstance(self.friction, Friction) or self.guide.share == 0:
+            return {}
+        own = {name: float(value) for name, value in self.friction.parameters().items()}
+        factor = {name: self.guide.share if name in _SHARED else 1.0 for name in _AT_GUIDE}
+        law = {name: own[name] * factor[name] / self.I_P**power for name, power in _AT_GUIDE.items()}
+        rest = {name: value for name, value in self.guide.parameters().items() if name not in ("share", *law)}
+        return {**law, **rest}
 
     @property
     def M_0(self) -> float:
@@ -385,8 +474,12 @@ class Machine(Model):
 
     @property
     def errors(self) -> dict[str, Parameter]:
-        """Parameters of the plant for play and geometry, where there are any."""
+        """Parameters of the plant for play, hysteresis, friction at the guides and geometry, where there are any."""
         play: dict[str, Parameter] = {f"{name}.play": axis.play for name, axis in self.axes.items() if axis.play}
+        for name, axis in self.axes.items():
+            wound = axis.hysteresis.parameters() if axis.hysteresis is not None else {}
+            play |= {f"{name}.hysteresis.{key}": value for key, value in wound.items()}
+            play |= {f"{name}.guide.{key}": value for key, value in axis.friction_at_guide.items()}
         geometry = self.geometry.parameters() if self.geometry is not None else {}
         return play | {f"geometry.{name}": value for name, value in geometry.items()}
 
@@ -416,6 +509,11 @@ class Machine(Model):
         if isinstance(friction, ForeignUnit):
             raise InputError(_foreign(axis, friction, who))
         return friction
+
+    @property
+    def guided(self) -> list[str]:
+        """Axes with friction at the guide."""
+        return [name for name, axis in self.axes.items() if axis.friction_at_guide.get("F_S")]
 
     @field_validator("axes")
     @classmethod

@@ -38,7 +38,9 @@ def effects(unit: str, groups: Mapping[str, str]) -> type[ParameterGroup]:
     fields: dict[str, Any] = {
         name: (group(unit, name, text) | None, Field(default=None, description=text)) for name, text in groups.items()
     }
-    return create_model("Effects", __base__=ParameterGroup, __module__=__name__, **fields)
+    globals()["Effects"] = create_model("Effects", __base__=ParameterGroup, __module__=__name__, **fields)
+    model: type[ParameterGroup] = globals()["Effects"]
+    return model
 
 
 def group(unit: str, name: str, text: str) -> Any:
@@ -53,4 +55,6 @@ def group(unit: str, name: str, text: str) -> Any:
         for key, row in rows.items()
     }
     title = name.title().replace("_", "")
-    return create_model(title, __base__=ParameterGroup, __module__=__name__, __doc__=f"{text}.", **fields)
+    # A scenario is sent to other processes, where a class is looked up by its name.
+    globals()[title] = create_model(title, __base__=ParameterGroup, __module__=__name__, __doc__=f"{text}.", **fields)
+    return globals()[title]

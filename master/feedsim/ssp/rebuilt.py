@@ -248,9 +248,19 @@ def _axis(parts: Parts, axis: str, told: Mapping[str, Any], folder: Path) -> dic
         "pitch": pitch,
         "constant_load": f"{plant[f'{axis}.M_0']!r} N.m",
         **({"play": f"{play!r} m"} if (play := plant.get(f"{axis}.play")) else {}),
+        **_effects(parts, axis),
         "drive": drive,
         "friction": friction,
     }
+
+
+def _effects(parts: Parts, axis: str) -> dict[str, Any]:
+    """Hysteresis and friction at the guide of an axis, where there is any."""
+    if parts.roles.plant not in parts.archives:
+        return {}
+    given = parts.values[parts.roles.plant]
+    on = [name for name, value in (("hysteresis", "value"), ("guide", "F_S")) if given.get(f"{axis}.{name}.{value}")]
+    return {name: _group(parts, parts.roles.plant)[axis][name] for name in on}
 
 
 def _shipped_drive(parts: Parts, control: str) -> dict[str, Any]:

@@ -8,8 +8,13 @@ from .table import Row, Table
 
 
 def dump(tables: Iterable[Table]) -> bytes:
-    """Unit -> name -> what its row says, without rows per axis; a bound that is not there is left out."""
-    content = {table.unit: {row.name: _entry(row) for row in table.scalars} for table in tables}
+    """Unit -> name -> what its row says; a bound that is not there is left out. Parameters that every axis has stand
+    under "unit/axis"."""
+    content = {}
+    for table in tables:
+        content[table.unit] = {row.name: _entry(row) for row in table.scalars}
+        if own := [row for row in table.axis_rows if row.causality == "parameter"]:
+            content[f"{table.unit}/axis"] = {row.name: _entry(row) for row in own}
     return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
 
 

@@ -104,6 +104,7 @@ def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: s
     record = {
         "replay": ["a", "--machine", "a"],
         "identify-drive": ["a"],
+        "identify-modes": ["a", "--machine", "a"],
         "pack": ["a", "--out", "b.fmu"],
         "page": ["a", "--out", "b.html"],
         "docs": ["--path"],

@@ -23,6 +23,7 @@ ORDER = [
     "identify",
     "tune",
     "analysis",
+    "modal",
     "compare",
     "ssp",
     "cosim",

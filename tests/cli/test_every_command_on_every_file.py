@@ -54,6 +54,7 @@ NEEDED = {
     "identify": ["--axis", "Z"],
     "identify-drive": ["--axes", "Z", "--window", "0s..0.5s"],
     "replay": ["--machine", "machines/test_centre"],
+    "identify-modes": ["--machine", "machines/test_centre"],
     "frf": ["--no-measure", "--no-full-model"],
     "circle": ["--feed", "1000 mm/min"],
     "sweep": ["--workers", "1"],

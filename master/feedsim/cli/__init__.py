@@ -31,6 +31,7 @@ from feedsim.cli import (
     frf,
     identify,
     machine,
+    modes,
     pack,
     page,
     replay,
@@ -61,6 +62,7 @@ examples:
   feedsim run identify_z_constant.yaml
   feedsim identify results/identify_z_constant/log.csv --axis Z --machine machines/test_centre
   feedsim identify-drive capture.json --axes X,Y --out results/my_machine
+  feedsim identify-modes bench.mat --machine machines/test_centre --input iq:A --motor theta_m:rad --interval 0.4ms
   feedsim replay capture.json --machine results/my_machine
   feedsim compensate xz_circle.yaml
   feedsim circle ballbar.csv --axes X,Y --radius "150 mm" --feed "1000 mm/min"
@@ -76,8 +78,8 @@ examples:
 
 COMMANDS = (
     example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, replay.IDENTIFY_DRIVE,
-    replay.REPLAY, compensate.COMMAND, circle.COMMAND, show.COMMAND, pack.COMMAND, page.COMMAND, run.SSP, sweep.COMMAND,
-    compare.COMMAND, files.SCHEMA, files.CONVERT, docs.COMMAND,
+    modes.COMMAND, replay.REPLAY, compensate.COMMAND, circle.COMMAND, show.COMMAND, pack.COMMAND, page.COMMAND, run.SSP,
+    sweep.COMMAND, compare.COMMAND, files.SCHEMA, files.CONVERT, docs.COMMAND,
     completion.COMMAND,
 )  # fmt: skip
 

@@ -87,7 +87,7 @@ def _summary(path: Path) -> bool:
 
 _RUN = ("run", "validate", "frf", "compensate", "pack", "page", "ssp", "machine info", "machine show", "machine build",
         "machine pack")  # fmt: skip
-_RECORDS = ("identify", "circle", "show", "compare", "convert", "identify-drive", "replay")
+_RECORDS = ("identify", "circle", "show", "compare", "convert", "identify-drive", "replay", "identify-modes")
 KINDS = (
     Kind("a study", ("sweep", "validate"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),
     Kind("a scenario", _RUN, _keyed({"motions"}, none={"sampling", "parameters"})),
@@ -112,7 +112,7 @@ KINDS = (
     Kind("a unit for simulators (FMU)", (), _ends(".fmu")),
     Kind("a table of modes, which a machine file names", (), _modes),
     Kind("a record", _RECORDS, _table),
-    Kind("a record", ("identify", "convert", "identify-drive", "replay"), _ends(".mat")),
+    Kind("a record", ("identify", "convert", "identify-drive", "replay", "identify-modes"), _ends(".mat")),
     Kind("a record", ("identify-drive", "replay", "identify", "convert"), _capture),
 )
 

@@ -27,7 +27,7 @@ MOVES = "moves.json"  # in it: name -> from where it is moved into the directory
 # away what it does not write itself. Not friction.yaml: scenarios and machine files may name it.
 _OWN_FILE = re.compile(
     rf"{FIGURES}/[\w-]+\.(png|svg|gif)|result\.csv|log\.csv|frf(_measured)?\.csv|(residuals|open_loop|plateaus)\.csv"
-    r"|(uncompensated|feedforward|compensation|replay)\.csv"
+    r"|(uncompensated|feedforward|compensation|replay|response)\.csv"
 )
 
 

@@ -1,0 +1,302 @@
+"""Rigid body, delays and elastic modes in measured frequency responses.
+
+Every response is that of an acceleration to the torque (or current) at the motor:
+
+    G_c(s) = e^(-s tau_c) (a_c s/(s + c) + sum_k b_ck s^2/(s^2 + 2 D_k w_k s + w_k^2))
+
+Poles are common to all outputs: c is viscous friction over inertia, a_c = 1/J for the motor, b_ck the product of the
+mass-normalised mode shape at motor and output (D. Ewins, Modal Testing, 2nd ed., 2000, ch. 2). Least squares of the
+logarithm of model over measurement, magnitude and phase alike, each line with its own standard deviation and with what
+a linear model of a machine with friction is not better than. Modes are added one after the other, each where it takes
+away most; their number is that which predicts lines best that the fit has not seen (cross-validation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from feedsim.errors import InputError
+from feedsim.trace.response import Complexes
+from feedsim.trace.trace import Array
+
+Lines = NDArray[np.int64]
+
+MODEL = 0.05  # 0.4 dB and 3 degrees: what a linear model of an axis with friction is not better than
+FOLDS = 5
+FINAL = 1e-12  # of the cost: the last fit ends there
+BETTER = 0.05  # share of the predicted residual that a further mode has to take away
+MOST_MODES = 5
+LEAST_LINES = 20
+GRID = 80  # frequencies at which a further mode is tried
+TRIED_DAMPING = (0.01, 0.04)
+LOW_D, HIGH_D = 1e-4, 0.7
+LONGEST = 5e-3  # [s] of a delay
+NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Mode:
+    """frequency [Hz], damping ratio [1], with standard deviations; shares: output -> b_ck/|a_motor| [of its unit]."""
+
+    frequency: float
+    damping: float
+    frequency_sigma: float
+    damping_sigma: float
+    residues: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A fit.
+
+    Attributes:
+        outputs: names, the motor first. rigid: output -> a_c. delay: output -> tau_c [s]. friction: c [1/s].
+        modes: by frequency. parameters: (P,) of the model.
+        predicted: number of modes -> rms of the residual, in its standard deviations, of lines that a fit had not seen.
+        rigid_sigma: output -> standard deviation of a_c.
+    """
+
+    outputs: tuple[str, ...]
+    rigid: Mapping[str, float]
+    rigid_sigma: Mapping[str, float]
+    delay: Mapping[str, float]
+    friction: float
+    modes: tuple[Mode, ...]
+    parameters: Array
+    predicted: Mapping[int, float]
+
+    def response(self, output: str, frequency: Array) -> Complexes:
+        """(N,) acceleration over the input."""
+        shape = _Shape(len(self.outputs), len(self.modes))
+        row = shape.model(self.parameters, np.asarray(2j * pi * frequency))[self.outputs.index(output)]
+        return np.asarray(row, dtype=np.complex128)
+
+    def dips(self, output: str, low: float, high: float) -> list[float]:
+        """Antiresonances [Hz]: least magnitudes between two frequencies."""
+        frequency = np.geomspace(low, high, 20000)
+        return extremes(frequency, -np.log(np.abs(self.response(output, frequency))))
+
+
+def extremes(frequency: Array, height: Array) -> list[float]:
+    """Frequencies of the local maxima of `height` [Hz]."""
+    top = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:])) + 1
+    return [float(frequency[k]) for k in top]
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """The order of parameters: ln c, (ln w, ln D) per mode, then per output tau, a, b of every mode."""
+
+    outputs: int
+    modes: int
+
+    def model(self, x: Array, s: Complexes) -> Complexes:
+        """(C, N)"""
+        basis = self.basis(x, s)
+        rows = []
+        for k in range(self.outputs):
+            own = self.of_output(x, k)
+            rows.append(np.exp(-s * own[0]) * (basis @ own[1:]))
+        return np.array(rows)
+
+    def basis(self, x: Array, s: Complexes) -> Complexes:
+        """(N, 1 + modes)"""
+        w, D = np.exp(x[1 : 1 + 2 * self.modes : 2]), np.exp(x[2 : 2 + 2 * self.modes : 2])
+        columns = [s / (s + np.exp(x[0]))]
+        columns += [s**2 / (s**2 + 2 * d * one * s + one**2) for one, d in zip(w, D, strict=True)]
+        return np.array(columns).T
+
+    def slopes(self, x: Array, s: Complexes) -> Complexes:
+        """(C, N, P) derivative of the logarithm of the model."""
+        c, basis = np.exp(x[0]), self.basis(x, s)
+        w, D = np.exp(x[1 : 1 + 2 * self.modes : 2]), np.exp(x[2 : 2 + 2 * self.modes : 2])
+        shapes = [-s * c / (s + c) ** 2]
+        for one, d in zip(w, D, strict=True):
+            below = s**2 + 2 * d * one * s + one**2
+            shapes += [-(s**2) * (2 * d * one * s + 2 * one**2) / below**2, -(s**2) * 2 * d * one * s / below**2]
+        found = np.zeros((self.outputs, len(s), len(x)), dtype=np.complex128)
+        for k in range(self.outputs):
+            own = self.of_output(x, k)
+            G = basis @ own[1:]
+            G = np.where(np.abs(G) > 1e-300, G, 1e-300)
+            first = 1 + 2 * self.modes + k * (2 + self.modes)
+            found[k, :, 0] = own[1] * shapes[0] / G
+            for m in range(self.modes):
+                found[k, :, 1 + 2 * m] = own[2 + m] * shapes[1 + 2 * m] / G
+                found[k, :, 2 + 2 * m] = own[2 + m] * shapes[2 + 2 * m] / G
+            found[k, :, first] = -s
+            found[k, :, first + 1 : first + 2 + self.modes] = basis / G[:, None]
+        return found
+
+    def of_output(self, x: Array, k: int) -> Array:
+        first = 1 + 2 * self.modes + k * (2 + self.modes)
+        return x[first : first + 2 + self.modes]
+
+    def without_residues(self, poles: Array, delays: Array, s: Complexes, G: Complexes, weight: Array) -> Array:
+        """Parameters with the residues by linear least squares of the relative error."""
+        basis = self.basis(poles, s)
+        found = [poles]
+        for k in range(self.outputs):
+            A = basis * (np.exp(-s * delays[k]) * weight[k] / np.abs(G[k]))[:, None]
+            y = G[k] * weight[k] / np.abs(G[k])
+            x = np.linalg.lstsq(np.vstack([A.real, A.imag]), np.concatenate([y.real, y.imag]), rcond=None)[0]
+            found += [delays[k : k + 1], x]
+        return np.concatenate(found)
+
+
+def fitted(
+    frequency: Array, values: Mapping[str, Complexes], relative: Mapping[str, Array], modes: int | None = None
+) -> Fitted:
+    """Fit responses.
+
+    Args:
+        frequency: (N,) [Hz]. values: output -> (N,) acceleration over the input, the motor first. relative: output ->
+            (N,) relative standard deviations. modes: how many; None: as many as predict best.
+
+    Raises InputError: too few lines; a response that is zero.
+    """
+    if len(frequency) < LEAST_LINES:
+        raise InputError(f"{len(frequency)} lines of a frequency response; at least {LEAST_LINES} are needed")
+    names = tuple(values)
+    G = np.array([values[name] for name in names])
+    if not np.all(np.abs(G) > 0):
+        raise InputError("a frequency response is 0 at a line: its logarithm is not told; leave the line out (--band)")
+    weight = 1 / np.hypot(np.array([relative[name] for name in names]), MODEL)
+    problem = _Lines(np.asarray(2j * pi * frequency, dtype=np.complex128), G, weight)
+    every = np.arange(len(frequency), dtype=np.int64)
+    chain = _chain(problem, every, MOST_MODES if modes is None else modes)
+    predicted: dict[int, float] = {}
+    if modes is None:
+        left = np.zeros((len(chain), FOLDS))
+        for fold in range(FOLDS):
+            out = every[fold::FOLDS]
+            seen = np.setdiff1d(every, out)
+            for count, begin in enumerate(chain):
+                x = problem.solved(_Shape(len(names), count), begin, seen)
+                left[count, fold] = np.mean(problem.residual(_Shape(len(names), count), x, out) ** 2)
+        predicted = {count: float(np.sqrt(np.mean(row))) for count, row in enumerate(left)}
+        count = 0
+        for more in range(1, len(chain)):
+            gained = predicted[more] < (1 - BETTER) ** (more - count) * predicted[count]
+            if gained and _physical(_Shape(len(names), more), chain[more]):
+                count = more
+    else:
+        count = len(chain) - 1
+    ended = problem.solved(_Shape(len(names), count), chain[count], every, FINAL)
+    return _of(names, problem, ended, count, predicted)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    s: Complexes
+    G: Complexes
+    weight: Array
+
+    def residual(self, shape: _Shape, x: Array, lines: Lines) -> Array:
+        """(2 C K,) logarithm of model over measurement, in standard deviations."""
+        ratio = shape.model(x, self.s[lines]) / self.G[:, lines]
+        r = np.log(np.where(np.abs(ratio) > 1e-12, ratio, 1e-12)) * self.weight[:, lines]
+        return np.concatenate([r.real.ravel(), r.imag.ravel()])
+
+    def jacobian(self, shape: _Shape, x: Array, lines: Lines) -> Array:
+        """(2 C K, P) of the residual."""
+        J = shape.slopes(x, self.s[lines]) * self.weight[:, lines, None]
+        J = J.reshape(-1, len(x))
+        return np.concatenate([J.real, J.imag])
+
+    def solved(self, shape: _Shape, begin: Array, lines: Lines, tolerance: float = 1e-6) -> Array:
+        """The least squares from `begin`."""
+        low, high = self.bounds(shape)
+        scale = np.maximum(np.abs(begin), 1e-3)
+        scale[: 1 + 2 * shape.modes] = 1.0
+        for k in range(shape.outputs):
+            scale[1 + 2 * shape.modes + k * (2 + shape.modes)] = 1e-3
+        inside = np.clip(begin, low + 1e-9, high - 1e-9)
+        found = least_squares(
+            lambda x: self.residual(shape, x, lines), inside, lambda x: self.jacobian(shape, x, lines),
+            bounds=(low, high), x_scale=scale, xtol=1e-10, ftol=tolerance, max_nfev=60,
+        )  # fmt: skip
+        return np.asarray(found.x)
+
+    def bounds(self, shape: _Shape) -> tuple[Array, Array]:
+        first, last = float(np.abs(self.s[0])), float(np.abs(self.s[-1]))
+        own = [(-LONGEST, LONGEST), *[(-np.inf, np.inf)] * (1 + shape.modes)]
+        ends = [(np.log(1e-3 * first), np.log(10 * first))]
+        ends += [(np.log(first), np.log(last)), (np.log(LOW_D), np.log(HIGH_D))] * shape.modes
+        ends += own * shape.outputs
+        low, high = zip(*ends, strict=True)
+        return np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
+
+
+def _chain(problem: _Lines, lines: Lines, most: int) -> list[Array]:
+    """Fits with 0, 1, ... modes, each begun at the one before and a mode where it takes away most."""
+    outputs = len(problem.G)
+    first = float(np.abs(problem.s[0]))
+    s, G, weight = problem.s[lines], problem.G[:, lines], problem.weight[:, lines]
+    shape = _Shape(outputs, 0)
+    begin = shape.without_residues(np.array([np.log(0.3 * first)]), np.zeros(outputs), s, G, weight)
+    found = [problem.solved(shape, begin, lines)]
+    grid = np.geomspace(1.1 * first, 0.95 * float(np.abs(problem.s[-1])), GRID)
+    for count in range(1, most + 1):
+        before, last = shape, found[-1]
+        shape = _Shape(outputs, count)
+        delays = np.array([before.of_output(last, k)[0] for k in range(outputs)])
+        tried = []
+        for w in grid:
+            for D in TRIED_DAMPING:
+                poles = np.concatenate([last[: 1 + 2 * before.modes], [np.log(w), np.log(D)]])
+                x = shape.without_residues(poles, delays, s, G, weight)
+                off = (shape.model(x, s) - G) / np.abs(G) * weight
+                tried.append((float(np.sum(np.abs(off) ** 2)), x))
+        tried.sort(key=lambda each: each[0])
+        ends = [problem.solved(shape, x, lines) for _, x in (tried[0], tried[len(TRIED_DAMPING) * 4])]
+        costs = [float(np.sum(problem.residual(shape, x, lines) ** 2)) for x in ends]
+        found.append(ends[int(np.argmin(costs))])
+    return found
+
+
+def _physical(shape: _Shape, x: Array) -> bool:
+    """Whether all modes may be those of a structure: damped, with the motor, which is pushed where it is measured, and
+    no two within their half-power widths, which are one mode that the model does not quite meet."""
+    w, D = np.exp(x[1 : 1 + 2 * shape.modes : 2]), np.exp(x[2 : 2 + 2 * shape.modes : 2])
+    order = np.argsort(w)
+    w, D = w[order], D[order]
+    motor = shape.of_output(x, 0)
+    return bool(
+        np.all(np.diff(w) > (D * w)[1:] + (D * w)[:-1]) and np.all(D > 1.1 * LOW_D) and np.all(motor[2:] * motor[1] > 0)
+    )
+
+
+def _of(names: tuple[str, ...], problem: _Lines, x: Array, count: int, predicted: Mapping[int, float]) -> Fitted:
+    shape = _Shape(len(names), count)
+    lines = np.arange(len(problem.s), dtype=np.int64)
+    r = problem.residual(shape, x, lines)
+    J = problem.jacobian(shape, x, lines)
+    scale = np.linalg.norm(J, axis=0) + 1e-300
+    inverse = np.linalg.pinv((J / scale).T @ (J / scale), hermitian=True)
+    # What lines leave may be less than what a linear model is not better than: intervals are not told by it then.
+    variance = max(float(r @ r) / max(len(r) - len(x), 1), 1.0)
+    sigma = np.sqrt(np.maximum(np.diag(inverse) * variance, 0.0)) / scale
+    modes = []
+    for k in range(count):
+        f, D = float(np.exp(x[1 + 2 * k])) / (2 * pi), float(np.exp(x[2 + 2 * k]))
+        residues = {name: float(shape.of_output(x, c)[2 + k]) for c, name in enumerate(names)}
+        modes.append(Mode(f, D, f * float(sigma[1 + 2 * k]), D * float(sigma[2 + 2 * k]), residues))
+    own = {name: shape.of_output(x, c) for c, name in enumerate(names)}
+    own_sigma = {name: shape.of_output(sigma, c) for c, name in enumerate(names)}
+    return Fitted(
+        names,
+        {name: float(each[1]) for name, each in own.items()},
+        {name: float(each[1]) for name, each in own_sigma.items()},
+        {name: float(each[0]) for name, each in own.items()},
+        float(np.exp(x[0])),
+        tuple(sorted(modes, key=lambda mode: mode.frequency)),
+        x,
+        predicted,
+    )

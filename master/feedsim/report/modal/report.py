@@ -1,0 +1,222 @@
+"""modes.csv, response.csv (measured, fitted), summary.json, report.html and figures of identified modes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feedsim.analysis import Figure
+from feedsim.findings import Note
+from feedsim.modal.identified import MOTOR, AxisModes
+from feedsim.modal.rational import NORMAL_95
+from feedsim.report.chart import Axis, Chart, Curve, Panel
+from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, tile_value
+from feedsim.report.formatting import minus, typeset
+from feedsim.report.picture import Picture
+from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
+from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.sections import figures_footer, figures_section, provenance_section
+from feedsim.report.style import BLUE, MUTED, VERMILLION, Array, remarked
+from feedsim.scenario import Subject
+from feedsim.structure.modes import write_modes
+from feedsim.trace.response import Complexes, FrequencyResponse
+from feedsim.trace.response_files import write_response
+
+MODES, CURVES = "modes.csv", "response.csv"
+KIND = "identify-modes"
+
+
+@dataclass(frozen=True, eq=False)
+class ModesReport:
+    """What was identified, and what it rests on."""
+
+    found: AxisModes
+    file: Path
+    subject: Subject
+    settings: Mapping[str, str]
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """By name."""
+        found, axis = self.found, self.found.axis
+        fit = found.fit
+        figures: dict[str, Figure] = {}
+        for k, (own, measured) in enumerate(found.dips, 1):
+            figures[f"{axis}.antiresonance_{k}"] = Figure(own, "Hz", "least response of the motor: of the fit")
+            figures[f"{axis}.antiresonance_{k}_measured"] = Figure(
+                measured, "Hz", "least response of the motor: of the measured lines"
+            )
+        for k, (own, measured) in enumerate(found.peaks, 1):
+            figures[f"{axis}.resonance_{k}"] = Figure(own, "Hz", "largest response of the motor: of the fit")
+            figures[f"{axis}.resonance_{k}_measured"] = Figure(
+                measured, "Hz", "largest response of the motor: of the measured lines"
+            )
+        if found.ratios is not None:
+            told = "inertia behind the first mode over that of the motor, (resonance/antiresonance)^2 - 1"
+            for key, ratio, of in zip(
+                ("ratio", "ratio_measured"), found.ratios, ("fit", "measured lines"), strict=True
+            ):
+                figures[f"{axis}.{key}"] = Figure(ratio, "1", f"{told}: of the {of}")
+        per = f"(rad/s^2)/({found.measured.input_unit})"
+        figures[f"{axis}.rigid"] = Figure(abs(fit.rigid[MOTOR]), per, "acceleration of the motor in rigid motion")
+        for name, delay in fit.delay.items():
+            figures[f"{axis}.{name}_delay"] = Figure(1e3 * delay, "ms", f"delay of the {name} behind the input")
+        for name, (decibel, degrees) in found.left.items():
+            figures[f"{axis}.{name}_magnitude_left"] = Figure(
+                decibel, "dB", f"{name}: 90 % of the lines are within this of the fit"
+            )
+            figures[f"{axis}.{name}_phase_left"] = Figure(
+                degrees, "deg", f"{name}: 90 % of the lines are within this of the fit"
+            )
+        return figures
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should know."""
+        return [*self.found.warnings, *(Note(text) for text in self.found.notes)]
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """OutputError unless the results can be written to a directory without an input being lost."""
+    check_place(directory, (MODES, CURVES, REPORT, SUMMARY), inputs, kind=KIND)
+
+
+def write(report: ModesReport, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
+    """Write all files; returns the paths. Raises OutputError."""
+    found = report.found
+    columns: dict[str, Complexes] = {}
+    units: dict[str, str] = {}
+    for name, values in found.measured.values.items():
+        unit = f"({'m' if found.measured.linear[name] else 'rad'}/s^2)/({found.measured.input_unit})"
+        columns |= {f"{name}": values, f"{name} fit": found.fit.response(name, found.measured.frequency)}
+        units |= {f"{name}": unit, f"{name} fit": unit}
+    response = FrequencyResponse(found.measured.frequency, columns, units)
+    files = {MODES: partial(write_modes, modes=found.table), CURVES: partial(write_response, response=response)}
+    return write_report(directory, report_of(report), partial(summary, report), files, drawn, kind=KIND)
+
+
+def report_of(report: ModesReport) -> Report:
+    """Content of the report."""
+    found = report.found
+    with remarked(f"{report.file.name}, axis {found.axis} of {report.subject.machine.name}"):
+        pictures = [_bode(found)]
+    rows: list[tuple[Text, ...]] = [
+        (f"{mode.frequency:.4g}", f"{NORMAL_95 * mode.frequency_sigma:.2g}", f"{100 * mode.damping:.3g}",
+         f"{100 * NORMAL_95 * mode.damping_sigma:.2g}",
+         *(minus(f"{mode.residues[name] / found.fit.rigid[name]:.3g}") for name in found.fit.outputs))
+        for mode in found.fit.modes
+    ]  # fmt: skip
+    heads = ("Frequency [Hz]", "±, 95 %", "Damping [%]", "±, 95 %", *(f"Share of {n}" for n in found.fit.outputs))
+    tables: list[Section] = [Section("Modes", [
+        Paragraph("Share: residue of the mode over that of the rigid motion; of the motor it is the square of the "
+                  "relative mode shape."), Table("r" * len(heads), heads, rows)])]  # fmt: skip
+    if found.fit.predicted:
+        chosen = len(found.fit.modes)
+        tables.append(Section("Number of modes", [
+            Paragraph("Rms of what lines leave, in their standard deviations, that a fit to the other lines predicts."),
+            Table("rrl", ("Modes", "Left of unseen lines", ""),
+                  [(str(k), f"{left:.3g}", "taken" if k == chosen else "")
+                   for k, left in found.fit.predicted.items()])]))  # fmt: skip
+    return Report(
+        f"Modes of {found.axis}",
+        f"identified from {report.file.name}",
+        warnings=report.warnings,
+        notes=[note for note in report.subject.notes if note],
+        answer=answers(report),
+        tiles=[
+            Tile(tile_value(figure), name.partition(".")[2].replace("_", " "), typeset(figure.meaning))
+            for name, figure in report.figures.items()
+            if name.endswith(("resonance_1", "ratio"))
+        ],
+        main=[*pictures, *tables, figures_section(report.figures)],
+        provenance=provenance_section([("Response", report.file.name), ("Estimate", found.measured.method)],
+                                      hashed(_files(report))),
+        footer=figures_footer(f"Values in full precision: summary.json; what machines take: {MODES}.",
+                              "docs/identification.md"),
+    )  # fmt: skip
+
+
+def _bode(found: AxisModes) -> Picture:
+    """Measured lines, the fit, and the machine's own response."""
+    frequency = found.measured.frequency
+    panels = []
+    scale = abs(found.fit.rigid[MOTOR]) if found.measured.input_unit != "N.m" else 0.0
+
+    def curves(name: str, of: Any) -> list[Curve]:
+        own = found.own[name]
+        # Over a current, the machine's torque has the scale of the rigid motion.
+        factor = scale / np.abs(found.own[MOTOR][0]) if scale else 1.0
+        sign = np.sign(found.fit.rigid[name]) or 1.0
+        return [
+            Curve("measured", frequency, of(found.measured.values[name]), MUTED, dots=True, width=2.0),
+            Curve("fit", frequency, of(found.fit.response(name, frequency)), BLUE),
+            Curve("machine", frequency, of(own * factor * sign), VERMILLION),
+        ]
+
+    def decibel(values: Any) -> Array:
+        return np.asarray(20 * np.log10(np.maximum(np.abs(values), 1e-300)), dtype=np.float64)
+
+    def phase(values: Any) -> Array:
+        return np.asarray(np.degrees(np.unwrap(np.angle(values))), dtype=np.float64)
+
+    axis = Axis("frequency", "Hz", log=True)
+    for name in found.fit.outputs:
+        panels.append(Panel(f"{name}: acceleration over the input", axis, Axis("magnitude", "dB"),
+                            curves(name, decibel), linked="f"))  # fmt: skip
+        panels.append(Panel(f"{name}: phase", axis, Axis("phase", "°"), curves(name, phase), linked="f", height=0.8))
+    caption = "Measured lines, a rigid body with modes and delays, and the machine's structure without delays."
+    return Picture(f"modes-{found.axis}", f"Axis {found.axis}: measured, fitted and of the machine", caption,
+                   Chart(panels))  # fmt: skip
+
+
+def _files(report: ModesReport) -> list[tuple[str, Path]]:
+    return [("response", report.file), *report.subject.files]
+
+
+def summary(report: ModesReport, files: Sequence[str]) -> dict[str, Any]:
+    """Content of summary.json."""
+    found = report.found
+    return {
+        "kind": "modes",
+        "answer": answers(report),
+        "settings": dict(report.settings),
+        "axis": found.axis,
+        "modes": [
+            {
+                "frequency": {"value": mode.frequency, "unit": "Hz", "sigma": finite(mode.frequency_sigma)},
+                "damping": {"value": mode.damping, "unit": "1", "sigma": finite(mode.damping_sigma)},
+                "shares": {name: mode.residues[name] / found.fit.rigid[name] for name in found.fit.outputs},
+            }
+            for mode in found.fit.modes
+        ],
+        "predicted": {str(count): left for count, left in found.fit.predicted.items()},
+        "figures": figures_part(report.figures),
+        "software": software(),
+        "inputs": inputs_part(hashed(_files(report))),
+        "files": list(files),
+    }
+
+
+def answers(report: ModesReport) -> list[str]:
+    """What was found, and how near it is."""
+    found = report.found
+    modes = ", ".join(f"{m.frequency:.4g} Hz ({100 * m.damping:.2g} %)" for m in found.fit.modes) or "no mode"
+    left = "; ".join(f"{name}: {db:.2g} dB and {deg:.2g} degrees" for name, (db, deg) in found.left.items())
+    return [
+        f"{found.axis}: rigid body with {modes} of damping. 90 % of the lines are met within {left}.",
+        f"Estimate: {found.measured.method}, {len(found.measured.frequency)} lines.",
+        f"{MODES} is the machine's table with these modes in place of its elastic ones; other axes are rigid in it.",
+    ]
+
+
+def summary_lines(report: ModesReport, directory: Path) -> list[str]:
+    """For the terminal."""
+    lines = [f"modes of {report.found.axis} from {report.file.name} -> {directory / REPORT}"]
+    lines += [f"  {line}" for line in answers(report)]
+    lines += [f"    {name:<34} {figure}" for name, figure in report.figures.items()]
+    return lines

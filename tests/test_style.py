@@ -25,7 +25,6 @@ NOT_YET = {
     "docs/effects.md",
     "docs/identification.md",
     "docs/page.md",
-    "docs/performance.md",
     "docs/real-machine.md",
     "docs/replay.md",
     "docs/reports.md",

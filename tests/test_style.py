@@ -23,7 +23,6 @@ NOT_YET = {
     "SECURITY.md",
     "docs/architecture.md",
     "docs/effects.md",
-    "docs/identification.md",
     "docs/page.md",
     "docs/real-machine.md",
     "docs/replay.md",

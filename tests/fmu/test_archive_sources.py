@@ -195,3 +195,17 @@ def test_another_machine_needs_no_compiler(plant: Archive, tmp_path: Path) -> No
             slave.getReal([len(described)])  # there is no second axis
     finally:
         slave.freeInstance()
+
+
+def test_staged_sources_that_are_also_another_folders_stay_as_they_are_there(tmp_path: Path) -> None:
+    """A copy of a build folder by hard links, as of a whole checkout: a build here does not write into the other."""
+    loaded = build.load(build.unit_directory("friction"), toolchain.find_compiler())
+    there, here = tmp_path / "there", tmp_path / "here"
+    for folder in (there, here):
+        folder.mkdir()
+    for name in loaded.sources:
+        (there / name).write_text("another version")
+        (here / name).hardlink_to(there / name)
+    build._stage(loaded, here)
+    assert {name: (here / name).read_bytes() for name in loaded.sources} == dict(loaded.sources)
+    assert {(there / name).read_text() for name in loaded.sources} == {"another version"}

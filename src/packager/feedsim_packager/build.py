@@ -209,8 +209,8 @@ def _references(unit: Unit) -> dict[str, bytes]:
 def _stage(unit: Unit, sources: Path) -> None:
     sources.mkdir(parents=True, exist_ok=True)
     for path in sources.iterdir():
-        if path.name not in unit.sources and path.suffix in (".c", ".h", ".def"):
-            path.unlink()  # left from an earlier build; it would be found by #include
+        if path.name in unit.sources or path.suffix in (".c", ".h", ".def"):
+            path.unlink()  # of an earlier build: it would be found by #include, or be the same file as another's copy
     for file_name, content in unit.sources.items():
         (sources / file_name).write_bytes(content)
 

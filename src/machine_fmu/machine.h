@@ -31,7 +31,7 @@ extern const Scheme machine_schemes[SCHEMES]; /* in the order of the parameter c
 typedef struct Machine {
     size_t axes;
     bool warned;             /* of held setpoints */
-    bool warned_far;         /* of setpoints that begin elsewhere than the axes stand */
+    bool warned_far[2];      /* of setpoints that begin elsewhere than the axes stand: at a later release, at first */
     bool has_motion;         /* the archive holds one */
     Part plant, motion;      /* motion: has_motion alone */
     Part *drives, *contacts; /* [axes] */

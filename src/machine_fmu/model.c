@@ -29,7 +29,7 @@ static void machine_start(Unit *unit) {
     machine_bind(unit, true);
     machine_head(unit)->end = machine_state_size(unit);
     machine_head(unit)->share = 1;
-    machine->warned_far = false;
+    machine->warned_far[false] = machine->warned_far[true] = false;
     if (machine->has_motion) {
         setpoint_part.start(&machine->motion);
     }
@@ -183,30 +183,47 @@ static void warn_of_held(Unit *unit, Machine *machine, double h) {
 }
 
 /* Setpoints that begin so far from the axis that the speed controller's gain alone takes it to its torque limit: mostly
- * an input that nothing is connected to, or a pose that is another one here than there. */
-static bool begins_far(const AxisBlock *axis) {
-    const double step = axis->drive_K_p * axis->drive_K_v * (axis->x_s - axis->drive_x_a) / axis->drive_I_P;
-    return axis->release && fabs(step) > axis->drive_M_max;
+ * an input that nothing is connected to, or a pose that is another one here than there; at a later release, setpoints
+ * that went on without the axis. */
+static double setpoint_of(Unit *unit, const AxisBlock *axis) {
+    return unit_scalars(unit)->motion_built_in ? axis->motion_x_s : axis->x_s;
 }
 
-static void warn_of_far(Unit *unit, Machine *machine) {
+static bool begins_far(Unit *unit, const AxisBlock *axis, bool first) {
+    const double step = axis->drive_K_p * axis->drive_K_v * (setpoint_of(unit, axis) - axis->drive_x_a);
+    const bool begins = axis->release && (first || !axis->drive_release);
+    return begins && fabs(step / axis->drive_I_P) > axis->drive_M_max;
+}
+
+static void warn_of_far(Unit *unit, Machine *machine, bool first) {
     char axes[FAR_TEXT_SIZE] = "", text[2][NUMBER_TEXT_SIZE];
     size_t at = 0;
     for (size_t i = 0; i < machine->axes && at < sizeof axes; i++) {
         const AxisBlock *axis = unit_axis(unit, i);
-        if (begins_far(axis)) {
-            at += (size_t)snprintf(axes + at, sizeof axes - at, "%s'%s.x_s' is %s m and the axis stands at %s m",
-                                   at > 0 ? ", " : "", unit_axis_name(unit, i), number_text(text[0], axis->x_s),
-                                   number_text(text[1], axis->drive_x_a));
+        if (begins_far(unit, axis, first)) {
+            const char *input = unit_scalars(unit)->motion_built_in ? "motion.x_s" : "x_s";
+            at +=
+                (size_t)snprintf(axes + at, sizeof axes - at, "%s'%s.%s' is %s m and the axis stands at %s m",
+                                 at > 0 ? ", " : "", unit_axis_name(unit, i), input,
+                                 number_text(text[0], setpoint_of(unit, axis)), number_text(text[1], axis->drive_x_a));
         }
     }
-    if (at > 0 && !machine->warned_far) {
+    if (at == 0 || machine->warned_far[first]) {
+        return;
+    }
+    machine->warned_far[first] = true;
+    if (first) {
         unit_warn(
             unit,
             "the first setpoints are far from the axes: %s; the drives go there at their torque limits. Setpoints "
             "begin where the axes stand, which is also the inputs' start value; or set the pose (x_0)",
             axes);
-        machine->warned_far = true;
+    } else {
+        unit_warn(
+            unit,
+            "setpoints are far from the axes when these are released: %s; the drives go there at their torque limits. "
+            "Let setpoints begin where the axes stand at that time",
+            axes);
     }
 }
 
@@ -282,9 +299,7 @@ static bool machine_step(Unit *unit, double t, double h) {
         return false;
     }
     warn_of_held(unit, machine, h);
-    if (head->cycle == 0 && !unit_scalars(unit)->motion_built_in) {
-        warn_of_far(unit, machine);
-    }
+    warn_of_far(unit, machine, head->cycle == 0);
     begin_extremes(unit, machine);
     const int64_t first = head->cycle;
     while (t_k < last) {

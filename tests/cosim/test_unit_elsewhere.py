@@ -4,6 +4,7 @@ behind a control instant, saved states that somebody made up."""
 from __future__ import annotations
 
 import itertools
+import re
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -98,6 +99,66 @@ def test_an_axis_without_release_is_not_told_of(machine: Packed, tmp_path: Path)
     unit.slave.setBoolean([unit.references["Z.release"]], [False])
     unit.step_to(1e-3)
     assert not said
+    unit.close()
+
+
+def test_setpoints_far_at_a_later_release_are_told_once(machine: Packed, tmp_path: Path) -> None:
+    """A control that goes on while the drive is off. The axis stands: what it coasts is nothing to 50 mm."""
+    said: list[str] = []
+    unit = Unit(machine, tmp_path / "unit", said)
+    outside(unit, {})
+    release = [unit.references["Z.release"]]
+    unit.slave.setBoolean(release, [False])
+    unit.step_to(1e-3)
+    unit.set({"Z.x_s": 0.15})
+    unit.step_to(2e-3)
+    assert not said
+    unit.slave.setBoolean(release, [True])
+    unit.step_to(3e-3)
+    (told,) = said
+    assert "released: 'Z.x_s' is 0.15 m and the axis stands at 0.1" in told
+    for k, value in enumerate([False, True, False, True]):
+        unit.slave.setBoolean(release, [value])
+        unit.set({"Z.x_s": 0.0})
+        unit.step_to((4 + k) * 1e-3)
+    assert len(said) == 1
+    unit.close()
+
+
+def test_setpoints_that_wait_for_the_release_are_not_told_of(machine: Packed, tmp_path: Path) -> None:
+    said: list[str] = []
+    unit = Unit(machine, tmp_path / "unit", said)
+    outside(unit, {})
+    release = [unit.references["Z.release"]]
+    for k, value in enumerate([False, True, False, True]):
+        unit.slave.setBoolean(release, [value])
+        unit.step_to((1 + k) * 1e-3)
+    assert not said
+    unit.close()
+
+
+def test_a_motion_inside_that_went_on_is_told_of_at_the_release(z_move: Packed, tmp_path: Path) -> None:
+    said: list[str] = []
+    unit = Unit(z_move, tmp_path / "unit", said)
+    release = [unit.references["Z.release"]]
+    unit.slave.setBoolean(release, [False])
+    unit.step_to(1.5)  # the move is over
+    unit.slave.setBoolean(release, [True])
+    unit.step_to(1.51)
+    (told,) = said
+    where = re.search(r"released: 'Z\.motion\.x_s' is (\S+) m and the axis stands at (\S+) m", told)
+    assert where is not None
+    assert [float(where[1]), float(where[2])] == pytest.approx([0.2, 0.1], abs=1e-6)
+    unit.close()
+
+
+def test_a_new_initialisation_is_told_of_again(machine: Packed, tmp_path: Path) -> None:
+    said: list[str] = []
+    unit = Unit(machine, tmp_path / "unit", said)
+    for again in (1, 2):
+        outside(unit, {"Z.x_s": 0.0})
+        unit.step_to(1e-3)
+        assert len(said) == again
     unit.close()
 
 

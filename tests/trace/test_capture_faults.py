@@ -14,7 +14,7 @@ from capture_helpers import CYCLE, ROWS, SIGNALS, axis_signals, content
 from feedsim.errors import InputError
 from feedsim.files.columns import Columns
 from feedsim.identify import read_records
-from feedsim.trace import read_recording
+from feedsim.trace import capture, json_stream, read_recording
 from feedsim.trace.recording import Recording
 
 Signals = dict[str, Any]
@@ -238,6 +238,53 @@ def test_a_file_takes_the_memory_of_its_numbers(tmp_path: Path) -> None:
     # Numbers, up to as much again of columns by themselves while pitch is looked for, and the text of a piece in hand.
     assert peak < 4 * numbers + 12e6
     assert numbers > 0.6e6
+
+
+def test_more_numbers_than_are_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file of a gigabyte and a half, in small."""
+    path = written(tmp_path, noisy())
+    width = len(SIGNALS) + 1
+    monkeypatch.setattr(capture, "MOST_NUMBERS", ROWS * width)
+    read_recording(path)
+    monkeypatch.setattr(capture, "MOST_NUMBERS", ROWS * width - 1)
+    with pytest.raises(InputError, match=rf"row {ROWS}: more than [\d,]+ numbers, rows of {width} signals; allowed: "):
+        read_recording(path)
+
+
+def test_more_blocks_than_are_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = content({"X1|1": noisy()})
+    data["Payload"] = [message for message in data["Payload"] if "HFData" in message]
+    data["Payload"] += [{"HFBlockEvent": {"HFProbeCounter": k, "GCode": "G1 X1"}} for k in range(3)]
+    path = tmp_path / "capture.json"
+    path.write_text(json.dumps(data))
+    monkeypatch.setattr(capture, "MOST_BLOCKS", 3)
+    assert len(capture.read_capture(path).marks) == 3
+    monkeypatch.setattr(capture, "MOST_BLOCKS", 2)
+    with pytest.raises(InputError, match="more than 2 NC blocks"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize("counter", [10**400, -(10**400), float("nan"), float("inf"), "7", None])
+def test_a_block_without_a_place_is_left_out(tmp_path: Path, counter: object) -> None:
+    data = content({"X1|1": noisy()})
+    data["Payload"] = [message for message in data["Payload"] if "HFData" in message]
+    data["Payload"] += [{"HFBlockEvent": {"HFProbeCounter": at, "GCode": "G1 X1"}} for at in (counter, 12)]
+    path = tmp_path / "capture.json"
+    path.write_text(json.dumps(data))
+    assert len(capture.read_capture(path).marks) == 1
+
+
+@pytest.mark.parametrize("key", ["Header", "Notes"])
+def test_a_value_that_does_not_end_is_not_taken_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str
+) -> None:
+    """What is no row is read as a whole, up to a length: a list of numbers outside Payload fills no memory."""
+    path = tmp_path / "capture.json"
+    path.write_text(json.dumps(content({"X1|1": noisy()}) | {key: [0.125] * 100_000}))
+    monkeypatch.setattr(json_stream, "CHUNK", 1 << 10)
+    monkeypatch.setattr(json_stream, "LONGEST", 1 << 14)
+    with pytest.raises(InputError, match=r"the value at character \d+ does not end within 16,384 characters"):
+        read_recording(path)
 
 
 def test_a_position_that_jumps(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ A file holds a header with the list of signals, and a payload of messages: rows 
 such as NC blocks ("HFBlockEvent"). A counter of cycles is the clock of both. Signals are called NAME|n,
 n being the control's number of the axis. The header tells neither units nor directions nor pitches. Units are those
 that the signals have on such controls, held against the data; pitch and direction: capture_axes.py. Rows are read one
-by one (json_stream.py), so that a file takes the memory of its numbers.
+by one (json_stream.py), so that a file takes the memory of its numbers, and no more than MOST_NUMBERS of them.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ from feedsim.trace.trace import LARGEST, Array, recorded
 SUFFIX = ".json"
 COUNTER = "CYCLE"
 LONGEST_NAME, MOST_SHOWN = 200, 60  # characters: of a name; of a cell in a message
+# 1.1 GB as numbers, in memory twice while they are sorted into columns; a file of some 1.3 GB.
+MOST_NUMBERS, MOST_BLOCKS = 1 << 27, 1_000_000
 LENGTHS = {"DES_POS": "mm", "ENC_POS": "mm", "ENC1_POS": "mm", "ENC2_POS": "mm", "CONT_DEV": "mm",
            "VEL_FFW": "mm/s", "CMD_SPEED": "mm/s"}  # fmt: skip
 OTHERS = {"TORQUE": "N.m", "TORQUE_FFW": "N.m", "CURRENT": "A", "POWER": "W", "LOAD": "%"}
@@ -64,7 +66,7 @@ class _Content:
     width: int | None = None
     rows: int = 0
     cells: array[float] = field(default_factory=lambda: array("d"))
-    events: list[Mapping[str, Any]] = field(default_factory=list)
+    blocks: list[tuple[float, str]] = field(default_factory=list)  # counter and text of NC blocks
 
 
 def read_capture(path: Path) -> Capture:
@@ -96,7 +98,7 @@ def read_capture(path: Path) -> Capture:
     columns |= {name: values[:, k] for k, name in enumerate(names) if name != COUNTER}
     axes = axes_of(_axes(content.header or {}), columns)
     by_number = {axis.number: axis for axis in axes}
-    marks = tuple(_marks(content.events, counter[0], interval))
+    marks = tuple(Mark((at - float(counter[0])) * interval, text) for at, text in content.blocks)
     units = {name: _unit(name, columns, by_number) for name in columns if name != "time"}
     return Capture(columns, {"time": "s"} | units, axes, marks)
 
@@ -156,7 +158,7 @@ def _message(stream: JsonStream, found: _Content, number: int) -> None:
         else:
             value = stream.value()
             if key == "HFBlockEvent" and isinstance(value, dict):
-                found.events.append(value)
+                _event(found, value)
 
 
 def _row(found: _Content, row: object) -> None:
@@ -165,6 +167,11 @@ def _row(found: _Content, row: object) -> None:
         raise _of_length(found, found.rows, f"{len(row)} values" if isinstance(row, list) else "no list")
     found.width = len(row)
     found.rows += 1
+    if len(found.cells) + len(row) > MOST_NUMBERS:
+        raise InputError(
+            f"{found.path}, row {found.rows}: more than {MOST_NUMBERS:,} numbers, rows of {found.width} signals; "
+            f"allowed: up to that ({8e-9 * MOST_NUMBERS:.1f} GB in memory). Record fewer signals or less time"
+        )
     try:
         found.cells.extend(row)
     except (TypeError, OverflowError):
@@ -175,6 +182,14 @@ def _row(found: _Content, row: object) -> None:
                 if isinstance(cell, int) and not isinstance(cell, bool):
                     fault = f"; allowed: up to {LARGEST:g}"
                 raise InputError(f"{found.path}, row {found.rows}: {name} is {_shown(cell)}{fault}") from None
+
+
+def _event(found: _Content, event: Mapping[str, Any]) -> None:
+    at, block = event.get("HFProbeCounter"), event.get("GCode")
+    if isinstance(at, (int, float)) and abs(at) <= LARGEST and isinstance(block, str):
+        if len(found.blocks) == MOST_BLOCKS:
+            raise InputError(f"{found.path}: more than {MOST_BLOCKS:,} NC blocks; allowed: up to that")
+        found.blocks.append((float(at), block.strip()))
 
 
 def _of_length(found: _Content, row: int, there: str) -> InputError:
@@ -253,12 +268,3 @@ def _per_second(columns: Mapping[str, Array], signal: str, number: str) -> bool:
     speed = columns[f"{signal}|{number}"]
     moved = float(slope @ slope)
     return not moved or 0.5 < float(speed @ slope) / moved < 2.0
-
-
-def _marks(events: Sequence[Mapping[str, Any]], first: float, interval: float) -> list[Mark]:
-    marks = []
-    for event in events:
-        at, block = event.get("HFProbeCounter"), event.get("GCode")
-        if isinstance(at, (int, float)) and isinstance(block, str):
-            marks.append(Mark(float((at - first) * interval), block.strip()))
-    return marks

@@ -14,6 +14,7 @@ from typing import Any, TextIO
 from feedsim.errors import InputError
 
 CHUNK = 1 << 20  # characters
+LONGEST = 1 << 26  # characters of a value that is taken whole
 _BLANK = re.compile(r"[ \t\n\r]*")
 
 
@@ -62,6 +63,11 @@ class JsonStream:
             try:
                 value, end = self._decode(self._buffer, self._at)
             except json.JSONDecodeError:
+                if len(self._buffer) - self._at > LONGEST:
+                    raise InputError(
+                        f"{self._path} is no JSON file that can be read: the value at character "
+                        f"{self._before + self._at} does not end within {LONGEST:,} characters"
+                    ) from None
                 if self._fill():
                     self._chunk *= 2  # a long value, which is scanned again
                     continue

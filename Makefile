@@ -188,8 +188,8 @@ test-platforms: $(ALL_FMUS) $(VARIABLES) $(VENV)/.dev ## the FMUs of all platfor
 
 # Other people's simulators and validators. What cannot be installed is skipped; the summary at the end says what and why.
 # Java and Maven are the machine's: nothing is installed outside this folder here (CONTRIBUTING.md says how).
-test-importers: fmus $(VENV)/.importers ## the units in other simulators, three validators (Java, Maven: CONTRIBUTING)
-	$(PY) tests/importers/install.py $(BUILD)/importers
+test-importers: fmus $(VENV)/.importers ## the units in other simulators, three validators (Java, Maven, cargo: CONTRIBUTING)
+	$(PY) tests/importers/install.py --rust $(BUILD)/importers
 	FEEDSIM_IMPORTERS=$(BUILD)/importers $(PY) -m pytest tests/importers
 
 schemas: $(VENV)/.run $(VARIABLES) ## write the JSON Schemas of scenarios/schemas anew, for editors

@@ -83,6 +83,22 @@ def _without_units(table: Path, bare: Path) -> Path:
     return bare
 
 
+def with_enumerations(controller: Path, changed: Path) -> Path:
+    """The archive with the types of the filters as FMI enumerations; its library is the same."""
+    items = "".join(f'<Item name="{name}" value="{i}"/>' for i, name in enumerate(("off", "second_order", "low_pass")))
+    declared = f'<SimpleType name="FilterType"><Enumeration>{items}</Enumeration></SimpleType></TypeDefinitions>'
+    with ZipFile(controller) as given, ZipFile(changed, "w", ZIP_DEFLATED) as taken:
+        for name in given.namelist():
+            content = given.read(name)
+            if name == "modelDescription.xml":
+                pattern = rb'(name="filter_\d\.type"[^>]*>\s*)<Integer( [^>]*/>)'
+                content, found = re.subn(pattern, rb'\1<Enumeration declaredType="FilterType"\2', content)
+                assert found == 4
+                content = content.replace(b"</TypeDefinitions>", declared.encode())
+            taken.writestr(name, content)
+    return changed
+
+
 def with_table(case: Case, fmus: Path, folder: Path) -> System:
     """The unit, driven by the unit that plays a table: two columns of the table per axis of it, whatever they mean."""
     signals, names = _signals(), list(dict.fromkeys(case.inputs.values()))

@@ -1,10 +1,11 @@
-"""Fetch what `make test-importers` needs beyond pip: Maestro and VDMCheck2 (by Maven), into FOLDER.
+"""Fetch what `make test-importers` needs beyond pip, into FOLDER: Maestro and VDMCheck2 by Maven, fmi-sim and
+fmu-runner by cargo.
 
-    python tests/importers/install.py [--system] FOLDER
+    python tests/importers/install.py [--system] [--rust] FOLDER
 
-Java and Maven must be there. With --system they are installed first where they are not (apt, as root); without it
-nothing is installed on the machine itself. What cannot be had is said, and is no failure: its tests are skipped with
-the reason.
+Java and Maven must be there, and cargo for --rust, which takes minutes. With --system Java and Maven are installed
+first where they are not (apt, as root); without it nothing is installed on the machine itself. What is missing is said,
+and is no failure: its tests are skipped with the reason.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 POM = Path(__file__).with_name("pom.xml")
+JAVA = "Maestro and VDMCheck2"
 MAESTRO = "maestro-3.1.1-jar-with-dependencies.jar"
 # VDMCheck2 looks for its parts beside itself, under names without versions.
 VDMCHECK = ("vdmcheck2-1.1.3", "vdmj-4.5.0", "annotations-4.5.0", "xsd2vdm-1.1.3", "fmuReader-1.1.3")
@@ -27,35 +29,65 @@ UNPACKED = {
     "static-model-1.1.3": "fmi2-static-model/",
     "vdmcheck2-1.1.3": "fmi2schema/",
 }
+# What cargo builds, and how. Without optimisation: they are built once and run for seconds.
+RUST = {
+    "fmi-sim": ("fmi-sim", "--version", "0.7.0", "--locked"),
+    "fmu-runner-program": ("--path", str(Path(__file__).with_name("rust"))),
+}
+LONGEST = 900  # s; fmi-sim, with 150 crates, takes minutes
 PACKAGES = {"java": "default-jre-headless", "mvn": "maven"}
 
 
 def main(words: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(description="Fetch Maestro and VDMCheck2, for make test-importers.")
+    parser = argparse.ArgumentParser(description="Fetch what make test-importers needs beyond pip.")
     parser.add_argument("--system", action="store_true", help="install Java and Maven too, with apt, as root")
+    parser.add_argument("--rust", action="store_true", help="build fmi-sim and fmu-runner too, with cargo")
     parser.add_argument("folder", type=Path, metavar="FOLDER")
     options = parser.parse_args(words)
-    return fetch(options.folder, system=options.system)
+    fetch(options.folder, system=options.system)
+    if options.rust:
+        build(options.folder / "cargo")
+    return 0
 
 
-def fetch(folder: Path, *, system: bool) -> int:
-    """Exit code. `system`: whether the machine's package manager may be used."""
+def build(folder: Path) -> None:
+    """The programs in Rust, into `folder`/bin."""
+    for name, words in RUST.items():
+        if shutil.which(name, path=str(folder / "bin")):
+            continue
+        if not shutil.which("cargo"):
+            _left_out(name, "cargo not found (Rust 1.85 or newer: rustup)")
+            continue
+        print(f"building {name} (some minutes)", flush=True)
+        command = ["cargo", "install", "--quiet", "--debug", "--root", str(folder.resolve()), *words]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST)
+        except subprocess.TimeoutExpired:
+            _left_out(name, f"cargo did not build it within {LONGEST} s")
+            continue
+        if done.returncode:
+            _left_out(name, "cargo could not build it:\n" + (done.stdout + done.stderr).strip()[-500:])
+
+
+def fetch(folder: Path, *, system: bool) -> None:
+    """Maestro and VDMCheck2. `system`: whether the machine's package manager may be used."""
     jars, vdmcheck = folder / "jars", folder / "vdmcheck"
     needed = ["java"] if _complete(folder) else list(PACKAGES)
     if system and any(not shutil.which(program) for program in needed):
         _apt(needed)
     if missing := [program for program in needed if not shutil.which(program)]:
         packages = " ".join(PACKAGES[name] for name in missing)
-        return _left_out(f"{' and '.join(missing)} not found (Debian: {packages}; --system installs them, as root)")
+        _left_out(JAVA, f"{' and '.join(missing)} not found (Debian: {packages}; --system installs them, as root)")
+        return
     if not _complete(folder):
         jars.mkdir(parents=True, exist_ok=True)
         goal = ("dependency:copy-dependencies", f"-DoutputDirectory={jars.resolve()}")
         done = subprocess.run(["mvn", "-q", "-B", "-f", str(POM), *goal], capture_output=True, text=True)
         if done.returncode:
-            return _left_out("Maven could not fetch them:\n" + (done.stdout + done.stderr).strip()[-500:])
+            _left_out(JAVA, "Maven could not fetch them:\n" + (done.stdout + done.stderr).strip()[-500:])
+            return
         _lay_out(jars, vdmcheck)
         shutil.move(jars / MAESTRO, folder / MAESTRO)
-    return 0
 
 
 def _complete(folder: Path) -> bool:
@@ -79,9 +111,8 @@ def _lay_out(jars: Path, vdmcheck: Path) -> None:
             archive.extractall(vdmcheck, [member for member in archive.namelist() if member.startswith(part)])
 
 
-def _left_out(reason: str) -> int:
-    print(f"left out: Maestro and VDMCheck2: {reason}", flush=True)
-    return 0
+def _left_out(what: str, reason: str) -> None:
+    print(f"left out: {what}: {reason}", flush=True)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from importers import with_container, with_ecos, with_fmpy, with_libcosim, with_maestro
+from importers import with_cargo, with_container, with_ecos, with_fmpy, with_fmuloader, with_libcosim, with_maestro
 from importers.loops import Master
 from importers.system import Experiment, Result, System
 
@@ -56,6 +56,12 @@ def _package(module: str, distribution: str) -> tuple[Callable[[], str], Callabl
         return ""
 
     return lambda: metadata.version(distribution), missing
+
+
+def _cargo(name: str) -> tuple[Callable[[], str], Callable[[], str]]:
+    """Version, and reason to be missing, of a program that cargo builds."""
+    absent = f"{name} is built by `make test-importers` (Rust's cargo)"
+    return lambda: with_cargo.VERSIONS[name], lambda: "" if with_cargo.program(name) else absent
 
 
 _NO_MAESTRO = "Maestro is installed by `make test-importers` (Java and Maven)"
@@ -113,3 +119,31 @@ IMPORTERS = (
         "all units in parallel; the first step is made with 0 on every connected input",
     ),
 )
+
+SINGLE = (
+    Importer(
+        "fmi-sim",
+        "",
+        *_cargo("fmi-sim"),
+        with_cargo.run_sim,
+        Master(),
+        "steps one unit; time as a sum of steps",
+    ),
+    Importer(
+        "fmu-runner",
+        "",
+        *_cargo("fmu-runner"),
+        with_cargo.run_runner,
+        Master(),
+        "steps one unit",
+    ),
+    Importer(
+        "fmuloader",
+        "",
+        *_package("fmuloader", "fmuloader"),
+        with_fmuloader.run,
+        Master(),
+        "steps one unit",
+    ),
+)
+"""Those that step one unit and wire none."""

@@ -14,6 +14,7 @@ from importers.system import FINISHED, RELEASE, Component, Experiment, Result, S
 # Relative to the largest value. libcosim's time is whole nanoseconds and its steps differences of such times, exact to
 # some 1e-17 s of 125 us, so 1e-13 of a step; measured are 3e-15. In the others no bit differs.
 SAME = 1e-12
+ENUMERATIONS_UNKNOWN = ("ecos", "libcosim", "Maestro")  # what becomes of them there: docs/importing.md, "choices"
 
 
 def _agree(result: Result, expected: Result, *, first: int = 0) -> None:
@@ -31,6 +32,23 @@ def test_a_unit_alone(case: alone.Case, importer: Importer, fmus: Path, tmp_path
         pytest.skip("its first step is made with zeros: simulate_fmu is compared instead")
     result = importer.run(alone.with_table(case, fmus, tmp_path), alone.experiment(case), tmp_path)
     _agree(result, alone.by_hand(case, fmus))
+
+
+def test_why_choices_are_no_enumerations(importer: Importer, fmus: Path, tmp_path: Path) -> None:
+    """Most importers cannot set one; the page says so. Who learns it fails here, and the page is to be changed."""
+    if importer.sequential or importer.master.zeros:
+        pytest.skip("not compared alone, as above")
+    (case,) = (case for case in alone.CASES if "filter_2.type" in case.start)
+    system = alone.with_table(case, fmus, tmp_path)
+    changed = alone.with_enumerations(fmus / "controller.fmu", tmp_path / "controller.fmu")
+    parts = {**system.components, case.unit: Component(changed, system.components[case.unit].start)}
+    expected = alone.by_hand(case, fmus)
+    try:
+        _agree(importer.run(System(parts, system.connections), alone.experiment(case), tmp_path), expected)
+    except (AssertionError, KeyError):
+        assert importer.name in ENUMERATIONS_UNKNOWN
+    else:
+        assert importer.name not in ENUMERATIONS_UNKNOWN
 
 
 @pytest.mark.parametrize("case", alone.CASES, ids=lambda case: case.unit)

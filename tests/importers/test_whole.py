@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from importers import whole
-from importers.registry import Importer
+from importers.registry import SINGLE, Importer
 
 # At the control cycle, and at steps that meet its instants now and then. All steps, and random ones, in FMPy:
 # tests/cosim/test_one_unit.py.
 CASES = [("z_positioning", 125e-6), ("z_positioning", 7.3e-3), ("xz_circle", 1e-3), ("xz_circle", 7.3e-3)]
+# Of those that step one unit: the steps that one takes first.
+PLAIN = [("z_positioning", 125e-6), ("xz_circle", 1e-3), ("xz_circle", 10e-3), ("z_positioning", 10e-3)]
 SLOW = {"Maestro": CASES[1:3]}  # a start of Java for each
 
 
@@ -34,6 +36,20 @@ def test_every_importer_gets_the_run(
     worst, told = whole.difference(result, motion, step)
     assert worst == 0.0
     assert told >= len(motion.common(step, do.steps)[0]) - 1  # not each tells of the first or the last
+
+
+@pytest.mark.parametrize("single", SINGLE, ids=lambda single: single.name)
+@pytest.mark.parametrize("case", PLAIN, ids=str)
+def test_importers_of_one_unit_get_the_run(
+    motions: dict[str, whole.Whole], single: Importer, case: tuple[str, float], tmp_path: Path
+) -> None:
+    if reason := single.missing():
+        pytest.skip(reason)
+    motion, step = motions[case[0]], case[1]
+    do = motion.experiment(step)
+    worst, told = whole.difference(single.run(motion.system, do, tmp_path), motion, step)
+    assert worst == 0.0
+    assert told == len(motion.common(step, do.steps)[0])
 
 
 def test_another_step_or_motion_would_be_seen(motions: dict[str, whole.Whole], tmp_path: Path) -> None:

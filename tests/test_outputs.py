@@ -66,6 +66,7 @@ CASES = [
     ("pack s/z_positioning.yaml --out s/machines/test_centre/modes.csv", "is an input"),
     ("pack s/z_positioning.yaml --out table.csv", "--force"),
     ("machine pack s/machines/test_centre --out s/machines/test_centre/machine.yaml", "is an input"),
+    ("machine pack s/machines/test_centre --out s/machines/test_centre/modes.csv --force", "is an input"),
     ("machine build s/machines/one_axis --out s/machines/one_axis", "modes.csv: exists already"),
     ("ssp s/z_positioning.yaml --out mine/result.csv", "ends in .ssp"),
     ("run s/z_positioning.yaml --out mine", "mine/result.csv: exists already"),

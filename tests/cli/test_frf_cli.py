@@ -389,6 +389,15 @@ def test_figures_that_are_not_determined_are_null_and_said(tmp_path: Path) -> No
     assert "-3 dB first - Hz" in report.answers(found)[1]
 
 
+def test_a_rigid_machine_is_measured_without_a_warning_of_numpy(fmus: Path, tmp_path: Path) -> None:
+    """Nothing is divided by the compliance at the tool, which is zero."""
+    place = ROOT / "scenarios" / "machines" / "emps"
+    result = feedsim("frf", place, "--out", tmp_path / "frf", fmus=fmus, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "RuntimeWarning" not in result.stderr
+    assert "measured n/M within" in result.stdout
+
+
 @pytest.mark.parametrize("machine", ["sinumerik_840d", "emps", "one_axis"])
 def test_every_shipped_machine_is_taken(fmus: Path, tmp_path: Path, machine: str) -> None:
     """Rigid axes have no compliance at the tool, and a slow cycle no response at 1 kHz."""

@@ -57,6 +57,17 @@ def test_a_result_that_is_late(late: float, rows: float, words: str) -> None:
     assert proposal.text.startswith(f"Z.x_a, Z.n_a, Z.M_a: {words}")
 
 
+def test_one_row_without_a_number_is_no_other_time() -> None:
+    """All other rows are the reference's: a shift of 0 s explains nothing."""
+    columns = motion(TIME)
+    columns["Z.x_a"][300] = np.nan
+    assert "earlier" not in texts(differs(columns))
+    columns = motion(TIME)
+    columns["Z.x_a"][300] += 1e-3
+    assert "earlier" not in texts(differs(columns))
+    assert "later" not in texts(differs(columns))
+
+
 def test_a_part_of_a_row_late() -> None:
     found = differs(motion(TIME - 0.4e-3), tol="1e-5")
     (proposal,) = found.looks_like

@@ -149,8 +149,9 @@ def agreement(system: linear.LinearSystem, campaign: Campaign) -> dict[str, Figu
         sure = near & (measured.coherence[name] > COHERENT) if name in measured.coherence else near
         where = f"where the coherence exceeds {COHERENT:g}, {low:g} to {high:g} Hz"
         decibel = degrees = np.nan
-        if sure.any():
-            quotient = measured[name][sure] / response(system, name, measured.frequency[sure])
+        closed = response(system, name, measured.frequency[sure])
+        if (there := closed != 0).any():  # the tool of a rigid machine does not yield
+            quotient = measured[name][sure][there] / closed[there]
             decibel = float(np.max(np.abs(20 * np.log10(np.abs(quotient)))))
             degrees = float(np.max(np.abs(np.degrees(np.angle(quotient)))))
         key = figure_key(name)

@@ -67,6 +67,8 @@ def likeness(
         if not guesses or guessed[each.name].outside:
             open_ones.append(each)
     shift = _shifted(open_ones, result, reference, tolerances, options) if open_ones else None
+    if shift is not None and abs(shift - options.shift) <= WHOLE * usual_step(result.time):
+        shift = None  # where it is now it fits best
     late: list[Variable] = []
     for each in open_ones:
         assert each.curves is not None

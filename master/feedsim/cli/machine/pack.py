@@ -42,7 +42,7 @@ def pack(options: Namespace) -> None:
     # The archive that the machine file names as its plant, and one that is packed in place, are made anew here.
     made = [path for path in (machine.plant, options.base) if path is not None]
     read = [file for _, file in described.files if not any(same(file, each) for each in made)]
-    check_file(options.out, [options.machine, *read], ours=PACKED, what="unit")
+    check_file(options.out, [options.machine, machine.modes, *read], ours=PACKED, what="unit")
     announce_archive(options.base, "the packed plant's trial")
     base = options.base or cosim.fmus_directory() / "plant.fmu"
     pose = _pose_of(machine, options.at)

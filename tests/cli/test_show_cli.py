@@ -45,7 +45,7 @@ def test_what_differs_is_told(results: tuple[Path, Path], tmp_path: Path, capsys
     assert [source["name"] for source in summary["sources"]] == ["as_is", "changed"]
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "+1.00<" in page  # the difference of G
-    assert set(re.findall(r'<figure id="([\w-]+)" class="chart"', page)) >= {"contour-XZ", "position"}
+    assert set(re.findall(r'<figure id="([\w-]+)" class="chart(?: lead)?"', page)) >= {"contour-XZ", "position"}
 
 
 def test_a_record_lies_beside_a_result(results: tuple[Path, Path], tmp_path: Path) -> None:
@@ -55,7 +55,9 @@ def test_a_record_lies_beside_a_result(results: tuple[Path, Path], tmp_path: Pat
     np.savetxt(tmp_path / "record.csv", table, "%.6f", ",", header="t [ms],X.x_a [mm],X.M_a [N.m]", comments="")
     assert show(tmp_path / "out", results[0], tmp_path / "record.csv") == 0
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert {"contour-XZ", "position", "torque"} <= set(re.findall(r'<figure id="([\w-]+)" class="chart"', page))
+    assert {"contour-XZ", "position", "torque"} <= set(
+        re.findall(r'<figure id="([\w-]+)" class="chart(?: lead)?"', page)
+    )
     assert "Parameters that differ" not in page  # one of them has none
 
 

@@ -40,7 +40,7 @@ def stage_of(found: Identification) -> Stationary:
 
 def tiles(found: Identification) -> str:
     text = html(report_of(identified(found=found), []))
-    return " ".join(Page(text[text.index('<div class="keys">') : text.index("</header>")]).words)
+    return " ".join(Page(text[text.index('<div class="screen') : text.index("</header>")]).words)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

@@ -36,6 +36,15 @@ def changes_section(proposals: Sequence[Proposal], machine: Machine | None = Non
     return Section("What to change", [Table("tllrrttt", heads, rows, NOTE)], "changes")
 
 
+def first_change(proposals: Sequence[Proposal]) -> str:
+    """The first proposal that has a value, in a few words: "X.K_v 4 → 4.2 (m/min)/mm"; "" without one."""
+    each = next((each for each in proposals if each.proposed is not None), None)
+    if each is None:
+        return ""
+    present, proposed = _values(each)
+    return f"{each.axis}.{each.parameter.removeprefix('drive.')} {present.split(' ')[0]} → {proposed}"
+
+
 def change_lines(proposals: Sequence[Proposal]) -> list[str]:
     """A line each for the terminal."""
     found = []

@@ -15,9 +15,13 @@ from feedsim.report.picture import Picture
 
 if TYPE_CHECKING:
     from feedsim.analysis import Figure
+    from feedsim.report.chart import Chart
 
 # Significant digits of a tile; the table has more.
 TILE_DIGITS = 4
+# The first screen has this many tiles, this many words of answers and of each finding, and rows of panels; all else is
+# a click away.
+TILES, ANSWER_WORDS, FINDING_WORDS, LEAD_ROWS = 3, 45, 24, 2
 
 
 @dataclass(frozen=True)
@@ -128,11 +132,11 @@ class Report:
     """A report of any kind, in the order in which it is read; what is None or empty is left out.
 
     Attributes:
-        answer: ahead of everything else, what the result is, what it means, and what to do next.
-        warnings: below it, what is wrong first (`feedsim.findings`). notes: what the numbers are
-            worth, each once.
-        tiles: leading numbers.
-        main: sections, tables and pictures.
+        answer: what the result is and what it means; only what is wrong stands ahead of it.
+        warnings: what is wrong first (`feedsim.findings`). notes: what the numbers are worth, each once.
+        tiles: leading numbers, the weightiest first: of these TILES stand on the first screen.
+        lead: the picture of the first screen; None: the first one of `main`. next_step: what to do, with a command.
+        main: sections, tables and pictures; those with a title are folded.
         provenance: where the numbers come from: the last section, in small print.
     """
 
@@ -145,6 +149,41 @@ class Report:
     warnings: Sequence[str] = ()
     notes: Sequence[str] = ()
     tiles: Sequence[Tile] = ()
+    lead: Picture | None = None
+    next_step: Text = ""
+
+    @property
+    def first_picture(self) -> Picture | None:
+        """The picture of the first screen: `lead`, or the first one of `main`, its first panels where it has many."""
+        if self.lead is not None:
+            return self.lead
+        first = next((part for part in self.main if isinstance(part, Picture)), None)
+        return first and first.first_rows(LEAD_ROWS)
+
+    @property
+    def charts(self) -> dict[str, Chart]:
+        """All charts of the page by their stems."""
+        pictures = [*([self.first_picture] if self.first_picture else []), *self.pictures]
+        return {picture.stem: picture.chart for picture in pictures if picture.chart is not None}
+
+    @property
+    def answers(self) -> tuple[list[str], list[str]]:
+        """The answers of the first screen, one at least, and the others."""
+        words, shown = 0, 0
+        for line in self.answer:
+            words += len(line.split())
+            if shown and words > ANSWER_WORDS:
+                break
+            shown += 1
+        return list(self.answer[:shown]), list(self.answer[shown:])
+
+    @property
+    def remarks(self) -> tuple[list[str], list[str]]:
+        """Notes of the first screen, one that is short, and the others; notes among the findings are of the latter."""
+        said = [text for kind, text in self.findings if kind == "note"]
+        notes = list(dict.fromkeys(note for note in self.notes if note))
+        short = [note for note in notes[:1] if len(note.split()) <= FINDING_WORDS]
+        return short, [*notes[len(short) :], *said]
 
     @property
     def findings(self) -> list[tuple[str, str]]:
@@ -155,6 +194,16 @@ class Report:
     def pictures(self) -> list[Picture]:
         """All pictures, in their order."""
         return list(_pictures(self.main))
+
+
+def parted(text: str, most: int = FINDING_WORDS) -> tuple[str, str]:
+    """A text's beginning of `most` words or so, and the rest: parted behind a sentence or a clause where it has one."""
+    words = text.split(" ")
+    if len(words) <= most + most // 4:
+        return text, ""
+    ends = [k + 1 for k, word in enumerate(words[:most]) if word.endswith((".", ";", ":", ","))]
+    cut = max((end for end in ends if end > most // 4), default=most)
+    return " ".join(words[:cut]), " ".join(words[cut:])
 
 
 def _pictures(parts: Sequence[Part | None]) -> Iterator[Picture]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from feedsim.report.chart.embedded import embedded
 from feedsim.report.chart.still import still
-from feedsim.report.content import Report
+from feedsim.report.content import TILES, Report, parted
 from feedsim.report.formatting import typeset
 from feedsim.report.style import PALETTE
 
@@ -28,10 +28,11 @@ def html(report: Report, kind: str = "") -> str:
     environment.filters["typeset"] = typeset
     environment.filters["kind"] = lambda part: type(part).__name__
     environment.filters["still"] = lambda picture: still(picture.chart, picture.stem, picture.title)
-    charts = {picture.stem: picture.chart for picture in report.pictures if picture.chart is not None}
+    environment.filters["parted"] = parted
+    charts = report.charts
     return environment.get_template("report.html.j2").render(
         report=report, palette=PALETTE, data=embedded(charts) if charts else "", script=script() if charts else "",
-        policy=policy(script() if charts else ""), kind=kind,
+        policy=policy(script() if charts else ""), kind=kind, most_tiles=TILES,
     )  # fmt: skip
 
 

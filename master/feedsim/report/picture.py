@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -54,6 +54,13 @@ class Picture:
     def svg(self) -> str:
         """The drawing as text of an SVG."""
         return self.drawn.svg
+
+    def first_rows(self, most: int) -> Picture:
+        """The picture itself, or one of its first rows of panels where it has more than `most`."""
+        if self.chart is None or len(rows := list(self.chart.rows())) <= most:
+            return self
+        first = [panel for row in rows[:most] for panel in row]
+        return replace(self, stem=f"{self.stem}-first", shows=Chart(first, self.chart.widths))
 
     def save(self, path: str | Path) -> Path:
         """Write it as .png or .svg, which the name tells; returns the path. Raises InputError, OutputError."""

@@ -17,7 +17,7 @@ from feedsim.analysis.circularity import axis_letters
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
 from feedsim.report.changes import changes_section
-from feedsim.report.content import Bullets, Report, Section, Tile, tile_value
+from feedsim.report.content import Bullets, Report, Section, Tile, code, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, typeset
 from feedsim.report.picture import Picture
@@ -81,11 +81,14 @@ def report_of(
     """Content of the report."""
     circle = recorded.circle
     prefix = axis_letters(circle.axes)
-    tiles = [
-        Tile(tile_value(each), TILES[name.partition(".")[2]], typeset(each.meaning))
-        for name, each in figures.items()
-        if name.partition(".")[2] in TILES
-    ]
+    labels = {"G": TILES["G"]}
+    peaks = {
+        f"peak_{axis}": f"reversal peak, {axis} reverses" for axis in circle.axes if f"{prefix}.peak_{axis}" in figures
+    }
+    labels |= dict(sorted(peaks.items(), key=lambda each: -abs(figures[f"{prefix}.{each[0]}"].value)))
+    labels |= TILES
+    own = {key: figures.get(f"{prefix}.{key}") for key in labels}
+    tiles = [Tile(tile_value(each), labels[key], typeset(each.meaning)) for key, each in own.items() if each]
     rows = [
         ("Radius", f"{circle.radius * 1e3:.6g} mm"),
         ("Path speed", f"{circle.speed * 6e4:.5g} mm/min"),
@@ -97,6 +100,7 @@ def report_of(
         answer=answers(diagnosis),
         warnings=list(recorded.doubts),
         tiles=tiles,
+        next_step=("Lay a simulated circle over it:\n", code(f"feedsim show {files[0].name} FOLDER_OF_A_RUN")),
         main=[
             picture(circle, recorded, diagnosis),
             diagnosis_section(prefix, diagnosis),

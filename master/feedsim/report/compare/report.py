@@ -104,7 +104,7 @@ def report_of(comparisons: Sequence[Comparison]) -> Report:
         answer=_answer(comparisons),
         warnings=[*([one.problem] if one and one.problem else []), *_not_seen(comparisons)],
         tiles=_tiles(comparisons, counts),
-        main=list(_single(one, 1, draw=True, alone=True)) if one else [_pairs(comparisons), *_sections(comparisons)],
+        main=list(_alone(one)) if one else [_pairs(comparisons), *_sections(comparisons)],
         footer="Deviation: distance of the result from the reference, less what the tolerance in time forgives. "
         "How results are compared: docs/comparing.md.",
     )
@@ -149,6 +149,14 @@ def _sections(comparisons: Sequence[Comparison]) -> Iterator[Section]:
         parts += _single(each, number, draw=not each.same and pictures < MOST_PICTURES, alone=False)
         pictures += any(isinstance(part, Picture) for part in parts)
         yield Section(each.result, parts, _anchor(number))
+
+
+def _alone(comparison: Comparison) -> Iterator[Part]:
+    """The only pair: its picture, and all else under a title."""
+    parts = list(_single(comparison, 1, draw=True, alone=True))
+    yield from (part for part in parts if isinstance(part, Picture))
+    if others := [part for part in parts if not isinstance(part, Picture)]:
+        yield Section("Variable by variable", others)
 
 
 def _single(comparison: Comparison, number: int, *, draw: bool, alone: bool) -> Iterator[Part]:

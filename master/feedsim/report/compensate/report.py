@@ -45,6 +45,12 @@ def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:
         warnings=compensation.warnings,
         notes=(scenario.machine.note, scenario.note),
         tiles=list(_tiles(compensation)),
+        next_step=(
+            "See what becomes of it as the machine wears or warms:\n",
+            code(f"feedsim compensate {scenario.file.name} --table"),
+        )
+        if not compensation.table
+        else ("Lay it over another run:\n", code("feedsim show THIS_FOLDER OTHER_FOLDER")),
         main=[
             *pictures,
             _errors(compensation) if compensation.table else None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.responses import Responses
 from feedsim.analysis.truncation import Truncation
 from feedsim.report import sections
-from feedsim.report.content import Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.content import LEAD_ROWS, Report, Section, Table, Text, Tile, code, tile_value
 from feedsim.report.formatting import display_unit, minus, number, typeset
 from feedsim.report.frf.bode_plots import pictures_of
 from feedsim.report.frf.truncation_plots import truncation_pictures
@@ -34,9 +34,11 @@ TILES = {  # figure of an axis -> label
     "position.bandwidth_first": "position loop, −3 dB",
     "position.gain_margin": "position loop, gain margin",
 }
+LEAST = {"gain_margin": "gain margin", "phase_margin": "phase margin", "bandwidth_first": "bandwidth"}
 AS_DECIBEL = ("gain_margin",)
 MEASURED_PARTS = ("magnitude", "phase", "share")
 
+OPEN_LOOP = "position-loop"  # stem of the picture that has the margins
 FORMAT = 1
 
 
@@ -83,7 +85,12 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
         warnings=responses.warnings,
         notes=subject.notes,
         answer=answers(responses),
-        tiles=list(_tiles(responses)),
+        tiles=_tiles(responses),
+        lead=next((each.first_rows(LEAD_ROWS) for each in pictures if each.stem == OPEN_LOOP), None),
+        next_step=(
+            "Change a gain and look again:\n",
+            code(f"feedsim frf {subject.file.name} --set machine.axes.{responses.axes[0]}.drive.K_v=VALUE"),
+        ),
         main=[*pictures, _resonances(responses), _agreement(responses), sections.figures_section(responses.figures)],
         provenance=_provenance(subject, responses),
         footer=sections.figures_footer(
@@ -92,14 +99,23 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
     )
 
 
-def _tiles(responses: Responses) -> Iterable[Tile]:
-    for axis in responses.axes:
-        for key, label in TILES.items():
-            if (figure := responses.figures.get(f"{axis}.{key}")) is not None:
-                shown = figure
-                if key.rpartition(".")[2] in AS_DECIBEL and math.isfinite(figure.value) and figure.value > 0:
-                    shown = Figure(20 * math.log10(figure.value), "dB", figure.meaning)
-                yield Tile(_value(shown), f"{axis}: {label}", typeset(figure.meaning))
+def _tiles(responses: Responses) -> list[Tile]:
+    """The least of each kind first, which says what is nearest to the limit; then all others by axis."""
+    named = {f"{axis}.{key}": f"{axis}: {label}" for axis in responses.axes for key, label in TILES.items()}
+    named = {name: label for name, label in named.items() if name in responses.figures}
+    least = []
+    for ending in LEAST:
+        own = [name for name in named if name.endswith(ending) and math.isfinite(responses.figures[name].value)]
+        least += [min(own, key=lambda name: responses.figures[name].value)] if own else []
+    tiles = []
+    for name in [*least, *(name for name in named if name not in least)]:
+        figure = shown = responses.figures[name]
+        if name.rpartition(".")[2] in AS_DECIBEL and math.isfinite(figure.value) and figure.value > 0:
+            shown = Figure(20 * math.log10(figure.value), "dB", figure.meaning)
+        axis, loop, key = name.split(".")
+        label = f"least {LEAST[key]}, {loop} loop of {axis}" if name in least else named[name]
+        tiles.append(Tile(_value(shown), label, typeset(figure.meaning)))
+    return tiles
 
 
 def _value(figure: Figure) -> str:

@@ -22,7 +22,7 @@ from feedsim.report.style import remarked
 
 PLATEAUS, RESIDUALS, OPEN_LOOP = "plateaus.csv", "residuals.csv", "open_loop.csv"
 REMARK_WIDTH, REMARK_LINES = 100, 3  # fits the narrowest figure
-LEADING = ("F_C", "F_S", "v_s", "F_log", "sigma_2", "sigma_0", "sigma_1", "W", "gamma", "M_0", "J", "delay")
+LEADING = ("F_C", "F_S", "sigma_0", "v_s", "F_log", "sigma_2", "sigma_1", "W", "gamma", "M_0", "J", "delay")
 HEADS = ("Parameter", "Meaning", "Value", "Unit", "95 % interval", "±", "At the slide", "Unit", "Remark")
 METHOD = (
     "Stage 1 fits the stationary friction to mean torques at constant speed; stage 2 drives the friction model with "
@@ -77,7 +77,12 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
         answer=answers(found),
         warnings=identified.warnings,
         notes=identified.notes,
-        tiles=list(_tiles(identified)),
+        tiles=_tiles(identified),
+        next_step=(
+            "Run the machine with this friction:\n",
+            code(f"feedsim run SCENARIO.yaml --set machine.axes.{found.axis}.friction={FRICTION}"),
+            " (with the file's path)",
+        ),
         main=[
             _use(found),
             Section("What further moves would tell", [_bullets(found.advice)]) if found.advice else None,
@@ -116,8 +121,23 @@ def answers(found: Identification) -> list[str]:
     return lines
 
 
-def _tiles(identified: Identified) -> Iterator[Tile]:
+def _tiles(identified: Identified) -> list[Tile]:
+    """Parameters, those first that most is asked of, and behind them how near the model comes."""
     found = identified.found
+    tiles = []
+    for name in LEADING:
+        estimate = found.estimates.get(name)
+        if estimate is None or estimate.status not in ("estimated", "given"):
+            continue
+        factor, unit = quantities.shown_unit(estimate)
+        relative = friction_file.relative_text(estimate)
+        label = f"{name}, {estimate.meaning}" + (f" (±{relative})" if relative else "")
+        value = f"{minus(powers(friction_file.value_text(estimate, factor)))} {display_unit(unit)}".strip()
+        tiles.append(Tile(value, typeset(label), typeset(estimate.meaning)))
+    return [*tiles, *_errors(found)]
+
+
+def _errors(found: Identification) -> Iterator[Tile]:
     if (stage := found.stationary) is not None:
         alone = "" if found.prior else ", stage 1 alone"
         if quantities.is_curve(stage):
@@ -129,25 +149,14 @@ def _tiles(identified: Identified) -> Iterator[Tile]:
             yield Tile("no curve", f"{count}, three make a curve", "distinct speeds of the plateaus")
         meaning = "largest relative deviation of a plateau's friction from the curve"
         yield Tile(f"{powers(f'{100 * stage.worst_curve:.2g}')} %", f"largest deviation of a plateau{alone}", meaning)
-    for name in LEADING:
-        estimate = found.estimates.get(name)
-        if estimate is None or estimate.status not in ("estimated", "given"):
-            continue
-        factor, unit = quantities.shown_unit(estimate)
-        relative = friction_file.relative_text(estimate)
-        label = f"{name}, {estimate.meaning}" + (f" (±{relative})" if relative else "")
-        value = f"{minus(powers(friction_file.value_text(estimate, factor)))} {display_unit(unit)}".strip()
-        yield Tile(value, typeset(label), typeset(estimate.meaning))
     if found.dynamic is not None:
         meaning = "friction torque measured less that of the model, over all stretches"
         yield Tile(f"{found.dynamic.rms:.3g} N·m", "residual of stage 2, rms", meaning)
 
 
-def _use(found: Identification) -> Section:
-    command = f"feedsim run SCENARIO.yaml --set machine.axes.{found.axis}.friction={FRICTION}"
+def _use(found: Identification) -> Section | None:
     hint = friction_file.constant_load_hint(found)
-    load = Paragraph(f"The {typeset(hint)}.") if hint else None
-    return Section("Use", [Paragraph((code(command), " (with the file's path)")), load])
+    return Section("Constant load", [Paragraph(f"The {typeset(hint)}.")]) if hint else None
 
 
 def _bullets(texts: Sequence[str]) -> Bullets:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from feedsim.report.content import Animation, Paragraph, Report, Section, Table, Text, Tile
+from feedsim.report.content import Animation, Paragraph, Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import display_unit, number, typeset
 from feedsim.report.machine.animation import mode_gif
 from feedsim.report.machine.model import model
@@ -87,6 +87,7 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
         warnings=info.warnings,
         notes=[info.note],
         tiles=list(_tiles(info)),
+        next_step=("See how a mode moves:\n", code("feedsim machine show MACHINE --mode 1 --animate")),
         main=[*pictures, _axes(info), _modes(info)],
         provenance=provenance_section(rows, hashed(list(files))),
         footer="Values in full precision: summary.json. Pictures: figures/.",

@@ -127,6 +127,7 @@ def report_of(report: DriveReport) -> Report:
         warnings=report.warnings,
         notes=report.notes,
         answer=answers(report),
+        next_step=("Hold it against another record:\n", code("feedsim replay OTHER_RECORD --machine THIS_FOLDER")),
         tiles=[
             Tile(tile_value(figure), f"{name.partition('.')[0]}: {LEADING[key]}", typeset(figure.meaning))
             for name, figure in report.figures.items()

@@ -10,7 +10,7 @@ from typing import Any
 from feedsim.analysis import Figure
 from feedsim.identify import Provenance
 from feedsim.replay.compare import Comparison
-from feedsim.report.content import Report, Section, Table, Tile, tile_value
+from feedsim.report.content import Report, Section, Table, Tile, code, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import typeset
 from feedsim.report.provenance import figures_part, hashed, inputs_part, machine_part, quantity, software
@@ -85,6 +85,10 @@ def report_of(replayed: Replayed) -> Report:
         notes=[note for note in (*replayed.subject.notes, *(source.note for source in replayed.sources)) if note],
         answer=answers(replayed),
         tiles=list(_tiles(replayed.figures)),
+        next_step=(
+            "Identify the drives from the record:\n",
+            code(f"feedsim identify-drive {record} --machine MACHINE"),
+        ),
         main=[
             *pictures,
             figures_section(replayed.figures),

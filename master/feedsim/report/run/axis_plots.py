@@ -15,6 +15,7 @@ from feedsim.trace import Trace, release
 
 TIME = Axis("time", "s")
 TOOL, SCALE = "tool point", "linear scale x_a"
+BEYOND = "Distance beyond the target"
 ZOOM_BEFORE, ZOOM_AFTER = 0.030, 0.400  # s about the end of the NC motion
 OF_AXES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 # What the whole run is shown by: signal, title, quantity, unit, factor from SI, whether a display sign turns it over.
@@ -102,7 +103,7 @@ def _beyond(trace: Trace, approach: Approach, figures: Figures, band: float) -> 
         else:
             note = f"still outside ±{band * 1e6:g} µm until {settled:.1f} ms"
     return Panel(
-        "Distance beyond the target",
+        BEYOND,
         Axis("time after the end of the NC motion", "ms", span=(-ZOOM_BEFORE * 1e3, last)),
         Axis("beyond the target" if approach.sense > 0 else "beyond the target, to minus", "µm",
              span=(-1.45 * max(reach), 1.45 * max(reach))),

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from feedsim.analysis import Turn, contour
+from feedsim.analysis import Diagnosis, Turn, contour
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Mark, Panel, Polar
 from feedsim.report.formatting import minus
@@ -29,10 +29,13 @@ class OnCircle(Protocol):
     def radius(self) -> float: ...
 
 
-def contour_picture(trace: Trace, turn: Turn, stem: str, back: Turn | None = None) -> Picture:
-    """Contour error of a turn in polar form, magnified, with scale rings and the quadrant glitches.
+def contour_picture(
+    trace: Trace, turn: Turn, stem: str, back: Turn | None = None, diagnosis: Diagnosis | None = None
+) -> Picture:
+    """Contour error of a turn in polar form, magnified, with scale rings and the peaks of the reversals.
 
-    back: the turn in the other sense, which is drawn over it.
+    back: the turn in the other sense, which is drawn over it. diagnosis: which has the heights of the peaks over the
+    fitted rest of the circle; without it the quadrant glitches are shown.
     """
     by_scale = contour(trace, turn)
     on = circle(turn, float(np.abs(by_scale.deviation).max()))
@@ -53,17 +56,30 @@ def contour_picture(trace: Trace, turn: Turn, stem: str, back: Turn | None = Non
     caption = (
         f"Radius {turn.radius * 1e3:.6g} mm, {DIRECTIONS[turn.sense]} from {turn.axes[0]} to {turn.axes[1]}, turn from "
         f"{turn.begin:.4f} to {turn.end:.4f} s.{over} Radius deviation magnified {on.magnification:,.0f} times; rings "
-        f"at ±{on.ring:g} µm about the programmed circle. The markers show the quadrant glitches: the largest "
-        "deviation within ±45° of an axis crossing, less the median of the turn."
+        f"at ±{on.ring:g} µm about the programmed circle. "
+    )
+    heights = _heights(diagnosis, turn.sense)
+    caption += (
+        "The markers show the reversal peaks, over the fitted rest of the circle."
+        if heights
+        else "The markers show the quadrant glitches: the largest deviation within ±45° of an axis crossing, less the "
+        "median of the turn."
     )
     marks = [
-        Mark(glitch.angle, glitch.deviation * 1e6, f"{minus(glitch.name)}: {glitch.height * 1e6:.2f} µm", VERMILLION)
+        Mark(glitch.angle, glitch.deviation * 1e6, f"{minus(glitch.name)}: {height * 1e6:.2f} µm", VERMILLION)
         for glitch in by_scale.glitches
+        if (height := heights.get(glitch.name, 0.0 if heights else glitch.height))
     ]
     median = Level(by_scale.median * 1e6, "median (scales)", dash="dotted")
     sense = turn.sense if back is None else 0
-    chart = circle_chart(on, curves, marks, (median,), sense, "quadrant glitches\n(less the median)")
+    chart = circle_chart(on, curves, marks, (median,), sense, "" if heights else "quadrant glitches\n(less the median)")
     return Picture(stem, title, caption, chart)
+
+
+def _heights(diagnosis: Diagnosis | None, sense: int) -> dict[str, float]:
+    """Where a turn of a sense reverses, such as "X+" -> height of its peak [m], 0 where none stands out."""
+    peaks = diagnosis.peaks if diagnosis is not None else ()
+    return {peak.name: peak.height for peak in peaks if peak.sense == sense}
 
 
 def torque_picture(trace: Trace, turn: Turn, signs: Mapping[str, int], stem: str) -> Picture | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -23,7 +24,8 @@ from feedsim.analysis import (
 from feedsim.cosim import Run
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
-from feedsim.report.changes import changes_part, changes_section
+from feedsim.report.changes import changes_part, changes_section, first_change
+from feedsim.report.chart import Chart, Panel
 from feedsim.report.content import Paragraph, Report, Section, Span, Table, Tile, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, duration, number, typeset
@@ -40,11 +42,11 @@ from feedsim.report.provenance import (
 )
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
 from feedsim.report.run.accuracy import accuracy_picture, accuracy_section
-from feedsim.report.run.axis_plots import overview_picture, positioning_picture
+from feedsim.report.run.axis_plots import BEYOND, overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
 from feedsim.report.run.pose import pose_part, pose_section
-from feedsim.report.run.words import accuracy_words, moved_words, stop_words
+from feedsim.report.run.words import accuracy_words, moved_words, next_step, stop_words
 from feedsim.scenario import Level, Logging
 from feedsim.trace import Trace, write_csv
 from feedsim.tune import of_run
@@ -72,6 +74,7 @@ TILES = {
 OF_REVERSALS = {"peak": "reversal peak", "glitch": "quadrant glitch"}  # of an axis: peak_X
 MOST_MOTIONS = 200
 LINE = ("overshoot", "settling_time", "peak_torque", "G", "A", "R", "B")
+FIRST = ("overshoot", "settling_time", "ringing_frequency", "G", "peak", "A", "R", "B")
 HEADER = (*LINE, "duration", "ringing_frequency", "plateau_torque", "rest_torque", "F_max", "F_min", "mean", "E", "M")
 FORMAT = 1
 COUPLING = {
@@ -131,7 +134,7 @@ def write(
     if page:
         files[PAGE] = page
     causes = diagnoses(run) if causes is None else causes
-    report = report_of(run, figures, draw(run, figures), causes)
+    report = report_of(run, figures, draw(run, figures, causes), causes)
     if page:
         report = replace(report, main=[TRY_IT, *report.main])
     return write_report(
@@ -145,7 +148,7 @@ def report_of(
     """Content of the report. causes: prefix of a circle's figures -> why it is not round."""
     causes = causes or {}
     scenario, machine = run.scenario, run.scenario.machine
-    factor = real_time_factor(run)
+    factor, proposals = real_time_factor(run), of_run(run, causes)
     speed = f" ({factor:.2g} times real time)" if factor is not None else ""
     footer = (
         "Values in full precision: summary.json; time series: result.csv. "
@@ -157,11 +160,13 @@ def report_of(
         answer=answers(run, figures, causes) or moved_words(run.trace),
         warnings=(*run.warnings, *doubts(figures, causes)),
         notes=(machine.note, scenario.note),
-        tiles=[tile(name, figure) for name, figure in figures.items() if is_leading(name, HEADER)],
+        tiles=tiles(figures),
+        lead=lead(run, pictures),
+        next_step=next_step(run, causes, first_change(proposals)),
         main=[
             *pictures,
             *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
-            changes_section(of_run(run, causes), machine),
+            changes_section(proposals, machine),
             *accuracy_sections(run),
             sections.figures_section(figures),
             motions_section(run),
@@ -197,6 +202,36 @@ def answers(run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagno
     return found
 
 
+def tiles(figures: Mapping[str, Figure]) -> list[Tile]:
+    """Leading figures, those first that answer what is asked. A reversal has one height: over the fitted rest of the
+    circle where that is known, else the quadrant glitch."""
+    named = [name for name in figures if is_leading(name, HEADER) and not _has_peak(name, figures)]
+
+    def place(name: str) -> tuple[int, int]:
+        key = re.sub("^(peak|glitch)_.*", "peak", name.partition(".")[2])
+        size = abs(figures[name].value) if key == "peak" else 0
+        return FIRST.index(key) if key in FIRST else len(FIRST), -round(1e3 * size) if math.isfinite(size) else 0
+
+    return [tile(name, figures[name]) for name in sorted(named, key=place)]
+
+
+def _has_peak(name: str, figures: Mapping[str, Figure]) -> bool:
+    """Whether a figure is a glitch whose height over the fitted rest is known, too."""
+    return ".glitch_" in name and name.replace(".glitch_", ".peak_") in figures
+
+
+def lead(run: Run, pictures: Sequence[Picture]) -> Picture | None:
+    """The picture of the first screen, where it is not the first one: a stop without the way to it."""
+    for task in tasks(run.scenario, run.program)[:1]:
+        if isinstance(task, PositioningTask) and pictures and (chart := pictures[0].chart) is not None:
+            panel = next((each for each in chart.panels if isinstance(each, Panel) and each.title == BEYOND), None)
+            if panel is not None:
+                title = f"Axis {task.approach.axis} about its target"
+                shown = Chart([replace(panel, title="", height=1.9)])
+                return replace(pictures[0], stem=f"{pictures[0].stem}-first", title=title, shows=shown)
+    return None
+
+
 def tile(name: str, figure: Figure) -> Tile:
     """A figure with its name in words."""
     prefix, _, key = name.partition(".")
@@ -205,8 +240,8 @@ def tile(name: str, figure: Figure) -> Tile:
     return Tile(tile_value(figure), f"{prefix.replace('#', ' no. ')}: {label}", typeset(figure.meaning))
 
 
-def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
-    """The figures of a report: those of every evaluation, and an overview of all axes."""
+def draw(run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis] | None = None) -> list[Picture]:
+    """The figures of a report: those of every evaluation, and an overview of all axes. causes: as of report_of()."""
     signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
     pictures: list[Picture] = []
     for task in tasks(run.scenario, run.program):
@@ -224,7 +259,9 @@ def draw(run: Run, figures: Mapping[str, Figure]) -> list[Picture]:
                 )
             )
         elif isinstance(task, CircleTask):
-            pictures.append(contour_picture(run.trace, task.turn, f"contour-{stem}", task.back))
+            pictures.append(
+                contour_picture(run.trace, task.turn, f"contour-{stem}", task.back, (causes or {}).get(task.prefix))
+            )
             torques = torque_picture(run.trace, task.turn, signs, f"torque-{stem}")
             pictures += [torques] if torques is not None else []
         else:
@@ -389,7 +426,11 @@ def real_time_factor(run: Run) -> float | None:
 
 def summary_line(run: Run, figures: Mapping[str, Figure]) -> str:
     """The run in one line: its leading figures, and how fast it was."""
-    leading = [f"{name} {figure}" for name, figure in figures.items() if is_leading(name, LINE)]
+    leading = [
+        f"{name} {figure}"
+        for name, figure in figures.items()
+        if is_leading(name, LINE) and not _has_peak(name, figures)
+    ]
     factor = real_time_factor(run)
     digits = ".0f" if factor is not None and factor >= 10 else ".2g"
     speed = f" ({factor:{digits}} x real time)" if factor is not None else ""
@@ -399,7 +440,7 @@ def summary_line(run: Run, figures: Mapping[str, Figure]) -> str:
 def is_leading(name: str, among: Sequence[str]) -> bool:
     """Whether a figure, named with its prefix, is one of ``among`` by the scales, or the quadrant glitch of an axis."""
     _, _, figure = name.partition(".")
-    return figure in among or (figure.startswith("glitch_") and figure[-1] not in "+-")
+    return figure in among or (figure.startswith(("glitch_", "peak_")) and figure[-1] not in "+-")
 
 
 def logging_part(logging: Logging | None, log: Trace | None) -> dict[str, Any] | None:

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from feedsim.analysis import Figures
+from feedsim.analysis import Diagnosis, Figures
+from feedsim.analysis.circle import worth_telling
+from feedsim.cosim import Run
+from feedsim.report.content import Text, code
 from feedsim.trace import Trace
 
 # Of A, what repeats is worth compensating from this share of it on.
@@ -43,6 +47,19 @@ def accuracy_words(figures: Figures) -> str:
     if B > SYSTEMATIC * E:
         return f"{first}: most of it repeats and changes with the direction: backlash, reversal value B {B:.2f} um."
     return f"{first}: most of it repeats at each target: compensation of the pitch can take it away."
+
+
+def next_step(run: Run, causes: Mapping[str, Diagnosis], change: str = "") -> Text:
+    """What to do with a run, by what it has shown first: a command to copy. change: that is proposed, in words."""
+    file = run.scenario.file.name
+    if change:
+        return f"Try {change}:\n", code(f"feedsim run {file} --try")
+    told = [term.key for diagnosis in causes.values() for term in worth_telling(diagnosis)[:1]]
+    if told[:1] == ["peaks"]:
+        return "See what friction compensation takes away:\n", code(f"feedsim compensate {file}")
+    if told[:1] == ["servo"]:
+        return "See how each axis answers:\n", code(f"feedsim frf {file}")
+    return "Lay another run or a record over it:\n", code("feedsim show THIS_FOLDER OTHER_FOLDER")
 
 
 def moved_words(trace: Trace) -> list[str]:

@@ -113,6 +113,12 @@ def report_of(sources: Sequence[Source]) -> Report:
         " against ".join(names) if len(names) <= 3 else f"{len(names)} results side by side",
         counted(len(sources), "source"),
         answer=_answer(sources),
+        next_step=(
+            "See whether they are the same within a tolerance:\n",
+            code("feedsim compare RESULT.csv REFERENCE.csv --tol 1e-6"),
+        )
+        if len(sources) > 1
+        else "",
         notes=tuple(note for source in sources for note in source.notes),
         main=[
             *pictures_of(sources),

@@ -475,7 +475,7 @@ function placed(chart, width, tall = 1) {
   for (let k = 0; k < chart.panels.length; k += columns.length) {
     const row = chart.panels.slice(k, k + columns.length);
     const widths = columns.map(each => (width - GAP * (columns.length - 1)) * each / total);
-    const natural = row.map((panel, j) => panel.kind === "polar" ? Math.min(widths[j], ROUND) + 24
+    const natural = row.map((panel, j) => panel.kind === "polar" ? Math.min(widths[j], ROUND * Math.min(1, tall + 0.2)) + 24
       : panel.kind === "grid" ? grid_top(panel) + 24 * panel.rows.length + 12
       : panel.y.names.length ? EDGE.top + EDGE.bottom + 26 * panel.y.names.length : HEIGHT * tall * panel.height + EDGE.bottom + top_of(panel) - EDGE.top);
     const height = Math.max(...natural);

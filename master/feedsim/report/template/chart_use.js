@@ -130,8 +130,9 @@ class Live {
     else make("line", { ...styled(curve), x1: x, x2: x + 20, y1: y, y2: y, "stroke-width": Math.max(1.6, curve.width) }, parent);
   }
 
-  draw(width = this.width || this.room.clientWidth || 960, tall = 1) {
+  draw(width = this.width || this.room.clientWidth || document.querySelector("main")?.clientWidth || 960, tall = 0) {
     this.width = width = Math.max(width, 200);
+    tall ||= this.fitting(width);
     const { boxes, height } = placed(this.chart, width, tall), title = this.figure.dataset.title;
     const svg = make("svg", { class: "chart", viewBox: `0 0 ${width} ${Math.ceil(height)}`, role: "group", "aria-roledescription": "chart", tabindex: "0",
       "aria-label": `${title}. ${[...this.names.keys()].join(", ")}. ${KEYS}`, "font-family": FONT, "font-size": 12 });
@@ -153,6 +154,13 @@ class Live {
       this.times.textContent = `${Number(times.toPrecision(3)).toLocaleString("en")}×`;
     }
     if (this.cursor) this.point(this.cursor.panel, this.cursor.x, true);
+  }
+
+  // The picture of the first screen ends with it: its panels are lower where the screen is.
+  fitting(width) {
+    if (!this.figure.classList.contains("lead")) return 1;
+    const room = Math.max(innerHeight, 600) - (this.field.getBoundingClientRect().top + scrollY) - BELOW;
+    return [1, 0.9, 0.8, 0.7, 0.6, 0.5].find(tall => placed(this.chart, width, tall).height < room) || 0.45;
   }
 
   back() {
@@ -389,10 +397,12 @@ class Live {
 
 // What is in sight is drawn at once, the others when there is time; until then their still pictures stand there.
 const lives = [], waiting = [...document.querySelectorAll("figure.chart")];
+const BELOW = 40; // room for what stands below the picture of the first screen
+const in_sight = figure => figure.getClientRects().length && figure.getBoundingClientRect().top < innerHeight;
 const begin = figure => { const live = new Live(figure); lives.push(live); live.draw(); };
 const later = window.requestIdleCallback || (act => setTimeout(act, 1));
 const go_on = () => { if (waiting.length) { begin(waiting.shift()); later(go_on); } };
-while (waiting.length && waiting[0].getBoundingClientRect().top < innerHeight) begin(waiting.shift());
+while (waiting.length && in_sight(waiting[0])) begin(waiting.shift());
 later(go_on);
 let frame = 0;
 addEventListener("resize", () => {
@@ -402,11 +412,27 @@ addEventListener("resize", () => {
 // On paper panels stand side by side, however narrow the sheet is: it is read from nearer than a screen. They are lower
 // where the chart would else leave the rest of a sheet empty.
 const SHEET = 0.9; // height of a chart against its width
+const opened = []; // what is folded is printed
 addEventListener("beforeprint", () => {
+  for (const part of document.querySelectorAll("details:not([open])")) { opened.push(part); part.open = true; }
   while (waiting.length) begin(waiting.shift());
   for (const live of lives) {
     const width = Math.max(720, COLUMN * live.chart.widths.length);
     live.draw(width, [1, 0.85, 0.7].find(tall => placed(live.chart, width, tall).height < SHEET * width) || 0.6);
   }
 });
-addEventListener("afterprint", () => { for (const live of lives) live.draw(live.room.clientWidth); });
+addEventListener("afterprint", () => {
+  for (const part of opened.splice(0)) part.open = false;
+  for (const live of lives) live.draw(live.room.clientWidth || undefined);
+});
+// What is unfolded is drawn as wide as it is then; a link into what is folded opens it.
+document.addEventListener("toggle", event => {
+  for (const live of lives) if (event.target.contains(live.room) && live.room.clientWidth && live.room.clientWidth !== live.width) live.draw(live.room.clientWidth);
+}, true);
+const unfold = () => {
+  const asked = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  for (let part = asked; part; part = part.parentElement) if (part.tagName === "DETAILS") part.open = true;
+  if (asked) asked.scrollIntoView();
+};
+addEventListener("hashchange", unfold);
+unfold();

@@ -1,0 +1,238 @@
+"""The first screen of reports in a real browser: answer, picture, figures and next step without scrolling.
+
+What is folded opens by keyboard, by links and on paper; numbers that a page shows twice agree.
+"""
+
+from __future__ import annotations
+
+import html as markup
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from command_helpers import feedsim
+from feedsim.analysis import diagnoses, evaluate
+from feedsim.findings import Wrong
+from feedsim.report import run as report
+from feedsim.report.content import Report, parted
+from feedsim.report.page import html
+from report_helpers import circle_run, positioning_run
+from ssp_helpers import short_scenario
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (requirements-dev.lock)")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)")
+FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"]
+ROOT = Path(__file__).resolve().parents[2]
+MOST_WORDS = 120  # of two letters and more: numbers and units are none
+# Words within the window but those of charts, their buttons and titles of what is folded; where the parts end.
+SEEN = """() => {
+  const words = [], walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  for (let node = walk.nextNode(); node; node = walk.nextNode()) {
+    const own = node.parentElement, range = document.createRange();
+    if (own.closest("svg, script, style, .bar, .spoken, details.fold > summary") || !own.checkVisibility()) continue;
+    range.selectNodeContents(node);
+    const box = range.getBoundingClientRect();
+    if (box.width && box.top < innerHeight) {
+      words.push(...node.textContent.trim().split(/\\s+/).filter(word => /\\p{L}{2}/u.test(word)));
+    }
+  }
+  const foot = name => { const all = document.querySelector(name); return all && all.getBoundingClientRect().bottom; };
+  const top = name => { const all = document.querySelector(name); return all && all.getBoundingClientRect().top; };
+  return { words, answer: foot(".answer"), top: top(".lead svg, .lead img"), picture: foot(".lead svg, .lead img"),
+           keys: foot(".screen .keys"), next: foot(".next"), wide: document.documentElement.scrollWidth };
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as api:
+        try:
+            found = api.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        except playwright.Error as error:
+            pytest.skip(f"Chromium does not start here: {str(error).splitlines()[0]}")
+        yield found
+        found.close()
+
+
+@pytest.fixture(scope="module")
+def files(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A report of each kind that is made in a moment; docs/reports.md shows the others."""
+    folder = tmp_path_factory.mktemp("kinds")
+    for name, run in (("circle", circle_run()), ("stop", positioning_run())):
+        report.write(run, evaluate(run), folder / name)
+    machine = ROOT / "scenarios" / "machines" / "one_axis"
+    short_scenario(folder)
+    for words in (
+        f"frf {machine} --no-measure --out frf", "run short.yaml --out run", f"machine show {machine} --out machine",
+        "compare run/result.csv stop/result.csv --report compare/report.html --common --only *.x_a",
+        "show stop run --out show", "circle circle/result.csv --axes X,Z --out recorded",
+    ):  # fmt: skip
+        (folder / "compare").mkdir(exist_ok=True)
+        done = feedsim(*words.split(), fmus=fmus, cwd=folder)
+        assert done.returncode == 0 or words.startswith("compare"), (words, done.stderr)
+    return {path.parent.name: path for path in folder.glob("*/report.html")}
+
+
+def opened(browser: Any, file: Path, width: int, height: int) -> Any:
+    page = browser.new_page(viewport={"width": width, "height": height})
+    page.goto(file.as_uri())
+    page.wait_for_selector(".still", state="detached") if page.locator(".still").count() else None
+    return page
+
+
+NAMES = ("circle", "stop", "frf", "run", "machine", "compare", "show", "recorded")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_answer_picture_figures_and_next_step_without_scrolling(
+    name: str, browser: Any, files: dict[str, Path]
+) -> None:
+    page = opened(browser, files[name], 1400, 900)
+    seen = page.evaluate(SEEN)
+    page.close()
+    assert len(seen["words"]) <= MOST_WORDS, " ".join(seen["words"])
+    assert 0 < seen["answer"] < seen["top"] < seen["picture"] <= 900
+    for part in ("keys", "next"):
+        assert seen[part] is None or seen[part] <= 900
+    assert seen["keys"] or seen["next"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_answer_and_picture_on_a_phone(name: str, browser: Any, files: dict[str, Path]) -> None:
+    page = opened(browser, files[name], 390, 844)
+    seen = page.evaluate(SEEN)
+    page.close()
+    assert seen["wide"] <= 390
+    assert seen["answer"] < 844
+    assert seen["top"] < 0.75 * 844
+
+
+@pytest.mark.parametrize("name", ["circle", "frf"])
+def test_what_is_folded_opens_by_keyboard_and_is_drawn(name: str, browser: Any, files: dict[str, Path]) -> None:
+    page = opened(browser, files[name], 1200, 900)
+    folds = page.locator("details.fold")
+    assert folds.count() > 3
+    for fold in folds.all():
+        assert fold.evaluate("each => !each.open")
+        fold.locator("summary").first.focus()
+        page.keyboard.press("Enter")
+        assert fold.evaluate("each => each.open")
+    page.wait_for_timeout(100)
+    for chart in page.locator("details.fold svg.chart").all():
+        assert chart.evaluate("each => each.viewBox.baseVal.width") == pytest.approx(
+            chart.evaluate("each => each.parentNode.clientWidth"), abs=1
+        )
+    page.close()
+
+
+def test_a_link_opens_what_it_leads_to(browser: Any, files: dict[str, Path]) -> None:
+    page = opened(browser, files["circle"], 1200, 900)
+    page.locator("footer a").first.click()
+    page.wait_for_timeout(100)
+    assert page.locator("details.fold:has(#figures)").evaluate("each => each.open")
+    page.close()
+
+
+def test_paper_has_all_of_it(browser: Any, files: dict[str, Path], tmp_path: Path) -> None:
+    page = opened(browser, files["circle"], 1200, 900)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("details:not([open])").count() == 0
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.locator("details.fold[open]").count() == 0
+    page.close()
+
+
+def test_what_is_wrong_stands_ahead_of_the_answer() -> None:
+    wrong = Wrong("speed loop of X: UNSTABLE, it swings at 204 Hz")
+    run = replace(circle_run(), warnings=("something doubtful", wrong))
+    text = html(report.report.report_of(run, {}, []))
+    first = html(Report("t", "", [], "", answer=["the answer"], warnings=["something doubtful", wrong]))
+    assert first.index("UNSTABLE") < first.index("the answer") < first.index("something doubtful")
+    assert text.index("UNSTABLE") < text.index("<main>")
+
+
+def test_long_findings_are_parted_and_lose_nothing() -> None:
+    text = " ".join(f"word{k}" + ("." if k % 9 == 8 else "") for k in range(80))
+    head, rest = parted(text)
+    assert f"{head} {rest}" == text
+    assert head.endswith(".")
+    assert len(head.split()) <= 30
+    assert parted("short") == ("short", "")
+
+
+NUMBER = re.compile(r"−?\d+(?:\.\d+)?(?:×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
+
+
+def agree(one: str, other: str) -> bool:
+    """Whether two numbers as printed may be one value: equal to the digits of the coarser one."""
+    values, places = [], []
+    for text in (one, other):
+        plain = text.replace("−", "-")
+        values.append(float(plain))
+        places.append(len(plain.partition(".")[2]))
+    return abs(values[0] - values[1]) <= 0.51 * 10.0 ** -min(places)
+
+
+def facts(text: str) -> dict[str, list[str]]:
+    """Fact -> its values as they stand on the page of a circle: tiles, answer, marks of the picture, the two tables."""
+    said = markup.unescape(re.sub(r"<[^>]+>", " ", text.partition("<main>")[0]))
+    found: dict[str, list[str]] = {}
+
+    def add(fact: str, value: str) -> None:
+        found.setdefault(fact, []).append(value)
+
+    for value, label in re.findall(r"<b>([^<]+) <small>µm</small></b><span>([^<]+)</span>", text):
+        if peak := re.search(r"peak, (\w) reverses", label):
+            add(f"peak {peak[1]}", value)
+        elif "circular deviation G" in label:
+            add("G", value)
+    for value in re.findall(r"circular deviation G (\S+) µm", said):
+        add("G", value)
+    for axis, value in re.findall(r"(\w) (?:stays behind|jumps ahead) for a moment where it reverses, (\S+) µm", said):
+        add(f"peak {axis}", value)
+    for axis, value in re.findall(r'"text":"([XYZ])[+−]: (\S+) µm"', text):
+        add(f"peak {axis}", value)
+    for axis, value in re.findall(r"<td>Reversal peaks of (\w)</td><td[^>]*>(−?[\d.]+)", text):
+        add(f"peak {axis}", value)
+    for name, value in re.findall(r"<code>XZ\.(G|peak_\w)</code></td><td[^>]*>(−?[\d.]+)</td>", text):
+        add(name.replace("peak_", "peak "), value)
+    return found
+
+
+@pytest.mark.parametrize("name", ["circle", "recorded"])
+def test_a_fact_has_one_value(name: str, files: dict[str, Path]) -> None:
+    found = facts(files[name].read_text(encoding="utf-8"))
+    assert {"G", "peak X", "peak Z"} <= set(found)
+    for fact, values in found.items():
+        assert len(values) >= 3, fact
+        for value in values[1:]:
+            assert agree(values[0], value.rstrip(",")), (fact, values)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_tiles_agree_with_the_table_of_figures(name: str, files: dict[str, Path]) -> None:
+    """Of every figure with a tile: tile and table have the same value, by the same meaning."""
+    text = files[name].read_text(encoding="utf-8")
+    rows = re.findall(
+        r'<td><code>[^<]+</code></td><td class="number">([^<]+)</td><td>([^<]*)</td><td[^>]*>([^<]+)</td>', text
+    )
+    table = {(meaning, unit): value for value, unit, meaning in rows}
+    for meaning, value, unit in re.findall(r'<div class="key" title="([^"]+)"><b>([^<]+) <small>([^<]+)</small>', text):
+        if (meaning, unit) in table and NUMBER.fullmatch(value):
+            assert agree(value, table[meaning, unit]), (meaning, value, table[meaning, unit])
+
+
+def test_the_diagnosis_names_the_same_peaks_as_the_figures() -> None:
+    run = circle_run()
+    figures, causes = evaluate(run), diagnoses(run)
+    for axis in "XZ":
+        largest = max(abs(peak.height) for peak in causes["XZ"].peaks if peak.axis == axis)
+        assert abs(figures[f"XZ.peak_{axis}"].value) == pytest.approx(1e6 * largest)
+    assert np.isfinite(figures["XZ.G"].value)

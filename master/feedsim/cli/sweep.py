@@ -92,7 +92,12 @@ def sweep(options: Namespace) -> int:
     wrong = [str(text) for text in table["warnings"] if str(text).startswith(WRONG)]
     first = wrong[0].removeprefix(WRONG).split(" | ")[0] if wrong else ""
     told = [Wrong(f"{len(wrong)} of {len(table)} runs, the first: {first}")] if wrong else []
-    finish(options.quiet, told, _summary(study, last[0], perf_counter() - begun, directory))
+    finish(
+        options.quiet,
+        told,
+        *report.question(table, study, planned),
+        _summary(study, last[0], perf_counter() - begun, directory),
+    )
     return 0
 
 

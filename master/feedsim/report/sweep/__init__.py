@@ -5,6 +5,6 @@ Start with report.py.
 """
 
 from feedsim.report.results import discard
-from feedsim.report.sweep.report import check_writable, write
+from feedsim.report.sweep.report import check_writable, question, write
 
-__all__ = ["check_writable", "discard", "write"]
+__all__ = ["check_writable", "discard", "question", "write"]

@@ -230,6 +230,17 @@ class Account:
         return tuple(dict.fromkeys([*found, *self.sensitivities.warnings]))
 
     @cached_property
+    def best(self) -> tuple[Output, int] | None:
+        """The figure that the study's goal names, and the row with its best value; None where no run has one."""
+        if self.study.goal is None:
+            return None
+        way, name = self.study.goal
+        output = next((each for each in self.outputs if each.name == name), None)
+        if output is None or not np.isfinite(output.values).any():
+            return None
+        return output, int((np.nanargmin if way == "smallest" else np.nanargmax)(output.values))
+
+    @cached_property
     def failures(self) -> tuple[Failure, ...]:
         """Failed runs by message, the most frequent first."""
         return failures(self.table, self.design)

@@ -27,7 +27,7 @@ def of_account(account: Account, output: Output, measure: Measure, stem: str) ->
     random = account.study.sampling.method != "grid"
     found = (
         distribution_picture(output, account.inputs, measure, stem, random),
-        scatter_picture(output, account.inputs, measure, stem),
+        scatter_picture(output, account.inputs, measure, stem, _best_row(account, output)),
     )
     return [picture for picture in found if picture is not None]
 
@@ -137,8 +137,18 @@ def _moving(measure: Measure, left_out: int) -> str:
     return text + (f" {left_out} more parameters, which move it less, are not drawn." if left_out else "")
 
 
-def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, stem: str) -> Picture | None:
-    """The figure over each parameter, the strongest first, every run a point; None without values."""
+def _best_row(account: Account, output: Output) -> int | None:
+    """The run that the study's goal asks for, where it is about this figure."""
+    return account.best[1] if account.best is not None and account.best[0] is output else None
+
+
+def scatter_picture(
+    output: Output, inputs: Sequence[Input], measure: Measure, stem: str, best: int | None = None
+) -> Picture | None:
+    """The figure over each parameter, the strongest first, every run a point; None without values.
+
+    best: the row that is looked for, which is marked.
+    """
     shown = [inputs[k] for k in measure.telling()[:MOST_PANELS] or range(len(inputs))[:MOST_PANELS]]
     shown = [each for each in shown if len(np.unique(each.values)) > 1]
     if not len(output.known) or not shown:
@@ -149,11 +159,12 @@ def scatter_picture(output: Output, inputs: Sequence[Input], measure: Measure, s
     caption += "; the line is the running median"
     caption += ", the marks the medians of each value" if any(len(each.levels) for each in shown) else ""
     caption += f". {left_out} of {len(inputs)} parameters, which move it less, are not drawn." if left_out else "."
-    chart = Chart([_panel(output, each) for each in shown], (1.0,) * min(PANELS, len(shown)))
+    caption += " The ring is the run that is looked for." if best is not None else ""
+    chart = Chart([_panel(output, each, best) for each in shown], (1.0,) * min(PANELS, len(shown)))
     return Picture(f"scatter-{stem}", f"{output.name} over the parameters", caption, chart, worded=True)
 
 
-def _panel(output: Output, each: Input) -> Panel:
+def _panel(output: Output, each: Input, best: int | None = None) -> Panel:
     """A figure over a parameter, a point per run, and at the foot a stroke per run without a value."""
     known = np.isfinite(output.sample)
     x, y = each.sample[known].astype(float), output.sample[known]
@@ -180,6 +191,10 @@ def _panel(output: Output, each: Input) -> Panel:
         if len(median[0]):
             curves.append(Curve("running median", *median, VERMILLION, width=1.8))
         axis = Axis(each.name, each.scale.shown_unit, log=each.logarithmic)
+    if best is not None:
+        value = float(each.values[best])
+        place = float(np.searchsorted(each.levels, value)) if len(each.levels) else value
+        marks.append(Mark(place, float(output.values[best]), "", INK, hollow=True))
     low, reach = float(y.min()), float(np.ptp(y)) or 0.1 * abs(float(y.min())) or 1.0
     feet = (low - 0.07 * reach, low - 0.02 * reach)
     levels = [Level(at, upright=True, colour=VERMILLION, dash="", ends=feet) for at in without[:MOST_FEET].tolist()]

@@ -8,7 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feedsim.report.content import Paragraph, Part, Report, Section, Table, Text, Tile, code
+import numpy as np
+
+from feedsim.report.content import LEAD_ROWS, Paragraph, Part, Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import counted, minus, number, three
 from feedsim.report.picture import Picture
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
@@ -35,6 +37,7 @@ METHODS = {
 MOST_FAILURES = 50  # kinds
 MOST_ANSWERS = 4  # figures that are told first
 WORTH = 0.05  # share of the scatter, from which a parameter is told to move a figure
+EDGE = 0.01  # share of a parameter's range, up to which a value lies at its end
 MOST_RUNS = 12  # numbers of a kind
 SOBOL_NOTE = (
     "First order: the share of the scatter that would be gone if the parameter were known. Total: the share that would "
@@ -82,7 +85,12 @@ def write(
     with remarked(f"{study.name}. {machine.name}. {machine.note}".strip(), REMARK_WIDTH, REMARK_LINES):
         whole, single = pictures_of(account)
     return write_report(
-        directory, report_of(account, whole, single), partial(summary, account), {}, drawn, kind="sweep"
+        directory,
+        report_of(account, whole, single),
+        partial(summary, account, answer=answers(account)),
+        {},
+        drawn,
+        kind="sweep",
     )
 
 
@@ -96,7 +104,9 @@ def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Pictu
         answer=answers(account),
         warnings=account.warnings,
         notes=(scenario.machine.note, scenario.note, study.note),
-        tiles=list(_tiles(account)),
+        tiles=[*_goal_tiles(account), *_tiles(account)],
+        lead=lead(account, whole, single),
+        next_step=_next(account),
         main=[
             _statistics(account),
             *whole,
@@ -119,11 +129,80 @@ def _tiles(account: Account) -> Iterator[Tile]:
         yield Tile(f"{wall:.4g} s", "time of all runs", "from the beginning to the end of all runs")
 
 
+def _goal_tiles(account: Account) -> Iterator[Tile]:
+    """The best value, what the scenario has without changes, and what lies between them."""
+    if (found := account.best) is None:
+        return
+    output, row = found
+    unit, value = output.scale.shown_unit, float(output.values[row])
+    way = account.study.goal[0] if account.study.goal else ""
+    yield Tile(f"{three(value)} {unit}".rstrip(), f"{way} {output.name}, run {account.runs[row]}", "the run looked for")
+    if math.isfinite(output.nominal):
+        yield Tile(f"{three(output.nominal)} {unit}".rstrip(), "the scenario unchanged", "value without changes")
+        more = minus(f"{100 * (value / output.nominal - 1):+.1f} %") if output.nominal else ""
+        yield Tile(more or "–", "against the scenario", "difference of the two")
+
+
+def question(table: Runs, study: Study, design: Design) -> list[str]:
+    """The answer to the goal of a study, for the terminal; empty without a goal."""
+    return goal_words(Account(table, study, design))
+
+
+def goal_words(account: Account) -> list[str]:
+    """The answer to the question of the study: the best value, where it lies, and that of the scenario unchanged."""
+    if account.study.goal is None:
+        return []
+    way, name = account.study.goal
+    if (found := account.best) is None:
+        return [f"{way.capitalize()} {name}: no run has this figure."]
+    output, row = found
+    unit = output.scale.shown_unit
+    at = ", ".join(f"{each.name} {each.text(float(each.values[row]))} {each.scale.shown_unit}".rstrip()
+                   for each in account.inputs)  # fmt: skip
+    nominal = f"; the scenario unchanged has {three(output.nominal)} {unit}".rstrip()
+    own = nominal if math.isfinite(output.nominal) else ""
+    edge = [each.name for each in account.inputs if _at_edge(each, row)]
+    more = f". It lies at the end of what was tried of {' and '.join(edge)}: try further" if edge else ""
+    return [f"{way.capitalize()} {name}: {three(float(output.values[row]))} {unit}".rstrip()
+            + f" in run {account.runs[row]}, with {at}{own}{more}."]  # fmt: skip
+
+
+def _at_edge(each: Input, row: int) -> bool:
+    """Whether a run has the least or the greatest of a parameter's values, to a hundredth of their range."""
+    if each.words or (reach := float(np.ptp(each.values))) == 0:
+        return False
+    value = float(each.values[row])
+    return min(value - float(each.values.min()), float(each.values.max()) - value) <= EDGE * reach
+
+
+def lead(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) -> Picture | None:
+    """The picture that belongs to the study's question: its figure over the parameters, or what moves it."""
+    asked = account.study.explain or (account.study.goal[1] if account.study.goal else "")
+    titles = (f"{asked} over the parameters", f"Distribution of {asked}")
+    own = [each for each in (*single, *whole) if asked and each.title in titles]
+    begin = "distribution-" if account.study.explain else "scatter-"
+    first = next((each for each in own if each.stem.startswith(begin)), next(iter(own), None))
+    return first.first_rows(LEAD_ROWS) if first is not None else None
+
+
+def _next(account: Account) -> Text:
+    study = account.study
+    if (found := account.best) is not None:
+        return "The command that makes this run by itself:\n", code(f"feedsim sweep {study.file.name} --row "
+                                                                    f"{account.runs[found[1]]}")  # fmt: skip
+    if not (outputs := drawn(account)):
+        return ""
+    name = study.explain or outputs[0].name
+    return "Lay the two ends over each other:\n", code(f"feedsim show THIS_FOLDER:min={name} THIS_FOLDER:max={name}")
+
+
 def answers(account: Account) -> list[str]:
-    """How far the leading figures scatter, and what moves them most: a line each."""
+    """The answer to the study's question; how far the leading figures scatter, and what moves them most."""
     found, grid = measures(account), account.study.sampling.method == "grid"
-    lines = []
-    for output in drawn(account)[:MOST_ANSWERS]:
+    lines = goal_words(account)
+    asked = account.study.explain
+    shown = sorted(drawn(account), key=lambda each: each.name != asked)
+    for output in shown[:MOST_ANSWERS]:
         told, unit = output.statistics, output.scale.shown_unit
         low, high = (three(told[key]) for key in (("min", "max") if grid else ("q5", "q95")))
         spread = f"{low} to {high} {unit}".rstrip() + (" over the grid" if grid else " in nine of ten runs")

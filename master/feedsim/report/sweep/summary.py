@@ -25,11 +25,15 @@ def study_files(account: Account) -> list[InputFile]:
     return hashed(named)
 
 
-def summary(account: Account, files: Sequence[str]) -> dict[str, Any]:
-    """Content of summary.json; what could not be determined is null. Values are SI, as in the table."""
+def summary(account: Account, files: Sequence[str], answer: Sequence[str] = ()) -> dict[str, Any]:
+    """Content of summary.json; what could not be determined is null. Values are SI, as in the table.
+
+    answer: the lines that the report begins with.
+    """
     study, scenario, found = account.study, account.study.base.scenario, account.sensitivities
     return {
         "format": FORMAT,
+        "answer": list(answer),
         "warnings": list(account.warnings),
         "study": {
             "name": study.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, StrictBool, StrictInt, StrictStr, WithJsonSchema, field_validator
@@ -12,6 +13,8 @@ from feedsim.fields import File, Model, brief, fault
 Method = Literal["grid", "latin_hypercube", "sobol", "sensitivity"]
 Kind = Literal["uniform", "loguniform", "triangular", "normal", "lognormal"]
 
+# What a study can look for in a figure.
+WAYS = ("smallest", "largest")
 LONGEST_NAME = 60  # characters of a parameter's name, which heads a column
 MOST_RUNS = 1_000_000
 # Columns of the table that every study has.
@@ -100,6 +103,22 @@ class StudyFile(Model):
     figures: Annotated[tuple[Key, ...], Field(min_length=1)] | None = Field(
         default=None, description='Names or patterns such as "XZ.glitch_*" (default: all figures)'
     )
+
+    goal: StrictStr | None = Field(
+        default=None,
+        description='What is looked for: "smallest FIGURE" or "largest FIGURE"; the report names the run that has it',
+        examples=["smallest XZ.G"],
+    )
+    explain: Key | None = Field(
+        default=None, description="Figure whose scatter is to be explained; the report begins with it"
+    )
+
+    @field_validator("goal", mode="after")
+    @classmethod
+    def _goal(cls, goal: str | None) -> str | None:
+        if goal is not None and not re.fullmatch(f"({'|'.join(WAYS)}) [^ ]+", goal):
+            raise fault(f"{brief(goal)}; 'smallest FIGURE' or 'largest FIGURE' is expected, such as smallest XZ.G")
+        return goal
 
     @field_validator("parameters", mode="after")
     @classmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
 from itertools import combinations
 from math import prod
 from pathlib import Path
@@ -70,6 +71,8 @@ def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | N
         parameters=tuple(parameters.values()),
         settings=tuple(_meant(base, _settings(source))),
         figures=entry.figures,
+        goal=_goal(entry),
+        explain=entry.explain or "",
         files=tuple(dict.fromkeys(files)),
         overrides=tuple(overrides),
         warnings=tuple(warnings),
@@ -197,7 +200,12 @@ def _pattern_faults(source: Source, entry: StudyFile, base: Base, parameters: Ma
 
     parameters: those that could be read.
     """
-    if entry.figures is None:
+    asked: list[tuple[tuple[str | int, ...], str]] = [
+        (("figures", k), pattern) for k, pattern in enumerate(entry.figures or ())
+    ]
+    asked += [(("goal",), goal[1])] if (goal := _goal(entry)) else []
+    asked += [(("explain",), entry.explain)] if entry.explain else []
+    if not asked:
         return []
     unread = {*entry.parameters} - {*parameters}
     if any(_decides(entry.parameters[name].keys) for name in unread):
@@ -207,10 +215,22 @@ def _pattern_faults(source: Source, entry: StudyFile, base: Base, parameters: Ma
         return []
     names = [f"{beginning}.*" for beginning in sorted(known)]
     return [
-        describe(source, ("figures", i), f"{pattern!r} is none of the figures{did_you_mean(pattern, names)}")
-        for i, pattern in enumerate(entry.figures)
+        describe(source, place, f"{pattern!r} is none of the figures{did_you_mean(pattern, names)}")
+        for place, pattern in asked
         if not any(_may_match(pattern, beginning) for beginning in known)
+    ] + [
+        describe(source, place, f"{name!r} is not among `figures`: {', '.join(entry.figures)}")
+        for place, name in asked
+        if place[0] != "figures" and entry.figures and not any(fnmatchcase(name, each) for each in entry.figures)
     ]
+
+
+def _goal(entry: StudyFile) -> tuple[str, str] | None:
+    """Which end of which figure is looked for."""
+    if entry.goal is None:
+        return None
+    way, _, figure = entry.goal.partition(" ")
+    return way, figure
 
 
 def _all_beginnings(base: Base, parameters: Iterable[Parameter]) -> set[str] | None:

@@ -132,6 +132,7 @@ class Study:
         base: the scenario, with what the study sets in every run.
         settings: what the study sets in every run, as KEY=VALUE with file names relative to the working folder.
         figures: patterns of the figures wanted; None: all.
+        goal: "smallest" or "largest", and the figure. explain: a figure; "" where none is asked about.
         files: files of data that runs may read, each once.
         overrides: what was set from outside, as KEY=VALUE.
         warnings: what a user should know before the runs are made, a sentence each.
@@ -145,6 +146,8 @@ class Study:
     parameters: tuple[Parameter, ...]
     settings: tuple[str, ...] = ()
     figures: tuple[str, ...] | None = None
+    goal: tuple[str, str] | None = None
+    explain: str = ""
     files: tuple[Path, ...] = ()
     overrides: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -5,7 +5,8 @@ void drive_layout(Drive *p) {
     p->n_ring = p->x_ring + (size_t)p->position.x_delay.length;
     p->reference_ring = p->n_ring + (size_t)p->position.n_delay.length;
     p->speed_ring = p->reference_ring + (size_t)p->reference_model.dead_time.length;
-    p->samples = p->speed_ring + (size_t)p->measured_speed.window.length;
+    p->table_ring = p->speed_ring + (size_t)p->measured_speed.window.length;
+    p->samples = p->table_ring + (p->table.points > 0 ? (size_t)p->table.delay.length : 0);
 }
 
 /* The past before the first instant with release: setpoint and axis stood at their present values, everything else was
@@ -16,6 +17,10 @@ static void begin(const Drive *p, DriveState *x, double *lines, const DriveInput
     reference_model_start(&p->reference_model, &x->reference_model, lines + p->reference_ring, 0.0);
     if (!x->measured) {
         measured_speed_start(&p->measured_speed, &x->speed_newest, lines + p->speed_ring, in->x_a);
+    }
+    x->pulse = (PulseState){0};
+    if (p->table.points > 0) {
+        torque_table_start(&p->table, &x->table, lines + p->table_ring);
     }
     x->released = 1;
     x->measured = 1;
@@ -64,13 +69,21 @@ static void control(const Drive *p, DriveState *x, double *lines, const DriveInp
         if (begins) {
             begin(p, x, lines, in, x_s);
         }
-        setpoint_ramp_take(&x->ramp, position_step(&p->position, &x->position, lines + p->x_ring, lines + p->n_ring,
-                                                   x_s, in->n_ffw, in->x_a));
+        double n_new = position_step(&p->position, &x->position, lines + p->x_ring, lines + p->n_ring, x_s, in->n_ffw,
+                                     in->x_a);
+        if (p->pulse.used) {
+            n_new += pulse_step(&p->pulse, &x->pulse, in->n_ffw);
+        }
+        if (p->table.points > 0) {
+            torque_table_step(&p->table, &x->table, lines + p->table_ring, in->n_ffw);
+        }
+        setpoint_ramp_take(&x->ramp, n_new);
     }
     x->n_s = setpoint_ramp_value(&p->ramp, &x->ramp, (int32_t)x->tick) + in->n_add;
     x->n_ref = reference_model_step(&p->reference_model, &x->reference_model, lines + p->reference_ring, x->n_s);
     const double n = measured_speed_step(&p->measured_speed, &x->speed_newest, lines + p->speed_ring, in->x_a, in->n_a);
-    x->M_s = speed_step(&p->speed, &x->speed, x->n_s, x->n_ref, n, in->M_add);
+    const double M_add = p->table.points > 0 ? in->M_add + x->table.M : in->M_add;
+    x->M_s = speed_step(&p->speed, &x->speed, x->n_s, x->n_ref, n, M_add);
     double M = x->M_s;
     for (int32_t i = 0; i < p->filters; ++i) {
         M = biquad_step(&p->filter[i], &x->filter[i], M);

@@ -22,6 +22,7 @@
 #include <stdint.h>
 
 #include "biquad.h"
+#include "compensation.h"
 #include "corrections.h"
 #include "current.h"
 #include "measured_speed.h"
@@ -56,8 +57,10 @@ typedef struct Drive {
     Orders orders;           /* cogging and torque ripple of the motor */
     Measuring measuring;     /* what it reads instead of x_a and n_a */
     Corrections corrections; /* what it adds to x_s */
+    FrictionPulse pulse;     /* what it adds to the speed setpoint at reversals */
+    TorqueTable table;       /* what it adds to the torque setpoint */
     /* Where the delay lines begin among the `samples` doubles; filled in by drive_layout(). */
-    size_t x_ring, n_ring, reference_ring, speed_ring, samples;
+    size_t x_ring, n_ring, reference_ring, speed_ring, table_ring, samples;
 } Drive;
 
 typedef struct DriveInputs {
@@ -98,6 +101,8 @@ typedef struct DriveState {
     OrdersState orders;
     MeasuringState measuring;
     CorrectionsState corrections;
+    PulseState pulse;
+    TorqueTableState table;
 } DriveState;
 
 /* Place the delay lines of a Drive whose blocks are filled in. */

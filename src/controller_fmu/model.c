@@ -138,6 +138,49 @@ static void derive_effects(const Scalars *v, Drive *p) {
     c->used = fabs(c->backlash) > 0 || c->leadscrew.used;
 }
 
+/* Friction compensations. Accelerations and speeds of points have to rise: a table between them would have no value. */
+static bool derive_compensation(Unit *unit, const Scalars *v, Drive *p) {
+    FrictionPulse *u = &p->pulse;
+    *u = (FrictionPulse){
+        .used = fabs(v->friction_pulse_amplitude) > 0 ||
+                (v->friction_pulse_adaptation != 0 && fabs(v->friction_pulse_amplitude_min) > 0),
+        .adaptation = v->friction_pulse_adaptation != 0,
+        .I_P = v->I_P,
+        .T_pos = v->T_pos,
+        .amplitude = v->friction_pulse_amplitude,
+        .min = v->friction_pulse_amplitude_min,
+        .acceleration = {v->friction_pulse_acceleration_1, v->friction_pulse_acceleration_2,
+                         v->friction_pulse_acceleration_3},
+        .T = v->friction_pulse_time,
+        .wait = fmax(0.0, v->T_dyn + v->friction_pulse_delay)};
+    bool good = true;
+    for (int i = 0; u->used && u->adaptation && i < 2; ++i) {
+        if (u->acceleration[i] > u->acceleration[i + 1]) {
+            char text[2][NUMBER_TEXT_SIZE];
+            good = unit_fail(unit, "friction_pulse.acceleration_%d = %s m/s2 is above acceleration_%d = %s m/s2", i + 1,
+                             number_text(text[0], u->acceleration[i]), i + 2,
+                             number_text(text[1], u->acceleration[i + 1]));
+        }
+    }
+    TorqueTable *t = &p->table;
+    *t = (TorqueTable){.points = v->friction_table_points,
+                       .I_P = v->I_P,
+                       .T_pos = v->T_pos,
+                       .distance = v->friction_table_distance,
+                       .delay = delay_linear(fmax(0.0, v->T_dyn + v->T_sym + v->friction_table_delay) / v->T_pos)};
+    const double *speed = &v->friction_table_speed_0, *torque = &v->friction_table_torque_0;
+    for (int i = 0; i < t->points; ++i) {
+        t->speed[i] = speed[i];
+        t->torque[i] = torque[i];
+        if (i > 0 && !(speed[i] > speed[i - 1])) {
+            char text[2][NUMBER_TEXT_SIZE];
+            good = unit_fail(unit, "friction_table.speed_%d = %s m/s is not above speed_%d = %s m/s", i,
+                             number_text(text[0], speed[i]), i - 1, number_text(text[1], speed[i - 1]));
+        }
+    }
+    return good;
+}
+
 static bool derive_drive(Unit *unit, const Scalars *v, Drive *p) {
     bool cycles = derive_cycles(unit, v, p);
     bool filters = derive_filters(unit, v, p);
@@ -146,6 +189,9 @@ static bool derive_drive(Unit *unit, const Scalars *v, Drive *p) {
     }
     derive_blocks(v, p);
     derive_effects(v, p);
+    if (!derive_compensation(unit, v, p)) {
+        return false;
+    }
     drive_layout(p);
     return true;
 }
@@ -193,6 +239,7 @@ static bool accepts(Unit *unit, const Scalars *scalars, const void *state, size_
         {"place in the delay line of n_ffw", x->position.n_newest, p.position.n_delay.length},
         {"place in the delay line of T_ref", x->reference_model.newest, p.reference_model.dead_time.length},
         {"place in the delay line of speed_window", x->speed_newest, p.measured_speed.window.length},
+        {"place in the delay line of friction_table", x->table.newest, p.table.points > 0 ? p.table.delay.length : 1},
     };
     for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
         if (counts[i].value < 0 || counts[i].value >= counts[i].end) {

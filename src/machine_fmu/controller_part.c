@@ -6,6 +6,7 @@
 #include "part_shell.h"
 
 #include "../controller_fmu/biquad.c"
+#include "../controller_fmu/compensation.c"
 #include "../controller_fmu/corrections.c"
 #include "../controller_fmu/current.c"
 #include "../controller_fmu/delay.c"

@@ -227,6 +227,13 @@ def controller_cases() -> list[Pinned]:
     motor |= {"ripple_1.amplitude": 0.05, "ripple_3.amplitude": -0.1, "ripple_3.order": 3, "ripple_3.phase": -0.4}
     encoder = {"measuring.indirect": 1, "encoder.eccentricity": 2e-3, "encoder.phase": 0.9}
     back = _motion(0.4, 4e-3, 10e-6, back=True)
+    pulse = {"friction_pulse.amplitude": 6e-4, "friction_pulse.amplitude_min": 1e-3, "friction_pulse.time": 0.03}
+    pulse |= {"friction_pulse.adaptation": 1, "friction_pulse.delay": 1.7e-3}
+    pulse |= {"friction_pulse.acceleration_1": 0.02, "friction_pulse.acceleration_2": 0.05}
+    pulse |= {"friction_pulse.acceleration_3": 0.9}
+    torques = {"friction_table.points": 4, "friction_table.distance": 20e-6, "friction_table.delay": -1.4e-3}
+    torques |= {f"friction_table.speed_{i}": v for i, v in enumerate((0.0, 2e-3, 8e-3, 20e-3))}
+    torques |= {f"friction_table.torque_{i}": M for i, M in enumerate((0.5, 1.6, 1.2, 1.4))}
     ideal = {"ideal_current_loop": 1, "reference_model": 0, "filter_1.type": 0}
     move = _motion(0.4, 4e-3, 10e-6)
 
@@ -253,6 +260,8 @@ def controller_cases() -> list[Pinned]:
         case("indirect", back, encoder, MEASURED_OUTPUTS),
         case("corrections", back, own, ("M_a", "x_e")),
         case("motor_orders", back, motor, ("M_a", "i_q")),
+        case("friction_pulse", back, pulse, ("M_a", "n_s")),
+        case("friction_table", back, torques, ("M_a", "M_s")),
         # in motion, and back within a position cycle; for one cycle; and once more while the axis vibrates
         case("release", _released(move, 0.07, 0.0905, 0.11, 0.110125, 0.25, 0.3), late),
         case("uneven_step", _motion(0.3, 4e-3, 10e-6), None, ("M_a", "n_s"), 0.2e-3, 1e-3),

@@ -66,6 +66,54 @@ def corrected(p: Mapping[str, float], x_s: Array, ticks: int) -> Array:
     return result
 
 
+def _directions(n: Array) -> Array:
+    """Sign of the speed, at rest that of before; 0 ahead of the first motion."""
+    moving = np.abs(n) > 1e-4
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(n)), -1))
+    return np.where(last >= 0, np.sign(n[last]), 0.0)
+
+
+def friction_pulse(p: Mapping[str, float], n_ffw: Array, ticks: int) -> Array:
+    """Additions to the speed setpoint at the position instants (every `ticks`): one exponential per reversal."""
+    T_pos, n = ticks * p["T_c"], n_ffw[::ticks]
+    side = _directions(n)
+    time, result = np.arange(len(n)) * T_pos, np.zeros(len(n))
+    top, low = p.get("friction_pulse.amplitude", 0.0), p.get("friction_pulse.amplitude_min", 0.0)
+    wait = max(0.0, p["T_dyn"] + p.get("friction_pulse.delay", 0.0))
+    edges = [p.get(f"friction_pulse.acceleration_{i}", 0.0) for i in (1, 2, 3)]
+    for k in range(1, len(n)):
+        if side[k] * side[k - 1] < 0:
+            a = abs(n[k] - n[k - 1]) * p["I_P"] / T_pos
+            size = top
+            if p.get("friction_pulse.adaptation", 0):
+                size = top * a / edges[0] if a < edges[0] else float(np.interp(a, edges[1:], [top, low]))
+            since = time - time[k] - wait
+            begun = since > -1e-9 * T_pos
+            result[begun] = side[k] * size / p["I_P"] * np.exp(-since[begun] / p.get("friction_pulse.time", 0.05))
+    return result
+
+
+def friction_table(p: Mapping[str, float], n_ffw: Array, ticks: int) -> Array:
+    """Torques at the position instants, over the speed of a while ago."""
+    points = round(p.get("friction_table.points", 0))
+    T_pos, n = ticks * p["T_c"], n_ffw[::ticks]
+    if not points:
+        return np.zeros(len(n))
+    late = max(0.0, p["T_dyn"] + p["T_sym"] + p.get("friction_table.delay", 0.0))
+    time = np.arange(len(n)) * T_pos
+    n = np.interp(time - late, time, n, left=0.0)
+    side, speed = _directions(n), np.abs(n) * p["I_P"]
+    way = np.zeros(len(n))
+    for k in range(len(n)):
+        begun = k == 0 or side[k] * side[k - 1] < 0
+        way[k] = (0.0 if begun else way[k - 1]) + speed[k] * T_pos
+    built = np.minimum(1.0, way / p["friction_table.distance"]) if p.get("friction_table.distance", 0.0) else 1.0
+    speeds, torques = (
+        [p.get(f"friction_table.{name}_{i}", 0.0) for i in range(points)] for name in ("speed", "torque")
+    )
+    return np.asarray(side * np.interp(speed, speeds, torques) * built)
+
+
 def torque(p: Mapping[str, float], n_a: Array, M: Array) -> Array:
     """Torque at all instants and at the end of the last cycle, M the motor's own there; n_a at the instants."""
     before = np.concatenate([n_a[:1], n_a[:-1]])

@@ -86,6 +86,7 @@ class Cascade:
         # Positions are counted from the start, a difference without rounding: their last bit around 0.1 m would be
         # 1e-12 rad/s by K_v / I_P, and 1e-10 N.m by K_p and the integrator over a run.
         self.origin = x_s_start
+        self.pulses: NDArray[np.float64] | None = None  # additions to the speed setpoint, every T_pos
         self._begin(0.0)
 
     def _begin(self, x_s: float) -> None:
@@ -137,6 +138,8 @@ class Cascade:
         self.seen["x_e"] = delayed - x_a
         feedforward = p["k_ffw"] * p["I_P"] * self._delayed(self.n_history, p["T_dyn"])
         self.n_old, self.n_new = self.n_new, (p["K_v"] * (delayed - x_a) + feedforward) / p["I_P"]
+        if self.pulses is not None:
+            self.n_new += float(self.pulses[self.k // self.ratio])
 
     def _late(self, n_s: float) -> float:
         """n_s behind the reference model's dead time: linear between the cycles."""
@@ -254,8 +257,12 @@ def solve(case: Case, every: float, outputs: tuple[str, ...]) -> Table:
         given["release"] = booleans(case.inputs, "release", seen_at)
     given["turns"] = given["n_a"]
     given["x_a"], given["n_a"] = effects.measured(p, given["x_a"], given["n_a"])
-    given["x_s"] = effects.corrected(p, given["x_s"], round(p["T_pos"] / T_c))
+    ticks = round(p["T_pos"] / T_c)
+    given["x_s"] = effects.corrected(p, given["x_s"], ticks)
+    added = np.repeat(effects.friction_table(p, given["n_ffw"], ticks), ticks)[: len(t)]
+    given["M_add"] = given.get("M_add", 0.0) + added
     cascade = Cascade(case.parameters, float(given["x_s"][0]))
+    cascade.pulses = effects.friction_pulse(p, given["n_ffw"], ticks)
     torque, seen = [0.0], [dict.fromkeys((*OBSERVABLES, "i_d", "i_q"), 0.0)]
     seen[0]["x_m"] = float(given["x_a"][0])
     for k in range(cycles):

@@ -167,6 +167,97 @@ static void cogging_needs_no_current(void) {
     }
 }
 
+static void pulse_has_the_characteristic_of_the_manual(void) {
+    FrictionPulse p = {.used = true, .adaptation = true, .amplitude = 3e-4, .min = 8e-4};
+    p.acceleration[0] = 0.02;
+    p.acceleration[1] = 0.1;
+    p.acceleration[2] = 0.5;
+    CHECK_NEAR(pulse_amplitude(&p, 0.005), 3e-4 / 4.0, 1e-18);
+    CHECK_EQUAL(pulse_amplitude(&p, 0.02), 3e-4);
+    CHECK_EQUAL(pulse_amplitude(&p, 0.07), 3e-4);
+    CHECK_NEAR(pulse_amplitude(&p, 0.3), 5.5e-4, 1e-18);
+    CHECK_EQUAL(pulse_amplitude(&p, 0.5), 8e-4);
+    CHECK_EQUAL(pulse_amplitude(&p, 9.0), 8e-4);
+    p.adaptation = false;
+    CHECK_EQUAL(pulse_amplitude(&p, 0.005), 3e-4);
+}
+
+/* Of a constant acceleration through standstill: the pulse begins `wait` behind the first sample of the other sign. */
+static void pulse_begins_at_the_reversal_and_decays(void) {
+    const double I_P = 0.003, T_pos = 1e-3, T = 0.02;
+    for (int late = 0; late < 4; ++late) {
+        const double wait = 0.7e-3 * late;
+        const FrictionPulse p = {
+            .used = true, .I_P = I_P, .T_pos = T_pos, .amplitude = 6e-4, .T = T, .wait = wait};
+        PulseState x = {.n = 0.0};
+        for (int k = 0; k < 100; ++k) {
+            const double n = 0.35 - 0.02 * k; /* reverses between 17 and 18 */
+            const double value = pulse_step(&p, &x, n), since = (k - 18) * T_pos - wait;
+            const double expected = since < -1e-12 ? 0.0 : -0.2 * exp(-since / T);
+            CHECK_NEAR(value, expected, 1e-12);
+        }
+    }
+}
+
+static void pulse_needs_a_reversal(void) {
+    const FrictionPulse p = {.used = true, .I_P = 0.003, .T_pos = 1e-3, .amplitude = 6e-4, .T = 0.02};
+    PulseState x = {.n = 0.0};
+    const double n[] = {0.0, 1.0, 2.0, 0.0, 1e-6, -1e-6, 0.0, 3.0}; /* what a spline leaves of a stop is none */
+    for (int k = 0; k < 8; ++k) {
+        CHECK_EQUAL(pulse_step(&p, &x, n[k]), 0.0);
+    }
+    CHECK_NEAR(pulse_step(&p, &x, -1.0), -0.2, 1e-15);
+    CHECK_NEAR(pulse_step(&p, &x, 1.0), 0.2, 1e-15); /* in the place of the one before */
+}
+
+static void torque_follows_the_table_over_the_speed(void) {
+    TorqueTable p = {.points = 3, .I_P = 0.01, .T_pos = 1e-3, .distance = 2e-5};
+    const double speed[] = {0.0, 0.01, 0.03}, torque[] = {1.0, 3.0, 2.0};
+    for (int i = 0; i < 3; ++i) {
+        p.speed[i] = speed[i];
+        p.torque[i] = torque[i];
+    }
+    CHECK_EQUAL(torque_table_value(&p, 0.0), 1.0);
+    CHECK_NEAR(torque_table_value(&p, 0.005), 2.0, 1e-15);
+    CHECK_NEAR(torque_table_value(&p, 0.02), 2.5, 1e-15);
+    CHECK_EQUAL(torque_table_value(&p, 1.0), 2.0);
+    p.delay = delay_linear(2.0);
+    TorqueTableState x;
+    double ring[8];
+    torque_table_start(&p, &x, ring);
+    double way = 0.0;
+    for (int k = 0; k < 40; ++k) {
+        const double n = k < 20 ? 0.5 : -0.5; /* 5 mm/s: 2 N.m */
+        torque_table_step(&p, &x, ring, n);
+        const double sign = k < 2 ? 0.0 : k < 22 ? 1.0 : -1.0;
+        way = k < 2 ? 0.0 : k == 22 ? 5e-6 : way + 5e-6;
+        CHECK_NEAR(x.M, sign * 2.0 * fmin(1.0, way / 2e-5), 1e-12);
+    }
+}
+
+/* Both act in the drive: the pulse behind the position controller, the torque behind the speed controller. */
+static void compensations_act_in_the_drive(void) {
+    Drive p = {.T_c = T_C, .ticks = 8, .K_t = 2.0, .ideal_current_loop = true};
+    const PositionParameters position = {.T_pos = 1e-3, .I_P = 0.003, .K_v = 0.0, .k_ffw = 0.0};
+    p.position = position_of(&position);
+    p.ramp = (SetpointRamp){.ticks = 8, .ramped = false};
+    p.reference_model = reference_model_of(false, 900.0, 1.0, 0.0, T_C);
+    p.speed = speed_of(5.0, 0.012, false, 80.0, T_C);
+    p.pulse = (FrictionPulse){.used = true, .I_P = 0.003, .T_pos = 1e-3, .amplitude = 6e-4, .T = 0.02};
+    p.table = (TorqueTable){.points = 1, .I_P = 0.003, .T_pos = 1e-3, .delay = delay_linear(0.0)};
+    p.table.torque[0] = 1.5;
+    drive_layout(&p);
+    DriveState x = {.instant = 0};
+    double lines[64];
+    for (int k = 0; k < 80; ++k) {
+        const DriveInputs in = {.n_ffw = k < 40 ? 1.0 : -1.0, .release = true};
+        drive_instant(&p, &x, lines, &in);
+        const double pulse = k < 40 ? 0.0 : -0.2 * exp(-((k - 40) / 8) * 1e-3 / 0.02);
+        CHECK_NEAR(x.n_s, pulse, 1e-12);
+        CHECK_NEAR(x.M_s, 5.0 * pulse + (k < 40 ? 1.5 : -1.5), 1e-12);
+    }
+}
+
 int main(void) {
     angle_is_the_integral_of_the_speed();
     angle_stays_within_its_turn();
@@ -176,5 +267,10 @@ int main(void) {
     resolution_and_noise();
     backlash_compensation_follows_the_setpoint();
     cogging_needs_no_current();
+    pulse_has_the_characteristic_of_the_manual();
+    pulse_begins_at_the_reversal_and_decays();
+    pulse_needs_a_reversal();
+    torque_follows_the_table_over_the_speed();
+    compensations_act_in_the_drive();
     return CHECK_RESULT;
 }

@@ -148,6 +148,8 @@ EFFECTS = {
     "backlash_compensation": "Backlash compensation of the control",
     "leadscrew_compensation": "Leadscrew error compensation of the control",
     "leadscrew_compensation_minus": "Leadscrew error compensation in the negative direction",
+    "friction_pulse": "Friction compensation by a pulse on the speed setpoint",
+    "friction_table": "Friction compensation by a torque over the commanded speed",
 }
 _MEASURED = ("measuring", *(f"periodic_error_{i}" for i in (1, 2, 3)), "measuring_table", "encoder")
 

@@ -59,6 +59,7 @@ BLOCK = 0.05  # [s]: residuals further apart than that are taken to be independe
 VAGUE = 0.5  # relative half width of an interval beyond which a value is not determined
 APART = 2.0  # of the logarithm of the likelihood: below it two cycles are as likely as one another
 POOR = 0.3  # share of the torque, or of the lag, that a fit may leave
+EXACT = 1e-5  # of the travel: a position that a fit leaves within it is met, however small the lag
 ONE_WAY = 0.15  # share of the mean torque to which the constant load has to be known where the axis moves one way
 SHAPE = 0.25  # standard deviation of the friction, of itself, where only its usual shape separates it from the load
 HIDDEN = 0.8  # share of the usual deviation that is left: the record has not told it
@@ -301,8 +302,10 @@ def _refuse_poor(each: AxisRecord, found: Tuned) -> None:
         "position": (rms(found.position), rms((each.setpoint - each.position)[each.moving]), 1e6, "um",
                      "distance of the position behind its setpoint"),
     }  # fmt: skip
+    exact = rms(found.position) <= EXACT * float(np.ptp(each.position[each.moving]))  # the setpoint may be the encoder
     for channel, (left, whole, scale, unit, meaning) in signal.items():
-        if (channel == "position" or each.record.driven) and left > POOR * whole:
+        judged = each.record.driven if channel == "torque" else not exact
+        if judged and left > POOR * whole:
             raise InputError(
                 f"{each.record.name}, axis {each.axis}: the best fit leaves {scale * left:.3g} {unit} rms of a "
                 f"{meaning} of {scale * whole:.3g} {unit} rms while the axis moves; at most {100 * POOR:.0f} % are "

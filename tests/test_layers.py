@@ -14,7 +14,6 @@ PACKAGE = Path(__file__).resolve().parents[1] / "master" / "feedsim"
 ORDER = [
     "__main__",
     "cli",
-    "front",
     "jobs",
     "page",
     "report",
@@ -56,7 +55,7 @@ SOLE_USERS = {
     "ruckig": {"motions"},
     "jinja2": {"report/page.py"},
     "tqdm": {"cli"},
-    "pandas": {"front", "trace/trace.py", "sweep/table.py"},
+    "pandas": {"jobs/run.py", "jobs/sweep.py", "trace/trace.py", "sweep/table.py"},
     "pyuff": {"trace/uff.py"},
     "distributed": {"sweep"},
     "dask": {"sweep"},

@@ -11,75 +11,29 @@
 
 from __future__ import annotations
 
+import re as _re
 from importlib import import_module as _import_module
-from typing import TYPE_CHECKING
+from pathlib import Path as _Path
+from typing import Any as _Any
 
-if TYPE_CHECKING:
-    from typing import Any
+# The public names stand in the stub beside this file, where type checkers look. They are loaded on first use:
+# `feedsim --help` should not wait for numpy and fmpy.
+_STUB = _Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+_HOMES = {name: home for *home, name in _re.findall(r"^from (\S+) import (\w+) as (\w+)$", _STUB, _re.MULTILINE)}
 
-    from feedsim.analysis.evaluate import evaluate
-    from feedsim.analysis.figures import Figure
-    from feedsim.cosim import Run
-    from feedsim.errors import FeedsimError, InputError, OutputError, SimulationError
-    from feedsim.examples import copy as example
-    from feedsim.front.calls import frf, identify, load, run, sweep
-    from feedsim.front.comparison import compare
-    from feedsim.front.overlay import Overlay, show
-    from feedsim.front.result import Result
-    from feedsim.jobs.circle import circle
-    from feedsim.jobs.compensate import compensate
-    from feedsim.jobs.identify_drive import identify_drive
-    from feedsim.jobs.replay import replay
-    from feedsim.scenario import Machine, Scenario, load_machine
-    from feedsim.scenario.load import load as load_scenario
-    from feedsim.trace import Trace
-    from feedsim.trace import read_csv as read_trace
-
-# Loaded on first use: `feedsim --help` should not wait for numpy and fmpy.
-_HOMES = {
-    "FeedsimError": "errors",
-    "Figure": "analysis",
-    "InputError": "errors",
-    "Machine": "scenario",
-    "OutputError": "errors",
-    "Overlay": "front.overlay",
-    "Result": "front.result",
-    "Run": "cosim",
-    "Scenario": "scenario",
-    "SimulationError": "errors",
-    "Trace": "trace",
-    "circle": "jobs.circle",
-    "compare": "front.comparison",
-    "compensate": "jobs.compensate",
-    "evaluate": "analysis",
-    "example": "examples:copy",
-    "frf": "front.calls",
-    "identify": "front.calls",
-    "identify_drive": "jobs.identify_drive",
-    "load": "front.calls",
-    "load_machine": "scenario",
-    "load_scenario": "scenario:load",
-    "read_trace": "trace:read_csv",
-    "replay": "jobs.replay",
-    "run": "front.calls",
-    "show": "front.overlay",
-    "sweep": "front.calls",
-}
-
-__all__ = [
-    "FeedsimError", "Figure", "InputError", "Machine", "OutputError", "Overlay", "Result", "Run", "Scenario",
-    "SimulationError", "Trace", "circle", "compare", "compensate", "evaluate", "example", "frf",
-    "identify", "identify_drive", "load", "load_machine", "load_scenario", "read_trace", "replay", "run",
-    "show", "sweep",
-]  # fmt: skip
+__all__ = sorted(_HOMES)
 
 
-def __getattr__(public: str) -> Any:
+def __getattr__(public: str) -> _Any:
+    if public == "__version__":
+        from importlib.metadata import version
+
+        return version("feedsim")
     if public not in _HOMES:
         raise AttributeError(f"module 'feedsim' has no attribute '{public}'")
-    room, _, name = _HOMES[public].partition(":")
+    room, name = _HOMES[public]
     try:
-        return getattr(_import_module(f"feedsim.{room}"), name or public)
+        return getattr(_import_module(room), name)
     except ModuleNotFoundError as error:
         from feedsim.extras import missing
 

@@ -17,6 +17,7 @@ from feedsim.analysis import Figure
 from feedsim.analysis.campaign import Plan, signal_of
 from feedsim.analysis.responses import Responses, frequencies, read_overlays
 from feedsim.errors import InputError, OutputError
+from feedsim.jobs.frf import FrfResult
 from feedsim.linear.loops import names, response, unit_of
 from feedsim.report import frf as report
 from feedsim.report.frf import report as report_module
@@ -341,22 +342,22 @@ def one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("one_picture")
 def test_a_report_is_replaced_whole(tmp_path: Path) -> None:
-    report.write(subject(), responses(), tmp_path)
+    FrfResult(subject(), responses()).save(tmp_path)
     first = contents(tmp_path)
     assert "frf_measured.csv" in first
     (tmp_path / "notes.txt").write_text("mine")
-    report.write(subject(), responses(measured=False), tmp_path)
+    FrfResult(subject(), responses(measured=False)).save(tmp_path)
     second = contents(tmp_path)
     assert "frf_measured.csv" not in second, "the curves of an earlier measurement are left"
     assert set(first) - set(second) == {"frf_measured.csv"}
     assert (tmp_path / "notes.txt").read_text() == "mine"
-    report.write(subject(), responses(measured=False), tmp_path)
+    FrfResult(subject(), responses(measured=False)).save(tmp_path)
     assert contents(tmp_path) == second
 
 
 @pytest.mark.usefixtures("one_picture")
 def test_nothing_is_left_when_a_picture_cannot_be_moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    report.write(subject(), responses(), tmp_path)
+    FrfResult(subject(), responses()).save(tmp_path)
     before = contents(tmp_path)
     move = Path.replace
 
@@ -367,7 +368,7 @@ def test_nothing_is_left_when_a_picture_cannot_be_moved(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(Path, "replace", failing)
     with pytest.raises(OutputError, match="No space left on device"):
-        report.write(subject(), responses(measured=False), tmp_path)
+        FrfResult(subject(), responses(measured=False)).save(tmp_path)
     assert contents(tmp_path) == before
 
 
@@ -382,7 +383,7 @@ def test_names_and_warnings_cannot_break_the_page() -> None:
 @pytest.mark.usefixtures("one_picture")
 def test_figures_that_are_not_determined_are_null_and_said(tmp_path: Path) -> None:
     found = responses(figures={"Z.speed.bandwidth_first": Figure(float("nan"), "Hz", "m")})
-    report.write(subject(), found, tmp_path)
+    FrfResult(subject(), found).save(tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["figures"]["Z.speed.bandwidth_first"]["value"] is None
     assert "not determined" in (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -175,7 +175,7 @@ def test_programs_around_it_are_checked_by_its_types(installed: Installation, tm
         [*command, str(code)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
     revealed = [line.partition('"')[2].rstrip('"') for line in done.stdout.splitlines() if "Revealed type" in line]
-    expected = ["feedsim.front.result.Result", "bool", "feedsim.scenario.model.Scenario"]
+    expected = ["feedsim.jobs.run.RunResult", "bool", "feedsim.scenario.model.Scenario"]
     assert [each.removeprefix("builtins.") for each in revealed] == expected, done.stdout + done.stderr
     errors = [line for line in done.stdout.splitlines() if ": error: " in line]
     assert len(errors) == 1

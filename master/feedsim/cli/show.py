@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import CONTROL, FIGURES, QUIET, Command, Option, out
-from feedsim.cli.terminal import finish, results_in
+from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Lay results of feedsim run, recorded CSV files and runs of studies over each other: contours of
 circles, stops, following error, torque, speed, position and spectra, a table of their figures with differences, and
@@ -24,15 +24,13 @@ EPILOG = """examples:
 
 
 def show(options: Namespace) -> None:
-    """Read, lay over each other, write."""
-    from feedsim.front import overlay
-    from feedsim.report import show as report
+    """feedsim show."""
+    from feedsim.jobs.show import show
 
-    directory: Path = options.out or Path("results") / "show"
-    over = overlay.show(*options.results)
-    with results_in(directory, report.check_writable, over.files):
-        over.save(directory, drawn=options.figures)
-    finish(options.quiet, (), *over.lines, f"-> {directory / 'report.html'}")
+    out: Path = options.out or Path("results") / "show"
+    with watching(options.quiet) as watch:
+        over = show(*options.results, out=out, figures=options.figures, control=options.control, watch=watch)
+    finish(options.quiet, over.findings, *over.lines, f"-> {out / 'report.html'}")
 
 
 COMMAND = Command(
@@ -50,4 +48,5 @@ COMMAND = Command(
     ),
     description=DESCRIPTION,
     epilog=EPILOG,
+    job="show",
 )

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from argparse import Namespace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, out, settings
-from feedsim.cli.terminal import announce, finish, progress_bar, results_in, warn
-from feedsim.findings import WRONG, Wrong
+from feedsim.cli.terminal import announce, finish, warn, watching
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from feedsim.scenario.study import Study
     from feedsim.sweep import Design
-    from feedsim.sweep.study import Progress
 
 DESCRIPTION = """Make the runs of a study (docs/sweeps.md): a scenario of which parameters are varied over a grid, a
 Latin hypercube or a Sobol sequence. Writes table.csv or table.parquet with a row per run, study.json with what it comes
@@ -40,10 +37,43 @@ examples:
 
 def sweep(options: Namespace) -> int:
     """feedsim sweep."""
-    from feedsim.report import sweep as report
+    if options.row is not None or options.dry_run:
+        return _told(options)
+    from feedsim.jobs.sweep import sweep
+
+    out: Path = options.out or Path("results") / options.study.stem
+    begun = perf_counter()
+    with watching(options.quiet, " runs") as watch:
+        try:
+            result = sweep(
+                options.study,
+                out,
+                set=options.overrides,
+                runs=options.runs,
+                workers=options.workers,
+                scheduler=options.scheduler,
+                format=options.format,
+                restart=options.restart,
+                fmus=options.fmus,
+                figures=options.figures,
+                watch=watch,
+            )
+        except KeyboardInterrupt:
+            done = (
+                f"{watch.done} of {watch.total} runs are done and kept in" if watch.total else "what is done is kept in"
+            )
+            watch.announce(f"interrupted; {done} {out}; the same command continues")
+            return 130
+    finish(
+        options.quiet, result.findings, *(f"{line}; {perf_counter() - begun:.3g} s -> {out}" for line in result.lines)
+    )
+    return 0
+
+
+def _told(options: Namespace) -> int:
+    """What a study would do, or the command of one of its runs; nothing is run."""
     from feedsim.scenario.study import load_study
     from feedsim.sweep import design
-    from feedsim.sweep.study import AllFailed, run
 
     study = load_study(options.study, options.overrides, runs=options.runs)
     warn(study.warnings)
@@ -52,59 +82,7 @@ def sweep(options: Namespace) -> int:
         print(_command(study, planned, options.row, options.fmus))
         return 0
     announce(study.base.scenario.machine, options.fmus, coupling=study.base.scenario.coupling)
-    if options.dry_run:
-        return _dry_run(study, planned, options)
-    directory: Path = options.out or Path("results") / options.study.stem
-    inputs = [study.file, study.scenario, *study.files]
-    with results_in(directory, report.check_writable, inputs, options.overrides):
-        begun = perf_counter()
-        last: list[Progress] = []
-        try:
-            with progress_bar(options.quiet, " runs") as bar:
-
-                def progress(now: Progress) -> None:
-                    last[:] = [now]
-                    bar(study.name, now.done, now.total, now.resumed, f"{now.failed} failed" if now.failed else "")
-
-                table = run(
-                    study,
-                    directory,
-                    workers=options.workers,
-                    scheduler=options.scheduler,
-                    fmus=options.fmus,
-                    progress=progress,
-                    restart=options.restart,
-                    format=options.format,
-                    command=("feedsim", *sys.argv[1:]),  # not where it is installed: a study is sent to others
-                    say=None if options.quiet else lambda text: print(f"feedsim: {text}", file=sys.stderr),
-                    discard=lambda: report.discard(directory),
-                )
-        except AllFailed as error:
-            report.write(
-                error.table, study, planned, directory, drawn=options.figures
-            )  # which groups failures by what they have in common
-            raise
-        except KeyboardInterrupt:
-            done = f"{last[0].done} of {last[0].total} runs are done and kept in" if last else "what is done is kept in"
-            print(f"feedsim: interrupted; {done} {directory}; the same command continues", file=sys.stderr)
-            return 130
-        report.write(table, study, planned, directory, drawn=options.figures)
-    wrong = [str(text) for text in table["warnings"] if str(text).startswith(WRONG)]
-    first = wrong[0].removeprefix(WRONG).split(" | ")[0] if wrong else ""
-    told = [Wrong(f"{len(wrong)} of {len(table)} runs, the first: {first}")] if wrong else []
-    finish(
-        options.quiet,
-        told,
-        *report.question(table, study, planned),
-        _summary(study, last[0], perf_counter() - begun, directory),
-    )
-    return 0
-
-
-def _summary(study: Study, last: Progress, seconds: float, directory: Path) -> str:
-    failed = f", {last.failed} of them failed (their messages are in the table)" if last.failed else ""
-    resumed = f", {last.resumed} of them before" if last.resumed else ""
-    return f"{study.name}: {last.total} runs{resumed}{failed}; {seconds:.3g} s -> {directory}"
+    return _dry_run(study, planned, options)
 
 
 def _command(study: Study, planned: Design, row: int, fmus: Path | None) -> str:
@@ -195,4 +173,5 @@ COMMAND = Command(
     DESCRIPTION,
     EPILOG,
     needs=("sweep",),
+    job="sweep",
 )  # fmt: skip

@@ -46,12 +46,15 @@ class Progress:
 class TerminalWatch(Watch):
     """Shows what a job reports: a progress bar, and sentences on standard error."""
 
-    def __init__(self, bar: Any) -> None:
-        self._bar = bar
+    def __init__(self, bar: Any, quiet: bool) -> None:
+        self._bar, self._quiet = bar, quiet
         self._progress = Progress(bar)
+        self.command = ("feedsim", *sys.argv[1:])  # not where it is installed: records are sent to others
+        self.done, self.total = 0, 0
 
     def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
         """How many of its steps are done, of how many."""
+        self.done, self.total = done, total
         self._progress(what, done, total, before, note)
 
     def announce(self, sentence: str) -> None:
@@ -63,6 +66,16 @@ class TerminalWatch(Watch):
         """What the job will replace."""
         with self._bar.external_write_mode(file=sys.stderr):
             warn([Note(sentence)])
+
+    def warn(self, findings: Iterable[str]) -> None:
+        """What is the matter with the files that the job begins with."""
+        with self._bar.external_write_mode(file=sys.stderr):
+            warn(findings)
+
+    def say(self, sentence: str) -> None:
+        """What takes longer, and why."""
+        if not self._quiet:
+            self.announce(sentence)
 
 
 class _Standard(io.FileIO):
@@ -112,7 +125,7 @@ def watching(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterato
     from tqdm import tqdm
 
     with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
-        yield TerminalWatch(bar)
+        yield TerminalWatch(bar, quiet)
 
 
 @contextmanager

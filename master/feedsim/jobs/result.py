@@ -95,7 +95,7 @@ class Result(ABC):
         did not write may be replaced. control: parameters in the names and units of a control, "sinumerik", too. All is
         written or nothing. Raises OutputError.
         """
-        with replacing(force or forced()), _in_words_of(control):
+        with replacing(force or forced()), in_words_of(control):
             self.check_writable(Path(folder), self.inputs)
             return write_report(
                 folder, self.report(), self.summary, self.files(), figures, kind=self.kind, own=self.own
@@ -111,7 +111,7 @@ class Result(ABC):
         return f"<iframe style='width:100%;height:{HEIGHT}px;border:0' srcdoc=\"{page}\"></iframe>"
 
 
-def _in_words_of(control: str) -> AbstractContextManager[None]:
+def in_words_of(control: str) -> AbstractContextManager[None]:
     """Reports in the names of a control; without one their code is not loaded."""
     if not control:
         return nullcontext()

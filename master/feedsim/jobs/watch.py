@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +13,12 @@ if TYPE_CHECKING:
 class Watch:
     """Nobody: every word is lost. The command line has one that shows them.
 
+    command: the command line that was given, for records; empty in Python.
+
     >>> Watch().progress("reading", 1, 3)
     """
+
+    command: Sequence[str] = ()
 
     def progress(self, what: str, done: int, total: int, before: int = 0, note: str = "") -> None:
         """`done` of `total` steps of `what`; before: steps that an earlier call of the job has done."""
@@ -28,6 +32,12 @@ class Watch:
 
     def note(self, sentence: str) -> None:
         """What the job will replace."""
+
+    def warn(self, findings: Iterable[str]) -> None:
+        """What is the matter with the files that the job begins with."""
+
+    def say(self, sentence: str) -> None:
+        """What takes longer, and why."""
 
 
 SILENT = Watch()

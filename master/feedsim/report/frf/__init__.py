@@ -4,7 +4,7 @@ May use the report's core and the analyses.
 Start with report.py.
 """
 
-from feedsim.report.frf.report import check_writable, write
+from feedsim.report.frf.report import check_writable, draw, files_of, report_of, summary
 from feedsim.report.frf.words import answers
 
-__all__ = ["answers", "check_writable", "write"]
+__all__ = ["answers", "check_writable", "draw", "files_of", "report_of", "summary"]

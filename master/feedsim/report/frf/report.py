@@ -1,4 +1,4 @@
-"""The report on frequency responses: frf.csv, frf_measured.csv, summary.json, report.html and figures, whole or not."""
+"""The report on frequency responses: its page, summary.json, frf.csv and frf_measured.csv."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from feedsim.report.frf.truncation_plots import truncation_pictures
 from feedsim.report.frf.words import answers
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import InputFile, figures_part, hashed, inputs_part, machine_part, quantity, software
-from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place
 from feedsim.report.style import remarked
 from feedsim.scenario import Subject
 from feedsim.trace.response_files import write_response
@@ -50,18 +50,12 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (CURVES, MEASURED, REPORT, SUMMARY), inputs, kind="frf")
 
 
-def write(
-    subject: Subject, responses: Responses, directory: Path | str, *, drawn: Sequence[str] = ()
-) -> tuple[Path, ...]:
-    """Write frf.csv (closed form), frf_measured.csv where there is a measurement, summary.json, report.html, figures.
-
-    Returns the paths. Files of an earlier run are replaced. Raises OutputError.
-    """
+def files_of(responses: Responses) -> dict[str, Content]:
+    """frf.csv (closed form), and frf_measured.csv where there is a measurement."""
     files: dict[str, Content] = {CURVES: partial(write_response, response=responses.closed)}
     if responses.campaign is not None:
         files[MEASURED] = partial(write_response, response=responses.campaign.response)
-    report = report_of(subject, responses, draw(responses))
-    return write_report(directory, report, partial(summary, subject, responses), files, drawn, kind="frf")
+    return files
 
 
 def draw(responses: Responses) -> list[Picture]:

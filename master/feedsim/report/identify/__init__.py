@@ -4,7 +4,17 @@ May use the report's core and what `feedsim.identify` found.
 Start with report.py.
 """
 
-from feedsim.report.identify.report import check_writable, write
-from feedsim.report.identify.summary import headline, rigid_line, table_lines, terminal_lines, terminal_warnings
+from feedsim.report.identify.report import check_writable, draw, files_of, report_of
+from feedsim.report.identify.summary import (
+    headline,
+    rigid_line,
+    summary,
+    table_lines,
+    terminal_lines,
+    terminal_warnings,
+)
 
-__all__ = ["check_writable", "headline", "rigid_line", "table_lines", "terminal_lines", "terminal_warnings", "write"]
+__all__ = [
+    "check_writable", "draw", "files_of", "headline", "report_of", "rigid_line", "summary", "table_lines",
+    "terminal_lines", "terminal_warnings",
+]  # fmt: skip

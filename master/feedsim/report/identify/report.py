@@ -1,9 +1,8 @@
-"""The report of an identification: friction.yaml, CSV files, summary.json, report.html and figures, whole or not."""
+"""The report of an identification: its page, friction.yaml and CSV files."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
 
 from feedsim.identify import Identified, friction_file
@@ -13,10 +12,10 @@ from feedsim.report.content import Bullets, Paragraph, Part, Report, Section, Ta
 from feedsim.report.formatting import counted, display_unit, minus, powers, typeset
 from feedsim.report.identify import quantities
 from feedsim.report.identify.plots import describe, pictures_of
-from feedsim.report.identify.summary import open_loop_csv, plateaus_csv, residuals_csv, summary
+from feedsim.report.identify.summary import open_loop_csv, plateaus_csv, residuals_csv
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import software
-from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place
 from feedsim.report.sections import provenance_section
 from feedsim.report.style import remarked
 
@@ -44,12 +43,8 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs, kind="identify")
 
 
-def write(identified: Identified, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
-    """Write friction.yaml, plateaus.csv, residuals.csv and open_loop.csv (where there are any), summary.json,
-    report.html, figures.
-
-    Returns the paths. Files of an earlier run are replaced. Raises OutputError.
-    """
+def files_of(identified: Identified) -> dict[str, Content]:
+    """friction.yaml, plateaus.csv, residuals.csv and open_loop.csv, where there are any."""
     found = identified.found
     files: dict[str, Content] = {FRICTION: friction_file.friction_yaml(identified, software())}
     if found.stationary is not None:
@@ -58,11 +53,13 @@ def write(identified: Identified, directory: Path | str, *, drawn: Sequence[str]
         files[RESIDUALS] = residuals_csv(found)
     if found.balance is not None and found.balance.drifts:
         files[OPEN_LOOP] = open_loop_csv(found.balance)
+    return files
+
+
+def draw(identified: Identified) -> list[Picture]:
+    """The pictures; each says what its numbers are worth."""
     with remarked(quantities.remark(identified), REMARK_WIDTH, REMARK_LINES):
-        pictures = pictures_of(identified)
-    return write_report(
-        directory, report_of(identified, pictures), partial(summary, identified), files, drawn, kind="identify"
-    )
+        return list(pictures_of(identified))
 
 
 def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:

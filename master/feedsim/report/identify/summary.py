@@ -64,10 +64,14 @@ def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def terminal_lines(identified: Identified, directory: Path) -> list[str]:
-    """What the terminal shows: headline, table, what was done besides, advice, and how to use friction.yaml."""
+def terminal_lines(identified: Identified, directory: Path | None = None) -> list[str]:
+    """What the terminal shows: headline, table, what was done besides, advice, and how to use friction.yaml.
+
+    directory: where the result is; None: nowhere yet.
+    """
     found = identified.found
-    lines = [f"axis {found.axis}: {headline(identified)} -> {directory / 'report.html'}", *table_lines(identified)]
+    place = f" -> {directory / 'report.html'}" if directory is not None else ""
+    lines = [f"axis {found.axis}: {headline(identified)}{place}", *table_lines(identified)]
     if line := friction_file.open_loop_line(found):
         lines.append(f"  open loop: {line}")
     if line := rigid_line(identified):
@@ -75,6 +79,8 @@ def terminal_lines(identified: Identified, directory: Path) -> list[str]:
     lines += [f"  advice: {advice}" for advice in found.advice]
     if hint := friction_file.constant_load_hint(found):
         lines.append(f"  {hint}")
+    if directory is None:
+        return lines
     setting = shlex.quote(f"machine.axes.{found.axis}.friction={directory / FRICTION}")
     return [*lines, f"  use: feedsim run SCENARIO.yaml --set {setting}"]
 

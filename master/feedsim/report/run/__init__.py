@@ -5,6 +5,6 @@ Start with report.py; pose.py has the plant's pose.
 """
 
 from feedsim.report.provenance import input_paths
-from feedsim.report.run.report import answers, check_writable, growing, summary_line, write
+from feedsim.report.run.report import answers, check_writable, files_of, growing, summary_line, write
 
-__all__ = ["answers", "check_writable", "growing", "input_paths", "summary_line", "write"]
+__all__ = ["answers", "check_writable", "files_of", "growing", "input_paths", "summary_line", "write"]

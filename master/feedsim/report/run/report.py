@@ -120,6 +120,18 @@ def write(
     files that figures/* are drawn as. page: the machine as a page that computes, which the report links. Raises
     OutputError.
     """
+    files = files_of(run, page, recorded)
+    causes = diagnoses(run) if causes is None else causes
+    report = report_of(run, figures, draw(run, figures, causes), causes)
+    if page:
+        report = replace(report, main=[TRY_IT, *report.main])
+    return write_report(
+        directory, report, partial(summary, run, figures, causes=causes), files, drawn, kind="run", own=(PARTIAL,)
+    )
+
+
+def files_of(run: Run, page: str = "", recorded: Partial | None = None) -> dict[str, Content]:
+    """Name -> content of all files besides the report; arguments as of :func:`write`."""
 
     def result(path: Path) -> Path | None:
         if recorded is None or not recorded.left:
@@ -133,13 +145,7 @@ def write(
         files[LOG] = partial(write_csv, trace=run.log)
     if page:
         files[PAGE] = page
-    causes = diagnoses(run) if causes is None else causes
-    report = report_of(run, figures, draw(run, figures, causes), causes)
-    if page:
-        report = replace(report, main=[TRY_IT, *report.main])
-    return write_report(
-        directory, report, partial(summary, run, figures, causes=causes), files, drawn, kind="run", own=(PARTIAL,)
-    )
+    return files
 
 
 def report_of(

@@ -3,7 +3,3 @@
 May use the report's core, what the report of a run draws of circles, and the analyses.
 Start with report.py; pictures.py has the pictures.
 """
-
-from feedsim.report.show.report import check_writable, lines, write
-
-__all__ = ["check_writable", "lines", "write"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from feedsim.report.content import Bullets, Report, Section, Table, Text, code
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, display_unit, minus, scale, shown
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
-from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.show.pictures import Stop, pictures_of, stop_seen, stops_of
 
 FORMAT = 1
@@ -46,11 +45,6 @@ def files_of(sources: Sequence[Source]) -> list[Path]:
     return found
 
 
-def write(sources: Sequence[Source], directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
-    """Write summary.json, report.html and figures; returns the paths. Raises OutputError."""
-    return write_report(directory, report_of(sources), partial(summary, sources), {}, drawn, kind="show")
-
-
 def lines(sources: Sequence[Source]) -> list[str]:
     """What the command says: parameters that differ, and the leading figures of every source."""
     rows = differing(sources)
@@ -66,7 +60,7 @@ def lines(sources: Sequence[Source]) -> list[str]:
     return said or ["the sources have neither figures nor parameters to compare; the pictures do"]
 
 
-def _answer(sources: Sequence[Source]) -> list[str]:
+def answers(sources: Sequence[Source]) -> list[str]:
     """The same in the words of the page: what differs, and how far the leading figures are from the first source's."""
     names = [source.name for source in sources]
     rows = differing(sources)
@@ -112,7 +106,7 @@ def report_of(sources: Sequence[Source]) -> Report:
     return Report(
         " against ".join(names) if len(names) <= 3 else f"{len(names)} results side by side",
         counted(len(sources), "source"),
-        answer=_answer(sources),
+        answer=answers(sources),
         next_step=(
             "See whether they are the same within a tolerance:\n",
             code("feedsim compare RESULT.csv REFERENCE.csv --tol 1e-6"),

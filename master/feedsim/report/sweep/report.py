@@ -80,18 +80,23 @@ def write(
 
     The table may be that of an unfinished study. The table's own files are left as they are. Raises OutputError.
     """
-    account = Account(table, study, design, record_of(Path(directory)))
+    account = account_of(table, study, design, Path(directory))
+    content = partial(summary, account, answer=answers(account))
+    return write_report(directory, drawn_report(account), content, {}, drawn, kind="sweep")
+
+
+def account_of(table: Runs, study: Study, design: Design, directory: Path) -> Account:
+    """What table, study and the record in `directory` come to."""
+    return Account(table, study, design, record_of(directory))
+
+
+def drawn_report(account: Account) -> Report:
+    """Content of the report, with its pictures."""
+    study = account.study
     machine = study.base.scenario.machine
     with remarked(f"{study.name}. {machine.name}. {machine.note}".strip(), REMARK_WIDTH, REMARK_LINES):
         whole, single = pictures_of(account)
-    return write_report(
-        directory,
-        report_of(account, whole, single),
-        partial(summary, account, answer=answers(account)),
-        {},
-        drawn,
-        kind="sweep",
-    )
+    return report_of(account, whole, single)
 
 
 def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) -> Report:

@@ -1,4 +1,4 @@
-"""A comparison as a person calls it: apart from the calls that run a machine, as it does without what those need."""
+"""A result against a reference; it needs none of what runs need."""
 
 from __future__ import annotations
 

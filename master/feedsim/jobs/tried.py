@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from feedsim import analysis, cosim
-from feedsim.analysis import Diagnosis, Figure
-from feedsim.cosim import Run
-from feedsim.cosim.loop import Progress
-from feedsim.front import overlay
+from feedsim import cosim
+from feedsim.jobs.run import RunResult
+from feedsim.jobs.show import show
+from feedsim.jobs.watch import SILENT, Watch
 from feedsim.report import run as report
-from feedsim.report import show
 from feedsim.report.changes import change_lines
+from feedsim.report.show import report as show_report
 from feedsim.scenario import load
 from feedsim.tune import Proposal, of_run
 
@@ -34,31 +32,27 @@ class Tried:
 def check_writable(directory: Path) -> None:
     """Raise OutputError unless the second run and the overlay can be written beside the folder of the first."""
     report.check_writable(_second(directory))
-    show.check_writable(_overlaid(directory))
+    show_report.check_writable(_overlaid(directory))
 
 
-def tried(
-    run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis], directory: Path, *,
-    fmus: Path | None = None, progress: Progress | None = None,
-) -> Tried:  # fmt: skip
+def tried(run: RunResult, directory: Path, *, fmus: Path | None = None, watch: Watch = SILENT) -> Tried:
     """Run again with all proposals that have a value; write FOLDER_tried and the overlay FOLDER_overlay.
 
-    run, figures, causes: of the first run, which was written to `directory`. Raises as :func:`feedsim.cosim.run`, and
-    OutputError.
+    run: the first one, which was written to `directory`. Raises as :func:`feedsim.cosim.run`, and OutputError.
     """
-    proposals = tuple(of_run(run, causes, searched=True))
+    proposals = tuple(of_run(run, run.causes, searched=True))
     settings = tuple(each.setting for each in proposals if each.setting)
     if not settings:
         return Tried(proposals, (), ("nothing to try: no proposal has a value",))
     scenario = run.scenario
-    again = cosim.run(load(scenario.file, [*scenario.overrides, *settings]), fmus=fmus, progress=progress)
-    after = analysis.evaluate(again)
-    report.write(again, after, _second(directory), causes=analysis.diagnoses(again))
-    overlay.show(directory, _second(directory)).save(_overlaid(directory))
+    changed = load(scenario.file, [*scenario.overrides, *settings])
+    again = RunResult.of(cosim.run(changed, fmus=fmus, progress=watch.of(f"{scenario.name}, tried")))
+    again.save(_second(directory))
+    show(directory, _second(directory)).save(_overlaid(directory))
     told = [
-        f"tried: {name} {figures[name]} -> {figure}"
-        for name, figure in after.items()
-        if name in figures and _leading(name)
+        f"tried: {name} {run.figures[name]} -> {figure}"
+        for name, figure in again.figures.items()
+        if name in run.figures and _leading(name)
     ]
     return Tried(proposals, settings, (*change_lines(proposals), *told, f"-> {_overlaid(directory) / 'report.html'}"))
 

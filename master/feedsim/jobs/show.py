@@ -1,32 +1,32 @@
-"""Results and records over each other, at a prompt and in a notebook."""
+"""RunResults and records over each other, at a prompt and in a notebook."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from html import escape
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from feedsim import cosim
-from feedsim.analysis import Figure
+from feedsim.analysis import Figure, Named
 from feedsim.analysis.alignment import aligned
 from feedsim.analysis.side_by_side import Source, differing, named_apart, read_sources
 from feedsim.errors import InputError
-from feedsim.front.result import Result
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result
+from feedsim.jobs.run import RunResult
+from feedsim.jobs.watch import SILENT, Watch
 from feedsim.owned import TemporaryFolder
-from feedsim.report import page
-from feedsim.report import show as report
-from feedsim.report.picture import Picture
-from feedsim.report.show.pictures import pictures_of
-from feedsim.report.show.report import files_of, report_of
+from feedsim.report.content import Report
+from feedsim.report.show import report as page
 from feedsim.sweep.case import case, scenario_of
 
-Shown = str | Path | Result
-HEIGHT = 900  # [px] of a report in a notebook; it scrolls
+Shown = str | Path | RunResult
 
 
-class Overlay:
+class Overlay(Result):
     """Results and records over each other: what :func:`feedsim.show` returns.
 
     Attributes:
@@ -37,6 +37,8 @@ class Overlay:
     >>> over.names
     ('Z positioning',)
     """
+
+    kind = "show"
 
     def __init__(self, results: Mapping[str, Shown]) -> None:
         """results: name -> a result, its folder, or a CSV file. Raises InputError: nothing, or what is no result."""
@@ -49,8 +51,14 @@ class Overlay:
         found = zip(self.names, read_sources(paths), strict=True)
         self._sources = aligned([replace(source, name=name) for name, source in found])
 
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """Name -> figure, of the first result that has it."""
+        own = [(name, source) for source in reversed(self._sources) for name in source.figures]
+        return Named((name, Figure(*source.figures[name], "")) for name, source in own)
+
     @property
-    def figures(self) -> dict[str, tuple[Figure | None, ...]]:
+    def side_by_side(self) -> dict[str, tuple[Figure | None, ...]]:
         """Name -> the figure of every result; None where it has none of that name."""
         names = dict.fromkeys(name for source in self._sources for name in source.figures)
         return {name: tuple(_figure(source, name) for source in self._sources) for name in names}
@@ -61,39 +69,64 @@ class Overlay:
         return {name: tuple(values) for name, values in differing(self._sources)}
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
-        """Contours, following errors, torques, ..., over each other."""
-        return tuple(pictures_of(self._sources))
+    def findings(self) -> Sequence[str]:
+        """None: the results have their own."""
+        return ()
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """What differs, and how far the leading figures are from the first result's."""
+        return page.answers(self._sources)
 
     @property
     def lines(self) -> list[str]:
-        """What ``feedsim show`` says: parameters that differ, leading figures, how all was aligned."""
-        return report.lines(self._sources)
+        """Parameters that differ, leading figures, how all was aligned."""
+        return page.lines(self._sources)
 
     @property
-    def files(self) -> list[Path]:
+    def inputs(self) -> list[Path]:
         """The files that the results are read from."""
-        return files_of(self._sources)
+        return page.files_of(self._sources)
 
-    def save(self, directory: str | Path, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
-        """Write what ``feedsim show`` leaves; drawn: kinds of its figures, png and svg. Returns the paths."""
-        report.check_writable(Path(directory), self.files)
-        return report.write(self._sources, directory, drawn=drawn)
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self._sources)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self._sources, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, inputs)
 
     def __repr__(self) -> str:
         return "\n".join([f"Overlay of {', '.join(self.names)}", *self.lines])
 
-    def _repr_html_(self) -> str:
-        inside = escape(page.html(report_of(self._sources)), quote=True)
-        return f"<iframe style='width:100%;height:{HEIGHT}px;border:0' srcdoc=\"{inside}\"></iframe>"
 
+def show(
+    *results: Shown,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    control: str = "",
+    watch: Watch = SILENT,
+    **named: Shown,
+) -> Overlay:
+    """Lay results over each other.
 
-def show(*results: Shown, **named: Shown) -> Overlay:
-    """Lay results over each other: what :func:`run` returned, folders of ``feedsim run``, CSV files with a time.
+    Args:
+        results: what :func:`run` returned, folders of ``feedsim run``, CSV files with a time. A run of a study is named
+            by its folder and its number or what is least or largest: "results/z_stop:17",
+            "results/z_stop:max=Z.overshoot".
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        figures, force, control: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+        named: results under names of your own; the others are called by their scenario or file.
 
-    A run of a study is named by its folder and its number or what is least or largest: "results/z_stop:17",
-    "results/z_stop:max=Z.overshoot". named: results under names of your own; the others are called by their scenario or
-    file.
+    Raises:
+        InputError: nothing, or what is no result.
+        OutputError: `out` cannot be written.
 
     >>> import feedsim as fs
     >>> now = fs.run("z_positioning.yaml")
@@ -103,17 +136,21 @@ def show(*results: Shown, **named: Shown) -> Overlay:
     ('66.6666667 1/s', '83.3333333 1/s')
     """
     given: dict[str, Shown] = {}
-    files = list(dict.fromkeys(str(each) for each in results if not isinstance(each, Result)))
+    files = list(dict.fromkeys(str(each) for each in results if not isinstance(each, RunResult)))
     names = dict(zip(files, named_apart([Path(each) for each in files]), strict=True))
     for each in results:
-        plain = each.scenario.name if isinstance(each, Result) else _called(str(each), names[str(each)])
+        plain = each.scenario.name if isinstance(each, RunResult) else _called(str(each), names[str(each)])
         same = sum(re.fullmatch(rf"{re.escape(plain)}( \(\d+\))?", name) is not None for name in given)
         given[f"{plain} ({same + 1})" if same else plain] = each
     for name, each in named.items():
         if name in given:
             raise InputError(f"two results are called {name!r}; give one of them another name")
         given[name] = each
-    return Overlay(given)
+    over = Overlay(given)
+    if out is not None:
+        with kept(out, page.check_writable, watch, over.inputs, force=force):
+            over.save(out, figures=figures, force=force, control=control)
+    return over
 
 
 def _called(text: str, name: str) -> str:
@@ -123,12 +160,12 @@ def _called(text: str, name: str) -> str:
 
 def _at(each: Shown, folder: Path) -> Path:
     """Where a result stands; one of the prompt, and a run of a study, is written there."""
-    if not isinstance(each, Result):
+    if not isinstance(each, RunResult):
         chosen = case(str(each))
         if chosen is None:
             return Path(each)
         scenario, fmus = scenario_of(chosen)
-        each = Result.of(cosim.run(scenario, fmus=fmus))
+        each = RunResult.of(cosim.run(scenario, fmus=fmus))
     each.save(folder)
     return folder
 

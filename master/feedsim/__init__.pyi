@@ -1,0 +1,30 @@
+"""The public names of feedsim, one a line: for type checkers, and for the package itself, which loads them lazily."""
+
+from feedsim.analysis.evaluate import evaluate as evaluate
+from feedsim.analysis.figures import Figure as Figure
+from feedsim.cosim import Run as Run
+from feedsim.errors import FeedsimError as FeedsimError
+from feedsim.errors import InputError as InputError
+from feedsim.errors import OutputError as OutputError
+from feedsim.errors import SimulationError as SimulationError
+from feedsim.jobs.circle import circle as circle
+from feedsim.jobs.compare import compare as compare
+from feedsim.jobs.compensate import compensate as compensate
+from feedsim.jobs.example import example as example
+from feedsim.jobs.frf import frf as frf
+from feedsim.jobs.identify import identify as identify
+from feedsim.jobs.identify_drive import identify_drive as identify_drive
+from feedsim.jobs.replay import replay as replay
+from feedsim.jobs.result import Result as Result
+from feedsim.jobs.run import RunResult as RunResult
+from feedsim.jobs.run import run as run
+from feedsim.jobs.show import Overlay as Overlay
+from feedsim.jobs.show import show as show
+from feedsim.jobs.subject import load as load
+from feedsim.jobs.sweep import sweep as sweep
+from feedsim.scenario import Machine as Machine
+from feedsim.scenario import Scenario as Scenario
+from feedsim.scenario import load_machine as load_machine
+from feedsim.trace import Trace as Trace
+
+__version__: str

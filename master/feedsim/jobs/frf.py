@@ -1,0 +1,319 @@
+"""Frequency responses of feed drives and structure, in closed form and measured on the units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from feedsim.analysis import Figure, Named, linear, responses, truncation
+from feedsim.analysis.campaign import Plan, run_campaign
+from feedsim.analysis.responses import Overlay, Responses, highest_frequency, read_overlays
+from feedsim.analysis.truncation import Truncation
+from feedsim.arguments import Changes, Value, listed, quantity, settings, spelt
+from feedsim.cosim.plant import plant_modes
+from feedsim.cosim.trust import control as control_findings
+from feedsim.errors import FeedsimError, InputError
+from feedsim.findings import severity
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.linear.judgement import judge
+from feedsim.report import frf as page
+from feedsim.report.content import Report
+from feedsim.report.results import Content
+from feedsim.scenario import Coupling, Machine, Subject, load_subject
+from feedsim.scenario.structure.load import load_structure
+from feedsim.structure.table_check import table_mismatch
+from feedsim.trace import Array
+from feedsim.trace.response import Complexes, FrequencyResponse
+
+REALISATIONS_WITH_FRICTION = 4
+LOWEST, HIGHEST = 1.0, 1000.0  # [Hz]; the band where none is given
+ONE_REALISATION = (
+    "measured with friction and one realisation: every period is alike, so that the coherence says nothing of what is "
+    "not linear; take more realisations"
+)
+UNSTABLE = (
+    "the control loops are unstable: {} growing solution(s) of the closed system. The figures of loops presume stable "
+    "ones, and nothing was measured"
+)
+Band = str | tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrfResult(Result, Mapping[str, Complexes]):
+    """Frequency responses: a mapping of the closed form, name -> (F,) complex values over ``frequency``.
+
+    Names say what of what, such as "Z.n_a/Z.M_a". subject: what they are of; responses: all that was found.
+    """
+
+    subject: Subject
+    responses: Responses
+
+    kind = "frf"
+
+    @property
+    def response(self) -> FrequencyResponse:
+        """The closed form, up to twice the band: gain margins lie above it."""
+        return self.responses.closed
+
+    @property
+    def measured(self) -> FrequencyResponse | None:
+        """What was measured on the units; None where nothing was."""
+        return self.responses.campaign.response if self.responses.campaign is not None else None
+
+    @property
+    def frequency(self) -> Array:
+        """(F,) frequencies of the closed form [Hz]."""
+        return self.response.frequency
+
+    def unit(self, name: str) -> str:
+        """Unit of a response."""
+        return self.response.unit(name)
+
+    def __getitem__(self, name: str) -> Complexes:
+        return self.response[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.response)
+
+    def __len__(self) -> int:
+        return len(self.response.names)
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files of the machine, and of the curves laid over."""
+        return [*(file for _, file in self.subject.files), *(each.file for each in self.responses.overlays)]
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """ "Z.speed.phase_margin", "Z.position.bandwidth_first", ..."""
+        return Named(self.responses.figures)
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """What is to be known before the curves are believed."""
+        return self.responses.warnings
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """Stable or not, bandwidths and margins, and what to do next."""
+        return page.answers(self.responses)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answers."""
+        first, *further = self.answers
+        return [f"{self.subject.name}: {first}", *(f"  {line}" for line in further)]
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.subject, self.responses, page.draw(self.responses))
+
+    def files(self) -> Mapping[str, Content]:
+        """The curves as CSV."""
+        return page.files_of(self.responses)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.subject, self.responses, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, inputs)
+
+
+def frf(
+    subject: File,
+    axes: str | Sequence[str] | None = None,
+    *,
+    set: Changes = None,
+    band: Band | None = None,
+    tool: bool = True,
+    overlay: Sequence[str] = (),
+    full_model: bool = True,
+    measure: bool = True,
+    excitation: Literal["multisine", "prbs"] = "multisine",
+    inject: Literal["n_add", "M_add"] = "n_add",
+    amplitude: Value | None = None,
+    periods: int = 2,
+    settle: int = 2,
+    realisations: int | None = None,
+    seed: int = 1,
+    friction: bool = False,
+    offset_speed: Value | None = None,
+    fmus: File | None = None,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> FrfResult:
+    """Frequency responses of feed drives and structure, in closed form and, friction off, measured on the units.
+
+    Args:
+        subject: scenario file, machine file or machine folder.
+        axes: to look at; None: all.
+        set: changes of the file, as behind ``--set``.
+        band: lowest and highest frequency [Hz], or a text "1Hz..1000Hz"; None: 1 Hz to 1000 Hz, at most half the
+            sampling rate of the control cycle.
+        tool: with the compliance at the tool.
+        overlay: curves of files that are laid over, "measured.csv:Z.n_a/Z.M_a".
+        full_model: compare with all modes of the finite-element model, where the machine names its structure.
+        measure: on the units besides; the arguments that follow say how.
+        excitation: "multisine" or "prbs". inject: where it is added, "n_add" (speed setpoint) or "M_add" (torque).
+        amplitude: RMS of the signal [rad/s or N.m]; None: 5 % of the torque limit. Values may be texts, "0.5 rad/s".
+        periods: that are recorded. settle: periods ahead of those.
+        realisations: signals with other phases, averaged; None: 1, with friction 4. seed: of the phases.
+        friction: with friction; the closed form has none. offset_speed: of the motor while it is excited [rad/s].
+        fmus: folder of the archives.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        figures, force: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, no such axis, wrong arguments.
+        SimulationError: a unit failed.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> result = fs.frf("machines/test_centre", "Z", band=(1.0, 300.0), measure=False)
+    >>> abs(result["Z.n_a/Z.M_a"]).shape == result.frequency.shape
+    True
+    """
+    texts = settings(set)
+    loaded = load_subject(subject, texts)
+    machine = loaded.machine
+    chosen = _axes(axes, machine)
+    times = REALISATIONS_WITH_FRICTION if friction else 1
+    plan = Plan(
+        signal=excitation,
+        inject=inject,
+        rms=None if amplitude is None else quantity("amplitude", amplitude, *_unit_of(inject)),
+        band=_band(band, machine),
+        periods=_count("periods", periods),
+        settle=settle,
+        realisations=_count("realisations", times if realisations is None else realisations),
+        seed=seed,
+        friction=friction,
+        offset_speed=None if offset_speed is None else quantity("offset_speed", offset_speed, "rad/s", "5 rad/s"),
+        tool=tool,
+    )
+    archives = None if fmus is None else Path(fmus)
+    modes, doubts = plant_modes(machine)
+    frequency = responses.frequencies(machine, modes, plan.band, responses.BEYOND)
+    wanted = linear.names(chosen, tool=tool)
+    overlays, warnings = _overlays(overlay, wanted)
+    warnings += doubts
+    inputs = [*(file for _, file in loaded.files), *(each.file for each in overlays)]
+    with kept(out, page.check_writable, watch, inputs, texts, force=force):
+        watch.progress("closed form", 0, 1)
+        system = linear.LinearSystem(machine, modes)
+        found = linear.evaluate(system, chosen)
+        closed = responses.closed_form(system, wanted, frequency)
+        warnings += responses.zero_notes(closed)
+        watch.progress("closed form", 1, 1)
+        if not doubts and (doubt := table_mismatch(machine)) is not None:
+            warnings.append(doubt)
+        judged = control_findings(machine, judge(machine, modes))
+        if found.unstable_poles and not any(severity(each) == "wrong" for each in judged):
+            judged.append(UNSTABLE.format(found.unstable_poles))
+        warnings += judged
+        full = _full_model(machine, watch, warnings) if full_model else None
+        campaign = None
+        if measure and not found.unstable_poles:
+            announce(watch, machine, archives)
+            coupling = loaded.scenario.coupling if loaded.scenario is not None else Coupling()
+            campaign = run_campaign(
+                machine, chosen, plan, fmus=archives, progress=watch.progress, call_limit=coupling.call_limit
+            )
+        numbers = linear.figures(found)
+        if not tool:
+            numbers = {name: figure for name, figure in numbers.items() if not name.startswith("tool.")}
+        if full is not None:
+            numbers |= truncation.figures(full, tuple(machine.axes), frequency, shown=chosen, tool=tool)
+        if campaign is not None:
+            numbers |= responses.agreement(system, campaign)
+            warnings += campaign.warnings
+            if plan.friction and plan.realisations == 1:
+                warnings.append(ONE_REALISATION)
+        done = Responses(
+            machine=machine,
+            modes=modes,
+            axes=chosen,
+            band=plan.band,
+            result=found,
+            closed=closed,
+            campaign=campaign,
+            overlays=tuple(overlays),
+            truncation=full,
+            figures=numbers,
+            warnings=tuple(warnings),
+        )
+        result = FrfResult(loaded, done)
+        if out is not None:
+            result.save(out, figures=figures, force=force)
+    return result
+
+
+def _full_model(machine: Machine, watch: Watch, warnings: list[str]) -> Truncation | None:
+    """The machine's structure with all its modes, where a structure is named; adds to the warnings why there is none.
+
+    The comparison comes on top of what was asked for: where it cannot be had, the rest is still wanted.
+    """
+    if machine.structure is None:
+        return None
+    watch.progress("full model", 0, 1)
+    found = None
+    try:
+        found = truncation.truncation(load_structure(machine.structure), machine.pose)
+    except FeedsimError as error:
+        warnings.append(f"no comparison with the full model: {error}")
+    watch.progress("full model", 1, 1)
+    return found
+
+
+def _axes(axes: str | Sequence[str] | None, machine: Machine) -> tuple[str, ...]:
+    """The axes asked for, in the machine's order."""
+    chosen = listed(axes or ())
+    for name in chosen:
+        if name not in machine.axes:
+            raise InputError(
+                f"{spelt('axes')} {','.join(chosen)}: no axis {name!r}; there is {', '.join(machine.axes)}"
+            )
+    return tuple(axis for axis in machine.axes if not chosen or axis in chosen)
+
+
+def _unit_of(inject: str) -> tuple[str, str]:
+    """Unit of the excitation, and an example."""
+    return ("rad/s", "0.5 rad/s") if inject == "n_add" else ("N.m", "4 N.m")
+
+
+def _band(band: Band | None, machine: Machine) -> tuple[float, float]:
+    """Lowest and highest frequency [Hz]."""
+    if band is None:
+        return LOWEST, min(HIGHEST, highest_frequency(machine))
+    if not isinstance(band, str):
+        low, high = band
+        return quantity("band", low, "Hz", "1 Hz"), quantity("band", high, "Hz", "1000 Hz")
+    first, dots, last = band.partition("..")
+    if not dots:
+        raise InputError(f"{spelt('band')} {band}: LOW..HIGH is needed, such as 1Hz..1000Hz")
+    return quantity("band", first, "Hz", "1 Hz"), quantity("band", last, "Hz", "1000 Hz")
+
+
+def _count(name: str, number: int) -> int:
+    if number < 1:
+        raise InputError(f"{spelt(name)} {number}: at least 1 is needed")
+    return number
+
+
+def _overlays(texts: Sequence[str], known: Sequence[str]) -> tuple[list[Overlay], list[str]]:
+    overlays: list[Overlay] = []
+    warnings: list[str] = []
+    for text in texts:
+        found, doubts = read_overlays(text, known)
+        overlays += found
+        warnings += doubts
+    return overlays, warnings

@@ -1,0 +1,268 @@
+"""One scenario, run, with its figures, causes and pictures."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from feedsim import analysis, cosim
+from feedsim.analysis import Figure
+from feedsim.arguments import Changes
+from feedsim.cosim import Run
+from feedsim.findings import ranked, severity
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result, in_words_of
+from feedsim.jobs.subject import Opened, opened
+from feedsim.jobs.watch import SILENT, Watch
+from feedsim.outputs import forced, replacing
+from feedsim.report import run as report
+from feedsim.report.content import Report
+from feedsim.report.formatting import shown, typeset
+from feedsim.report.partial import Partial
+from feedsim.report.picture import Picture
+from feedsim.report.results import Content
+from feedsim.report.run.report import HEADER, TRY_IT, draw, is_leading, report_of, summary
+from feedsim.report.run.signals import signals_picture
+from feedsim.scenario import Scenario
+from feedsim.trace import Array
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True, repr=False)
+class RunResult(Run, Result):
+    """What a run leaves behind, with its figures, pictures and files.
+
+    page: the machine as a page that computes, where the job was asked for it.
+
+    >>> import feedsim as fs
+    >>> result = fs.run("z_positioning.yaml")
+    >>> result  # doctest: +ELLIPSIS
+    Result of 'Z positioning': 2.448 s, 9793 rows, 66 columns; Z.duration 1.247 s, Z.overshoot 3.13... um, ...
+    >>> float(result["Z.x_a"][-1].round(6))
+    0.2
+    """
+
+    page: str = ""
+
+    kind = "run"
+
+    @classmethod
+    def of(cls, run: Run, page: str = "") -> RunResult:
+        """A run, as it is."""
+        return cls(**{each.name: getattr(run, each.name) for each in fields(Run)}, page=page)
+
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """Name -> figure, such as "XZ.G", as the scenario's `evaluate` asks for them."""
+        return analysis.Named(analysis.evaluate(self))
+
+    @cached_property
+    def causes(self) -> Mapping[str, analysis.Diagnosis]:
+        """Prefix of a circle's figures -> why it is not round."""
+        return analysis.diagnoses(self)
+
+    @property
+    def time(self) -> Array:
+        """Instants [s] of the recorded signals."""
+        return self.trace.time
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """The warnings of the run, and doubts about what the figures rest on."""
+        return (*self.warnings, *analysis.doubts(self.figures, self.causes))
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """What circles, stops and positioning cycles are, why, and what to do."""
+        return report.answers(self, self.figures, self.causes)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answers, and the leading figures."""
+        return [*self.answers, f"{self.scenario.name}: {report.summary_line(self, self.figures)}"]
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files of the scenario."""
+        return report.input_paths(self.scenario)
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        content = report_of(self, self.figures, draw(self, self.figures, self.causes), self.causes)
+        return replace(content, main=[TRY_IT, *content.main]) if self.page else content
+
+    def files(self) -> Mapping[str, Content]:
+        """result.csv, log.csv where there is a log, machine.html where the page was asked for."""
+        return report.files_of(self, self.page)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return summary(self, self.figures, names, causes=self.causes)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        report.check_writable(folder, inputs)
+
+    def __getitem__(self, name: str) -> Array:
+        """A recorded signal in SI units, such as ``result["Z.x_a"]``."""
+        return self.trace[name]
+
+    def plot(self, *signals: str) -> Picture:
+        """The main picture of the report, or signals over time: ``result.plot("Z.x_a", "Z.M_fr")``, also "Z.*".
+
+        A notebook shows it; ``.save("circle.png")`` or ``.save("circle.svg")`` writes it.
+        """
+        if signals:
+            return signals_picture(self.trace.select(signals), self.scenario.name)
+        return self.pictures[0] if self.pictures else signals_picture(self.trace.select(["*.x_a"]), self.scenario.name)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """All recorded signals over time [s]; their units are in ``.attrs["units"]``. Needs the package pandas."""
+        return self.trace.to_pandas()
+
+    def save(
+        self,
+        folder: str | Path,
+        *,
+        figures: Sequence[str] = (),
+        force: bool = False,
+        control: str = "",
+        recorded: Partial | None = None,
+    ) -> tuple[Path, ...]:
+        """Write result.csv, summary.json, report.html, log.csv where there is a log, figures; returns the paths.
+
+        figures, force, control: as of :meth:`Result.save`. recorded: the rows, where they are in that folder already.
+        """
+        with replacing(force or forced()), in_words_of(control):
+            report.check_writable(Path(folder), self.inputs)
+            return report.write(self, self.figures, folder, recorded, self.causes, drawn=figures, page=self.page)
+
+    def __repr__(self) -> str:
+        figures = [f"{name} {figure}" for name, figure in self._leading().items()][:4]
+        wrong = [each for each in self.findings if severity(each) != "note"]
+        told = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .findings"] if wrong else []
+        return "; ".join(
+            [
+                f"Result of {self.scenario.name!r}: {self.program.duration:.4g} s, {len(self.trace)} rows, "
+                f"{len(self.trace.names)} columns",
+                *([", ".join(figures)] if figures else []),
+                *told,
+            ]
+        )
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><th style='text-align:left'>{escape(name)}</th>"
+            f"<td style='white-space:nowrap'>{escape(' '.join(shown(figure)))}</td>"
+            f"<td style='text-align:left'>{escape(typeset(figure.meaning))}</td></tr>"
+            for name, figure in self._leading().items()
+        )
+        said = "".join(f"<li>{escape(typeset(each))}</li>" for each in ranked(self.findings))
+        answer = "".join(f"<p>{escape(typeset(each))}</p>" for each in self.answers)
+        plot = self.plot()
+        alt = escape(f"{plot.title}. {plot.caption}", quote=True)
+        picture = f"<img alt='{alt}' style='max-width:100%' src='data:image/png;base64,{_text(plot.png)}'>"
+        machine = self.scenario.machine
+        note = f"<p><small>{escape(machine.note)}</small></p>" if machine.note else ""
+        return (
+            f"<b>{escape(self.scenario.name)}</b> · {escape(machine.name)}, {self.program.duration:.4g} s{answer}"
+            f"<table>{rows}</table>{f'<ul>{said}</ul>' if said else ''}{picture}{note}"
+        )
+
+    def _leading(self) -> dict[str, Figure]:
+        return {name: figure for name, figure in self.figures.items() if is_leading(name, HEADER)}
+
+    def __dir__(self) -> list[str]:
+        return [name for name in super().__dir__() if not name.startswith("_") or name.startswith("__")]
+
+
+def _text(content: bytes) -> str:
+    return b64encode(content).decode("ascii")
+
+
+def run(
+    scenario: File | Scenario,
+    *,
+    set: Changes = None,
+    page: bool = False,
+    fmus: File | None = None,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    control: str = "",
+    watch: Watch = SILENT,
+) -> RunResult:
+    """Run a scenario.
+
+    Args:
+        scenario: a file, an SSP file, or what :func:`load` has returned.
+        set: changes, as behind ``--set``: a mapping, or texts "KEY=VALUE".
+        page: with the machine as a page that computes, which the report links.
+        fmus: folder of the archives.
+        out: folder that the result is written to, row by row while it runs; None: :meth:`RunResult.save` does it.
+        figures, force, control: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, a motion that violates a limit, an evaluation that cannot be made.
+        SimulationError: a unit failed; where `out` is given the rows up to there are kept.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> stiff = fs.run("z_positioning.yaml", set={"machine.axes.Z.drive.K_v": "5 (m/min)/mm"})
+    >>> stiff.figures["Z.settling_time"].unit
+    'ms'
+    """
+    with opened(scenario, set, fmus) as subject:
+        analysis.check(subject.plan, subject.program)  # an evaluation that cannot be made is refused before the run
+        if page:
+            from feedsim.page.content import content
+
+            content(subject.plan, subject.program, fmus=subject.fmus)  # and so is a page
+        inputs = report.input_paths(subject.plan)
+        with kept(out, report.check_writable, watch, inputs, subject.changes, force=force):
+            for sentence in cosim.executed(subject.plan.machine, subject.fmus, subject.plan.coupling):
+                watch.announce(subject.named(sentence))
+            if out is None:
+                return _run(subject, None, page, watch)
+            with _rows_kept(report.growing(out), watch) as recorded:
+                result = _run(subject, recorded, page, watch)
+                result.save(out, figures=figures, force=force, control=control, recorded=recorded)
+    return result
+
+
+def _run(subject: Opened, recorded: Partial | None, page: bool, watch: Watch) -> RunResult:
+    done = cosim.run(
+        subject.plan,
+        program=subject.program,
+        fmus=subject.fmus,
+        progress=watch.of(subject.plan.name),
+        scratch=recorded.scratch if recorded is not None else None,
+        sink=recorded,
+    )
+    done = replace(done, warnings=subject.warnings(done.warnings))
+    if not page:
+        return RunResult.of(done)
+    from feedsim.page.html import html
+
+    return RunResult.of(done, html(done, fmus=subject.fmus))
+
+
+@contextmanager
+def _rows_kept(recorded: Partial, watch: Watch) -> Iterator[Partial]:
+    """Say where the rows are of a run that does not come to its end."""
+    try:
+        with recorded:
+            yield recorded
+    except BaseException:
+        if recorded.left:
+            watch.announce(f"the rows up to {recorded.time:.9g} s are kept in {recorded.path}")
+        raise

@@ -1,0 +1,214 @@
+"""The many runs of a study, in one table, with what moves its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.analysis import Figure, Named
+from feedsim.arguments import Changes, settings
+from feedsim.findings import WRONG, Wrong
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.owned import TemporaryFolder
+from feedsim.report.content import Report
+from feedsim.report.results import Content, discard
+from feedsim.report.sweep import report as page
+from feedsim.report.sweep.account import Account
+from feedsim.report.sweep.summary import summary
+from feedsim.scenario.study import Study, load_study
+from feedsim.sweep.design import design
+from feedsim.sweep.study import AllFailed, Progress
+from feedsim.sweep.study import run as run_study
+from feedsim.sweep.table import RECORD, Format, Table
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepResult(Result):
+    """A study with its runs: ``result["Z.overshoot"]`` is a column of its table.
+
+    account: table, study, design and what they come to. folder: where table, journal and record of the study are.
+    """
+
+    account: Account
+    folder: Path
+    _kept: TemporaryFolder | None = field(default=None)  # which lives as long as this
+
+    kind = "sweep"
+
+    @property
+    def study(self) -> Study:
+        """The study, checked."""
+        return self.account.study
+
+    @property
+    def table(self) -> Table:
+        """A row per run: parameters, figures, messages."""
+        return self.account.table
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Which runs have come to their end."""
+        return self.table.ok
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A column of the table."""
+        return self.table[name]
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The table. Needs the package pandas."""
+        return self.table.to_pandas()
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files of the study."""
+        return inputs_of(self.study)
+
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """Median of every figure over the runs that have it; nan where no run has. Units are those of runs."""
+        return Named(
+            (name, Figure(_median(self.table[name]), self.table.unit(name), f"median of {len(self)} runs"))
+            for name in self.table.figures
+        )
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """Runs whose results are wrong."""
+        wrong = [str(text) for text in self.table["warnings"] if str(text).startswith(WRONG)]
+        first = wrong[0].removeprefix(WRONG).split(" | ")[0] if wrong else ""
+        return [Wrong(f"{len(wrong)} of {len(self.table)} runs, the first: {first}")] if wrong else []
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """How far the leading figures scatter, and what moves them most."""
+        return page.answers(self.account)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answer to the goal of the study, and how many runs there are and have failed."""
+        failed = int((~self.ok).sum())
+        words = f", {failed} of them failed (their messages are in the table)" if failed else ""
+        return [*page.goal_words(self.account), f"{self.study.name}: {len(self)} runs{words}"]
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.drawn_report(self.account)
+
+    def files(self) -> Mapping[str, Content]:
+        """Table and record of the study; in its own folder they stay as they are."""
+        names = [RECORD, *(path.name for path in self.folder.glob("table.*"))]
+        return {name: (self.folder / name).read_bytes() for name in names if (self.folder / name).is_file()}
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return summary(self.account, names, answer=page.answers(self.account))
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, inputs)
+
+    def __repr__(self) -> str:
+        return repr(self.table)
+
+
+def sweep(
+    study: File,
+    out: File | None = None,
+    *,
+    set: Changes = None,
+    runs: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    format: Format = "csv",
+    restart: bool = False,
+    fmus: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> SweepResult:
+    """Make the runs of a study; those that `out` has are not made again.
+
+    Args:
+        study: study file.
+        out: folder that keeps journal, table and report; None: a temporary one, as long as the result lives.
+        set: changes of the study's scenario, as behind ``--set``.
+        runs: in place of the study's own number.
+        workers: processes; None: the cores, 0: this one alone.
+        scheduler: address of a Dask cluster, "tcp://host:8786", that makes the runs.
+        format: of the table, "csv" or "parquet".
+        restart: discard the runs that the folder has.
+        fmus: folder of the archives.
+        figures, force: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, or a folder that belongs to another state of the study.
+        AllFailed: all runs failed; table and report are written.
+        SimulationError: the workers are lost.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> result = fs.sweep("studies/z_stop.yaml", "study", runs=2, workers=1)
+    >>> len(result), int(result.ok.sum())
+    (2, 2)
+    """
+    texts = settings(set)
+    loaded = load_study(study, texts, runs=runs)
+    watch.warn(loaded.warnings)
+    planned = design(loaded)
+    archives = None if fmus is None else Path(fmus)
+    scenario = loaded.base.scenario
+    announce(watch, scenario.machine, archives, scenario.coupling)
+    temporary = TemporaryFolder() if out is None else None
+    folder = temporary.path if temporary is not None else Path(out or "")
+
+    def progress(now: Progress) -> None:
+        watch.progress(loaded.name, now.done, now.total, now.resumed, f"{now.failed} failed" if now.failed else "")
+
+    with kept(folder, page.check_writable, watch, inputs_of(loaded), texts, force=force):
+        try:
+            table = run_study(
+                loaded,
+                folder,
+                workers=workers,
+                scheduler=scheduler,
+                fmus=archives,
+                progress=progress,
+                restart=restart,
+                format=format,
+                command=watch.command,
+                say=watch.say,
+                discard=lambda: discard(folder),
+            )
+        except AllFailed as error:
+            # The report groups failures by what they have in common.
+            page.write(error.table, loaded, planned, folder, drawn=figures)
+            raise
+        if out is not None:
+            page.write(table, loaded, planned, folder, drawn=figures)
+        return SweepResult(page.account_of(table, loaded, planned, folder), folder, temporary)
+
+
+def inputs_of(study: Study) -> list[Path]:
+    """Files that a study reads."""
+    return [study.file, study.scenario, *study.files]
+
+
+def _median(values: NDArray[Any]) -> float:
+    known = np.asarray(values, dtype=np.float64)
+    known = known[np.isfinite(known)]
+    return float(np.median(known)) if known.size else float("nan")

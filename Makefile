@@ -33,7 +33,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help run test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study identification-accuracy lock ansys clean
+.PHONY: help run check test test-c test-python test-processors test-importers fuzz test-sanitize test-sanitize-scenario test-valgrind test-platforms fmus fmus-all page-module release lint format schemas reference check-reference bench worst-case docs docs-test pictures pose-study identification-study identification-accuracy lock ansys clean
 
 help: ## list the commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-22s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -149,6 +149,15 @@ run: fmus $(VENV)/.run ## build, run both scenarios, leave results, figures and 
 # --- test ----------------------------------------------------------------------------------------------------------
 
 -include tests/unit_c/tests.mk
+
+# Enough to see at once that nothing is broken: layers, public functions and commands, motions, the units in C, and one
+# scenario up to its report.
+CHECKED := tests/test_layers.py tests/cli/test_jobs_and_options.py tests/motions tests/report/test_formatting.py
+check: fmus $(VENV)/.dev ## the quick set, below two minutes: layers, units of C, one scenario, one report
+	@$(MAKE) -s test-c
+	$(PY) -m pytest -q $(CHECKED)
+	$(VENV)/bin/feedsim run scenarios/z_positioning.yaml --out $(BUILD)/check --quiet
+	@test -s $(BUILD)/check/report.html && echo "$(BUILD)/check/report.html is there"
 
 test: test-c test-sanitize test-sanitize-scenario test-valgrind test-python test-processors ## everything: C tests, sanitisers, leak check, Python tests, other processors' arithmetic
 

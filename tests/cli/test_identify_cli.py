@@ -208,7 +208,7 @@ def test_inputs_are_not_lost(
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("FEEDSIM_FMUS", str(fmus))
-    monkeypatch.setattr("feedsim.identify.identify", far_enough)
+    monkeypatch.setattr("feedsim.jobs.identify.identified_from", far_enough)
     machine = [] if "--machine" in words else ["--machine", str(MACHINE)]
     code = main(["identify", *words, *machine, "--axis", "Z", "--out", "out", "--quiet"])
     captured = capfd.readouterr()

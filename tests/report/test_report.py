@@ -24,12 +24,14 @@ from feedsim.cli.terminal import finish, warn
 from feedsim.errors import OutputError
 from feedsim.findings import Note, Wrong
 from feedsim.motions import Arc, Dwell, Move
+from feedsim.outputs import replacing
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
 from feedsim.report.chart.embedded import embedded
-from feedsim.report.content import Tile
+from feedsim.report.content import Report, Tile
 from feedsim.report.page import html, script
 from feedsim.report.provenance import archives, input_files
+from feedsim.report.results import write_report
 from feedsim.report.run.report import HEADER, real_time_factor, report_of, summary, tile
 from feedsim.report.run.words import moved_words
 from feedsim.report.style import PALETTE
@@ -387,6 +389,24 @@ def test_foreign_summary_removes_nothing(tmp_path: Path) -> None:
     (out / "summary.json").write_text(json.dumps({"files": ["../victim.png", "figures/../../victim.png", 3, None]}))
     report.write(small_run(), {}, out)
     assert victim.exists()
+
+
+def test_a_result_of_a_kind_nobody_knows_goes_but_for_what_it_keeps(tmp_path: Path) -> None:
+    """Ownership asks the summary alone: a new kind of result needs no entry elsewhere."""
+    content = Report("Odd", "", main=[], footer="", answer=["It is odd."])
+    written = write_report(
+        tmp_path, content, lambda names: {}, {"odd.csv": "x", "odd.yaml": "y"}, kind="odd", keeps=("odd.yaml",)
+    )
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert {"kind", "version", "answer", "figures", "warnings", "findings", "files", "keeps"} <= set(summary)
+    assert (summary["kind"], summary["answer"], summary["keeps"]) == ("odd", ["It is odd."], ["odd.yaml"])
+    assert set(summary["files"]) == {str(path.relative_to(tmp_path)) for path in written}
+    (tmp_path / "mine.csv").write_text("mine")
+    with replacing():
+        report.write(small_run(), {}, tmp_path)
+    assert not (tmp_path / "odd.csv").exists()
+    assert (tmp_path / "odd.yaml").read_text() == "y"
+    assert (tmp_path / "mine.csv").read_text() == "mine"
 
 
 def test_friction_outlives_the_results_that_it_came_with(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.files.columns import load_columns
 from feedsim.identify import STAGES, Asked, Estimate, Identification, Identified, named_apart, read_traces
+from feedsim.identify.friction_file import FRICTION
 from feedsim.identify.parameters import KINDS
 from feedsim.identify.stages import identify as identified_from
 from feedsim.jobs.folder import File, kept
@@ -87,6 +88,11 @@ class IdentifyResult(Result):
     def files(self) -> Mapping[str, Content]:
         """friction.yaml, and what the figures show as CSV."""
         return page.files_of(self.identified)
+
+    @property
+    def keeps(self) -> Sequence[str]:
+        """friction.yaml."""
+        return (FRICTION,)
 
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""

@@ -67,6 +67,11 @@ class DriveResult(Result):
         """A machine folder, or, where the machine was given, drive and friction of its axes."""
         return self.drives.found.files
 
+    @property
+    def keeps(self) -> Sequence[str]:
+        """All files of the machine."""
+        return tuple(self.files())
+
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
         return page.summary(self.drives, names)

@@ -35,6 +35,11 @@ class Result(ABC):
     own: ClassVar[Sequence[str]] = ()  # names of files that only results of this kind have
 
     @property
+    def keeps(self) -> Sequence[str]:
+        """Those of its files that scenarios and machine files may name: the next result in the folder leaves them."""
+        return ()
+
+    @property
     @abstractmethod
     def figures(self) -> Mapping[str, Figure]:
         """Name -> derived number with unit and meaning."""
@@ -98,7 +103,14 @@ class Result(ABC):
         with replacing(force or forced()), in_words_of(control):
             self.check_writable(Path(folder), self.inputs)
             return write_report(
-                folder, self.report(), self.summary, self.files(), figures, kind=self.kind, own=self.own
+                folder,
+                self.report(),
+                self.summary,
+                self.files(),
+                figures,
+                kind=self.kind,
+                own=self.own,
+                keeps=self.keeps,
             )
 
     def __repr__(self) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -23,12 +22,12 @@ from feedsim.report.provenance import sha256, to_json
 SUMMARY, REPORT, FIGURES = "summary.json", "report.html", "figures"
 SCRATCH = ".feedsim-"  # how the folder begins in which files are made
 MOVES = "moves.json"  # in it: name -> from where it is moved into the directory, null: it is removed
-# What a report of any kind leaves besides report.html and summary.json, which every one replaces; the next one takes
-# away what it does not write itself. Not friction.yaml: scenarios and machine files may name it.
-_OWN_FILE = re.compile(
-    rf"{FIGURES}/[\w-]+\.(png|svg|gif)|result\.csv|log\.csv|frf(_measured)?\.csv|(residuals|open_loop|plateaus)\.csv"
-    r"|(uncompensated|feedforward|compensation|replay|response)\.csv"
-)
+ENVELOPE = 1  # version of what every summary.json has, whatever its kind: write_report()
+# What results of feedsim 0.1 have left besides figures: their summaries do not say which files stay.
+_OF_0_1 = {
+    "result.csv", "log.csv", "frf.csv", "frf_measured.csv", "residuals.csv", "open_loop.csv", "plateaus.csv",
+    "uncompensated.csv", "feedforward.csv", "compensation.csv", "replay.csv",
+}  # fmt: skip
 
 
 def check_place(
@@ -111,9 +110,9 @@ def write_results(
     grown: those of ``files`` that are there already, complete behind ``fill``, and where, on the same disk; they are
     moved from there, and back if moving fails. drawn: kinds of files that every picture is drawn as.
     Everything is made in a temporary directory in the target and moved when complete; files of an earlier result, of
-    whatever kind, are replaced, those that this one has not are removed, and both are put back if moving fails. Only
-    friction.yaml of an identification stays: scenarios and machine files may name it. Raises OutputError, also where
-    another process writes to the directory.
+    whatever kind, are replaced, those that this one has not are removed, and both are put back if moving fails. What
+    the earlier result keeps stays: scenarios and machine files may name it. Raises OutputError, also where another
+    process writes to the directory.
     """
     directory = Path(directory)
     with claimed(directory), _as_output_error(directory):
@@ -145,12 +144,15 @@ def write_report(
     *,
     kind: str,
     own: Sequence[str] = (),
+    keeps: Sequence[str] = (),
 ) -> tuple[Path, ...]:
     """Write a report of any kind: report.html, summary.json, ``files``, and its pictures as figures/*.
 
-    kind, own: as for :func:`check_place`. summary: content of summary.json, a function of the names of all files.
-    drawn: kinds of files that the pictures are drawn as; the page holds what they show in any case. Whole or not at
-    all, as :func:`write_results` does it. Returns the paths. Raises OutputError.
+    kind, own: as for :func:`check_place`. summary: what summary.json has of this kind, a function of the names of all
+    files; around it stands what all have: kind, version, answer, figures, warnings, findings, files. keeps: those of
+    ``files`` that scenarios and machine files may name; they stay when the next result takes the folder. drawn: kinds
+    of files that the pictures are drawn as; the page holds what they show in any case. Whole or not at all, as
+    :func:`write_results` does it. Returns the paths. Raises OutputError.
     """
     grown: dict[str, Path] = {}
 
@@ -163,7 +165,9 @@ def write_report(
             elif (already := content(fresh / name)) is not None:
                 grown[name] = already
         write_text(fresh / REPORT, html(report, kind))
-        write_text(fresh / SUMMARY, to_json({**summary(names), "kind": kind, **_found(report)}))
+        head = {"kind": kind, "version": ENVELOPE, "answer": list(report.answer), "figures": {}}
+        rest = {**_found(report), "files": list(names), "keeps": [name for name in keeps if name in files]}
+        write_text(fresh / SUMMARY, to_json({**head, **summary(names), "kind": kind, **rest}))
 
     return write_results(directory, (*files, REPORT, SUMMARY), report.pictures, fill, grown, drawn, kind=kind, own=own)
 
@@ -222,11 +226,18 @@ def _inside(name: str) -> bool:
 
 
 def _stale(directory: Path, names: Sequence[str]) -> list[str]:
-    """Figures and curves that the summary of an earlier run in ``directory`` lists and this run does not write."""
+    """Files that the result in ``directory`` lists, does not keep, and that this one does not write."""
+    before = _summary(directory)
+    keeps = before.get("keeps", ())
+    stay = {REPORT, SUMMARY, *names, *(keeps if isinstance(keeps, list) else ())}
+    told = "version" in before
     return [
         name
         for name in _listed(directory) or ()
-        if _OWN_FILE.fullmatch(name) and name not in names and (directory / name).is_file()
+        if name not in stay
+        and (told or name in _OF_0_1 or name.startswith(f"{FIGURES}/"))
+        and _inside(name)
+        and (directory / name).is_file()
     ]
 
 

@@ -97,7 +97,8 @@ def write(report: ModesReport, directory: Path | str, *, drawn: Sequence[str] = 
         units |= {f"{name}": unit, f"{name} fit": unit}
     response = FrequencyResponse(found.measured.frequency, columns, units)
     files = {MODES: partial(write_modes, modes=found.table), CURVES: partial(write_response, response=response)}
-    return write_report(directory, report_of(report), partial(summary, report), files, drawn, kind=KIND)
+    content = partial(summary, report)
+    return write_report(directory, report_of(report), content, files, drawn, kind=KIND, keeps=(MODES,))
 
 
 def report_of(report: ModesReport) -> Report:

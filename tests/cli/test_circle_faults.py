@@ -104,6 +104,38 @@ def test_inches_of_which_nobody_says_the_radius(tmp_path: Path, capsys: pytest.C
     assert len(found["findings"]) == 1
 
 
+def scaled(table: Table, part: str, factor: float) -> Table:
+    return {name: values * (factor if part in name else 1) for name, values in table.items()}
+
+
+@pytest.mark.parametrize(
+    ("part", "factor", "words"),
+    [
+        ("mm", 1e-3, "the radius is 0.05 mm; were the record in m, it would be 50"),
+        ("mm", 1e3, "the radius is 50000 mm; were the record in mm, it would be 50"),
+        ("time", 1e3, "the feed is 1.8 mm/min, by radius and time; were the time in ms, it would be 1800 mm/min"),
+        ("time", 1e-3, "the feed is 1.8e+06 mm/min, by radius and time; were the time in s, it would be 1800 mm/min"),
+    ],
+)
+def test_units_a_thousand_times_off_of_which_nobody_says_more(
+    part: str, factor: float, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, said, found = diagnosed(scaled(scales(), part, factor), tmp_path, capsys)
+    assert code == 0
+    assert words in said
+    assert len(found["findings"]) == 1
+
+
+def test_a_sample_that_stands_out_far_is_no_missing_sector(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By so much that its angle jumps, too."""
+    table = scales()
+    table["Y [mm]"][SAMPLES // 2] += 6.0
+    code, said, _ = diagnosed(table, tmp_path, capsys, *GIVEN)
+    assert code == 0
+    assert "one sample stands out alone" in said
+    assert "missing" not in said
+
+
 def test_inches_that_the_header_tells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     told = {name.replace("mm", "inch"): values for name, values in inches(scales()).items()}
     code, said, found = diagnosed(told, tmp_path, capsys, *GIVEN)

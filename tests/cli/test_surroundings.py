@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from capture_helpers import axis_signals, content
+from command_helpers import feedsim
 from ssp_helpers import short_scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -190,3 +192,15 @@ def test_a_trace_that_is_none_keeps_nobody_waiting(words: list[str], tmp_path: P
         env={**os.environ, "PYTHONPATH": str(ROOT / "master")},
     )  # fmt: skip
     assert done.returncode == 2
+
+
+def test_control_characters_of_a_file_do_not_reach_the_terminal(tmp_path: Path) -> None:
+    """A name in a capture that would colour the screen, or move the cursor."""
+    data = content({"X1|1": axis_signals(10.0, 1)})
+    for signal in data["Header"]["SignalListHFData"][1:]:
+        signal["Axis"] = "X1\x1b[31m\x07"
+    (tmp_path / "capture.json").write_text(json.dumps(data))
+    done = feedsim("identify", "capture.json", "--axis", "Q", fmus=tmp_path, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "there is X1\\x1b[31m\\x07" in done.stderr
+    assert "\x1b" not in done.stderr

@@ -287,6 +287,16 @@ def test_a_value_that_does_not_end_is_not_taken_whole(
         read_recording(path)
 
 
+@pytest.mark.parametrize("cycle", [1e-300, 0.0009, 1001, 10**400, True])
+def test_a_cycle_that_no_control_has(tmp_path: Path, cycle: object) -> None:
+    data = content({"X1|1": noisy()})
+    data["Header"]["CycleTimeMs"] = cycle
+    path = tmp_path / "capture.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(InputError, match=r"CycleTimeMs is .{1,70}; a number of milliseconds, 0\.001 to 1000, is"):
+        read_recording(path)
+
+
 def test_a_position_that_jumps(tmp_path: Path) -> None:
     """A counter that was set anew, or two records in one file."""
     signals = noisy()

@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from feedsim.cli.options import Command, Group, Option, halves
+from feedsim.cli.terminal import visible
 
 if TYPE_CHECKING:
     from feedsim.compare import Comparison, Options, Tolerances, Variable
@@ -46,7 +47,7 @@ def compare(options: Namespace) -> int:
 
         report.write(comparisons, html=options.report, xml=options.junit, json=options.json, durations=durations)
     except FeedsimError as error:
-        print(*(_plain(line) for line in f"feedsim: {error}".split("\n")), sep="\n", file=sys.stderr)
+        print(*(visible(line) for line in f"feedsim: {error}".split("\n")), sep="\n", file=sys.stderr)
         return 2
     except Exception:  # a fault of our own must not look like a difference
         traceback.print_exc()
@@ -55,20 +56,20 @@ def compare(options: Namespace) -> int:
         if not options.quiet:
             # Of many pairs those that are the same take one line.
             full = options.all or len(comparisons) == 1
-            print("\n".join(_plain(line) for each in comparisons for line in _lines(each, options.all, full)))
+            print("\n".join(visible(line) for each in comparisons for line in _lines(each, options.all, full)))
             for line in (
                 *_default(comparisons),
                 *_unused(comparisons, options),
                 *_unreferenced(comparisons, options),
                 *_sum(comparisons),
             ):
-                print(_plain(line))
+                print(visible(line))
             sys.stdout.flush()
     except OSError:
         sys.stdout = None  # who read has gone, or the disk is full; the code still counts
     for each in comparisons:
         if each.verdict == "unusable" and options.quiet:
-            print(_plain(f"feedsim: {each.result}: {each.line}"), file=sys.stderr)
+            print(visible(f"feedsim: {each.result}: {each.line}"), file=sys.stderr)
     return code
 
 
@@ -245,17 +246,12 @@ def _lines(comparison: Comparison, everything: bool, notes: bool) -> list[str]:
     ranked = sorted(comparison.variables, key=lambda each: (-each.ratio, each.verdict == "same"))
     shown = [each for each in ranked if everything or each.verdict != "same"]
     cut = shown if everything else shown[:MOST_LINES]
-    width = max((len(_plain(each.name)) for each in cut), default=0)
-    found += [f"  {_plain(each.name):<{width}}  {_variable_line(each)}" for each in cut]
+    width = max((len(visible(each.name)) for each in cut), default=0)
+    found += [f"  {visible(each.name):<{width}}  {_variable_line(each)}" for each in cut]
     if len(shown) > len(cut):
         found.append(f"  and {len(shown) - len(cut)} more; --all lists them")
     found += [f"  looks like: {each.text}" for each in comparison.looks_like]
     return found + [f"  note: {note}" for note in comparison.notes if notes or not comparison.same]
-
-
-def _plain(text: str) -> str:
-    """As the terminal may show it: names come from files, and control characters in them are not obeyed."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def _variable_line(variable: Variable) -> str:

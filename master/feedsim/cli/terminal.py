@@ -149,8 +149,14 @@ def results_in(
 COLOURS = {"red": 31, "yellow": 33}
 
 
+def visible(line: str) -> str:
+    """As the terminal may show it: names come from files, and control characters in them are not obeyed."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in line)
+
+
 def painted(text: str, colour: str, stream: Any) -> str:
     """The text in a colour where a stream is a terminal that shows some, and NO_COLOR (no-color.org) is not set."""
+    text = "\n".join(visible(line) for line in text.split("\n"))
     plain = not colour or bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
     return text if plain or not stream.isatty() else f"\x1b[{COLOURS[colour]}m{text}\x1b[0m"
 

@@ -26,6 +26,7 @@ from feedsim.trace.trace import LARGEST, Array, recorded
 
 SUFFIX = ".json"
 COUNTER = "CYCLE"
+LEAST_CYCLE = 1e-3  # ms
 LONGEST_NAME, MOST_SHOWN = 200, 60  # characters: of a name; of a cell in a message
 # 1.1 GB as numbers, in memory twice while they are sorted into columns; a file of some 1.3 GB.
 MOST_NUMBERS, MOST_BLOCKS = 1 << 27, 1_000_000
@@ -206,8 +207,9 @@ def _missing(path: Path, key: str) -> InputError:
 
 def _cycle(path: Path, header: Mapping[str, Any]) -> float:
     cycle = header.get("CycleTimeMs")
-    if not isinstance(cycle, (int, float)) or isinstance(cycle, bool) or not 0 < cycle <= 1000:
-        raise InputError(f"{path}: Header.CycleTimeMs is {cycle!r}; a number of milliseconds up to 1000 is expected")
+    if not isinstance(cycle, (int, float)) or isinstance(cycle, bool) or not LEAST_CYCLE <= cycle <= 1000:
+        allowed = f"a number of milliseconds, {LEAST_CYCLE:g} to 1000, is expected"
+        raise InputError(f"{path}: Header.CycleTimeMs is {_shown(cycle)}; {allowed}")
     return float(cycle)
 
 

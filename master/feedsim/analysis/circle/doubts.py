@@ -23,6 +23,10 @@ RATIOS = {
     2.0: "the diameter?", 25.4: "inches, under a header of mm?", 1000.0: "another unit of length?",
     10.0: "centimetres?", 60.0: "per minute for per second?", 0.06: "m/min for mm/s?",
 }  # fmt: skip
+# A radius is below a millimetre, or above metres, where metres and millimetres were mistaken for one another; a feed of
+# millimetres per minute, or of thousands of metres, where seconds and milliseconds were [m], [m/s].
+LEAST_RADIUS, MOST_RADIUS = 1e-3, 5.0
+LEAST_FEED, MOST_FEED, USUAL_FEEDS = 10e-3 / 60, 1000.0 / 60, (50e-3 / 60, 200.0 / 60)
 ROUND, IN_INCHES, SMALL = 0.5e-3, 5e-3, 5e-4  # a radius in mm is a multiple of these [m], to this share
 # Samples are missing where the angle goes on by so many usual steps, and by so much [rad].
 STEPS, SECTOR = 5.0, math.radians(2)
@@ -74,7 +78,7 @@ def _ratio(ratio: float) -> str:
 
 
 def unusual_radius(radius: float) -> list[str]:
-    """That a radius [m] which nobody has given would be a round one if the record were in inches."""
+    """That a radius [m] which nobody has given would be usual if the record were in inches, metres or mm."""
 
     def multiple(value: float, of: float) -> bool:
         return value >= of and abs(value / of - round(value / of)) * of < SMALL * value
@@ -84,6 +88,23 @@ def unusual_radius(radius: float) -> list[str]:
             f"the radius is {radius * 1e3:.5g} mm; were the record in inches, it would be {radius * 25.4e3:.5g} mm: "
             "look at the unit in its header, or give --radius"
         ]
+    for factor, unit in ((1e3, "m"), (1e-3, "mm")):
+        if not LEAST_RADIUS <= radius <= MOST_RADIUS and LEAST_RADIUS <= factor * radius <= MOST_RADIUS:
+            return [
+                f"the radius is {radius * 1e3:.5g} mm; were the record in {unit}, it would be "
+                f"{factor * radius * 1e3:.5g} mm: look at the unit in its header, or give --radius"
+            ]
+    return []
+
+
+def unusual_feed(feed: float) -> list[str]:
+    """That a feed [m/s] by radius and time would be a usual one if the time were in milliseconds, or in seconds."""
+    for factor, unit in ((1e3, "ms"), (1e-3, "s")):
+        if not LEAST_FEED <= feed <= MOST_FEED and USUAL_FEEDS[0] <= factor * feed <= USUAL_FEEDS[1]:
+            return [
+                f"the feed is {feed * 6e4:.5g} mm/min, by radius and time; were the time in {unit}, it would be "
+                f"{factor * feed * 6e4:.5g} mm/min: look at the unit of the time in the header, or give --feed"
+            ]
     return []
 
 
@@ -91,7 +112,7 @@ def checked(angle: Array, deviation: Array, radius: float, by_axes: bool, axes: 
     """A turn, (N,) angles as they follow [rad] and deviations from `radius` [m]; by_axes: from positions of `axes`."""
     turned = np.unwrap(angle)
     keep = ~_alone(turned, deviation)
-    doubts = list(_spikes(turned, deviation, keep)) + list(_missing(turned))
+    doubts = list(_spikes(turned, deviation, keep)) + list(_missing(turned[keep]))
     angles, rest = turned[keep], deviation[keep]
     if by_axes:
         columns = {axes[0]: (radius + rest) * np.cos(angles), axes[1]: (radius + rest) * np.sin(angles)}

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from feedsim import units
-from feedsim.analysis.circle.doubts import OFF_FEED, check_feed, check_radius, checked, unusual_radius
+from feedsim.analysis.circle.doubts import OFF_FEED, check_feed, check_radius, checked, unusual_feed, unusual_radius
 from feedsim.analysis.circle.header import Told, own_format
 from feedsim.analysis.circle.model import CircleUnderTest, TurnedPath
 from feedsim.analysis.circularity import EVEN, PARTS, fitted_circle
@@ -129,7 +129,7 @@ def read_circle(
         doubts.append(f"{files[0]}: its header tells another feed than its time, {own * 6e4:.5g} mm/min, which counts")
     notes, doubts = [*headers.notes, *notes], [*headers.doubts, *doubts]
     if radius is None:
-        doubts += unusual_radius(nominal)
+        doubts += unusual_radius(nominal) or (unusual_feed(own) if own is not None and feed is None else [])
         notes.append(f"the programmed radius is taken to be {nominal * 1e3:.6g} mm, that of the recorded turns")
     circle = CircleUnderTest(axes, nominal, speed, pitch or {})
     return RecordedCircle(circle, tuple(turns), centre is None, tuple(notes), tuple(doubts))

@@ -31,6 +31,26 @@ def test_nothing_is_made_of_a_round_circle() -> None:
     assert "no single cause" in answer(found)
 
 
+def test_play_that_is_used_up_first_is_no_peak() -> None:
+    """An axis that stands until its play is used up, against one that loses it at once: both alone."""
+    circle, play = CircleUnderTest(("X", "Z"), radius=0.05, speed=0.05), 8e-6
+    paths = []
+    for sense in (1, -1):
+        t = np.arange(6000) * 2 * math.pi / 6000
+        x, z = circle.radius * np.cos(t), sense * circle.radius * np.sin(t)
+        slide = np.empty_like(x)
+        y = x[0] - play / 2
+        for _ in range(2):  # once round, so that it begins as it ends
+            for k, position in enumerate(x):
+                y = min(max(y, position - play / 2), position + play / 2)
+                slide[k] = y
+        paths.append(TurnedPath(np.arctan2(z, slide), np.hypot(slide, z) - circle.radius, sense, t))
+    found = diagnose(circle, paths)
+    assert found["lost_motion X"].value == pytest.approx(play, abs=0.05e-6)
+    assert found.terms[0].key == "lost_motion"
+    assert all(abs(peak.height) < 0.3e-6 for peak in found.peaks)
+
+
 ALONE = {
     # cause -> the term and what it must be; other terms stay below 10 nm, which is the second order of 50 um on 100 mm
     "offset": (Causes(offset=(12e-6, -16e-6)), {"offset": 20e-6}),
@@ -59,8 +79,35 @@ def test_shares_add_up_to_the_deviation() -> None:
     causes = Causes(offset=(2e-6, 1e-6), squareness=30e-6, delay=(5e-4, 0.0), peak=(4e-6, 6e-6), noise=1e-7)
     found = both(BALLBAR, causes)
     assert sum(term.share for term in found.terms) == pytest.approx(1.0, abs=1e-9)
-    told = [term.share for term in found.terms if term.told]
+    told = [round(term.gain, 9) for term in found.terms if term.told and term.key != "rest"]
     assert told == sorted(told, reverse=True)
+
+
+def test_the_first_cause_is_the_one_whose_removal_gains_most() -> None:
+    """Drawn causes, each removed from the generator: the first that is named is the one without which G is least."""
+    rng, right, decided = np.random.default_rng(7), 0, 0
+    for seed in range(40):
+        values = {
+            "squareness": Causes(squareness=rng.uniform(-1e-4, 1e-4)),
+            "servo": Causes(delay=(rng.uniform(-2e-4, 2e-4), 0.0)),
+            "lost_motion X": Causes(lost=(rng.uniform(0, 8e-6), 0.0)),
+            "peaks Z": Causes(peak=(0.0, rng.uniform(0, 9e-6))),
+        }
+        squareness, servo, lost, peak = values.values()
+        whole = Causes(squareness=squareness.squareness, delay=servo.delay, lost=lost.lost, peak=peak.peak)
+        without = {
+            "squareness": replace(whole, squareness=0.0), "servo": replace(whole, delay=(0.0, 0.0)),
+            "lost_motion X": replace(whole, lost=(0.0, 0.0)), "peaks Z": replace(whole, peak=(0.0, 0.0)),
+        }  # fmt: skip
+        G = {key: both(BALLBAR, causes, seed, 1500).G for key, causes in without.items()}
+        best, second = sorted(G.values())[:2]
+        if second - best < 0.1e-6:
+            continue  # as good as the same
+        decided += 1
+        first = both(BALLBAR, whole, seed, 1500).terms[0]
+        right += f"{first.key} {first.axis}".strip() == min(G, key=lambda key: G[key])
+    assert right >= 0.95 * decided
+    assert decided > 25
 
 
 def test_one_direction_tells_squareness_and_servo_mismatch_as_one() -> None:

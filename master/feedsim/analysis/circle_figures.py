@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedsim.analysis.circle import CircleUnderTest, Diagnosis, Term, TurnedPath, diagnose, name
 from feedsim.analysis.circularity import Turn, axis_letters, contour, fitted_centre
@@ -27,22 +28,28 @@ ANGLES = 720  # at which two directions are compared: every half degree
 
 
 def diagnosed(
-    trace: Trace, turns: Sequence[Turn], pitch: Mapping[str, float], gain: Mapping[str, complex] | None = None
+    trace: Trace,
+    turns: Sequence[Turn],
+    pitch: Mapping[str, float],
+    gain: Mapping[str, complex] | None = None,
+    drag: Mapping[str, NDArray[np.complex128]] | None = None,
+    columns: tuple[str, str] | None = None,
 ) -> Diagnosis | None:
     """Turns of one circle taken apart; None where they have too few samples for that.
 
-    pitch: axis -> [m]. gain: axis -> x_a/x_s at the circle's frequency [1].
+    pitch: axis -> [m]. gain: axis -> x_a/x_s at the circle's frequency [1]. drag: axis -> x_a over a torque at the
+    motor at the odd multiples of that frequency [m/(N.m)]. columns: of the positions; default: those of the scales.
     """
     turn = turns[0]
     paths = []
     for each in turns:
-        measured = contour(trace, each)
+        measured = contour(trace, each, columns)
         if len(measured.angle) < LEAST:
             return None
         phase = (measured.time - measured.time[0]) * (2 * math.pi / (each.end - each.begin))
         paths.append(TurnedPath(measured.angle, measured.deviation, each.sense, phase))
     speed = 2 * math.pi * turn.radius / (turn.end - turn.begin)
-    return diagnose(CircleUnderTest(turn.axes, turn.radius, speed, pitch, gain or {}), paths)
+    return diagnose(CircleUnderTest(turn.axes, turn.radius, speed, pitch, gain or {}, drag or {}), paths)
 
 
 def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedsim.analysis.circle import Diagnosis
 from feedsim.analysis.circle_figures import bidirectional, cause_figures, diagnosed, misleading
@@ -32,6 +33,8 @@ from feedsim.trace import Trace, matches
 # What acceleration leaves dies away in the run-in [s]: on the default machine it makes G 3 % too large after 0.2 s on
 # circles of 5 mm at 3 m/min and of 15 mm at 10 m/min, and nothing on one of 15 mm at 3 m/min.
 RUN_IN = 0.2
+# Of the loops' response to friction: frequencies up to this [Hz], and up to this multiple of the circle's.
+DRAG_HIGHEST, DRAG_MOST = 200.0, 401
 
 
 class Result(Protocol):
@@ -94,7 +97,7 @@ class CircleTask:
 
     def diagnosis(self, trace: Trace) -> Diagnosis | None:
         """Why the circle is not round; None where it has too few samples to tell."""
-        return diagnosed(trace, self.turns, self.pitch, self.gain)
+        return diagnosed(trace, self.turns, self.pitch, self.gain, self.drag)
 
     @property
     def pitch(self) -> dict[str, float]:
@@ -109,6 +112,22 @@ class CircleTask:
             system = LinearSystem(self.machine, plant_modes(self.machine)[0])
             return {
                 axis: complex(position_reference(system, axis, frequency, feedforward=True)[0])
+                for axis in self.turn.axes
+            }
+        except InputError:
+            return {}
+
+    @cached_property
+    def drag(self) -> dict[str, NDArray[np.complex128]]:
+        """x_a over M_add, a torque at the motor but for the current loop, of the plane's axes at the odd multiples of
+        the circle's frequency [m/(N.m)]; empty as gain."""
+        first = 1 / (self.turn.end - self.turn.begin)
+        highest = min(DRAG_HIGHEST, 0.4 / self.machine.cycles.T_c)
+        frequency = first * np.arange(1, max(2, min(highest / first, DRAG_MOST)), 2)
+        try:
+            system = LinearSystem(self.machine, plant_modes(self.machine)[0])
+            return {
+                axis: system.closing({axis: "position"}).transfer(frequency, f"{axis}.x_a", f"{axis}.M_add")
                 for axis in self.turn.axes
             }
         except InputError:

@@ -38,6 +38,7 @@ class Term:
         half: half of its interval of 95 %; NaN where it has none.
         size: difference of the largest and the smallest radial deviation that it makes alone [m].
         share: of G: what it contributes where the deviation is largest, less where it is smallest, over G [1].
+        gain: by how much G falls without it [m]; below 0 where it rises.
     """
 
     key: str
@@ -47,6 +48,7 @@ class Term:
     unit: str
     size: float
     share: float
+    gain: float = 0.0
 
     @property
     def told(self) -> bool:
@@ -80,7 +82,8 @@ class Diagnosis:
     Attributes:
         circle, senses: what was tested, and in which senses.
         G: largest less smallest radial deviation of all turns [m].
-        terms: by their share of G, the largest first. peaks: of all reversals, in the order of the turns.
+        terms: those that are told from zero first, by how much G falls without them, then by their size.
+        peaks: of all reversals, in the order of the turns.
         vibrations: the strongest of each axis that stands out, of the radius where only that is known.
         lag: the part of the mean radius that the loops' response makes [m]; None where the drives are not known.
         form: order -> amplitude of it in what remains [m].
@@ -147,7 +150,7 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         if key == "rest":
             value = float(np.ptp(part))
         share = float(part[high] - part[low]) / G if G > 0 else 0.0
-        terms.append(Term(key, axis, value, half, unit, float(np.ptp(part)), share))
+        terms.append(Term(key, axis, value, half, unit, float(np.ptp(part)), share, G - float(np.ptp(e - part))))
     if centred:
         value, half, unit = _value(circle, found, peaks, "offset", "")
         terms.append(Term("offset", "", value, half, unit, 2 * value, 0.0))
@@ -155,7 +158,9 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         circle=circle,
         senses=tuple(path.sense for path in paths),
         G=G,
-        terms=tuple(sorted(terms, key=lambda term: (-term.share if term.told else 1.0, -term.size))),
+        terms=tuple(
+            sorted(terms, key=lambda term: (not term.told or term.key == "rest", -round(term.gain / FLOOR), -term.size))
+        ),
         peaks=peaks,
         vibrations=vibrations(circle, found, whole),
         lag=_lag(circle),

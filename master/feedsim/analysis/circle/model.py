@@ -14,13 +14,21 @@ What friction makes where an axis reverses is no part of the model. A window beh
 else does not fit counts less (Tukey's biweight). Where a peak dies away slowly, what is left of it behind its window is
 fitted as an exponential whose size and decay the window shows, the size to within its own amount: so the tail is not
 taken for lost motion, and where the two are not told apart, the interval of the lost motion holds both.
+
+On a fast circle a peak takes as long as a quarter turn, and no exponential is its shape. Where the drives are known, so
+is that shape: Coulomb friction is a torque that changes sign where an axis reverses, and the position follows it by the
+loops' response at the odd harmonics of the turn. It stands in the place of the exponentials, with its first two slopes,
+as friction takes some way to turn round.
+
+Lost motion is a step, or play: then an axis stands behind a reversal until the play is used up, along R (1 - cos). That
+of both is taken which leaves less there.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,9 +47,16 @@ DECAYS = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 18.0, 
 FALLEN = 2.0  # angle of the means [deg] that say where a peak has fallen to half its height
 # Neighbouring samples share what disturbs them. Blocks of this angle [deg] do not, as far as intervals are concerned.
 BLOCK = 6.0
+# Friction is no clean step: the response to it outside the windows is known to this share.
+KNOWN = 0.2
+# Lost motion from which on its shape is looked at [m]; the mark that it is play.
+PLAY, PLAYED = 0.2e-6, "play"
+# Of known responses: the angle in which friction turns round [deg]; points of a turn.
+TURNS, PERIOD = 10.0, 2048
 PASSES = 6
 # Travel in pitches from which an error that repeats with the pitch is told from the circle's own shape.
 PITCHES = 2.0
+REPEATS = 2.0  # and pitches that must lie between two windows, where the drives are known
 # More samples of a turn tell nothing more of its shape.
 MOST = 8000
 # The angle that is programmed and the one where the machine is are told apart from this deviation [m] on.
@@ -51,14 +66,16 @@ UNSEEN = 5e-9
 @dataclass(frozen=True)
 class CircleUnderTest:
     """What is known of the circle: axes of its plane (first, second), radius [m], path speed [m/s]; the pitch of an
-    axis [m] where an error that repeats with it is looked for; the response of an axis, x_a over x_s, at the circle's
-    frequency [1], where its drive is known."""
+    axis [m] where an error that repeats with it is looked for; where the drive of an axis is known, its response x_a
+    over x_s at the circle's frequency [1], and x_a over a torque at the motor at the odd multiples of it, from the
+    first on [m/(N.m)]."""
 
     axes: tuple[str, str]
     radius: float
     speed: float
     pitch: Mapping[str, float] = field(default_factory=dict)
     gain: Mapping[str, complex] = field(default_factory=dict)
+    drag: Mapping[str, NDArray[np.complex128]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +113,7 @@ class Fit:
         window: how far behind a reversal is left out [rad].
         noise: standard deviation of a sample outside the windows [m].
         left_out: pitch errors that the circle is too small for.
+        unsure: what a term may be off by as the loops' response is not known better [m].
     """
 
     names: tuple[str, ...]
@@ -111,6 +129,7 @@ class Fit:
     window: float
     noise: float
     left_out: tuple[str, ...]
+    unsure: float = 0.0
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
@@ -130,7 +149,8 @@ class Fit:
         part = self.values[rows]
         length = float(np.hypot(*part)) if len(rows) == 2 else 0.0
         along = part / length if length > 0 else np.full(len(rows), 1 / math.sqrt(len(rows)))
-        return self.quantile * math.sqrt(max(float(along @ self.covariance[np.ix_(rows, rows)] @ along), 0.0))
+        own = self.quantile * math.sqrt(max(float(along @ self.covariance[np.ix_(rows, rows)] @ along), 0.0))
+        return math.hypot(own, self.unsure)
 
 
 def enough_pitches(circle: CircleUnderTest, axis: str) -> bool:
@@ -144,18 +164,32 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     A path of angle and radius alone may have the programmed angle in place of the one where the machine was: that of
     both which leaves less is taken.
     """
-    found = _windowed(circle, paths, told=False)
+    found = _shaped(circle, paths, told=False)
     moved = sum(math.hypot(found[a], found[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))
     moved += abs(found["squareness"])
     if all(path.phase is not None for path in paths) or moved**2 < circle.radius * UNSEEN:
         return found
-    other = _windowed(circle, paths, told=True)
+    other = _shaped(circle, paths, told=True)
     return other if other.noise < found.noise else found
 
 
-def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], told: bool) -> Fit:
+def _shaped(circle: CircleUnderTest, paths: Sequence[TurnedPath], told: bool) -> Fit:
+    """Lost motion as a step, or as play that is used up first, whichever leaves less behind the reversals."""
+    found = _windowed(circle, paths, told, play=False)
+    if max(found["lost_0"], found["lost_1"]) < PLAY:
+        return found
+    other = _windowed(circle, paths, told, play=True)
+    return other if _behind(other) < _behind(found) else found
+
+
+def _behind(found: Fit) -> float:
+    """What is left behind the reversals, in squares [m2]."""
+    return sum(float((off[which >= 0] ** 2).sum()) for off, which in zip(found.residual, found.reversal, strict=True))
+
+
+def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], told: bool, play: bool) -> Fit:
     for degrees in BEHIND:
-        found = _fit(circle, paths, math.radians(degrees), told)
+        found = _fit(circle, paths, math.radians(degrees), told, play)
         if _calm(found):
             break
     return found
@@ -181,15 +215,19 @@ class _Tails:
     spread: Array
 
 
-def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, told: bool) -> Fit:
+def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, told: bool, play: bool) -> Fit:
     both = len({path.sense for path in paths}) == 2
-    values: dict[str, float] = {}
+    asked = [axis for axis in circle.axes if axis in circle.pitch]
+    # Where friction's response reaches far, an error must be seen to repeat between two windows.
+    free = circle.radius * (math.pi / 2 - window - math.radians(AHEAD)) if circle.drag else math.inf
+    circle = replace(circle, pitch={axis: p for axis, p in circle.pitch.items() if REPEATS * p <= free})
+    values: dict[str, float] = {PLAYED: 1.0} if play else {}
     ends = np.cumsum([len(path.angle) for path in paths])[:-1]
     tails = _Tails(np.empty((sum(len(path.angle) for path in paths), 0)), np.empty(0))
     residual: Array = np.empty(0)
     for number in range(PASSES):
         undone = [_undo(circle, path, values, told) for path in paths]
-        parts = [_columns(circle, each, path.sense, both) for each, path in zip(undone, paths, strict=True)]
+        parts = [_columns(circle, each, path.sense, both, values) for each, path in zip(undone, paths, strict=True)]
         windows = [_windows(each, path.sense, window) for each, path in zip(undone, paths, strict=True)]
         names = tuple(parts[0])
         matrix = np.concatenate([np.column_stack([part[name] for name in names]) for part in parts])
@@ -198,12 +236,16 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, to
         kept = which < 0
         if number == 2:  # the ellipse is undone, so that the windows show the peaks alone
             usual = _usual([each.angle for each in undone], np.split(residual, ends), [free for free, _ in windows])
-            tails = _tails(undone, paths, _left(residual, which, since, window, usual), window)
+            tails = (
+                _known_tails(circle, undone, paths, residual, which)
+                if all(axis in circle.drag for axis in circle.axes)
+                else _tails(undone, paths, _left(residual, which, since, window, usual), window)
+            )
         fitted = (np.column_stack([matrix, tails.columns]) if len(tails.spread) else matrix)[kept]
         blocks = _blocks(undone)[kept] if len(tails.spread) else np.empty(0)
         robust = robust_fit(fitted, deviation[kept], tails.spread, blocks)
         step = robust.values[: len(names)]
-        values = {name: values.get(name, 0.0) + float(d) for name, d in zip(names, step, strict=True)}
+        values |= {name: values.get(name, 0.0) + float(d) for name, d in zip(names, step, strict=True)}
         residual = deviation - matrix @ step
         if number > 1 and float(np.abs(step).max()) < SETTLED:
             break
@@ -225,7 +267,8 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, to
         columns=tuple(parts),
         window=window,
         noise=robust.noise,
-        left_out=tuple(axis for axis in circle.axes if axis in circle.pitch and not enough_pitches(circle, axis)),
+        left_out=tuple(axis for axis in asked if not enough_pitches(circle, axis)),
+        unsure=KNOWN * float(np.abs(tail[kept]).max(initial=0.0)) if len(circle.drag) == 2 else 0.0,
     )
 
 
@@ -297,6 +340,42 @@ def _tails(
     return _Tails(np.column_stack(columns) if columns else np.empty((samples, 0)), np.array(spread))
 
 
+def _known_tails(
+    circle: CircleUnderTest,
+    undone: Sequence[_Undone],
+    paths: Sequence[TurnedPath],
+    residual: Array,
+    which: NDArray[np.int64],
+) -> _Tails:
+    """The same where the loops' response is known: of each axis the periodic response to its friction, and the slope.
+
+    A torque that is -F sgn(v) moves the axis by F 4/pi sum over odd k of Im(T_k exp(i k theta))/k, theta its own angle
+    from the half axis + on, T_k its response. The columns are 1 m at their largest; friction is as large as the
+    windows' peaks, or less, and turns round within TURNS: so do the first two slopes of the response.
+    """
+    columns, spread = [], []
+    for i, axis in enumerate(circle.axes):
+        peak = float(np.abs(residual[(which >= 0) & (which % 2 == i)]).max(initial=0.0))
+        if peak < TAIL_FLOOR:
+            continue
+        k = 2 * np.arange(len(circle.drag[axis])) + 1
+        waves = circle.drag[axis] / k
+        theta = np.linspace(0, 2 * math.pi, PERIOD, endpoint=False)
+        turned = np.exp(1j * np.outer(theta, k))
+        largest = float(np.abs((turned @ waves).imag).max())
+        within = math.radians(TURNS)
+        for order, size in enumerate((TAIL, within, within**2)):
+            own = (turned @ ((1j * k) ** order * waves)).imag / largest
+            parts = []
+            for each, path in zip(undone, paths, strict=True):
+                passed = path.sense * (each.angle - each.turned[i]) % (2 * math.pi)
+                along = (np.cos, np.sin)[i](each.angle)
+                parts.append(along * np.interp(passed, theta, own, period=2 * math.pi))
+            columns.append(np.concatenate(parts))
+            spread.append(size * peak)
+    return _Tails(np.column_stack(columns) if columns else np.empty((len(residual), 0)), np.array(spread))
+
+
 def _undo(circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float], told: bool) -> _Undone:
     """The path with what ``values`` say taken off: displacements of the axes first, then the ellipse.
 
@@ -317,26 +396,39 @@ def _undo(circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float]
         programmed = circle.radius * np.array([np.cos(angle), np.sin(angle)])
         p = centre + distortion @ programmed
         for name, (axis, displacement) in _displacements(
-            circle, angle, programmed, path.sense, (0, math.pi / 2)
+            circle, angle, programmed, path.sense, (0, math.pi / 2), values
         ).items():
             p[axis] += of(name) * displacement
         angle = np.arctan2(p[1], p[0])
     positions = (circle.radius + path.deviation) * np.array([np.cos(angle), np.sin(angle)])
     p = positions - centre
     angle = np.arctan2(p[1], p[0])
-    for name, (axis, displacement) in _displacements(circle, angle, positions, path.sense, turned).items():
+    for name, (axis, displacement) in _displacements(circle, angle, positions, path.sense, turned, values).items():
         p[axis] -= of(name) * displacement
     plain = np.linalg.solve(distortion, p)
     return _Undone(positions, np.arctan2(plain[1], plain[0]), np.hypot(plain[0], plain[1]) - circle.radius, turned)
 
 
 def _displacements(
-    circle: CircleUnderTest, angle: Array, positions: Array, sense: int, turned: tuple[float, float]
+    circle: CircleUnderTest,
+    angle: Array,
+    positions: Array,
+    sense: int,
+    turned: tuple[float, float],
+    values: Mapping[str, float],
 ) -> dict[str, tuple[int, Array]]:
-    """Terms that displace one axis: its number, and the displacement for 1 m of the term."""
+    """Terms that displace one axis: its number, and the displacement for 1 m of the term. Play of `values` is used up
+    behind a reversal before it is lost."""
     found = {}
     for i in (0, 1):
-        found[f"lost_{i}"] = (i, 0.5 * sense * np.sign(np.sin(angle - turned[i])))
+        side = sense * np.sign(np.sin(angle - turned[i]))
+        lost = values.get(f"lost_{i}", 0.0)
+        if lost > 0 and PLAYED in values:
+            since = sense * (angle - turned[i]) % math.pi
+            way = circle.radius * (1 - np.cos(since))
+            found[f"lost_{i}"] = (i, side * np.clip(way / lost - 0.5, -0.5, 0.5))
+        else:
+            found[f"lost_{i}"] = (i, 0.5 * side)
     for i, axis in enumerate(circle.axes):
         if enough_pitches(circle, axis):
             phase = 2 * math.pi / circle.pitch[axis] * positions[i]
@@ -344,7 +436,9 @@ def _displacements(
     return found
 
 
-def _columns(circle: CircleUnderTest, undone: _Undone, sense: int, both: bool) -> dict[str, Array]:
+def _columns(
+    circle: CircleUnderTest, undone: _Undone, sense: int, both: bool, values: Mapping[str, float]
+) -> dict[str, Array]:
     """Radial deviation for 1 m of every term; ``both`` senses are there to tell a delay from an angle."""
     angle = undone.angle
     along = np.cos(angle), np.sin(angle)
@@ -352,7 +446,7 @@ def _columns(circle: CircleUnderTest, undone: _Undone, sense: int, both: bool) -
     found["squareness"] = np.sin(2 * angle)
     if both:
         found["servo"] = sense * np.sin(2 * angle)
-    displacements = _displacements(circle, angle, undone.positions, sense, undone.turned)
+    displacements = _displacements(circle, angle, undone.positions, sense, undone.turned, values)
     return found | {name: along[axis] * displacement for name, (axis, displacement) in displacements.items()}
 
 

@@ -34,7 +34,7 @@ def answer(diagnosis: Diagnosis) -> str:
 
 
 def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
-    """Every term with its sentence, those that are told from zero first, by their share of G."""
+    """Every term with its sentence, those that are told from zero first, by how much G falls without them."""
     return [(term, sentence(diagnosis, term)) for term in diagnosis.terms]
 
 
@@ -45,7 +45,7 @@ def worth_telling(diagnosis: Diagnosis) -> list[Term]:
     besides = [
         term for term in able if term not in found and term.key != "offset" and term.size >= BESIDES * diagnosis.G
     ]
-    return [*sorted(found, key=lambda term: -term.share), *sorted(besides, key=lambda term: -term.size)]
+    return [*sorted(found, key=lambda term: (-term.gain, -term.share)), *sorted(besides, key=lambda term: -term.size)]
 
 
 def sentence(diagnosis: Diagnosis, term: Term) -> str:

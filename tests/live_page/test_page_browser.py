@@ -1,159 +1,16 @@
-"""A page in a real browser: numbers of a run, knobs by keyboard, states, lessons, no complaint, nothing asked for."""
+"""A page in Chromium: knobs by keyboard, states, lessons, any width, no complaint, nothing asked for."""
 
 from __future__ import annotations
 
-import csv
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
-import numpy as np
 import pytest
 
-from feedsim import cli, cosim, scenario
-from feedsim.analysis import evaluate
-from feedsim.cosim import fmus_directory
-from feedsim.errors import InputError
-from live_page.test_page_numbers import SAME, settings, states
+from feedsim import cli
+from page_browsers import WAIT, Opened, data_of
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (requirements-dev.lock)")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)"),
-    pytest.mark.skipif(
-        not (fmus_directory() / "machine.wasm").is_file(), reason="no module of the machine (make page-module)"
-    ),
-]
-FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run"]
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
-LARGEST = 400_000  # bytes, of the default machine: what goes into any mail
-WAIT = 60_000  # ms: a busy machine computes a second's work slowly
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as api:
-        try:
-            found = api.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        except playwright.Error as error:
-            pytest.skip(f"Chromium does not start here: {str(error).splitlines()[0]}")
-        yield found
-        found.close()
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder, found = tmp_path_factory.mktemp("pages"), {}
-    for name in ("xz_circle", "z_positioning"):
-        found[name] = folder / f"{name}.html"
-        assert cli.main(["page", str(SCENARIOS / f"{name}.yaml"), "--out", str(found[name])]) == 0
-    return found
-
-
-class Opened:
-    """A page; `said` on its console, `asked` for."""
-
-    def __init__(self, browser: Any, file: Path, width: int = 1300, address: str = "", **context: Any) -> None:
-        self.context = browser.new_context(viewport={"width": width, "height": 900}, accept_downloads=True, **context)
-        self.page = self.context.new_page()
-        self.said: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda message: self.said.append(message.text))
-        self.page.on("pageerror", lambda error: self.said.append(str(error)))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto(file.as_uri() + address)
-
-    def __enter__(self) -> Opened:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.context.close()
-
-    def count(self, what: str = "shown") -> int:
-        return int(self.page.locator("html").get_attribute(f"data-{what}") or 0)
-
-    def settled(self, what: str = "loops") -> None:
-        """Until pictures and frequency response are those of the newest state."""
-        self.page.wait_for_selector(f"html[data-{what}]", state="attached", timeout=WAIT)
-        while True:
-            before = self.count(what)
-            self.page.wait_for_timeout(400)
-            if self.count(what) == before and self.count() <= self.count("loops"):
-                return
-
-    def figures(self) -> dict[str, str]:
-        rows = self.page.locator("#figures tbody tr").all()
-        return {row.locator("th").inner_text(): row.locator("td").first.inner_text() for row in rows}
-
-    def trace(self, folder: Path) -> dict[str, np.ndarray[Any, Any]]:
-        with self.page.expect_download() as waiting:
-            self.page.locator("#csv").click()
-        waiting.value.save_as(folder / "page.csv")
-        with (folder / "page.csv").open() as file:
-            head, *rows = csv.reader(file)
-        return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
-
-
-def address_of(data: dict[str, Any], state: list[Any]) -> str:
-    pairs = (f"{quote(knob['key'])}={quote(str(value))}" for knob, value in zip(data["knobs"], state, strict=True))
-    return "#" + "&".join(pairs)
-
-
-def data_of(file: Path) -> dict[str, Any]:
-    import json
-    import re
-
-    text = file.read_text(encoding="utf-8")
-    found = re.search(r'<script type="application/json" id="feedsim-page">(.*?)</script>', text, re.DOTALL)
-    assert found
-    data: dict[str, Any] = json.loads(found[1])
-    return data
-
-
-def shown(figure: Any) -> str:
-    """As the page has it: four digits."""
-    if not np.isfinite(figure.value):
-        return "not determined"
-    unit = figure.unit.replace("um", "µm").replace("N.m", "N·m")
-    value = float(f"{figure.value:.4g}")
-    return f"{value:.4g} {unit}" if abs(value) < 1e4 else f"{value:g} {unit}"
-
-
-def number_of(text: str) -> float:
-    return float(
-        text.replace("−", "-").split()[0].replace("×10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
-    )
-
-
-@pytest.mark.parametrize("name", ["xz_circle", "z_positioning"])
-def test_what_a_browser_computes_is_a_run(browser: Any, files: dict[str, Path], name: str, tmp_path: Path) -> None:
-    file = files[name]
-    assert file.stat().st_size < LARGEST
-    data = data_of(file)
-    for state in states(data, 3, seed=7):
-        with Opened(browser, file, address=address_of(data, state)) as opened:
-            opened.settled()
-            try:
-                run = cosim.run(scenario.load(SCENARIOS / f"{name}.yaml", settings(data, state)))
-            except InputError:
-                assert opened.page.locator("#problem").is_visible()
-                continue
-            figures = evaluate(run)
-            seen = opened.figures()
-            assert len(seen) >= 10
-            for key, text in seen.items():
-                if text == "not determined":
-                    assert np.isnan(figures[key].value)
-                else:
-                    # the last of four digits, where a half may be rounded either way
-                    assert number_of(text) == pytest.approx(figures[key].value, rel=5.01e-4), key
-            trace = opened.trace(tmp_path)
-            for column in (column for column in trace if column.endswith(".x_a")):
-                assert np.abs(trace[column] - run.trace[column]).max() <= SAME
-            assert opened.said == []
-            assert [url.partition("#")[0] for url in opened.asked if not url.startswith("blob:")] == [file.as_uri()]
 
 
 def test_knobs_by_keyboard_undo_keep_and_take_away(browser: Any, files: dict[str, Path]) -> None:
@@ -202,7 +59,7 @@ def test_what_a_run_refuses_is_said_and_nothing_freezes(browser: Any, files: dic
         field = opened.page.get_by_role("spinbutton", name="motion 0: circle, feed: programmed speed along the path")
         field.fill("31000")
         field.press("Enter")
-        opened.page.wait_for_selector("#problem:not([hidden])", timeout=WAIT)
+        opened.page.wait_for_selector("#problem:not([hidden])", timeout=1e3 * WAIT)
         assert "allowed at most" in opened.page.locator("#problem").inner_text()
         field.fill("3000")
         field.press("Enter")
@@ -260,7 +117,7 @@ def test_without_scripts_the_scenario_is_shown_as_written(browser: Any, files: d
 @pytest.mark.parametrize("width", [360, 800, 1600])
 def test_it_fits_at_any_width(browser: Any, files: dict[str, Path], width: int) -> None:
     with Opened(browser, files["xz_circle"], width=width) as opened:
-        opened.settled("shown")
+        opened.settled()
         wide = opened.page.locator("body").evaluate("body => document.documentElement.scrollWidth")
         assert wide <= width
         unnamed = "nodes => nodes.filter(node => !(node.getAttribute('aria-label') || node.textContent.trim())).length"

@@ -1,18 +1,20 @@
 """What a page computes against a run of the same scenario with the same settings: setpoints, positions, figures,
-warnings, margins. The page's scripts run in node; another test has them in a browser."""
+causes, warnings, margins. The page's scripts run in node, and the page itself in Chromium and in Firefox."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from feedsim import cosim, nc, scenario
-from feedsim.analysis import Figure, evaluate
+from feedsim import cli, cosim, nc, scenario
+from feedsim.analysis import Diagnosis, Figure, evaluate
 from feedsim.analysis.circle import answer, swinging
 from feedsim.analysis.evaluate import diagnoses, doubts
 from feedsim.cosim import fmus_directory
@@ -22,12 +24,13 @@ from feedsim.linear.margins import grid, margins
 from feedsim.linear.system import LinearSystem
 from feedsim.page.content import content, rows, segments
 from feedsim.report.content import Table
+from feedsim.report.formatting import typeset
 from feedsim.report.run.diagnosis import diagnosis_section
 from feedsim.structure import checked_modes
+from page_browsers import FIGURES, Firefox, Opened, address_of, number_of
 from page_helpers import NODE, answers
 
 pytestmark = [
-    pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)"),
     pytest.mark.skipif(
         not (fmus_directory() / "machine.wasm").is_file(), reason="no module of the machine (make page-module)"
     ),
@@ -38,6 +41,7 @@ SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 SAME = 1e-15  # m
 # Figures are shown with some four digits; what differs by rounding alone agrees to far more.
 DIGITS = 1e-7
+LARGEST = 400_000  # bytes, of the default machine: what goes into any mail
 STATES = 20  # of each of the two scenarios
 SHORT: dict[str, list[str]] = {"xz_circle": [], "z_positioning": ["motions.1.duration=0.4 s"]}
 
@@ -72,59 +76,138 @@ def same(page: Any, figure: float) -> bool:
     return bool(np.isclose(value, figure, rtol=DIGITS, atol=1e-7, equal_nan=True))
 
 
-@pytest.mark.parametrize("name", ["xz_circle", "z_positioning"])
-def test_random_states_are_runs_of_the_same_settings(name: str, tmp_path: Path) -> None:
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """What a run says of a state; problem: why there is none."""
+
+    state: list[Any]
+    changes: list[str]
+    asked: scenario.Scenario | None = None
+    program: nc.Program | None = None
+    positions: Mapping[str, np.ndarray[Any, Any]] = field(default_factory=dict)
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    diagnoses: Mapping[str, Diagnosis] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    problem: str = ""
+
+
+@cache
+def expected(name: str) -> tuple[dict[str, Any], list[Expected]]:
+    """A page's data, and its random states as `feedsim run` has them; once for all that computes them otherwise."""
     given = scenario.load(SCENARIOS / f"{name}.yaml", SHORT[name])
-    data = content(given, nc.plan(given)).data
-    drawn = states(data, STATES, seed=31)
-    axes = [axis for axis in given.machine.axes if any(axis in motion.axes for motion in given.motions)]
-    keep = [f"{axis}.x_a" for axis in axes]
-    found = answers(data, [{"state": state, "axis": axes[-1], "keep": keep} for state in drawn], tmp_path)
-    compared = 0
-    for state, page in zip(drawn, found, strict=True):
+    data, found = content(given, nc.plan(given)).data, []
+    for state in states(data, STATES, seed=31):
         changes = [*SHORT[name], *settings(data, state)]
         try:
             asked = scenario.load(SCENARIOS / f"{name}.yaml", changes)
             program = nc.plan(asked)
             run = cosim.run(asked, program=program)
-            figures = evaluate(run)
+            moved = [axis for axis in asked.machine.axes if any(axis in motion.axes for motion in asked.motions)]
+            positions = {f"{axis}.x_a": np.array(run.trace[f"{axis}.x_a"]) for axis in moved}
+            warnings = tuple(sorted(map(str, run.warnings)))
+            found.append(Expected(state, changes, asked, program, positions, evaluate(run), diagnoses(run), warnings))
         except FeedsimError as error:
-            if "problem" not in page:
-                pytest.fail(f"{changes}: refused by a run, not by the page: {error}")
+            found.append(Expected(state, changes, problem=str(error)))
+    assert sum(not each.problem for each in found) > STATES // 2, "most of the states can be run"
+    return data, found
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)")
+@pytest.mark.parametrize("name", SHORT)
+def test_random_states_are_runs_of_the_same_settings(name: str, tmp_path: Path) -> None:
+    data, wanted = expected(name)
+    keep = [*next(each.positions for each in wanted if not each.problem)]
+    asked = [{"state": each.state, "axis": keep[-1].partition(".")[0], "keep": keep} for each in wanted]
+    for each, page in zip(wanted, answers(data, asked, tmp_path), strict=True):
+        if each.problem:
+            assert "problem" in page, f"{each.changes}: refused by a run, not by the page: {each.problem}"
             continue
-        assert "problem" not in page, f"{changes}: {page['problem']}"
-        compared += 1
-        wanted = rows(asked, program)
-        planned = np.array(page["rows"]).reshape(wanted.shape)
-        assert np.abs(planned - wanted)[:, ::2].max() <= SAME
+        assert "problem" not in page, f"{each.changes}: {page['problem']}"
+        assert each.asked is not None
+        assert each.program is not None
+        setpoints = rows(each.asked, each.program)
+        planned = np.array(page["rows"]).reshape(setpoints.shape)
+        assert np.abs(planned - setpoints)[:, ::2].max() <= SAME
         # A speed of 50 mm/s is 16 rad/s: the quotient of differences of positions.
-        assert np.abs(planned - wanted)[:, 1::2].max() <= 1e-9
-        for column in keep:
-            assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= SAME, (column, changes)
-        _compare_causes(page, run, figures)
+        assert np.abs(planned - setpoints)[:, 1::2].max() <= 1e-9
+        for column, values in each.positions.items():
+            assert np.abs(np.array(page["trace"][column]) - values).max() <= SAME, (column, each.changes)
+        _compare_causes(page, each)
         for figure, (value, unit) in page["figures"].items():
-            assert unit == figures[figure].unit
-            assert same(value, figures[figure].value), (figure, value, figures[figure].value)
-        assert sorted(page["warnings"]) == sorted(map(str, run.warnings))
-        for mine, its in zip(page["segments"], segments(program), strict=True):
+            assert unit == each.figures[figure].unit
+            assert same(value, each.figures[figure].value), (figure, value, each.figures[figure].value)
+        assert sorted(page["warnings"]) == list(each.warnings)
+        for mine, its in zip(page["segments"], segments(each.program), strict=True):
             assert {key: mine[key] for key in ("kind", "index", "axes")} == {
                 key: its[key] for key in ("kind", "index", "axes")
             }
             assert mine["end"] == pytest.approx(its["end"], abs=1e-12)
-        _compare_loop(page["loop"], asked)
-    assert compared > STATES // 2, "most of the states can be run"
+        _compare_loop(page["loop"], each.asked)
 
 
-def _compare_causes(page: dict[str, Any], run: cosim.Run, figures: Mapping[str, Figure]) -> None:
+@pytest.mark.parametrize("name", SHORT)
+def test_random_states_in_a_browser(browser: Any, name: str, tmp_path: Path) -> None:
+    """The same in Chromium, as a reader of the page has it: figures to the digits shown, positions by the CSV."""
+    data, wanted = expected(name)
+    file = tmp_path / "page.html"
+    changes = [part for change in SHORT[name] for part in ("--set", change)]
+    assert cli.main(["page", str(SCENARIOS / f"{name}.yaml"), *changes, "--out", str(file)]) == 0
+    assert file.stat().st_size < LARGEST
+    with Opened(browser, file) as opened:
+        opened.settled()
+        for each in wanted:
+            opened.turn_to(address_of(data, each.state))
+            if each.problem:
+                assert opened.page.locator("#problem").is_visible(), each.changes
+                continue
+            assert opened.page.locator("#problem").is_hidden(), each.changes
+            seen = opened.figures()
+            assert [*seen] == [*each.figures]
+            for key, text in seen.items():
+                value = each.figures[key].value
+                if text == "not determined":
+                    assert np.isnan(value)
+                else:
+                    # the last of four digits, where a half may be rounded either way; zeros to 1e-7
+                    assert number_of(text) == pytest.approx(value, rel=5.01e-4, abs=1e-7), (key, each.changes)
+            shown = opened.page.locator("#warnings li").all_inner_texts()
+            assert sorted(shown) == sorted(typeset(warning) for warning in each.warnings)
+            for column, mine in opened.trace(tmp_path, [*each.positions]).items():
+                assert np.abs(mine - each.positions[column]).max() <= SAME, (column, each.changes)
+        assert opened.said == []
+        assert [url.partition("#")[0] for url in opened.asked if not url.startswith("blob:")] == [file.as_uri()]
+
+
+def test_a_page_in_firefox_is_a_run(firefox: Firefox, files: dict[str, Path]) -> None:
+    for name, file in files.items():
+        firefox.open(file)
+        run = cosim.run(scenario.load(SCENARIOS / f"{name}.yaml"))
+        figures = evaluate(run)
+        for key, text in firefox.run(FIGURES):
+            if text == "not determined":
+                assert np.isnan(figures[key].value)
+            else:
+                assert number_of(text) == pytest.approx(figures[key].value, rel=5.01e-4, abs=1e-7), key
+        before = firefox.run(FIGURES)
+        firefox.run(
+            "(slider => { slider.value = 150; slider.dispatchEvent(new Event('input')); "
+            "slider.dispatchEvent(new Event('change')); })(document.querySelectorAll('#knobs input[type=range]')[2])"
+        )
+        firefox.settled()
+        assert firefox.run(FIGURES) != before
+    assert firefox.complaints() == []
+
+
+def _compare_causes(page: dict[str, Any], each: Expected) -> None:
     """Why the circle is not round: its figures, in the order of a run, and all that is said of them."""
-    for prefix, diagnosis in diagnoses(run).items():
+    for prefix, diagnosis in each.diagnoses.items():
         found = page["causes"].pop(prefix)
         page["figures"] |= found["figures"]
-        assert [*page["figures"]] == [*figures]
+        assert [*page["figures"]] == [*each.figures]
         assert (found["answer"], found["swinging"]) == (answer(diagnosis), swinging(diagnosis))
         table = next(part for part in diagnosis_section(prefix, diagnosis).parts if isinstance(part, Table))
         assert [tuple(row) for row in found["rows"]] == list(table.rows)
-        assert found["doubts"] == [str(note) for note in doubts(figures, {prefix: diagnosis})]
+        assert found["doubts"] == [str(note) for note in doubts(each.figures, {prefix: diagnosis})]
     assert not page["causes"]
 
 

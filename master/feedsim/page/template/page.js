@@ -29,7 +29,8 @@ function ask() {
   if (!ready || busy) { again = true; return; }
   again = false;
   busy = true;
-  worker.postMessage({ id: ++asked, state: view.state, axis: chosen_axis });
+  document.documentElement.dataset.asked = String(++asked);
+  worker.postMessage({ id: asked, state: view.state, axis: chosen_axis });
 }
 
 function answered({ data }) {
@@ -48,7 +49,9 @@ function answered({ data }) {
   }
   if (data.warnings) {
     view.found.warnings = data.warnings;
-    return show_warnings();
+    show_warnings();
+    document.documentElement.dataset.warned = String(asked);
+    return;
   }
   if (data.loop) {
     view.loop = data.loop;
@@ -57,13 +60,15 @@ function answered({ data }) {
     return;
   }
   busy = false;
-  if (data.problem) tell(`With these values there is no run: ${data.problem}`, true);
-  else {
+  if (data.problem) {
+    to_draw = [];
+    tell(`With these values there is no run: ${data.problem}`, true);
+    document.documentElement.dataset.shown = String(asked);
+  } else {
     view.found = data.found;
     view.causes = null;
     show();
   }
-  document.documentElement.dataset.shown = String(asked); // of the answers, for those who wait
   if (again) ask();
 }
 
@@ -102,19 +107,39 @@ function draw_chart(stem, chart) {
 
 const slug = text => text.replace(/[^A-Za-z0-9]+/g, "-");
 
+// Pictures of the newest state that are still to be drawn; what is in sight comes first. A slow machine shows a frame in between.
+const AT_A_TIME = 40; // ms
+let to_draw = [], drawing = 0;
+const turns = new MessageChannel();
+turns.port1.onmessage = () => draw_on();
+
+function draw_on() {
+  const begun = performance.now();
+  while (to_draw.length) {
+    const [stem, chart] = to_draw.shift();
+    draw_chart(stem, chart());
+    if (to_draw.length && performance.now() - begun > AT_A_TIME) { turns.port2.postMessage(0); return; }
+  }
+  document.documentElement.dataset.shown = String(drawing); // of the answers, for those who wait
+}
+
 function show() {
   tell("");
-  const { found, kept } = view;
+  const { found, kept } = view, charts = [];
   const same = kept && kept.tasks.map(each => each.prefix).join() === found.tasks.map(each => each.prefix).join() ? kept : null;
   for (const task of found.tasks) {
-    if (task.kind === "circle") {
-      draw_chart(`contour-${slug(task.prefix)}`, contour_chart(task, found, same));
-      draw_chart(`torque-${slug(task.prefix)}`, torque_chart(task, found, same, HELD.signs));
-    } else draw_chart(`stop-${slug(task.prefix)}`, stop_chart(task, found, same, HELD.signs));
+    const end = slug(task.prefix);
+    if (task.kind === "circle") charts.push([`contour-${end}`, () => contour_chart(task, found, same)], [`torque-${end}`, () => torque_chart(task, found, same, HELD.signs)]);
+    else charts.push([`stop-${end}`, () => stop_chart(task, found, same, HELD.signs)]);
   }
-  draw_chart("following", following_chart(HELD.moved, found, kept));
+  charts.push(["following", () => following_chart(HELD.moved, found, kept)]);
+  const seen = charts.map(([stem]) => { const { top, bottom } = by(stem).getBoundingClientRect(); return bottom > 0 && top < innerHeight; });
+  to_draw = [...charts.filter((_, k) => seen[k]), ...charts.filter((_, k) => !seen[k])];
+  drawing = asked;
+  draw_on();
   show_figures();
-  show_warnings();
+  for (const section of document.querySelectorAll("section[id^=why-]")) section.classList.add("stale");
+  by("warned").classList.add("stale");
   lesson_look();
 }
 
@@ -126,7 +151,6 @@ function show_loop() {
     const gain = Number.isFinite(loop.gain_margin) ? `${fixed(20 * Math.log10(loop.gain_margin), 1)} dB at ${number(loop.gain_at, 3)} Hz` : "none is reached";
     by("margins").textContent = `Axis ${axis}, sliding (friction left out): gain margin ${gain}; phase margin ${fixed(loop.phase_margin, 0)}° at ${number(loop.phase_at, 3)} Hz. Usual are 6 dB and 30°.`;
   }
-  show_warnings();
   lesson_look();
 }
 
@@ -134,6 +158,7 @@ function show_warnings() {
   const list = view.found ? view.found.warnings.map(typeset) : [];
   by("warnings").replaceChildren(...list.map(text => { const item = document.createElement("li"); item.textContent = text; return item; }));
   by("warned").hidden = !list.length;
+  by("warned").classList.remove("stale");
 }
 
 const four = (value, unit) => Number.isFinite(value) ? `${number(value, 4)} ${unit.replace("um", "µm").replace("N.m", "N·m")}` : "not determined";
@@ -159,19 +184,29 @@ function figure_names({ figures, tasks }) {
   return tasks.flatMap(({ prefix }) => known.filter(name => name.startsWith(`${prefix}.`)));
 }
 
+// Rows stay as long as their names and columns do: only what has changed is written.
 function show_figures() {
-  const { found, kept } = view, first = { figures: HELD.written }, rows = [], heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"];
-  for (const name of figure_names(found)) {
-    const row = document.createElement("tr"), cell = (text, tag = "td") => element(tag, tag === "td" ? { class: "number" } : { scope: "row" }, row, text);
-    cell(name, "th");
-    cell(found.figures[name] ? four(...found.figures[name]) : "…");
-    for (const other of [...(kept ? [kept] : []), first]) cell(other.figures[name] ? four(...other.figures[name]) : "–");
-    rows.push(row);
+  const { found, kept } = view, heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"], names = figure_names(found), table = by("figures"), body = table.tBodies[0];
+  const text = figures => name => figures[name] ? four(...figures[name]) : "–", columns = [name => found.figures[name] ? four(...found.figures[name]) : null, ...(kept ? [text(kept.figures)] : []), text(HELD.written)];
+  const layout = [...heads, ...names].join("\n");
+  if (table.dataset.layout !== layout) {
+    table.dataset.layout = layout;
+    const head = document.createElement("tr");
+    heads.forEach((title, k) => element("th", { scope: "col", ...(k ? { class: "number" } : {}) }, head, title));
+    table.tHead.replaceChildren(head);
+    body.replaceChildren(...names.map(name => {
+      const row = document.createElement("tr");
+      element("th", { scope: "row" }, row, name);
+      for (const column of columns) element("td", { class: "number" }, row, column(name) ?? "…");
+      return row;
+    }));
+    return;
   }
-  const head = document.createElement("tr");
-  heads.forEach((text, k) => element("th", { scope: "col", ...(k ? { class: "number" } : {}) }, head, text));
-  by("figures").tHead.replaceChildren(head);
-  by("figures").tBodies[0].replaceChildren(...rows);
+  names.forEach((name, k) => columns.forEach((column, j) => {
+    const cell = body.rows[k].cells[j + 1], value = column(name);
+    cell.classList.toggle("stale", value === null);
+    if (value !== null && cell.textContent !== value) cell.textContent = value;
+  }));
 }
 
 // --- knobs --------------------------------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 // In the worker: one state at a time; a newer one ends what is under way.
 let work = null, newest = 0;
+const PROGRESS = 150; // ms; what is done sooner needs no bar
 const turns = new MessageChannel(), waiting = [];
 turns.port1.onmessage = () => waiting.shift()();
 const breath = () => new Promise(done => { waiting.push(done); turns.port2.postMessage(0); });
@@ -9,7 +10,12 @@ onmessage = async ({ data: asked }) => {
     try { work = await work_of(asked.data); postMessage({ ready: true }); } catch (error) { postMessage({ failed: String(error.message || error) }); }
     return;
   }
-  const { id, state, axis } = asked, latest = async () => { await breath(); return id === newest; }, on = async share => { postMessage({ id, share }); return latest(); };
+  const { id, state, axis } = asked, latest = async () => { await breath(); return id === newest; };
+  let told = performance.now();
+  const on = async share => {
+    if (performance.now() - told > PROGRESS) { postMessage({ id, share }); told = performance.now(); }
+    return latest();
+  };
   newest = id;
   if (!(await latest())) return;
   try {

@@ -137,10 +137,13 @@ function nearest(x, value) {
 // A curve as a path: of each column of pixels its extremes, where there are more rows than can be told apart.
 function path_of(x, y, across, up, range, columns) {
   const parts = [];
-  let pen = "M";
+  let pen = "M", last_a = NaN, last_b = NaN;
   const point = k => {
-    const a = across(x[k]), b = up(y[k]);
-    if (Number.isFinite(a) && Number.isFinite(b)) { parts.push(pen, a.toFixed(1), " ", b.toFixed(1)); pen = "L"; } else pen = "M";
+    const a = Math.round(10 * across(x[k])) / 10, b = Math.round(10 * up(y[k])) / 10;
+    if (!Number.isFinite(a) || !Number.isFinite(b)) { pen = "M"; return; }
+    if (pen === "L" && a === last_a && b === last_b) return; // the same tenth of a pixel
+    parts.push(pen, a, " ", b);
+    [pen, last_a, last_b] = ["L", a, b];
   };
   if (!range) { for (let k = 0; k < x.length; k++) point(k); return parts.join(""); }
   const begin = Math.max(0, row_at(x, range[0]) - 1), end = Math.min(x.length, row_at(x, range[1]) + 2);
@@ -410,7 +413,7 @@ function draw_polar(panel, box, parent, values, hidden, reach, id) {
   const shown = panel.curves.filter(each => !hidden.has(each.name));
   for (const curve of shown) {
     const angle = values(curve.x), deviation = values(curve.y), n = angle.length;
-    const points = Array.from(angle, (each, k) => place(each, deviation[k]).map(value => value.toFixed(1)).join(" "));
+    const points = Array.from(angle, (each, k) => place(each, deviation[k]).map(value => Math.round(10 * value) / 10).join(" ")).filter((point, k, all) => point !== all[k - 1]);
     const ends = n ? Math.abs(deviation[n - 1] - deviation[0]) < 0.02 * reach : false;
     make("path", { ...styled(curve), d: n ? `M${points.join("L")}${ends ? "Z" : ""}` : "" }, field);
   }

@@ -124,6 +124,63 @@ def test_it_fits_at_any_width(browser: Any, files: dict[str, Path], width: int) 
         assert opened.page.locator("#page button, #page input, #page select").evaluate_all(unnamed) == 0
 
 
+# Of every text in sight: its colour against that of the nearest ground, after WCAG 2.1, 1.4.3 (3 where letters are
+# large), where it is too little. Controls that are off are exempt.
+CONTRAST = """() => {
+    const numbers = text => text.match(/[\\d.]+/g).map(Number), through = /rgba\\(.*, 0\\)|transparent/;
+    const linear = c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4, shares = [0.2126, 0.7152, 0.0722];
+    const light = colour => shares.reduce((sum, share, k) => sum + share * linear(numbers(colour)[k] / 255), 0);
+    const found = [];
+    for (const node of document.querySelectorAll("#page *")) {
+        const own = [...node.childNodes].some(each => each.nodeType === 3 && each.textContent.trim());
+        const seen = node.checkVisibility({ opacityProperty: true }) && !node.disabled && !node.closest("option");
+        if (!own || !seen) continue;
+        let ground = node;
+        const behind = () => getComputedStyle(ground).backgroundColor;
+        while (ground.parentElement && through.test(behind())) ground = ground.parentElement;
+        const below = light(behind()), style = getComputedStyle(node);
+        const text = light(node instanceof SVGElement ? style.fill : style.color), size = parseFloat(style.fontSize);
+        const ratio = (Math.max(text, below) + 0.05) / (Math.min(text, below) + 0.05);
+        const large = size >= 24 || (size >= 18.6 && Number(style.fontWeight) >= 700);
+        if (ratio < (large ? 3 : 4.5)) found.push([node.tagName, node.textContent.slice(0, 40), ratio]);
+    }
+    return found;
+}"""
+MOVING = """() => [...document.querySelectorAll("#page *")]
+    .filter(node => parseFloat(getComputedStyle(node).transitionDuration) > 0).length"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_contrast_is_enough_and_motion_is_reduced_where_asked(
+    browser: Any, files: dict[str, Path], scheme: str
+) -> None:
+    with Opened(browser, files["xz_circle"], color_scheme=scheme, reduced_motion="reduce") as opened:
+        opened.settled()
+        opened.page.locator("#lessons button").first.click()
+        opened.page.locator("#more").click()
+        opened.page.locator("section[id^=why-] summary").click()
+        opened.settled()
+        assert opened.page.evaluate(CONTRAST) == []
+        assert opened.page.locator("#figures tr.more").first.is_visible()
+        assert opened.page.evaluate(MOVING) == 0
+        opened.page.locator("#lesson").evaluate("node => { node.style.color = 'rgb(120, 130, 140)'; }")
+        assert opened.page.evaluate(CONTRAST) != [], "a grey that is hard to read is found"
+
+
+def test_tiles_say_what_is_and_what_was(browser: Any, files: dict[str, Path]) -> None:
+    with Opened(browser, files["z_positioning"]) as opened:
+        opened.settled()
+        tiles = opened.page.locator("#keys .key")
+        assert tiles.count() == 3
+        first = tiles.all_inner_texts()
+        assert all(text.split("\n")[0] in text.split("as written ")[1] for text in first)
+        opened.turn_to("#machine.axes.Z.drive.T_sym=0.003")
+        now = tiles.all_inner_texts()
+        assert [text.split("as written")[1] for text in now] == [text.split("as written")[1] for text in first]
+        assert now[0] != first[0]
+        assert opened.page.locator("#keys .key.changed").count() >= 1
+
+
 def test_text_of_the_user_is_text(browser: Any, tmp_path: Path) -> None:
     out = tmp_path / "x.html"
     hostile = "<img src=x onerror=alert(1)></script><script>alert(2)</script>{data}"

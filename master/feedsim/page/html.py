@@ -24,7 +24,7 @@ from feedsim.page.content import Content, content, packed
 from feedsim.page.scripts import showing, styles, text, worker
 from feedsim.report.chart.still import still
 from feedsim.report.content import Table
-from feedsim.report.formatting import typeset
+from feedsim.report.formatting import display_unit, duration, shown, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
@@ -61,23 +61,24 @@ def html(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
     """The text of the page; arguments and errors as for :func:`write`."""
     held = content(run.scenario, run.program, wanted, fmus)
     scenario, machine = run.scenario, run.scenario.machine
-    shown = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]
+    shown_tasks = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]
     moved = [axis for axis in machine.axes if any(axis in segment.axes for segment in run.program.segments)]
     figures = evaluate(run)
-    planes = [list(task.turn.axes) for task in shown if isinstance(task, CircleTask)]
+    planes = [list(task.turn.axes) for task in shown_tasks if isinstance(task, CircleTask)]
     data = held.data | {
         "axes": list(machine.axes), "moved": moved, "plane": planes[0] if planes else None,
         "signs": held.data["machine"]["signs"], "written": _written(figures),
     }  # fmt: skip
     # The axis whose loop is shown at first stands last: that of the circle's ordinate, or the one that moves.
     order = [axis for axis in machine.axes if axis not in moved] + moved
-    script, cycle = showing(), f"control cycle {machine.cycles.T_c * 1e6:g} us"
+    script, cycle = showing(), f"control cycle {duration(machine.cycles.T_c)}"
     parts = {
         "policy": _policy(script), "title": escape(scenario.name), "style": styles(),
         "machine": escape(f"{machine.name}: axes {', '.join(machine.axes)}; {cycle}"),
         "notes": "\n".join(f'<p class="note">{escape(note)}</p>' for note in _notes(run, held)),
-        "knobs": "\n".join(_groups(held.data["knobs"])), "pictures": "\n".join(_pictures(run, shown)),
+        "knobs": "\n".join(_groups(held.data["knobs"])), "pictures": "\n".join(_pictures(run, shown_tasks)),
         "axes": "".join(f"<option{' selected' * (axis == order[-1])}>{escape(axis)}</option>" for axis in order),
+        "keys": "".join(_keys(shown_tasks, figures)),
         "figures": _table(figures), "footer": _footer(held), "worker": packed(worker().encode()), "script": script,
         "charts": _json({"charts": {}, "arrays": [], "palette": {n: c for n, c, _ in PALETTE} | {"ground": "#ffffff"}}),
         "data": _json(data | {"axes": order}),
@@ -116,7 +117,7 @@ def _groups(knobs: Sequence[Mapping[str, Any]]) -> Iterable[str]:
 
 
 def _row(k: int, knob: Mapping[str, Any]) -> str:
-    unit = "" if knob["shown"] in ("", "1") else f" [{knob['shown']}]"
+    unit = f" [{display_unit(knob['shown'])}]" if display_unit(knob["shown"]) else ""
     name, about = escape(f"{knob['name']}{unit}"), escape(str(knob["text"]))
     label = escape(f"{knob['group']}, {knob['name']}: {knob['text']}", quote=True)
     if knob["choices"]:
@@ -163,12 +164,12 @@ def _why(prefix: str, end: str, diagnosis: Diagnosis) -> str:
         f"<tr>{''.join(f'<td{mark}>{escape(str(cell))}</td>' for mark, cell in zip(marks, row, strict=True))}</tr>"
         for row in table.rows
     )
-    words = " ".join(filter(None, [answer(diagnosis), swinging(diagnosis)]))
+    words = typeset(" ".join(filter(None, [answer(diagnosis), swinging(diagnosis)])))
     return (
         f'<section id="why-{end}" aria-labelledby="why-head-{end}"><h2 id="why-head-{end}">{escape(prefix)}: why the '
-        f'circle is not round</h2><p class="answer">{escape(typeset(words))}</p><details><summary>All causes, their '
-        f'amounts and shares</summary><div class="scroll"><table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody>'
-        "</table></div></details></section>"
+        f'circle is not round</h2><p class="answer">{escape(words[:1].upper() + words[1:])}</p><details><summary>All '
+        'causes, their amounts and shares</summary><div class="scroll"><table>'
+        f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div></details></section>"
     )
 
 
@@ -182,6 +183,26 @@ def _figure(picture: Picture, *, bare: bool = False) -> str:
     )
 
 
+def _keys(shown_tasks: Sequence[CircleTask | PositioningTask], figures: Mapping[str, Figure]) -> Iterable[str]:
+    """What one looks at first: a tile for each of few figures, as written; the page writes what they are now."""
+    for task in shown_tasks:
+        if isinstance(task, CircleTask):
+            words = {"G": "circular deviation G"}
+            words |= {f"glitch_{axis}": f"quadrant glitch where {axis} reverses" for axis in task.turn.axes}
+            words |= {"G_b": "circular deviation G(b) of both directions"} if task.back is not None else {}
+        else:
+            axis = task.approach.axis
+            words = {"overshoot": f"overshoot of {axis}", "settling_time": f"settling time of {axis}",
+                     "peak_torque": f"largest torque of {axis}"}  # fmt: skip
+        for name, meaning in words.items():
+            key = f"{task.prefix}.{name}"
+            value = " ".join(filter(None, shown(figures[key])))
+            yield (
+                f'<div class="key" data-figure="{escape(key, quote=True)}"><b>{escape(value)}</b>'
+                f'<span>{escape(meaning)}<br><small class="needs">as written {escape(value)}</small></span></div>'
+            )
+
+
 def _written(figures: Mapping[str, Figure]) -> dict[str, tuple[float | None, str]]:
     """Figures of the scenario as written, for the page's comparisons."""
     return {name: (each.value if math.isfinite(each.value) else None, each.unit) for name, each in figures.items()}
@@ -189,11 +210,17 @@ def _written(figures: Mapping[str, Figure]) -> dict[str, tuple[float | None, str
 
 def _table(figures: Mapping[str, Figure]) -> str:
     rows = "".join(
-        f'<tr><th scope="row">{escape(name)}</th><td class="number">{escape(str(figure))}</td></tr>'
+        f'<tr{_aside(name)}><th scope="row">{escape(name)}</th><td class="number">{escape(str(figure))}</td></tr>'
         for name, figure in figures.items()
     )
     head = '<th scope="col">figure</th><th scope="col" class="number">as written</th>'
     return f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody>"
+
+
+def _aside(name: str) -> str:
+    """Of figures that many others stand for: of the tool point, of the other direction, of one quadrant."""
+    more = ".tool." in name or ".clockwise." in name or re.search(r"\.glitch_.*[+-]$", name)
+    return ' class="more"' if more else ""
 
 
 def _footer(held: Content) -> str:

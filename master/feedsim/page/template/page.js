@@ -7,7 +7,7 @@ const STEPS = 400; // of a slider
 // --- values -------------------------------------------------------------------------------------------------------------
 
 const limited = (knob, value) => Math.min(Math.max(value, knob.least ?? -Infinity), knob.most ?? Infinity);
-const shown_value = (knob, value) => knob.choices.length ? value : number(value * knob.factor, 6).replaceAll("−", "-").replace(/×10.*/, "") && String(Number((value * knob.factor).toPrecision(7)));
+const shown_value = (knob, value) => knob.choices.length ? value : number(value * knob.factor, 6).replaceAll("−", "-").replace(/×10.*/, "") && String(Number((value * knob.factor).toPrecision(5)));
 const unit_text = knob => knob.shown === "1" ? "" : knob.shown.replace("N.m", "N·m").replaceAll(".s", "·s").replace(/^u(?=[a-z])/, "µ");
 const logarithmic = knob => knob.low > 0 && knob.high / knob.low > 4;
 
@@ -161,6 +161,7 @@ function show_warnings() {
   by("warned").classList.remove("stale");
 }
 
+const three_digits = (value, unit) => Number.isFinite(value) ? `${three(value)} ${unit.replace("um", "µm").replace("N.m", "N·m")}` : "not determined";
 const four = (value, unit) => Number.isFinite(value) ? `${number(value, 4)} ${unit.replace("um", "µm").replace("N.m", "N·m")}` : "not determined";
 
 // Of every circle why it is not round, once that is known.
@@ -168,7 +169,7 @@ function show_causes() {
   for (const [prefix, { answer, swinging, rows }] of Object.entries(view.causes)) {
     const section = by(`why-${slug(prefix)}`);
     if (!section) continue;
-    section.querySelector(".answer").textContent = typeset([answer, swinging].filter(each => each).join(" "));
+    section.querySelector(".answer").textContent = typeset([answer[0].toUpperCase() + answer.slice(1), swinging].filter(each => each).join(" "));
     section.querySelector("tbody").replaceChildren(...rows.map(cells => {
       const row = document.createElement("tr");
       cells.forEach((text, k) => element("td", { class: ["", "number", "number", "number", "meaning"][k] }, row, text));
@@ -186,6 +187,12 @@ function figure_names({ figures, tasks }) {
 
 // Rows stay as long as their names and columns do: only what has changed is written.
 function show_figures() {
+  for (const tile of document.querySelectorAll("#keys .key")) {
+    const name = tile.dataset.figure, figure = view.found.figures[name], written = HELD.written[name];
+    tile.querySelector("b").textContent = figure ? three_digits(...figure) : "–";
+    tile.querySelector("small").textContent = `as written ${three_digits(...written)}`;
+    tile.classList.toggle("changed", Boolean(figure) && three_digits(...figure) !== three_digits(...written));
+  }
   const { found, kept } = view, heads = ["figure", "now", ...(kept ? ["kept"] : []), "as written"], names = figure_names(found), table = by("figures"), body = table.tBodies[0];
   const text = figures => name => figures[name] ? four(...figures[name]) : "–", columns = [name => found.figures[name] ? four(...found.figures[name]) : null, ...(kept ? [text(kept.figures)] : []), text(HELD.written)];
   const layout = [...heads, ...names].join("\n");
@@ -196,6 +203,7 @@ function show_figures() {
     table.tHead.replaceChildren(head);
     body.replaceChildren(...names.map(name => {
       const row = document.createElement("tr");
+      row.classList.toggle("more", /\.(tool|clockwise)\.|\.glitch_.*[-+]$/.test(name));
       element("th", { scope: "row" }, row, name);
       for (const column of columns) element("td", { class: "number" }, row, column(name) ?? "…");
       return row;
@@ -304,6 +312,11 @@ async function copy(text, what) {
 const on = (id, act) => by(id).addEventListener("click", act);
 on("undo", () => { if (view.undo.length) { view.redo.push([...view.state]); go_to(view.undo.pop(), false); } });
 on("redo", () => { if (view.redo.length) { view.undo.push([...view.state]); go_to(view.redo.pop(), false); } });
+on("more", () => {
+  const all = by("figures").classList.toggle("all");
+  by("more").setAttribute("aria-expanded", String(all));
+  by("more").textContent = all ? "Show fewer" : "Show all";
+});
 on("reset", () => go_to(START));
 on("keep", () => {
   const clear = view.kept !== null;

@@ -68,12 +68,13 @@ def test_motions_that_a_page_does_not_plan_are_carried_along(tmp_path: Path) -> 
 @pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)")
 def test_effects_are_knobs_whether_the_machine_has_them_or_not(tmp_path: Path) -> None:
     """One of each kind, turned on in the page, against a run with the page's own settings."""
-    file, indirect = SCENARIOS / "one_axis.yaml", ["machine.axes.X.drive.measuring={indirect: true}"]
+    file = SCENARIOS / "one_axis.yaml"
+    indirect = ["machine.axes.X.drive.measuring={indirect: true}", "machine.axes.X.guide={share: 30 %}"]
     wanted = {
         "cogging_1.amplitude": 0.4, "ripple_2.amplitude": 0.03, "measuring.linear": 2e-5, "encoder.eccentricity": 1e-3,
         "periodic_error_1.amplitude": 1e-6, "backlash_compensation.value": 7e-6, "X.play": 9e-6,
         "measuring.indirect": "true", "leadscrew_compensation.e_1": 3e-6, "leadscrew_compensation.spacing": 0.1,
-        "geometry.E_XX": 4e-5,
+        "geometry.E_XX": 4e-5, "hysteresis.value": 2e-6, "friction.F_C": 0.13, "friction.sigma_0": 400.0,
     }  # fmt: skip
     given = scenario.load(file, indirect)
     data = content(given, nc.plan(given), list(wanted)).data
@@ -84,6 +85,7 @@ def test_effects_are_knobs_whether_the_machine_has_them_or_not(tmp_path: Path) -
     run = cosim.run(scenario.load(file, [*indirect, *settings(data, state)]))
     for column in keep:
         assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= SAME
+    assert sorted(page["warnings"]) == sorted(map(str, run.warnings))
     assert np.abs(run.trace["X.x_a"] - cosim.run(given).trace["X.x_a"]).max() > 1e-6
     assert not [knob for knob in content(given, nc.plan(given)).data["knobs"] if "cogging" in knob["key"]]
 

@@ -152,8 +152,12 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
     ahead = [warning for warning in run_check(scenario, program, fmus=folder) if warning not in said]
     tables = {} if machine.plant is None else {"table": _table(modes, machine), "pose": _table(here, machine)}
     scheme = SCHEMES[coupling.scheme]
+    # Judged is all friction of an axis, wherever it acts.
+    friction = {f"{name}.friction.{key}": value for name, axis in machine.axes.items()
+                if axis.guide is not None and axis.guide.share
+                for key, value in machine.shipped_friction(name, "a page").parameters().items()}  # fmt: skip
     return {
-        "reach": reach.described(machine, program, resources), "modes": tables,
+        "friction": friction, "reach": reach.described(machine, program, resources), "modes": tables,
         "warnings": [str(warning) for warning in ahead],
         "locked": [list(each) for each in zip(omega, damping, peak, strict=True) if MOST_K_V * each[2] > SHOWS],
         "scheme": {"name": scheme.name, "stable_share": scheme.stable_share, "substeps": coupling.substeps},
@@ -177,7 +181,7 @@ def _knob(knob: Knob, archive: Archive) -> dict[str, Any]:
     return {
         "key": knob.key, "group": knob.group, "name": knob.name, "text": knob.text, "value": knob.value,
         "unit": knob.unit, "shown": knob.shown, "factor": knob.factor, "low": knob.low, "high": knob.high, **bounds,
-        "sets": [[*_reference(archive, name), name] for name in knob.sets], "motion": list(knob.motion),
+        "sets": [[*_reference(archive, name), name, factor] for name, factor in knob.sets], "motion": list(knob.motion),
         "choices": list(knob.choices),
     }  # fmt: skip
 

@@ -17,8 +17,8 @@ from feedsim.cosim.roles import controller_parameters
 from feedsim.errors import InputError
 from feedsim.motions.circular import Circle
 from feedsim.motions.move import Move
-from feedsim.scenario import Machine, Scenario
-from feedsim.scenario.machine import EFFECTS
+from feedsim.scenario import Friction, Machine, Scenario
+from feedsim.scenario.machine import EFFECTS, Axis
 from feedsim.variables import Variable
 
 # Shown where nobody chooses, of every axis that a motion moves.
@@ -38,7 +38,10 @@ TRIED = {
     ("1/m^2", "1/m^2"): 1e-3,
 }  # fmt: skip
 # How an effect lies and runs; how large it is, is tried.
-SETTINGS = ("order", "phase", "period", "first", "spacing", "seed", "ramp")
+SETTINGS = (
+    "order", "phase", "period", "first", "spacing", "seed", "ramp", "way", "v_s", "v_log", "beta", "warm_power",
+    "place_first", "place_spacing",
+)  # fmt: skip
 # Parameters that the machine's cycles and axes fix, and those that are no matter of trying.
 FIXED = ("T_c", "T_pos", "I_P")
 # How far a slider goes about the scenario's value; a number may be typed beyond, within the table's range.
@@ -56,7 +59,7 @@ class Knob:
         value: of the scenario, a number or one of `choices`.
         low, high: ends of the slider; least, most: what is allowed.
         unit, shown: SI unit, unit in the page; factor: of what is shown per SI.
-        sets: names of the unit's parameters. motion: place of a motion's field.
+        sets: names of the unit's parameters, and factors from `value` to them. motion: place of a motion's field.
     """
 
     key: str
@@ -71,7 +74,7 @@ class Knob:
     high: float = 0.0
     least: float = -math.inf
     most: float = math.inf
-    sets: tuple[str, ...] = ()
+    sets: tuple[tuple[str, float], ...] = ()
     motion: tuple[int | str, ...] = ()
     choices: tuple[str, ...] = field(default=())
 
@@ -109,7 +112,8 @@ def fits(knob: Knob, pattern: str) -> bool:
 def _is_on(knob: Knob) -> bool:
     """Whether a knob is an effect that the machine has."""
     parts = knob.key.split(".")
-    effect = parts[1] == "geometry" or parts[-1] == "play" or any(part in EFFECTS for part in parts)
+    groups = (*EFFECTS, "geometry", "hysteresis", "guide", "play")
+    effect = any(part in groups for part in parts)
     return effect and knob.value not in (0.0, "false") and (knob.choices != () or parts[-1] not in SETTINGS)
 
 
@@ -117,13 +121,17 @@ def _of_axes(machine: Machine) -> list[Knob]:
     found = []
     for axis, described in machine.axes.items():
         group = f"axis {axis}"
-        own = controller_parameters(machine, axis)
-        drive: dict[str, Any] = {**own, **{name: start for name, start in _effects().items() if name not in own}}
+        given = controller_parameters(machine, axis)
+        drive: dict[str, Any] = {**given, **{name: each for name, each in _effects().items() if name not in given}}
         friction = machine.shipped_friction(axis, "machine.fmu").parameters()
-        for part, values, unit in (("drive", drive, "controller"), ("friction", friction, "friction")):
+        structure = _at_slide(described)
+        for part, values, unit in (("drive", drive, "controller"), ("friction", friction, "friction"),
+                                   ("", structure, "plant/axis")):  # fmt: skip
             table = variables.parameters(unit)
             for name, value in values.items():
-                key, sets = f"machine.axes.{axis}.{part}.{name}", (f"{axis}.{part}.{name}",)
+                whole = f"{part}.{name}".removeprefix(".")
+                key, own = f"machine.axes.{axis}.{whole}", ((f"{axis}.{whole}", 1.0),)
+                sets = _friction_sets(described, axis, name) if part == "friction" else own
                 if name in SWITCHES:
                     found.append(Knob(key, group, name, table[name].short, SWITCHED[bool(value)], sets=sets,
                                       choices=SWITCHED))  # fmt: skip
@@ -132,8 +140,31 @@ def _of_axes(machine: Machine) -> list[Knob]:
         if machine.shipped_drive(axis, "machine.fmu").indirect:
             key, reach = f"machine.axes.{axis}.play", REACH * (described.play or TRIED["m", "um"])
             found.append(Knob(key, group, "play", "play between motor and slide", described.play, "m", "um", 1e6, 0.0,
-                              reach, 0.0, 1.0, (f"{axis}.play",)))  # fmt: skip
+                              reach, 0.0, 1.0, ((f"{axis}.play", 1.0),)))  # fmt: skip
     return found
+
+
+def _at_slide(axis: Axis) -> dict[str, Any]:
+    """Hysteresis and friction of its own at the guide; the latter not where it is a share of the axis's friction."""
+    table = variables.parameters("plant/axis")
+    found = {name: row.start for name, row in table.items() if name.partition(".")[0] in ("hysteresis", "guide")}
+    wound = axis.hysteresis.parameters() if axis.hysteresis is not None else {}
+    found |= {f"hysteresis.{name}": value for name, value in wound.items()}
+    if axis.guide is not None and axis.guide.share is not None:
+        return {name: value for name, value in found.items() if not name.startswith("guide.")}
+    return found | {f"guide.{name}": value for name, value in axis.friction_at_guide.items()}
+
+
+def _friction_sets(described: Axis, axis: str, name: str) -> tuple[tuple[str, float], ...]:
+    """Where a parameter of an axis's friction acts: at the motor, and in part at the guide."""
+    assert isinstance(described.friction, Friction)
+    value = float(described.friction.parameters()[name])
+    at_motor, at_guide = described.friction_at_motor, described.friction_at_guide
+    shared = described.guide is not None and described.guide.share
+    if not shared or value == 0:
+        return ((f"{axis}.friction.{name}", 1.0),)
+    found = [(f"{axis}.friction.{name}", float(at_motor[name]) / value)]
+    return (*found, (f"{axis}.guide.{name}", float(at_guide[name]) / value)) if name in at_guide else tuple(found)
 
 
 def _effects() -> dict[str, Any]:
@@ -146,12 +177,13 @@ def _of_guides(machine: Machine) -> list[Knob]:
     given = machine.geometry.parameters() if machine.geometry is not None else {}
     table = variables.parameters("plant")
     return [
-        _number(f"machine.{name}", "guides", name, float(given.get(name.partition(".")[2], 0.0)), row, (name,))
+        _number(f"machine.{name}", "guides", name, float(given.get(name.partition(".")[2], 0.0)), row, ((name, 1.0),))
         for name, row in table.items() if name.startswith("geometry.")
     ]  # fmt: skip
 
 
-def _number(key: str, group: str, name: str, value: float, table: Variable, sets: tuple[str, ...]) -> Knob:
+def _number(key: str, group: str, name: str, value: float, table: Variable,
+            sets: tuple[tuple[str, float], ...]) -> Knob:  # fmt: skip
     shown = SHOWN_UNIT.get(table.unit, table.display_unit or table.unit)
     low, high = _ends(value, table)
     return Knob(

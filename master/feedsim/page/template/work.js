@@ -5,7 +5,7 @@ function applied(data, state) {
   const motions = structuredClone(data.motions), own = new Map(data.parameters.map(each => [each[0], each]));
   data.knobs.forEach((knob, k) => {
     const value = knob.choices.length && knob.sets.length ? Number(state[k] === "true") : state[k];
-    for (const [reference, kind, name] of knob.sets) if (own.has(reference) || state[k] !== knob.value) own.set(reference, [reference, kind, value, name]);
+    for (const [reference, kind, name, factor] of knob.sets) if (own.has(reference) || state[k] !== knob.value) own.set(reference, [reference, kind, value * factor, name]);
     if (knob.motion.length) {
       const [index, ...path] = knob.motion, last = path.pop();
       path.reduce((part, name) => part[name], motions[index])[last] = state[k];
@@ -26,8 +26,17 @@ class Work {
 
   // Drives and structure of a state as one linear system.
   linear(state, plant = this.plant) {
-    const own = new Map(applied(this.data, state).parameters.map(([, , value, name]) => [name, value]));
-    return new LinearSystem(this.data.machine, name => own.get(name), plant);
+    return new LinearSystem(this.data.machine, this.named(state), plant);
+  }
+
+  // Values of a state by the parameter's name; of friction all that the axis has, wherever it acts.
+  named(state) {
+    const { knobs, machine } = this.data, own = new Map(applied(this.data, state).parameters.map(([, , value, name]) => [name, value]));
+    for (const name in machine.friction) {
+      const k = knobs.findIndex(knob => knob.key === `machine.axes.${name}`);
+      own.set(name, k < 0 ? machine.friction[name] : state[k]);
+    }
+    return name => own.get(name);
   }
 
   async run(state, between) {
@@ -53,9 +62,9 @@ class Work {
 
   // All that a run warns of; null where the newest knob has ended it.
   async warnings(state, found, between) {
-    const { machine } = this.data, system = this.linear(state, this.judged_plant), own = new Map(applied(this.data, state).parameters.map(([, , value, name]) => [name, value]));
+    const { machine } = this.data, system = this.linear(state, this.judged_plant);
     const loops = await judge(system, machine.locked, between);
-    return loops && [...machine.warnings, ...loop_warnings(loops), ...exchange_warnings(machine, name => own.get(name), this.judged_plant.table), ...reach_warnings(machine, found.rows), ...found.warnings];
+    return loops && [...machine.warnings, ...loop_warnings(loops), ...exchange_warnings(machine, this.named(state), this.judged_plant.table), ...reach_warnings(machine, found.rows), ...found.warnings];
   }
 
   bode(state, axis, between) {

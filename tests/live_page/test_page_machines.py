@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedsim import cosim, nc, scenario
+from feedsim import cli, cosim, nc, scenario
 from feedsim.cosim import fmus_directory
 from feedsim.errors import InputError
-from feedsim.page import module
+from feedsim.page import module, write
 from feedsim.page.content import content
 from live_page.test_page_numbers import SAME, settings
 from machine_helpers import write_machine, write_scenario
@@ -63,6 +63,33 @@ def test_motions_that_a_page_does_not_plan_are_carried_along(tmp_path: Path) -> 
     assert "sine" in " ".join(held.left_out)
     page = answers(held.data, [{"state": [k["value"] for k in held.data["knobs"]], "keep": ["X.x_a"]}], tmp_path)[0]
     assert np.abs(np.array(page["trace"]["X.x_a"]) - cosim.run(given).trace["X.x_a"]).max() <= SAME
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)")
+def test_a_plant_that_follows_its_pose_is_computed_and_its_end_is_said(tmp_path: Path) -> None:
+    plant = tmp_path / "plant.fmu"
+    machine = SCENARIOS / "machines" / "test_centre"
+    packed = ["machine", "pack", str(machine), "--poses", "Z=0mm..150mm/50mm", "--out", str(plant)]
+    assert cli.main(packed) == 0
+    changes = [f"machine.plant={plant}", "motions.1.duration=0.1 s"]
+    given = scenario.load(SCENARIOS / "z_positioning.yaml", changes)
+    program = nc.plan(given)
+    data = content(given, program).data
+    state = [knob["value"] for knob in data["knobs"]]
+    page = answers(data, [{"state": state, "keep": ["Z.x_a"]}], tmp_path)[0]
+    run = cosim.run(given, program=program)
+    assert np.abs(np.array(page["trace"]["Z.x_a"]) - run.trace["Z.x_a"]).max() <= SAME
+    assert any("leaves the plant's grid of poses" in warning for warning in run.warnings)
+    assert sorted(page["warnings"]) == sorted(map(str, run.warnings))
+
+
+def test_a_page_that_is_too_large_is_refused_with_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("feedsim.page.html.LARGEST", 200_000)
+    out = tmp_path / "page.html"
+    given = scenario.load(SCENARIOS / "one_axis.yaml")
+    with pytest.raises(InputError, match=r"its page takes 0\.\d+ MB; allowed are 0\.2 MB"):
+        write(cosim.run(given), out)
+    assert not out.exists()
 
 
 @pytest.mark.skipif(NODE is None, reason="no node on this machine (Debian: apt install nodejs)")

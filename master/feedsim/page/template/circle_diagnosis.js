@@ -219,7 +219,7 @@ function bidirectional(trace, turn, back) {
   const turns = [turn, back].map(each => contour(trace, each)), [p, q] = fitted_centre({ angle: concatenated(turns.map(each => each.angle)), deviation: concatenated(turns.map(each => each.deviation)) }, turn.radius);
   const around = turns.map(({ angle, deviation }) => {
     const x = angle.map((each, k) => (turn.radius + deviation[k]) * Math.cos(each) - p), y = angle.map((each, k) => (turn.radius + deviation[k]) * Math.sin(each) - q);
-    return { angle: x.map((each, k) => Math.atan2(y[k], each)), deviation: x.map((each, k) => Math.hypot(each, y[k]) - turn.radius) };
+    return { angle: x.map((each, k) => Math.atan2(y[k], each)), deviation: x.map((each, k) => length_of(each, y[k]) - turn.radius) };
   });
   const even = Float64Array.from({ length: ANGLES }, (_, k) => k * (2 * Math.PI / ANGLES) - Math.PI), [there, again] = around.map(({ angle, deviation }) => {
     const order = Array.from(angle.keys()).sort((a, b) => angle[a] - angle[b]);

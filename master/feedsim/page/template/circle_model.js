@@ -97,7 +97,7 @@ function undo(circle, path, values) {
   for (let i = 0; i < n; i++) {
     const u = (d * p[0][i] - q * p[1][i]) / determinant, v = (a * p[1][i] - q * p[0][i]) / determinant;
     plain[i] = Math.atan2(v, u);
-    deviation[i] = Math.hypot(u, v) - R;
+    deviation[i] = length_of(u, v) - R;
   }
   return { positions: [x, y], angle: plain, deviation, turned };
 }

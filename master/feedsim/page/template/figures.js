@@ -139,11 +139,21 @@ function turns_of(item, segments) {
   return { kind: "circle", prefix: axes.join(axes.every(each => each.length === 1) ? "" : "-"), axes, turn: turns[0], back: turns[1] || null };
 }
 
+const seen_contours = new WeakMap(), length_of = (x, y) => Math.sqrt(x * x + y * y); // Math.hypot takes ten times as long
+
+// Of a turn by two columns, once for all who ask.
 function contour(trace, turn, names = turn.axes.map(axis => `${axis}.x_a`)) {
+  if (!seen_contours.has(trace)) seen_contours.set(trace, new Map());
+  const seen = seen_contours.get(trace), key = `${turn.begin} ${names}`;
+  if (!seen.has(key)) seen.set(key, contour_of(trace, turn, names));
+  return seen.get(key);
+}
+
+function contour_of(trace, turn, names) {
   let [first, last] = rows_within(trace.time, turn.begin, turn.end);
   if (trace.time[last - 1] >= turn.end) last--;
   const time = trace.time.slice(first, last), [x, y] = names.map((name, i) => trace[name].slice(first, last).map(each => each - turn.centre[i]));
-  const angle = x.map((each, k) => Math.atan2(y[k], each)), deviation = x.map((each, k) => Math.hypot(each, y[k]) - turn.radius), middle = median(deviation);
+  const angle = x.map((each, k) => Math.atan2(y[k], each)), deviation = x.map((each, k) => length_of(each, y[k]) - turn.radius), middle = median(deviation);
   const glitches = [0, 1, 2, 3].map(quarter => {
     let peak = -1;
     angle.forEach((each, k) => {
@@ -164,7 +174,7 @@ function fitted_centre({ angle, deviation }, radius) {
   for (let pass = 0; pass < 4; pass++) {
     const A = [[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]];
     for (let k = 0; k < x.length; k++) {
-      const d = Math.hypot(x[k] - p, y[k] - q), row = [(x[k] - p) / d, (y[k] - q) / d, 1];
+      const d = length_of(x[k] - p, y[k] - q), row = [(x[k] - p) / d, (y[k] - q) / d, 1];
       for (let i = 0; i < 3; i++) { for (let j = 0; j < 3; j++) A[i][j] += row[i] * row[j]; A[i][3] += row[i] * (d - radius); }
     }
     for (let i = 0; i < 3; i++) for (let j = 0; j < 3; j++) if (j !== i) { const f = A[j][i] / A[i][i]; for (let k = 0; k < 4; k++) A[j][k] -= f * A[i][k]; }
@@ -176,7 +186,7 @@ function fitted_centre({ angle, deviation }, radius) {
 
 // Range of the distance from it.
 function least_squares_deviation({ angle, deviation }, radius) {
-  const [p, q] = fitted_centre({ angle, deviation }, radius), far = angle.map((each, k) => Math.hypot((radius + deviation[k]) * Math.cos(each) - p, (radius + deviation[k]) * Math.sin(each) - q));
+  const [p, q] = fitted_centre({ angle, deviation }, radius), far = angle.map((each, k) => length_of((radius + deviation[k]) * Math.cos(each) - p, (radius + deviation[k]) * Math.sin(each) - q));
   return largest(far) - least(far);
 }
 

@@ -2,7 +2,7 @@
 // time. Definitions and sources stand there; a test holds both to the same digits. Complex numbers are pairs [re, im].
 const ONE = [1, 0], NONE = [0, 0];
 const plus = (a, b) => [a[0] + b[0], a[1] + b[1]], less = (a, b) => [a[0] - b[0], a[1] - b[1]], scaled = (k, a) => [k * a[0], k * a[1]];
-const mul = (a, b) => [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]], size_of = a => Math.hypot(a[0], a[1]), angle_of = a => Math.atan2(a[1], a[0]);
+const mul = (a, b) => [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]], size_of = a => Math.sqrt(a[0] * a[0] + a[1] * a[1]), angle_of = a => Math.atan2(a[1], a[0]);
 const over = (a, b) => { const n = b[0] * b[0] + b[1] * b[1]; return [(a[0] * b[0] + a[1] * b[1]) / n, (a[1] * b[0] - a[0] * b[1]) / n]; };
 const exponential = a => { const size = Math.exp(a[0]); return [size * Math.cos(a[1]), size * Math.sin(a[1])]; };
 const exponential_less_1 = a => [Math.expm1(a[0]) * Math.cos(a[1]) - 2 * Math.sin(a[1] / 2) ** 2, Math.exp(a[0]) * Math.sin(a[1])];

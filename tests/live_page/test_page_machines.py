@@ -114,7 +114,11 @@ def test_effects_are_knobs_whether_the_machine_has_them_or_not(tmp_path: Path) -
         assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= SAME
     assert sorted(page["warnings"]) == sorted(map(str, run.warnings))
     assert np.abs(run.trace["X.x_a"] - cosim.run(given).trace["X.x_a"]).max() > 1e-6
-    assert not [knob for knob in content(given, nc.plan(given)).data["knobs"] if "cogging" in knob["key"]]
+    usual = [knob["key"].partition("X.")[2] for knob in content(given, nc.plan(given)).data["knobs"]]
+    drive, friction = ("K_v", "k_ffw", "T_sym", "K_p", "T_n"), ("sigma_0", "F_C", "F_S", "W", "gamma")
+    effects = ("drive.measuring.indirect", "drive.backlash_compensation.value")
+    axis = {*(f"drive.{name}" for name in drive), *(f"friction.{name}" for name in friction), *effects}
+    assert axis == {key for key in usual if key}, "the usual knobs, and the effect that the machine has"
 
 
 @pytest.mark.parametrize(

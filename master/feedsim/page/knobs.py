@@ -60,6 +60,7 @@ class Knob:
         low, high: ends of the slider; least, most: what is allowed.
         unit, shown: SI unit, unit in the page; factor: of what is shown per SI.
         sets: names of the unit's parameters, and factors from `value` to them. motion: place of a motion's field.
+        without: of a machine that says nothing of it.
     """
 
     key: str
@@ -77,6 +78,7 @@ class Knob:
     sets: tuple[tuple[str, float], ...] = ()
     motion: tuple[int | str, ...] = ()
     choices: tuple[str, ...] = field(default=())
+    without: float | str = 0.0
 
 
 def chosen(scenario: Scenario, wanted: Sequence[str], *, planned: bool) -> list[Knob]:
@@ -110,11 +112,10 @@ def fits(knob: Knob, pattern: str) -> bool:
 
 
 def _is_on(knob: Knob) -> bool:
-    """Whether a knob is an effect that the machine has."""
+    """Whether a knob is an effect that the machine has: its value is not that of a machine without."""
     parts = knob.key.split(".")
-    groups = (*EFFECTS, "geometry", "hysteresis", "guide", "play")
-    effect = any(part in groups for part in parts)
-    return effect and knob.value not in (0.0, "false") and (knob.choices != () or parts[-1] not in SETTINGS)
+    effect = any(part in (*EFFECTS, "geometry", "hysteresis", "guide", "play") for part in parts)
+    return effect and knob.value != knob.without and (knob.choices != () or parts[-1] not in SETTINGS)
 
 
 def _of_axes(machine: Machine) -> list[Knob]:
@@ -134,7 +135,7 @@ def _of_axes(machine: Machine) -> list[Knob]:
                 sets = _friction_sets(described, axis, name) if part == "friction" else own
                 if name in SWITCHES:
                     found.append(Knob(key, group, name, table[name].short, SWITCHED[bool(value)], sets=sets,
-                                      choices=SWITCHED))  # fmt: skip
+                                      choices=SWITCHED, without=SWITCHED[0]))  # fmt: skip
                 elif name in table and table[name].kind == "REAL" and name not in FIXED:
                     found.append(_number(key, group, name, float(value), table[name], sets))
         if machine.shipped_drive(axis, "machine.fmu").indirect:
@@ -188,7 +189,7 @@ def _number(key: str, group: str, name: str, value: float, table: Variable,
     low, high = _ends(value, table)
     return Knob(
         key, group, name, table.short, value, table.unit, shown, units.convert(1.0, table.unit, shown), low, high,
-        table.minimum, table.maximum, sets,
+        table.minimum, table.maximum, sets, without=float(table.start),
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ by `make bench`, the grid of poses by `make pose-study`; that of the sweep by `m
 from __future__ import annotations
 
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,6 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from PIL import Image
 
 import feedsim as fs
 from feedsim import cli
@@ -83,7 +85,24 @@ def wear(place: Path) -> None:
     taken(place, "distribution-XZ-glitch_Z.png", "friction-wear.png")
 
 
-DRAWN: tuple[Callable[[Path], None], ...] = (contour, stribeck, structure, bode, tube)
+def gallery(place: Path) -> None:
+    """Of the gallery: every script of examples/, its picture made small."""
+    for script in sorted((ROOT / "examples").glob("*.py")):
+        folder = place / script.stem
+        folder.mkdir(parents=True)
+        subprocess.run([sys.executable, script], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+        small(folder / f"{script.stem}.png", IMAGES / "gallery" / f"{script.stem}.png")
+
+
+def small(picture: Path, target: Path) -> None:
+    """A picture at most 800 pixels wide, in 64 colours: a tenth of the bytes."""
+    with Image.open(picture) as opened:
+        shrunk = opened.convert("RGB")
+    shrunk.thumbnail((800, 2000), Image.Resampling.LANCZOS)
+    shrunk.quantize(64, dither=Image.Dither.NONE).save(target, optimize=True)
+
+
+DRAWN: tuple[Callable[[Path], None], ...] = (contour, stribeck, structure, bode, tube, gallery)
 
 
 def main() -> None:

@@ -6,10 +6,12 @@ May use feedsim. Start reading at pages(): the name of a page and its text in Ma
 from __future__ import annotations
 
 import argparse
+import ast
 import inspect
 import os
 from collections.abc import Iterator, Mapping
 from math import isinf
+from pathlib import Path
 from typing import Any
 
 import feedsim
@@ -17,6 +19,7 @@ from feedsim import cli
 from feedsim.scenario.schema import json_schema
 from feedsim.variables import table
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 UNITS = {
     "plant": "the mechanical structure, reduced to its modes",
     "controller": "position, speed and current control of one axis, with its motor",
@@ -36,7 +39,33 @@ FILES = {
 
 def pages() -> dict[str, str]:
     """Name of every page of the reference -> its text."""
-    return {"commands": commands(), "python": python(), "files": files(), "variables": variables()}
+    return {
+        "commands": commands(),
+        "python": python(),
+        "files": files(),
+        "variables": variables(),
+        "gallery": gallery(),
+    }
+
+
+def gallery() -> str:
+    """The examples: what each shows, its picture and its script."""
+    lines = ["# Gallery", "", "Small scripts that run as they stand, in any folder. All numbers of the "
+             "machines are synthetic.", ""]  # fmt: skip
+    for script in sorted(EXAMPLES.glob("*.py")):
+        text = script.read_text(encoding="utf-8")
+        title, _, words = (ast.get_docstring(ast.parse(text)) or "").partition("\n")
+        code = text.partition('\n"""\n')[2].strip()
+        lines += [
+            f"## {title.rstrip('.')}",
+            "",
+            words.strip(),
+            "",
+            f"![{title}](../images/gallery/{script.stem}.png)",
+            "",
+        ]
+        lines += [f"`examples/{script.name}`", "", f"```python\n{code}\n```", ""]
+    return "\n".join(lines)
 
 
 def commands() -> str:

@@ -25,6 +25,7 @@ ELSEWHERE = {
     ROOT / "README.md": "index.md",
     ROOT / "SECURITY.md": "security.md",
     DOCS / "README.md": "index.md",
+    ROOT / "examples" / "README.md": "reference/gallery.md",
     **{ROOT / "src" / unit / "README.md": f"units/{unit.removesuffix('_fmu')}.md"
        for unit in ("plant_fmu", "controller_fmu", "friction_fmu", "setpoint_fmu", "machine_fmu", "exchange", "page")},
 }  # fmt: skip

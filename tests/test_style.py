@@ -25,13 +25,6 @@ NOT_YET = {
     "docs/real-machine.md",
     "docs/replay.md",
     "docs/reports.md",
-    "src/controller_fmu/README.md",
-    "src/exchange/README.md",
-    "src/friction_fmu/README.md",
-    "src/machine_fmu/README.md",
-    "src/page/README.md",
-    "src/plant_fmu/README.md",
-    "src/setpoint_fmu/README.md",
 }
 MEDIAN = 14  # words of a sentence
 

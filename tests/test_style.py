@@ -17,15 +17,6 @@ PAGES = sorted(
     for pattern in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "docs/**/*.md", "src/*/README.md")
     for path in ROOT.glob(pattern)
 )
-# Pages of before the style: none is added, each leaves when it is rewritten.
-NOT_YET = {
-    "docs/architecture.md",
-    "docs/effects.md",
-    "docs/page.md",
-    "docs/real-machine.md",
-    "docs/replay.md",
-    "docs/reports.md",
-}
 MEDIAN = 14  # words of a sentence
 
 
@@ -33,24 +24,13 @@ def named(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if named(page) not in NOT_YET], ids=named)
+@pytest.mark.parametrize("page", PAGES, ids=named)
 def test_page_keeps_to_the_style(page: Path) -> None:
     assert prose.faults(page.read_text(encoding="utf-8"), own=page == prose.STYLE) == []
 
 
-def test_the_list_only_shrinks() -> None:
-    assert {named(page) for page in PAGES} >= NOT_YET
-    done = [name for name in NOT_YET if not prose.faults((ROOT / name).read_text(encoding="utf-8"))]
-    assert not done, "these keep to the style: take them off the list"
-
-
 def test_sentences_are_short_in_the_middle() -> None:
-    lengths = [
-        words
-        for page in PAGES
-        if named(page) not in NOT_YET
-        for words in prose.lengths(page.read_text(encoding="utf-8"))
-    ]
+    lengths = [words for page in PAGES for words in prose.lengths(page.read_text(encoding="utf-8"))]
     assert median(lengths) <= MEDIAN
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from collections.abc import Sequence
 from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING
@@ -16,6 +17,8 @@ from feedsim.report.style import PALETTE
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+
+    from feedsim.report.run.sheet import Filled
 
 # What draws the charts and what a reader does with them, in their order.
 SCRIPTS = ("chart_draw.js", "chart_use.js")
@@ -34,6 +37,16 @@ def html(report: Report, kind: str = "") -> str:
         report=report, palette=PALETTE, data=embedded(charts) if charts else "", script=script() if charts else "",
         policy=policy(script() if charts else ""), kind=kind, most_tiles=TILES,
     )  # fmt: skip
+
+
+def sheet_html(title: str, sheets: Sequence[Filled], rule: str) -> str:
+    """HTML text of acceptance sheets, for print; all text is escaped. rule: how is decided."""
+    environment = _environment()
+    environment.filters["typeset"] = typeset
+    environment.filters["still"] = lambda picture: still(picture.chart, picture.stem, picture.title)
+    return environment.get_template("sheet.html.j2").render(
+        title=title, sheets=sheets, rule=rule, palette=PALETTE, policy=policy("")
+    )
 
 
 def style() -> str:

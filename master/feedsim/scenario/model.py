@@ -6,7 +6,16 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, PrivateAttr, StrictInt, StrictStr, ValidationInfo, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    PrivateAttr,
+    StrictInt,
+    StrictStr,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from feedsim.fields import AxisName, Model, Quantity, Reading, fault, no_axis
 from feedsim.files.source import Place
@@ -15,6 +24,7 @@ from feedsim.scenario.coupling import Coupling
 from feedsim.scenario.loads import Load, MotionIndex
 from feedsim.scenario.logging import Logging, interval_fault, on_the_grid
 from feedsim.scenario.machine import Machine
+from feedsim.scenario.sheet import OF_CIRCLES, OF_POSITIONING, Sheet, checked
 
 MOST_MOTIONS = 10_000  # of a scenario; a longer program is recorded setpoints
 
@@ -62,6 +72,12 @@ class CircleTest(Model):
     radius: Annotated[float, Quantity("m", above=0, example="15 mm")] | None = Field(
         default=None, description="Only for recorded setpoints: radius (default: fitted to the setpoints)"
     )
+    sheet: Sheet | None = Field(default=None, description="Write an acceptance sheet in the letters of ISO 230-4")
+
+    @field_validator("sheet", mode="after")
+    @classmethod
+    def _sheet(cls, sheet: Sheet | None) -> Sheet | None:
+        return checked(sheet, OF_CIRCLES)
 
 
 class PositioningAccuracy(Model):
@@ -75,6 +91,12 @@ class PositioningAccuracy(Model):
         default=0.0, description="Standard deviation of the measuring system, drawn anew for every reading"
     )
     seed: Annotated[StrictInt, Field(ge=0)] = Field(default=0, description="Of that noise")
+    sheet: Sheet | None = Field(default=None, description="Write an acceptance sheet in the letters of ISO 230-2")
+
+    @field_validator("sheet", mode="after")
+    @classmethod
+    def _sheet(cls, sheet: Sheet | None) -> Sheet | None:
+        return checked(sheet, OF_POSITIONING)
 
 
 Evaluation = Annotated[Positioning | CircleTest | PositioningAccuracy, Field(discriminator="kind")]

@@ -29,6 +29,7 @@ from feedsim.report.chart import Chart, Panel
 from feedsim.report.content import Paragraph, Report, Section, Span, Table, Tile, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, duration, number, typeset
+from feedsim.report.page import sheet_html
 from feedsim.report.partial import PARTIAL, Partial
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import (
@@ -41,6 +42,7 @@ from feedsim.report.provenance import (
     software,
 )
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.run import sheet
 from feedsim.report.run.accuracy import accuracy_picture, accuracy_section
 from feedsim.report.run.axis_plots import BEYOND, overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
@@ -89,12 +91,21 @@ TRY_IT = Paragraph(
 )
 
 
+SHEETS = Paragraph((Span("Acceptance sheet for print", "file", sheet.HTML), ": readings, conditions, limits."))
+
+
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless a run's results can be written to ``directory`` without one of ``inputs`` being lost.
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (RESULT, REPORT, SUMMARY, LOG, PAGE, PARTIAL), inputs, kind="run", own=(PARTIAL,))
+    check_place(
+        directory,
+        (RESULT, REPORT, SUMMARY, LOG, PAGE, sheet.HTML, sheet.CSV, PARTIAL),
+        inputs,
+        kind="run",
+        own=(PARTIAL,),
+    )
 
 
 def growing(directory: Path | str) -> Partial:
@@ -145,6 +156,9 @@ def files_of(run: Run, page: str = "", recorded: Partial | None = None) -> dict[
         files[LOG] = partial(write_csv, trace=run.log)
     if page:
         files[PAGE] = page
+    if sheets := sheet.sheets_of(run):
+        files[sheet.HTML] = sheet_html(run.scenario.name, sheets, sheet.RULE)
+        files[sheet.CSV] = sheet.table(sheets)
     return files
 
 
@@ -170,6 +184,7 @@ def report_of(
         lead=lead(run, pictures),
         next_step=next_step(run, causes, first_change(proposals)),
         main=[
+            *([SHEETS] if sheet.sheets_of(run) else []),
             *pictures,
             *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
             changes_section(proposals, machine),
@@ -205,7 +220,7 @@ def answers(run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagno
         if own and not isinstance(task, CircleTask):
             words = stop_words(own, task.band) if isinstance(task, PositioningTask) else accuracy_words(own)
             found.append(f"{task.prefix}: {words}")
-    return found
+    return [*filter(None, map(sheet.verdict_line, sheet.sheets_of(run))), *found]
 
 
 def tiles(figures: Mapping[str, Figure]) -> list[Tile]:

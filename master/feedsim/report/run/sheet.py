@@ -1,0 +1,222 @@
+"""Acceptance sheets of a run: readings, conditions, figures in the letters of ISO 230-2 and -4, limits, verdicts.
+
+A figure passes where its magnitude and the uncertainty together keep within the limit, and fails where it exceeds the
+limit by more than the uncertainty; between these it is not decided (the decision rule of ISO 14253-1).
+Start with sheets_of().
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from feedsim.analysis import AccuracyTask, CircleTask, Figure, contour, tasks
+from feedsim.analysis.circularity import Turn
+from feedsim.cosim import Run
+from feedsim.motions.circular import DIRECTIONS
+from feedsim.report.formatting import minus
+from feedsim.report.picture import Picture
+from feedsim.report.run.accuracy import accuracy_picture
+from feedsim.report.run.circle_plots import contour_picture
+from feedsim.scenario import CircleTest, PositioningAccuracy
+from feedsim.scenario.sheet import OF_CIRCLES, OF_POSITIONING, Sheet
+from feedsim.trace import Trace
+
+HTML, CSV = "sheet.html", "sheet.csv"
+SIMULATED = "Simulated by feedsim. Nothing was measured on a machine."
+RULE = (
+    "A figure passes where its magnitude and the uncertainty U (k = 2) together keep within the limit, and fails where "
+    "it exceeds the limit by more than U; between these it is not decided (ISO 14253-1)."
+)
+# As the standard writes them: letter, place of the arrow.
+SYMBOLS = {
+    "A": "A", "A_up": "A↑", "A_down": "A↓", "R": "R", "R_up": "R↑", "R_down": "R↓", "B": "B", "B_mean": "B\u0305",
+    "E": "E", "E_up": "E↑", "E_down": "E↓", "M": "M",
+}  # fmt: skip
+PASSES, FAILS, OPEN, NO_LIMIT = "pass", "fail", "not decided", "–"
+HEADS = ("Sheet", "Part", "Item", "Target [mm]", "Angle [deg]", "Approach", "Run", "Value", "Unit", "Limit", "Verdict")
+EVERY = 1.0  # [deg] between the readings of a circle
+
+
+@dataclass(frozen=True)
+class Result:
+    """A figure of a sheet: symbol, meaning, value [um], limit [um] (NaN: none), and whether it passes."""
+
+    symbol: str
+    meaning: str
+    value: float
+    limit: float
+    verdict: str
+
+    @property
+    def cells(self) -> tuple[str, str, str, str, str]:
+        """As the sheet shows them."""
+        limit = "–" if math.isnan(self.limit) else f"{self.limit:.2f}"
+        return self.symbol, self.meaning, minus(f"{self.value:.2f}"), limit, self.verdict
+
+
+@dataclass(frozen=True, eq=False)
+class Filled:
+    """A sheet: title, standard, conditions, table of readings, figures, picture.
+
+    Attributes:
+        heads, rows: of the readings as they are printed. readings: rows of sheet.csv behind "Sheet" and "Part".
+    """
+
+    title: str
+    standard: str
+    conditions: Sequence[tuple[str, str]]
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    results: Sequence[Result]
+    picture: Picture
+    readings: Sequence[Sequence[str]] = field(default=())
+
+    @property
+    def verdict(self) -> str:
+        """Of all figures with a limit: fail if one fails, else not decided if one is, else pass; "" without limits."""
+        found = {result.verdict for result in self.results} - {NO_LIMIT}
+        return next((each for each in (FAILS, OPEN, PASSES) if each in found), "")
+
+
+def sheets_of(run: Run) -> list[Filled]:
+    """The sheets that the scenario asks for, one per evaluation with the key `sheet`."""
+    found: list[Filled] = []
+    for item, task in zip(run.scenario.evaluate, tasks(run.scenario, run.program), strict=True):
+        if isinstance(item, PositioningAccuracy) and item.sheet is not None and isinstance(task, AccuracyTask):
+            found.append(_positioning(run, task, item.sheet))
+        elif isinstance(item, CircleTest) and item.sheet is not None and isinstance(task, CircleTask):
+            found.append(_circle(run, task, item.sheet))
+    return found
+
+
+def verdict_line(sheet: Filled) -> str:
+    """ "Z: pass after ISO 230-2: A 1.31 um of 6 um"; "" without limits."""
+    if not sheet.verdict:
+        return ""
+    words = {PASSES: "passes", FAILS: "FAILS", OPEN: "is not decided"}[sheet.verdict]
+    judged = [result for result in sheet.results if result.verdict != NO_LIMIT]
+    telling = [result for result in judged if result.verdict == sheet.verdict] if sheet.verdict != PASSES else judged
+    parts = [f"{result.symbol} {result.value:.2f} um (limit {result.limit:g} um)" for result in telling]
+    return f"{sheet.title} {words} ({sheet.standard}): {', '.join(parts)}."
+
+
+def judged(value: float, limit: float, uncertainty: float) -> str:
+    """Verdict on a figure; all in one unit. A figure that could not be determined is not decided."""
+    if math.isnan(limit):
+        return NO_LIMIT
+    if not math.isfinite(value):
+        return OPEN
+    if abs(value) + uncertainty <= limit:
+        return PASSES
+    return FAILS if abs(value) - uncertainty > limit else OPEN
+
+
+def _results(
+    figures: Mapping[str, Figure], symbols: Mapping[str, str], sheet: Sheet, known: Sequence[str]
+) -> list[Result]:
+    found = []
+    for name in known:
+        if (figure := figures.get(name)) is None:
+            continue
+        limit = 1e6 * sheet.limits.get(name, math.nan)
+        verdict = judged(figure.value, limit, 1e6 * sheet.uncertainty)
+        meaning = figure.meaning.replace(" (ISO 230-2)", "").replace("ISO 230-4 ", "")
+        found.append(Result(symbols[name], meaning, figure.value, limit, verdict))
+    return found
+
+
+def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
+    found, visits = task.found(run.trace)[""], task.visits
+    prefix = task.prefix
+    rests = [visit.end - visit.begin for visit in visits.visits]
+    conditions = [
+        *_common(run),
+        ("Axis under test", prefix.partition("#")[0]),
+        ("Position by", "linear scale"),
+        ("Targets", f"{len(visits.targets)}, from {1e3 * visits.targets[0]:.6g} to {1e3 * visits.targets[-1]:.6g} mm"),
+        ("Approaches", f"{visits.runs} of each side of each target"),
+        ("Rest at a target", f"{min(rests):.3g} s; read at its end"),
+        *_given(sheet),
+    ]
+    readings = 1e6 * found.deviations
+    heads = ("Target [mm]", "Approach", *(f"{k + 1}" for k in range(visits.runs)), "x\u0305 [µm]", "s [µm]", "B [µm]")
+    rows, told = [], []
+    for i, target in enumerate(visits.targets):
+        for side, arrow in enumerate("↑↓"):
+            own = readings[side, i]
+            last = minus(f"{1e6 * found.B[i]:.3f}") if side == 0 else ""
+            rows.append((f"{1e3 * target:.6g}", arrow, *(minus(f"{value:.3f}") for value in own),
+                         minus(f"{1e6 * found.mean[side, i]:.3f}"), f"{1e6 * found.s[side, i]:.3f}", last))  # fmt: skip
+            told += [("deviation", f"{1e3 * target:.9g}", "", arrow, str(k + 1), f"{value:.6f}", "um")
+                     for k, value in enumerate(own)]  # fmt: skip
+    results = _results(found.figures, SYMBOLS, sheet, OF_POSITIONING)
+    picture = accuracy_picture(prefix, found, f"sheet-{prefix.replace('#', '-')}")
+    return Filled(f"Positioning of {prefix}", "ISO 230-2", conditions, heads, rows, results, picture, told)
+
+
+def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
+    turn, figures = task.turn, task.figures(run.trace)
+    first, second = turn.axes
+    plane = "".join(turn.axes) if turn.sense > 0 else "".join(reversed(turn.axes))
+    symbols = {"G": f"G_{plane}", "G_b": f"G(b)_{first}{second}", "F_max": f"F_{plane},max",
+               "F_min": f"F_{plane},min", "D": f"D_{first}{second}"}  # fmt: skip
+    feed = 2 * math.pi * turn.radius / (turn.end - turn.begin) * 6e4
+    conditions = [
+        *_common(run),
+        ("Plane", f"{first}-{second}"),
+        ("Nominal path", f"diameter {2e3 * turn.radius:.6g} mm, feed {feed:.5g} mm/min"),
+        ("Centre", ", ".join(f"{axis} {1e3 * at:.6g} mm" for axis, at in zip(turn.axes, turn.centre, strict=True))),
+        ("Direction", " and ".join(DIRECTIONS[each.sense] for each in task.turns)),
+        ("Position by", "linear scales"),
+        *_given(sheet),
+    ]
+    names = [DIRECTIONS[each.sense] for each in task.turns]
+    grid = np.arange(0.0, 360.0, EVERY)
+    curves = [_deviation(run.trace, each, grid) for each in task.turns]
+    rows = [(f"{angle:g}", *(minus(f"{curve[k]:.3f}") for curve in curves))
+            for k, angle in enumerate(grid) if angle % 15 == 0]  # fmt: skip
+    told = [("radial deviation", "", f"{angle:g}", name, "", f"{curve[k]:.6f}", "um")
+            for name, curve in zip(names, curves, strict=True) for k, angle in enumerate(grid)]  # fmt: skip
+    results = _results(figures, symbols, sheet, OF_CIRCLES)
+    stem = f"sheet-{task.prefix.replace('#', '-')}"
+    picture = contour_picture(run.trace, turn, stem, task.back, task.diagnosis(run.trace))
+    heads = ("Angle [°]", *(f"{name} [µm]" for name in names))
+    return Filled(f"Circle {task.prefix}", "ISO 230-4", conditions, heads, rows, results, picture, told)
+
+
+def _deviation(trace: Trace, turn: Turn, grid: np.ndarray) -> np.ndarray:
+    """Radial deviation [um] at angles [deg] from the first axis."""
+    found = contour(trace, turn)
+    angle = np.rad2deg(found.angle) % 360.0
+    order = np.argsort(angle, kind="stable")
+    return np.asarray(np.interp(grid, angle[order], 1e6 * found.deviation[order], period=360.0))
+
+
+def _common(run: Run) -> list[tuple[str, str]]:
+    return [("Machine", run.scenario.machine.name), ("Kind of test", SIMULATED), ("Scenario", run.scenario.name)]
+
+
+def _given(sheet: Sheet) -> list[tuple[str, str]]:
+    return [*sheet.conditions.items(), ("Uncertainty U (k = 2)", f"{1e6 * sheet.uncertainty:g} µm")]
+
+
+def table(sheets: Sequence[Filled]) -> str:
+    """sheet.csv: conditions, readings and figures, a row each, with the columns HEADS."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(HEADS)
+    for sheet in sheets:
+        name = f"{sheet.title} ({sheet.standard})"
+        writer.writerows([name, "condition", what, "", "", "", "", how, "", "", ""] for what, how in sheet.conditions)
+        writer.writerows([name, "reading", *row, "", ""] for row in sheet.readings)
+        for each in sheet.results:
+            limit = "" if math.isnan(each.limit) else f"{each.limit:.9g}"
+            verdict = "" if each.verdict == NO_LIMIT else each.verdict
+            writer.writerow([name, "figure", each.symbol, "", "", "", "", f"{each.value:.6f}", "um", limit, verdict])
+    return text.getvalue()

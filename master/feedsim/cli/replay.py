@@ -63,6 +63,7 @@ def identify_drive(options: Namespace) -> None:
             columns=options.columns,
             window=options.window,
             position_cycle=options.position_cycle,
+            modes=options.modes,
             name=options.name,
             set=options.overrides,
             fmus=options.fmus,
@@ -115,6 +116,9 @@ IDENTIFY_DRIVE = Command(
         Option("--position-cycle", "VALUE",
                "cycle of the position loop of rigid axes, e.g. '2 ms' (default: the control cycle, as where the "
                "drive closes that loop itself, or that of the record's rows where the record speaks for it)"),
+        Option("--modes", "0..5|auto",
+               "elastic modes of every rigid axis; auto: as many as predict best what a fit has not seen (default: 0)",
+               default="0"),
         Option("--name", "NAME", "of the machine that is written (default: name of the record)"),
         out("drive_<name of the record>"), FIGURES, CONTROL,
         settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,

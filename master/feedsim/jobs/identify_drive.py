@@ -11,10 +11,12 @@ from typing import Any
 
 from feedsim.analysis import Figure, Named
 from feedsim.arguments import Changes, Value, quantity
+from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.records import Asked
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.replay.elastic import MOST_MODES
 from feedsim.replay.identified import identify_drives
 from feedsim.report.content import Report
 from feedsim.report.replay import drive as page
@@ -89,6 +91,7 @@ def identify_drive(
     columns: File | None = None,
     window: str | None = None,
     position_cycle: Value | None = None,
+    modes: int | str = 0,
     name: str | None = None,
     set: Changes = None,
     fmus: File | None = None,
@@ -109,6 +112,7 @@ def identify_drive(
         window: the part that counts, by times or by blocks of the record's program: "0.5 s..2 s", "N7..N20", "N7".
         position_cycle: cycle [s] of the position loop of rigid axes; None: the control cycle, as where the drive closes
             that loop itself, or that of the record's rows where the record speaks for it. Also a text, "2 ms".
+        modes: elastic modes of every rigid axis, 0 to 5, or "auto": as many as predict best what a fit has not seen.
         name: of the machine that is written; None: that of the record.
         set: changes of the machine, as behind ``--set``.
         fmus: folder of the archives.
@@ -130,6 +134,7 @@ def identify_drive(
     path = asked.recording.path
     title = name or path.stem
     cycle = quantity("position_cycle", position_cycle, "s", "1 ms") if position_cycle else None
+    count = count_of_modes(modes, asked.machine is not None)
     archives = None if fmus is None else Path(fmus)
     with kept(out, partial(page.check_writable, asked.axes), watch, asked.inputs, asked.told, force=force):
         watch.progress("reading", 0, 1)
@@ -138,7 +143,16 @@ def identify_drive(
             announce(watch, asked.machine, archives)
         head = page.head(path, asked.window, date.today().isoformat())
         found = identify_drives(
-            asked.read, records, asked.machine, head, title, page.note(path), watch.progress, archives, cycle
+            asked.read,
+            records,
+            asked.machine,
+            head,
+            title,
+            page.note(path, count),
+            watch.progress,
+            archives,
+            cycle,
+            count,
         )
         sources = [each.provenance for each in asked.read.values()]
         done = DriveReport(found, sources, asked.subject, title, asked.settings, asked.marks)
@@ -146,3 +160,13 @@ def identify_drive(
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
     return result
+
+
+def count_of_modes(modes: int | str, structure_known: bool) -> int | None:
+    """0 to 5, or None of "auto". InputError: neither, or modes where the machine has its own."""
+    text = str(modes)
+    if text != "auto" and not (text.isdecimal() and int(text) <= MOST_MODES):
+        raise InputError(f"--modes {text}: 0 to {MOST_MODES}, or auto")
+    if structure_known and text != "0":
+        raise InputError(f"--modes {text}: the structure is that of --machine; leave one of the two out")
+    return None if text == "auto" else int(text)

@@ -16,7 +16,8 @@ that hang together over stretches of time, as errors of a model do.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from math import hypot, inf, log, nan
 from pathlib import Path
 from typing import TypeVar
@@ -30,6 +31,7 @@ from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_de
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
+from feedsim.replay.elastic import KEYS, MOST_MODES, ElasticMode, begin_mode, modes_of, resonance
 from feedsim.replay.start import Begin
 from feedsim.replay.tuning import BOUNDS, FINAL, ROUGH, Problem, Rows, Tuned, together
 from feedsim.scenario import Machine
@@ -80,6 +82,8 @@ class DriveFound:
         other_cycles: cycle of the position loop [s] -> by how much the record is likelier with it than with the
             machine's (logarithm of the likelihood).
         runs: of the units.
+        modes: elastic ones. modes_predicted: number of modes -> rms of the position [m] of every quarter of the motion,
+            by a fit to the other three.
     """
 
     axis: str
@@ -94,6 +98,8 @@ class DriveFound:
     predicted: tuple[float, float]
     other_cycles: Mapping[float, float]
     runs: int
+    modes: tuple[ElasticMode, ...] = ()
+    modes_predicted: Mapping[int, float] = field(default_factory=dict)
 
 
 def identify_drive(
@@ -104,6 +110,7 @@ def identify_drive(
     structure_known: bool,
     begin: Begin | None = None,
     other_cycle: float | None = None,
+    modes: int | None = 0,
     progress: Progress = lambda what, done, total: None,
     fmus: Path | None = None,
 ) -> DriveFound:
@@ -116,6 +123,7 @@ def identify_drive(
         begin: what the record alone says, in place of the machine's values: a fit begins at each of its starts, and
             the best goes on.
         other_cycle: of the position loop [s], in place of the machine's, that what was found is held against.
+        modes: elastic ones of a rigid axis; None: as many as the record asks for.
 
     Raises:
         InputError: a record without motion; no start that the units can run; a result that leaves a large part of the
@@ -167,6 +175,10 @@ def identify_drive(
     else:
         found = _best_start(problem, free, candidates)
         chosen, parts, found = _parts(problem, found, progress)
+    elastic: Mapping[int, float] = {}
+    if modes != 0 and not structure_known:
+        progress("elastic modes", 1 + len(BLOCKS), 2 + len(BLOCKS))
+        found, elastic = _elastic(problem, found, modes)
     progress("last fit", 1 + len(BLOCKS), 2 + len(BLOCKS))
     for _ in range(MOST_TURNS):
         before = problem.weights
@@ -189,6 +201,7 @@ def identify_drive(
     return DriveFound(
         each.axis, estimates, taps, speed, problem.machine_of(found.values), parts, chosen,
         rms(found.position), rms(found.torque) if each.record.driven else nan, predicted, likelier, problem.runs,
+        _modes(problem, found, unseen), elastic,
     )  # fmt: skip
 
 
@@ -314,6 +327,59 @@ def _refuse_poor(each: AxisRecord, found: Tuned) -> None:
             )
 
 
+def _elastic(problem: Problem, found: Tuned, count: int | None) -> tuple[Tuned, Mapping[int, float]]:
+    """A fit with elastic modes, and the position [m] that it predicts of quarters of the motion with how many.
+
+    One mode after the other: where it is, regression says of what the units leave. It stays where the units, fitted to
+    three quarters, predict the fourth one better with it, or where the number is given.
+    """
+    folds = np.array_split(np.arange(len(problem.rows)), FOLDS)
+    found = problem.exact(found)
+    predicted = {0: _left_out(problem, found, folds)[0] * problem.weights["position"]}
+    for k in range(1, (MOST_MODES if count is None else count) + 1):
+        machine, scale = problem.tuned(found.values)
+        simulated = problem.replay.follow(machine, ("x_a",), problem.per_row, scale)[problem.each.axis]["x_a"]
+        K_v = (problem.start | dict(found.values))["K_v"]
+        one = resonance(problem.each, simulated, problem.per_row, K_v)
+        if one is None:
+            break
+        before, start = found, dict(problem.start)
+        best: tuple[float, Tuned, dict[str, float]] | None = None
+        for sign in (1.0, -1.0):
+            first = begin_mode(k, one, sign)
+            problem.start = start | first
+            with suppress(InputError):  # the units cannot run it
+                fit = problem.fitted([*before.names, *first], {**before.values, **first}, before)
+                cost = float(np.sum(fit.residuals**2))
+                if best is None or cost < best[0]:
+                    best = cost, fit, problem.start
+        problem.start = start
+        if best is None:
+            break
+        problem.start = best[2]
+        fit = problem.exact(best[1])
+        gain = _likelihood(problem, fit, folds) - _likelihood(problem, before, folds)
+        predicted[k] = _left_out(problem, fit, folds)[0] * problem.weights["position"]
+        if count is None and not gain > BETTER:
+            problem.start = start
+            break
+        found = fit
+        problem.weigh(found)
+        found = problem.exact(problem.fitted(found.names, found.values, found))
+    return found, predicted
+
+
+def _modes(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> tuple[ElasticMode, ...]:
+    """The elastic modes of a fit, with standard deviations."""
+    own = modes_of(found.values)
+    if not own:
+        return ()
+    spread = dict(zip(found.names, map(float, np.sqrt(np.diag(_covariance(problem, found, unseen)))), strict=True))
+    named = [[f"{key}_{k}" for key in KEYS] for k in range(1, len(own) + 1)]
+    told = [replace(each, sigma=tuple(spread[name] for name in names)) for each, names in zip(own, named, strict=True)]
+    return tuple(sorted(told, key=lambda each: each.frequency))
+
+
 def _one_way(each: AxisRecord, estimates: Mapping[str, Estimate], told: str) -> dict[str, Estimate]:
     """Estimates of which constant load and Coulomb friction are known as their sum.
 
@@ -432,7 +498,7 @@ def _estimates(
         told[name] = _judged(name, value, sigma, spread.get(by, nan) / problem.spread(by, values))
 
     for name in found.names:
-        if name not in ("K_i", "excess", "K_v", "T_dyn"):
+        if name not in ("K_i", "excess", "K_v", "T_dyn") and not name.startswith("mode_"):
             put(name, values[name], spread[name], name)
     ratio = np.array([(n == "K_p") / values["K_p"] - (n == "K_i") / values["K_i"] for n in found.names])
     T_n = values["K_p"] / values["K_i"]

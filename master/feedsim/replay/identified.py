@@ -53,6 +53,7 @@ def identify_drives(
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
     fmus: Path | None = None,
     position_cycle: float | None = None,
+    modes: int | None = 0,
 ) -> DrivesFound:
     """Identify the drive of every axis.
 
@@ -62,6 +63,7 @@ def identify_drives(
         head: comment at the top of the files. name, note: of the machine that is written. fmus: folder of the archives.
         position_cycle: of rigid axes [s]; None: the control cycle, or that of the record's rows where the record speaks
             for it.
+        modes: elastic ones of each rigid axis; None: as many as the record asks for.
 
     Raises InputError: of an axis, what :func:`identify_drive` refuses; neither a torque nor a machine.
     """
@@ -82,7 +84,8 @@ def identify_drives(
             with _begun(machine, name, note, axes, interval, cycle) as own:
                 found[axis] = identify_drive(
                     own, each, read[axis].records, structure_known=machine is not None, begin=begin,
-                    other_cycle=_other(cycle, interval) if machine is None else None, progress=tell, fmus=fmus,
+                    other_cycle=_other(cycle, interval) if machine is None else None,
+                    modes=modes, progress=tell, fmus=fmus,
                 )  # fmt: skip
         return found
 
@@ -101,7 +104,8 @@ def identify_drives(
         else:
             values = friction | {"J": one.estimates["J"].value, "M_0": one.machine.axes[axis].M_0}
             rigid[axis] = replace(
-                rigid_axis(each, begin.starts[0]), drive=drive, values=values, estimates=one.estimates, head=head
+                rigid_axis(each, begin.starts[0]), drive=drive, values=values, estimates=one.estimates, head=head,
+                modes=one.modes,
             )  # fmt: skip
     if rigid:
         files = machine_files(name, note, rigid, interval, cycle)

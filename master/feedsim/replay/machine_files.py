@@ -1,6 +1,7 @@
 """A machine folder out of what was identified: machine.yaml, modes.csv, and per axis drive_A.yaml and friction_A.yaml.
 
-The axes are rigid and move independently: one mode of frequency 0 each, with the inertia that was found.
+The axes move independently: one mode of frequency 0 each, with the inertia that was found, and the elastic modes of
+each.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pydantic.fields import FieldInfo
 from feedsim.fields import Quantity
 from feedsim.identify.friction_file import DIGITS, Line, friction_text, interval_text
 from feedsim.identify.result import Estimate
+from feedsim.replay.elastic import ElasticMode
 from feedsim.scenario import Drive, Filter, Friction
 from feedsim.scenario.parameter_group import ParameterGroup
 
@@ -44,6 +46,7 @@ class RigidAxis:
     values: Mapping[str, float]
     estimates: Mapping[str, Estimate]
     head: Sequence[str] = ()
+    modes: Sequence[ElasticMode] = ()
 
 
 def control_cycle(interval: float) -> float:
@@ -73,11 +76,21 @@ def friction_file(axis: str) -> str:
 def _modes(axes: Mapping[str, RigidAxis]) -> str:
     ports = [f"{kind}_{axis}" for kind in ("n", "x") for axis in axes] + [f"tcp_{axis}" for axis in TOOL]
     lines = [",".join(["mode", "frequency [Hz]", "damping ratio [1]", *ports])]
-    for k, (axis, each) in enumerate(axes.items()):
+    rows: list[tuple[float, float, dict[str, float]]] = []
+    for axis, each in axes.items():
         n = 1.0 / sqrt(each.values["J"])
         x = n * each.pitch / (2 * pi)
         moved = {f"n_{axis}": n, f"x_{axis}": x, f"tcp_{axis}": x}
-        lines.append(",".join([str(k), "0.0", "0.0", *(repr(float(moved.get(port, 0.0))) for port in ports)]))
+        rows.append((0.0, 0.0, moved))
+    for axis, each in axes.items():
+        n = 1.0 / sqrt(each.values["J"])
+        x = n * each.pitch / (2 * pi)
+        for mode in each.modes:
+            moved = {f"n_{axis}": mode.motor * n, f"x_{axis}": mode.scale * x, f"tcp_{axis}": mode.scale * x}
+            rows.append((mode.frequency, mode.damping, moved))
+    for k, (frequency, damping, moved) in enumerate(rows):
+        numbers = (frequency, damping, *(moved.get(port, 0.0) for port in ports))
+        lines.append(",".join([str(k), *(repr(float(number)) for number in numbers)]))
     return "\n".join(lines) + "\n"
 
 

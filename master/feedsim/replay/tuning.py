@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from feedsim.errors import FeedsimError, InputError
 from feedsim.identify.position_loop import rms
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
+from feedsim.replay.elastic import modes_of, with_modes
 from feedsim.replay.secant import Least, Point
 from feedsim.scenario import Machine
 from feedsim.trace.trace import Array
@@ -27,7 +28,9 @@ Rows = NDArray[np.int64]
 
 # Deviations of the logarithm (of the value itself where it is not in LOGARITHMIC) about the start: what is usual. The
 # inertia begins with the rigid line's, which accelerations tell well; where they do not, its deviation is that line's.
+# A mode's place is told by regression ahead of the fit.
 LOGARITHMIC = ("J", "K_p", "K_i", "K_v", "omega_0", "D", "F_C", "sigma_0", "sigma_1", "sigma_2", "v_s", "W")
+OF_MODES = {"mode_f": 0.1, "mode_D": 0.7, "mode_u": 0.7}  # of the logarithm
 USUAL = {
     "J": 0.05, "K_p": 1.0, "K_i": 1.5, "K_v": 1.0, "omega_0": 0.7, "D": 0.5, "F_C": 0.7, "sigma_0": 1.5,
     "sigma_1": 2.0, "sigma_2": 1.5, "v_s": 1.5, "W": 1.5, "gamma": 0.5, "excess": 0.5, "asymmetry": 0.2,
@@ -46,7 +49,13 @@ LEAST = {"position": 1e-9, "torque": 1e-3}  # [m], share of the torque: no chann
 # ends COMPARED off its least is off by a few hundredths of the logarithm of the likelihood, or a fifth of a standard
 # deviation; FINAL is a tenth of that, and a third of the deviation. ROUGH is to begin with, where weights are guessed.
 ROUGH, COMPARED, FINAL = 3e-3, 2e-4, 3e-5
+LEAST_SHAPE = 1e-3  # of a mode at the scale, over the rigid motion's
 DIFFERENCE = 1e-3  # of the logarithm, or of a tenth of the usual deviation
+
+
+def logarithmic(name: str) -> bool:
+    """Whether a parameter is scaled by its logarithm."""
+    return name in LOGARITHMIC or name.rpartition("_")[0] in OF_MODES
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +129,9 @@ class Problem:
         )  # fmt: skip
         load = {"constant_load": values["M_0"] / scale, "drive": drive, "friction": friction}
         axes = self.machine.axes | {self.each.axis: own.model_copy(update=load)}
-        return self.machine.model_copy(update={"axes": axes})
+        machine = self.machine.model_copy(update={"axes": axes})
+        modes = modes_of(values)
+        return with_modes(machine, self.each.axis, modes) if modes else machine
 
     def T_dyn(self, values: Mapping[str, float]) -> float:
         """What T_sym leaves of the whole delay, where that is known."""
@@ -155,16 +166,21 @@ class Problem:
     def away(self, name: str, value: float) -> float:
         start = self.start[name]
         usual = self.usual(name)
-        return log(value / start) / usual if name in LOGARITHMIC else (value - start) / usual
+        return log(value / start) / usual if logarithmic(name) else (value - start) / usual
 
     def at_end(self, name: str, value: float) -> bool:
         """Whether a value has run to where it has no effect, or to where it ends."""
-        if name in LOGARITHMIC:
+        if logarithmic(name):
             return abs(self.away(name, value)) > 0.95 * SPAN
         return any(abs(value - end) < 0.01 * self.usual(name) for end in ENDS.get(name, ()))
 
     def usual(self, name: str) -> float:
         """Deviation from the start that is usual, of the logarithm or of the value."""
+        key = name.rpartition("_")[0]
+        if key in OF_MODES:
+            return OF_MODES[key]
+        if key == "mode_v":
+            return max(abs(self.start[name]), LEAST_SHAPE)
         if name == "J":
             return max(USUAL["J"], self.start.get("J_sigma", 0.0))
         return USUAL[name] if name in USUAL else 2.0 * self.start["F_C"] if name == "F_log" else 5 * self.start["F_C"]
@@ -172,7 +188,7 @@ class Problem:
     def at(self, name: str, away: float) -> float:
         """The value that is so many usual deviations off the start."""
         off = away * self.usual(name)
-        if name in LOGARITHMIC:
+        if logarithmic(name):
             return self.start[name] * exp(off)
         low, high = BOUNDS.get(name, (-inf, inf))  # the way there and back rounds
         return min(max(self.start[name] + off, low), high)
@@ -180,9 +196,7 @@ class Problem:
     def bounds(self, names: Sequence[str]) -> tuple[Array, Array]:
         """(P,) and (P,), in usual deviations from the start."""
         ends = [
-            (-SPAN, SPAN)
-            if name in LOGARITHMIC
-            else tuple(self.away(name, end) for end in BOUNDS.get(name, (-inf, inf)))
+            (-SPAN, SPAN) if logarithmic(name) else tuple(self.away(name, end) for end in BOUNDS.get(name, (-inf, inf)))
             for name in names
         ]
         low, high = zip(*ends, strict=True)
@@ -190,7 +204,7 @@ class Problem:
 
     def spread(self, name: str, values: Mapping[str, float]) -> float:
         """The usual deviation of a parameter, in its own unit."""
-        return self.usual(name) * (abs(values[name]) if name in LOGARITHMIC else 1.0)
+        return self.usual(name) * (abs(values[name]) if logarithmic(name) else 1.0)
 
     def weigh(self, found: Tuned) -> None:
         """Take what is left with what was found as what a residual is worth.
@@ -238,7 +252,7 @@ class Problem:
 
         count = len(self.rows)
         weights = np.repeat([self.weights["position"], self.weights["torque"]], count)
-        steps = np.array([DIFFERENCE / self.usual(name) if name in LOGARITHMIC else 0.1 * DIFFERENCE for name in names])
+        steps = np.array([DIFFERENCE / self.usual(name) if logarithmic(name) else 0.1 * DIFFERENCE for name in names])
         return Least(
             errors, lambda x: np.append(x, self.rings(values(x))), weights, *self.bounds(names), steps
         )  # fmt: skip

@@ -12,6 +12,7 @@ from feedsim.arguments import spelt
 from feedsim.findings import Note
 from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
+from feedsim.identify.result import NORMAL_95
 from feedsim.replay.compare import Comparison
 from feedsim.replay.drive import APART, DriveFound
 from feedsim.replay.identified import DrivesFound
@@ -32,6 +33,12 @@ LEADING = {"position_rms": "position error, rms", "torque_rms": "torque error, r
 PARTS = (
     "A part is taken where the record predicts stretches and kinds of its motion better with it that the fit has not "
     "seen (cross-validation): gain of the logarithm of the likelihood."
+)
+
+
+MODES_TEXT = (
+    "Shapes are relative to the rigid motion. A mode stays where a fit to three quarters of the motion predicts the "
+    "fourth one better with it."
 )
 
 
@@ -98,9 +105,10 @@ def head(record: Path, window: tuple[float, float] | None, day: str) -> list[str
             "Intervals hold 95 % as far as the model is that of the axis."]  # fmt: skip
 
 
-def note(record: Path) -> str:
+def note(record: Path, modes: int | None = 0) -> str:
     """Of the machine that is written."""
-    return f"Identified from {record.name}. Axes are rigid; what the record does not show is assumed (see the files)."
+    axes = "rigid" if modes == 0 else "rigid but for the modes in modes.csv"
+    return f"Identified from {record.name}. Axes are {axes}; what the record does not show is assumed (see the files)."
 
 
 def machine_of(report: DriveReport) -> Machine:
@@ -137,6 +145,7 @@ def report_of(report: DriveReport) -> Report:
             *(_parameters(axis, one) for axis, one in drives.items()),
             *pictures,
             *(_parts(axis, one) for axis, one in drives.items() if one.parts),
+            *(_modes(axis, one) for axis, one in drives.items() if one.modes_predicted or one.modes),
             figures_section(report.figures),
             control_section(machine_of(report)),
         ],
@@ -174,6 +183,23 @@ def _parts(axis: str, one: DriveFound) -> Section:
     return Section(f"What the friction of {axis} needs", [Paragraph(PARTS), table])
 
 
+def _modes(axis: str, one: DriveFound) -> Section:
+    half = [tuple(NORMAL_95 * sigma for sigma in mode.sigma) for mode in one.modes]
+    rows = [
+        (f"{mode.frequency:.4g} ± {wide[0]:.2g}", f"{100 * mode.damping:.3g} ± {100 * wide[1]:.2g}",
+         f"{mode.motor:.3g} ± {wide[2]:.2g}", minus(f"{mode.scale:.3g}") + f" ± {wide[3]:.2g}")
+        for mode, wide in zip(one.modes, half, strict=True)
+    ]  # fmt: skip
+    heads = ("Frequency [Hz]", "Damping [%]", "Shape at the motor [1]", "Shape at the scale [1]")
+    parts: list[Paragraph | Table] = [Paragraph(MODES_TEXT)]
+    if rows:
+        parts.append(Table("rrrr", heads, rows))
+    if one.modes_predicted:
+        left = [(str(count), f"{1e6 * value:.3g}") for count, value in one.modes_predicted.items()]
+        parts.append(Table("rr", ("Modes", "Position left of unseen quarters [µm]"), left))
+    return Section(f"Elastic modes of {axis}", parts)
+
+
 def _files(report: DriveReport) -> list[tuple[str, Path]]:
     found = [("record", source.file) for source in report.sources]
     found += [("mapping", source.mapping) for source in report.sources if source.mapping is not None]
@@ -201,6 +227,12 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
                     "torque": {"value": finite(one.predicted[1]), "unit": "N.m"},
                 },
                 "position_cycle": {"value": one.machine.cycles.T_pos, "unit": "s"},
+                "modes": [
+                    {"frequency": mode.frequency, "damping": mode.damping, "motor": mode.motor, "scale": mode.scale,
+                     "sigma": [finite(sigma) for sigma in mode.sigma]}
+                    for mode in one.modes
+                ],
+                "modes_predicted": {str(count): value for count, value in one.modes_predicted.items()},
                 "runs": one.runs,
             }
             for axis, one in report.found.drives.items()
@@ -242,6 +274,11 @@ def summary_lines(report: DriveReport) -> list[str]:
         torque = f", torque {own['torque_rms']} rms" if "torque_rms" in own else ""
         lines.append(f"    left: position {own['position_rms']} rms{torque}, while it moves;")
         torque = f", {one.predicted[1]:.4g} N.m" if torque else ""
+        lines += [
+            f"    mode at {mode.frequency:.4g} Hz (+-{NORMAL_95 * mode.sigma[0]:.2g}), "
+            f"damping {100 * mode.damping:.2g} %, motor {mode.motor:.2g}, scale {mode.scale:.2g} of the rigid motion"
+            for mode in one.modes
+        ]
         lines.append(
             f"    of every quarter of the motion by a fit to the others: {1e6 * one.predicted[0]:.4g} um{torque}"
         )

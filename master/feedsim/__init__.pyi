@@ -22,6 +22,7 @@ from feedsim.jobs.show import Overlay as Overlay
 from feedsim.jobs.show import show as show
 from feedsim.jobs.subject import load as load
 from feedsim.jobs.sweep import sweep as sweep
+from feedsim.jobs.tune_compensation import tune_compensation as tune_compensation
 from feedsim.scenario import Machine as Machine
 from feedsim.scenario import Scenario as Scenario
 from feedsim.scenario import load_machine as load_machine

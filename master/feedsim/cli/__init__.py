@@ -38,6 +38,7 @@ from feedsim.cli import (
     run,
     show,
     sweep,
+    tune,
 )
 from feedsim.cli.grammar import Parser
 from feedsim.cli.kinds import meant
@@ -79,7 +80,7 @@ examples:
 COMMANDS = (
     example.COMMAND, run.RUN, run.VALIDATE, machine.COMMAND, frf.COMMAND, identify.COMMAND, replay.IDENTIFY_DRIVE,
     modes.COMMAND, replay.REPLAY, compensate.COMMAND, circle.COMMAND, show.COMMAND, pack.COMMAND, page.COMMAND, run.SSP,
-    sweep.COMMAND, compare.COMMAND, files.SCHEMA, files.CONVERT, docs.COMMAND,
+    sweep.COMMAND, tune.COMMAND, compare.COMMAND, files.SCHEMA, files.CONVERT, docs.COMMAND,
     completion.COMMAND,
 )  # fmt: skip
 

@@ -1,0 +1,133 @@
+"""A friction compensation as a control has it, found on a simulated machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from feedsim import scenario as scenarios
+from feedsim.analysis import Figure
+from feedsim.arguments import Changes, listed, settings, spelt
+from feedsim.errors import InputError
+from feedsim.fields import no_axis
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.report import tune as page
+from feedsim.report.content import Report
+from feedsim.report.provenance import input_paths
+from feedsim.report.results import Content
+from feedsim.report.tune.report import SETTINGS, SHEET
+from feedsim.tune.compensation import Judged, tune
+from feedsim.tune.compensators import KINDS, OBJECTIVES
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TuneCompensationResult(Result):
+    """A friction compensation. judged: its values, and errors of circles without and with it."""
+
+    judged: Judged
+
+    kind = "tune"
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files of the scenario."""
+        return input_paths(self.judged.scenario)
+
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """ "held_out.median", "held_out.worst", "friction+.median", ..., "X.largest_after"."""
+        return page.figures_of(self.judged)
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """Circles that get worse, and what of a real control is not known."""
+        return page.findings(self.judged)
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """What it takes off on circles that were held out."""
+        return page.answers(self.judged)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answer, and the values to type."""
+        return [*self.answers, *(f"  {line}" for line in page.sheet(self.judged).splitlines()[1:])]
+
+    def files(self) -> Mapping[str, Content]:
+        """Values to load and values to type."""
+        return {SETTINGS: page.settings(self.judged), SHEET: page.sheet(self.judged)}
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.judged)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.judged, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, inputs)
+
+
+def tune_compensation(
+    scenario: File,
+    *,
+    kind: str = "pulse_characteristic",
+    axes: str | Sequence[str] | None = None,
+    objective: str = "ratio",
+    set: Changes = None,
+    fmus: File | None = None,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> TuneCompensationResult:
+    """Find the values of a friction compensation on short circles, and judge them on other radii and feeds.
+
+    Args:
+        scenario: file whose machine is meant; its first circle gives the plane.
+        kind: pulse, pulse_characteristic, table or model.
+        axes: of the plane, that are compensated; both where they are not given.
+        objective: what is minimised: ratio, worst or largest.
+        set: changes of the scenario, as behind ``--set``.
+        fmus: folder of the archives.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        figures, force: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, no circle, units of other makers, an unknown kind or objective.
+        SimulationError: a unit failed.
+        OutputError: `out` cannot be written.
+    """
+    for name, value, known in (("kind", kind, KINDS), ("objective", objective, OBJECTIVES)):
+        if value not in known:
+            raise InputError(f"{spelt(name)} {value}: of {', '.join(known)}")
+    changes = settings(set)
+    plan = scenarios.load(scenario, changes)
+    planes = [motion.plane for motion in plan.motions if motion.kind == "circle"]
+    if not planes:
+        raise InputError(f"{plan.file}: has no circle, whose plane would be that of the circles to tune on")
+    plane = planes[0]
+    wanted = plane if axes is None else listed(axes)
+    for axis in wanted:
+        if axis not in plane:
+            raise InputError(f"{spelt('axes')} {','.join(wanted)}: {no_axis(axis, plane)}")
+        plan.machine.shipped_friction(axis, "tuning")
+        plan.machine.shipped_drive(axis, "tuning")
+    if not wanted or len(dict.fromkeys(wanted)) < len(wanted):
+        raise InputError(f"{spelt('axes')} {','.join(wanted)}: names of axes are needed, each once, such as X,Z")
+    archives = None if fmus is None else Path(fmus)
+    with kept(out, page.check_writable, watch, input_paths(plan), changes, force=force):
+        announce(watch, plan.machine, archives, plan.coupling)
+        judged = tune(plan, kind, plane, tuple(wanted), objective, fmus=archives, progress=watch.progress)
+        result = TuneCompensationResult(judged)
+        if out is not None:
+            result.save(out, figures=figures, force=force)
+    return result

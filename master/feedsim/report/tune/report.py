@@ -1,0 +1,270 @@
+"""The report of a tuned friction compensation: error over radius and feed, characteristic, values to type."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feedsim.analysis import Figure
+from feedsim.control import Name, names_of
+from feedsim.findings import Note, Wrong
+from feedsim.report import sections
+from feedsim.report.chart import Axis, Chart, Curve, Panel
+from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.formatting import minus, typeset
+from feedsim.report.picture import Picture
+from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
+from feedsim.report.results import REPORT, SUMMARY, check_place
+from feedsim.report.style import BLUE, MUTED, VERMILLION
+from feedsim.tune.circles import Pair
+from feedsim.tune.compensation import Judged
+from feedsim.tune.compensators import amplitude
+from feedsim.units import convert
+from feedsim.variables import parameters
+
+SETTINGS, SHEET = "settings.yaml", "sheet.csv"
+GROUPS = {"pulse": "friction_pulse", "pulse_characteristic": "friction_pulse", "table": "friction_table"}
+CONTROLS = {"pulse": "sinumerik", "pulse_characteristic": "sinumerik", "table": "twincat"}
+WORDS = {
+    "pulse": "a constant pulse on the speed setpoint",
+    "pulse_characteristic": "a pulse on the speed setpoint with a characteristic over the acceleration",
+    "table": "a torque over the commanded speed",
+    "model": "the friction model as torque feedforward",
+}
+OBJECTIVES = {
+    "ratio": "the mean of the ratios of errors with and without, large ratios counting more",
+    "worst": "the largest ratio of errors with and without",
+    "largest": "the largest error, in um: slow circles then count little",
+}
+UNKNOWN = (
+    "Of the real control the instant of the pulse, its exact shape and the order within a cycle are not public; here "
+    "the pulse begins where the axis reverses. Try the values with one circle, and vary the amplitude first"
+)
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
+    check_place(directory, (REPORT, SUMMARY, SETTINGS, SHEET), inputs, kind="tune")
+
+
+def figures_of(judged: Judged) -> dict[str, Figure]:
+    """How much errors at the reversals fall, on the circles that were held out."""
+    found = judged.reduction(judged.held_before, judged.held_after)
+    words = "reduction of the error at the reversals, of all circles and axes that were held out"
+    figures = {
+        "held_out.median": Figure(100 * float(np.median(found)), "%", f"median {words}"),
+        "held_out.worst": Figure(100 * float(found.min()), "%", f"least {words}"),
+    }
+    for change, (before, after) in judged.changed.items():
+        own = judged.reduction(before, after)
+        name, much = f"friction{'+' if change > 0 else '-'}", f"with the friction changed by {100 * change:+.0f} %"
+        figures[f"{name}.median"] = Figure(100 * float(np.median(own)), "%", f"median {words}, {much}")
+        figures[f"{name}.worst"] = Figure(100 * float(own.min()), "%", f"least {words}, {much}")
+    for axis, k in zip(judged.axes, judged.columns, strict=True):
+        for name, errors in (("before", judged.held_before), ("after", judged.held_after)):
+            figures[f"{axis}.largest_{name}"] = Figure(
+                1e6 * float(errors[:, k].max()), "um", f"largest error where {axis} reverses, {name} tuning: peak or "
+                "dip of the radius against the median of the turn",
+            )  # fmt: skip
+    return figures
+
+
+def findings(judged: Judged) -> list[str]:
+    """What is to be known before the values are typed."""
+    worse = [
+        f"{axis} on {pair.text}: {1e6 * before:.3g} -> {1e6 * after:.3g} um"
+        for axis, pair, before, after in judged.worse
+    ]
+    told: list[str] = [Wrong(f"worse with compensation than without: {', '.join(worse)}")] if worse else []
+    if judged.found.kind == "model":
+        told.append(Note("the compensation has the friction of the machine itself; a real one is never known so well"))
+    else:
+        told.append(Note(UNKNOWN))
+    return told
+
+
+def answers(judged: Judged) -> list[str]:
+    """What the compensation does to circles that it was not found on."""
+    figures = figures_of(judged)
+    where = f"{judged.plane[0]}-{judged.plane[1]}"
+    return [
+        f"{where}: {WORDS[judged.found.kind]} of {', '.join(judged.axes)} takes off {figures['held_out.median']} of "
+        f"the error at the reversals (median of {len(judged.held)} other circles), at least "
+        f"{figures['held_out.worst']}."
+    ]
+
+
+def rows(judged: Judged) -> Iterator[tuple[str, str, Name | None, Any, Any]]:
+    """Axis, parameter, its name in a control, old and new value in SI."""
+    if judged.found.kind not in GROUPS:
+        return
+    group, names = GROUPS[judged.found.kind], names_of(CONTROLS[judged.found.kind])
+    table = parameters("controller")
+    for axis, values in judged.found.values.items():
+        present = getattr(judged.scenario.machine.axes[axis].drive, group, None)
+        for name, value in values.items():
+            row = table[f"{group}.{name}"]
+            old = getattr(present, name) if present is not None else row.start
+            yield axis, f"{group}.{name}", names.get(f"drive.{group}.{name}"), old, value
+
+
+def settings(judged: Judged) -> str:
+    """The `set` group of a scenario with the values."""
+    lines = ["# Values of feedsim tune compensation, for the group `set` of a scenario.", "set:"]
+    table = parameters("controller")
+    for axis, parameter, _, _, value in rows(judged):
+        unit = table[parameter].unit
+        text = str(value).lower() if isinstance(value, bool) else str(value) if isinstance(value, int) else (
+            f"{value!r} {unit}".removesuffix(" 1")
+        )  # fmt: skip
+        lines.append(f"  machine.axes.{axis}.drive.{parameter}: {text}")
+    return "\n".join(lines) + "\n"
+
+
+def sheet(judged: Judged) -> str:
+    """Values to type: old and new, in the control's unit where its name is known."""
+    lines = ["axis,number,name,old,new,unit,unit confirmed,parameter"]
+    for axis, parameter, name, old, value in rows(judged):
+        if name is not None:
+            known = "yes" if name.confirmed else "no"
+            cells = [name.number, name.name, *(f"{name.shown(float(x)):.6g}" for x in (old, value)), name.unit, known]
+        else:
+            unit, display = _units(parameter)
+            cells = ["", "", *(_shown(x, unit, display) for x in (old, value)), display, ""]
+        lines.append(",".join([axis, *cells, parameter]))
+    return "\n".join(lines) + "\n"
+
+
+def _units(parameter: str) -> tuple[str, str]:
+    row = parameters("controller")[parameter]
+    return row.unit, row.display_unit
+
+
+def _shown(value: Any, unit: str, display: str) -> str:
+    if isinstance(value, bool) or not unit:
+        return str(int(value))
+    return f"{convert(float(value), unit, display):.6g}"
+
+
+def report_of(judged: Judged) -> Report:
+    """Content of the report."""
+    figures, machine = figures_of(judged), judged.scenario.machine
+    tiles = [
+        Tile(tile_value(figures[name]), label, typeset(figures[name].meaning))
+        for name, label in (("held_out.median", "median reduction"), ("held_out.worst", "least reduction"))
+    ]
+    notes = [note for note in (machine.note, judged.scenario.note) if note]
+    rows_ = [
+        ("Scenario", f"{judged.scenario.name} ({judged.scenario.file.name})"),
+        ("Machine", machine.name),
+        ("Minimised", OBJECTIVES[judged.objective]),
+        ("Runs to find it", str(judged.found.runs)),
+    ]
+    return Report(
+        f"Friction compensation of {', '.join(judged.axes)}",
+        f"{machine.name} · {WORDS[judged.found.kind]}",
+        answer=answers(judged),
+        warnings=findings(judged),
+        notes=notes,
+        tiles=tiles,
+        main=[
+            *pictures_of(judged),
+            _values(judged),
+            _errors("Circles held out", judged.held, judged.held_before, judged.held_after, judged),
+            _errors("Circles tuned on", judged.tuned, judged.tuned_before, judged.tuned_after, judged),
+            sections.figures_section(figures),
+        ],
+        provenance=sections.provenance_section(rows_, input_files(judged.scenario)),
+        footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
+    )
+
+
+def _values(judged: Judged) -> Section | None:
+    lines: list[tuple[Text, ...]] = [
+        tuple(code(cell) if i == 7 else minus(cell) for i, cell in enumerate(line.split(",")))
+        for line in sheet(judged).splitlines()[1:]
+    ]
+    if not lines:
+        return None
+    heads = ("Axis", "Number", "Name in the control", "Old", "New", "Unit", "Unit confirmed", "Parameter")
+    return Section("Values to type", [Table("lllrrlll", heads, lines), Paragraph(UNKNOWN + ".", "muted")])
+
+
+def _errors(title: str, pairs: Sequence[Pair], before: Any, after: Any, judged: Judged) -> Section:
+    lines: list[tuple[Text, ...]] = []
+    for i, pair in enumerate(pairs):
+        cells = [f"{pair.radius * 1e3:.4g}", f"{pair.feed * 60:.4g}", f"{pair.acceleration:.3g}"]
+        for k in judged.columns:
+            cells += [
+                f"{1e6 * before[i, k]:.2f}", f"{1e6 * after[i, k]:.2f}",
+                minus(f"{100 * (1 - after[i, k] / before[i, k]):.0f}"),
+            ]  # fmt: skip
+        lines.append(tuple(cells))
+    heads = ["Radius [mm]", "Feed [m/min]", "v²/r [m/s²]"]
+    for axis in judged.axes:
+        heads += [f"{axis} without [µm]", f"{axis} with [µm]", f"{axis} less by [%]"]
+    return Section(title, [Table("r" * len(heads), heads, lines)])
+
+
+def pictures_of(judged: Judged) -> list[Picture]:
+    """Errors over the acceleration without and with, and the characteristic as the control's manual draws it."""
+    accelerations = np.array([pair.acceleration for pair in judged.held])
+    across = Axis("acceleration at the reversal, v²/r", "m/s²", log=True)
+    panels = [
+        Panel(
+            f"{axis}", across, Axis("error at the reversals", "µm"),
+            [Curve(name, accelerations, 1e6 * errors[:, k], colour, dots=True)
+             for name, errors, colour in (
+                 ("without", judged.held_before, VERMILLION), ("with", judged.held_after, BLUE))],
+        )
+        for axis, k in zip(judged.axes, judged.columns, strict=True)
+    ]  # fmt: skip
+    found = [
+        Picture(
+            "tune-errors", "Errors at the reversals, circles held out",
+            "The larger of peak and dip of the radius, against the median of the turn.",
+            Chart(panels, (1.0,) * len(panels)),
+        )
+    ]  # fmt: skip
+    if judged.found.kind == "pulse_characteristic":
+        a = np.geomspace(accelerations.min() / 2, accelerations.max() * 1.5, 200)
+        curves = [
+            Curve(axis, a, 6e4 * amplitude(values, a), colour)
+            for (axis, values), colour in zip(judged.found.values.items(), (BLUE, VERMILLION, MUTED), strict=False)
+        ]
+        panel = Panel("Amplitude of the pulse", across, Axis("amplitude", "mm/min"), curves)
+        found.append(
+            Picture("tune-characteristic", "Characteristic over the acceleration",
+                    "As the manual of the control draws it.", Chart([panel]))
+        )  # fmt: skip
+    return found
+
+
+def summary(judged: Judged, names: Sequence[str]) -> Mapping[str, Any]:
+    """Content of summary.json."""
+    return {
+        "answer": answers(judged),
+        "kind_of_compensation": judged.found.kind,
+        "objective": judged.objective,
+        "values": {axis: dict(values) for axis, values in judged.found.values.items()},
+        "runs": judged.found.runs,
+        "figures": figures_part(figures_of(judged)),
+        "circles": {
+            name: [
+                {"radius": pair.radius, "feed": pair.feed, "before": list(before), "after": list(after)}
+                for pair, before, after in zip(pairs, befores.tolist(), afters.tolist(), strict=True)
+            ]
+            for name, pairs, befores, afters in (
+                ("tuned", judged.tuned, judged.tuned_before, judged.tuned_after),
+                ("held_out", judged.held, judged.held_before, judged.held_after),
+            )
+        },
+        "axes": list(judged.plane),
+        "machine": machine_part(judged.scenario.machine),
+        "inputs": inputs_part(input_files(judged.scenario)),
+        "software": software(),
+        "files": list(names),
+    }

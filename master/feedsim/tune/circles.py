@@ -1,0 +1,181 @@
+"""Circles of many radii and feeds in one run, and how far each axis leaves the circle where it reverses.
+
+Every circle is an arc of 450 deg; what counts is the turn from 60 to 420 deg, in which both axes reverse twice at
+constant speed. All circles stand behind each other in one program, so that a candidate costs one run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.analysis.circularity import quadrant
+from feedsim.analysis.figures import Array
+from feedsim.cosim import run
+from feedsim.cosim.feedforward import TorqueFeedforward
+from feedsim.errors import InputError
+from feedsim.motions.circular import Arc
+from feedsim.motions.dwell import Dwell
+from feedsim.motions.move import Move
+from feedsim.nc import Program, plan
+from feedsim.scenario import Machine, Scenario
+from feedsim.scenario.model import Recording
+
+# The practical range: accelerations v^2/r at the reversals [m/s^2], of radii [m] and feeds [m/s] of circular tests.
+ACCELERATIONS = (0.01, 2.0)
+RADII = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
+FEEDS = tuple(feed / 60 for feed in (0.5, 1.0, 2.0, 5.0, 10.0))
+SWEEP, BEGIN, END = math.radians(450), math.radians(60), math.radians(420)
+REST = 0.2  # [s] ahead of a circle
+INTERVAL = 1e-3  # [s] between the rows that are looked at
+COUNT = 8  # of accelerations that are tuned on
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A circle: radius [m] and feed [m/s]."""
+
+    radius: float
+    feed: float
+
+    @property
+    def acceleration(self) -> float:
+        """At the reversals, v^2/r [m/s^2]."""
+        return self.feed**2 / self.radius
+
+    @property
+    def duration(self) -> float:
+        """Of a turn [s]."""
+        return 2 * math.pi * self.radius / self.feed
+
+    @property
+    def text(self) -> str:
+        return f"R {self.radius * 1e3:g} mm at {self.feed * 60:g} m/min"
+
+
+def practical(machine: Machine, plane: Sequence[str]) -> list[Pair]:
+    """The pairs of the practical range that the axes have travel, speed and acceleration for, by acceleration."""
+    span = min(machine.axes[axis].travel[1] - machine.axes[axis].travel[0] for axis in plane)
+    speed = min(machine.axes[axis].max_speed for axis in plane)
+    most = min([machine.path.acceleration, *(machine.axes[axis].max_acceleration for axis in plane)])
+    found = [Pair(radius, feed) for radius in RADII for feed in FEEDS]
+    low, high = ACCELERATIONS
+    return sorted(
+        (each for each in found if low <= each.acceleration <= min(high, most) and 2 * each.radius < 0.9 * span
+         and each.feed <= speed),
+        key=lambda each: (each.acceleration, each.radius),
+    )  # fmt: skip
+
+
+def tuned_on(pairs: Sequence[Pair]) -> list[Pair]:
+    """Short circles over the accelerations of some pairs, none of which is among them: to tune on.
+
+    What a compensation has to do at a reversal follows most from the acceleration; small radii give it in little time.
+    """
+    low, high = (pairs[i].acceleration for i in (0, -1))
+    fastest, smallest = max(each.feed for each in pairs), min(each.radius for each in pairs)
+    found = []
+    for k, a in enumerate(np.geomspace(low, high, COUNT)):
+        radius = min(smallest * (1, 1, 2, 2, 2, 3, 3, 2)[k % 8], fastest**2 / a)
+        found.append(Pair(radius, float(f"{math.sqrt(a * radius) * 60:.3g}") / 60))
+    # The smallest circle at nearly the highest acceleration: there a pulse has the least time to decay.
+    found.append(Pair(smallest, float(f"{math.sqrt(0.9 * high * smallest) * 60:.3g}") / 60))
+    return [each for each in found if each not in pairs]
+
+
+@dataclass(frozen=True, eq=False)
+class Circles:
+    """Circles on a machine, planned.
+
+    scenario: with the motions. program: of them. pairs: in their order. turns: per pair the rows that count, of the
+    recorded table. centres: (2,) per pair [m].
+    """
+
+    scenario: Scenario
+    program: Program
+    plane: tuple[str, str]
+    pairs: tuple[Pair, ...]
+    turns: tuple[tuple[float, float], ...]
+    centres: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario, plane: tuple[str, str], pairs: Sequence[Pair]) -> Circles:
+        """Plan the circles in the middle of the travel. Raises InputError: limits of the axes forbid one."""
+        first, second = plane
+        machine = scenario.machine
+        middle = {axis: sum(machine.axes[axis].travel) / 2 for axis in plane}
+        motions: list[Move | Arc | Dwell] = []
+        for each in pairs:
+            start = {first: middle[first] + each.radius, second: middle[second]}
+            motions += [
+                Move(to=start, feed=0.9 * min(machine.axes[axis].max_speed for axis in plane)),
+                Dwell(duration=REST),
+                Arc(
+                    plane=plane, feed=each.feed, centre_by={first: -each.radius, second: 0.0}, angle=SWEEP,
+                ),
+            ]  # fmt: skip
+        columns = tuple(f"{axis}.x_a" for axis in plane)
+        own = scenario.model_copy(
+            update={
+                "motions": (*motions, Dwell(duration=REST)),
+                "recording": Recording(interval=_interval(machine), variables=columns),
+                "logging": None,
+                "evaluate": (),
+                "loads": (),
+            }
+        )
+        program = plan(own)
+        centre = (middle[first], middle[second])
+        arcs = [segment for segment, motion in zip(program.segments, own.motions, strict=True) if motion.kind == "arc"]
+        turns = tuple(_turn(program, plane, centre, segment.start, segment.end) for segment in arcs)
+        return cls(own, program, plane, tuple(pairs), turns, (centre,) * len(pairs))
+
+    def with_machine(self, machine: Machine) -> Scenario:
+        """The scenario on another machine of the same axes and limits."""
+        return self.scenario.model_copy(update={"machine": machine})
+
+    def errors(self, machine: Machine, *, fmus: Path | None = None, torque: TorqueFeedforward | None = None) -> Array:
+        """(pairs, 2 axes, 2) peak and dip [m] of the radius where an axis reverses, from the median of the turn.
+
+        The larger of two reversals each. Raises as :func:`feedsim.cosim.run`.
+        """
+        found = run(self.with_machine(machine), program=self.program, fmus=fmus, torque_feedforward=torque)
+        x, z = (np.asarray(found.trace[f"{axis}.x_a"]) for axis in self.plane)
+        result = np.empty((len(self.pairs), 2, 2))
+        for i, (each, turn, centre) in enumerate(zip(self.pairs, self.turns, self.centres, strict=True)):
+            rows = (found.trace.time >= turn[0]) & (found.trace.time <= turn[1])
+            u, w = x[rows] - centre[0], z[rows] - centre[1]
+            deviation, angle = np.hypot(u, w) - each.radius, np.arctan2(w, u)
+            deviation = deviation - np.median(deviation)
+            for k in range(2):
+                near = quadrant(angle, k * math.pi / 2) | quadrant(angle, k * math.pi / 2 + math.pi)
+                result[i, k] = deviation[near].max(), deviation[near].min()
+        return result
+
+
+def size(errors: Array) -> Array:
+    """max(peak, -dip) [m] of errors (..., 2)."""
+    return np.asarray(np.maximum(errors[..., 0], -errors[..., 1]))
+
+
+def _interval(machine: Machine) -> float:
+    return max(1, round(INTERVAL / machine.cycles.T_c)) * machine.cycles.T_c
+
+
+def _turn(
+    program: Program, plane: tuple[str, str], centre: tuple[float, float], start: float, end: float
+) -> tuple[float, float]:
+    """Begin and end [s] of the turn that counts, by the setpoints."""
+    rows: NDArray[np.bool_] = (program.time >= start) & (program.time <= end)
+    time = program.time[rows]
+    x, z = (np.asarray(program.x_s[axis][rows]) - c for axis, c in zip(plane, centre, strict=True))
+    angle = np.unwrap(np.arctan2(z, x))
+    angle = np.maximum.accumulate(angle - angle[0])
+    if angle[-1] < END:
+        raise InputError("a circle has no full turn at constant speed; take larger radii or lower feeds")
+    return float(np.interp(BEGIN, angle, time)), float(np.interp(END, angle, time))

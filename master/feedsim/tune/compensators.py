@@ -1,0 +1,260 @@
+"""Kinds of friction compensation, and how their values are found on a simulated machine.
+
+pulse, pulse_characteristic: amplitude and time constant enter a run once each, so that a grid of runs over both tells
+the error of every circle for any characteristic: peak and dip are close to straight lines in the amplitude. The search
+itself is on that grid, from many starts, and costs no runs. table: Gauss-Newton on the contour would need its samples;
+the torques are found by coordinate steps on the errors, for both axes in the same runs. model: nothing to find, the
+friction model of the machine is the compensation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.analysis.figures import Array
+from feedsim.cosim.feedforward import lag_of
+from feedsim.errors import InputError
+from feedsim.scenario import Drive, Machine
+from feedsim.tune.circles import Circles, size
+from feedsim.tune.closed_forms import axis_lag
+
+KINDS = ("pulse", "pulse_characteristic", "table", "model")
+OBJECTIVES = ("ratio", "worst", "largest")
+Progress = Callable[[str, int, int], None]
+
+# Amplitudes in shares of 2 F_C/K_p, the speed error that turns the friction torque round; time constants [s].
+SHARES = (0.0, 0.08, 0.16, 0.25, 0.35, 0.5, 0.7, 1.0)
+TIMES = (0.01, 0.02, 0.035, 0.06, 0.1, 0.17, 0.3)
+POPULATION, KEPT, ROUNDS, NARROWER = 4000, 200, 40, 0.88  # of the search on the grid
+NEVER_WORSE = 1.05  # of the error without compensation, where a pair counts as worse
+WEIGHT = 4.0  # exponent of the mean of ratios: large ones count more
+# Speeds of the table's points [m/s]: from standstill, where friction turns round, to fast circles.
+SPEEDS = tuple(speed / 60000 for speed in (0.0, 10.0, 30.0, 90.0, 250.0, 700.0, 2000.0, 6000.0))
+DISTANCE = 1e-6  # [m] the longest that the control allows
+STEPS = (0.5, 0.25, 0.12)  # of the friction F_C, by which torques are changed
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A compensation of some axes.
+
+    values: axis -> parameter of its drive (or of its group) -> SI. runs: that it took.
+    """
+
+    kind: str
+    values: Mapping[str, Mapping[str, float | bool | int]]
+    runs: int
+
+    def on(self, machine: Machine) -> Machine:
+        """The machine with it; "model" is no part of the drive and leaves it as it is."""
+        for axis, values in self.values.items():
+            group = {"pulse": "friction_pulse", "pulse_characteristic": "friction_pulse", "table": "friction_table"}
+            if self.kind in group:
+                machine = compensated(machine, axis, group[self.kind], values)
+        return machine
+
+
+def compensated(machine: Machine, axis: str, group: str, values: Mapping[str, float | bool | int]) -> Machine:
+    """A machine whose axis has a group of its drive with other values."""
+    own = machine.axes[axis]
+    kind = type(own.drive).model_fields[group].annotation
+    (model,) = [each for each in kind.__args__ if each is not type(None)]  # type: ignore[union-attr]
+    names = model.model_fields
+    filled = {name: values.get(name, info.default) for name, info in names.items()}
+    drive = own.drive.model_copy(update={group: model.model_construct(**filled)})
+    return machine.model_copy(update={"axes": {**machine.axes, axis: own.model_copy(update={"drive": drive})}})
+
+
+def scale_of(machine: Machine, axis: str) -> float:
+    """2 F_C/K_p I_P [m/s]: the speed error whose torque turns the friction round. InputError: another maker's unit."""
+    friction = machine.shipped_friction(axis, "tuning of a compensation")
+    drive = machine.shipped_drive(axis, "tuning of a compensation")
+    if drive.K_p <= 0:
+        raise InputError(f"axis {axis}: K_p is 0; a pulse on the speed setpoint has no effect")
+    return 2 * friction.F_C / drive.K_p * machine.axes[axis].I_P
+
+
+def score(ratios: Array, errors: Array, objective: str) -> Array:
+    """What is minimised, of ratios and errors [m] (..., pairs): the mean of the ratios with large ones counting more,
+    the worst ratio, or the largest error."""
+    if objective == "worst":
+        return np.asarray(ratios.max(axis=-1))
+    if objective == "largest":
+        return np.asarray(errors.max(axis=-1))
+    return np.asarray(np.mean(ratios**WEIGHT, axis=-1) ** (1 / WEIGHT))
+
+
+@dataclass(frozen=True, eq=False)
+class PulseGrid:
+    """Errors over amplitude and time constant, of every pair and axis: (shares, times, pairs, axes, 2) [m]."""
+
+    scales: tuple[float, float]
+    errors: Array
+
+    @classmethod
+    def measured(
+        cls, circles: Circles, machine: Machine, *, fmus: Path | None, progress: Progress, axes: Sequence[str]
+    ) -> PulseGrid:
+        """A run for every point of the grid, with both axes at the same share."""
+        scales = tuple(scale_of(machine, axis) if axis in axes else 0.0 for axis in circles.plane)
+        none = circles.errors(machine, fmus=fmus)
+        found = np.empty((len(SHARES), len(TIMES), *none.shape))
+        found[0] = none
+        total, done = (len(SHARES) - 1) * len(TIMES), 0
+        for i, share in enumerate(SHARES[1:], start=1):
+            for j, time in enumerate(TIMES):
+                progress("pulses", done, total)
+                own = machine
+                for axis, scale in zip(circles.plane, scales, strict=True):
+                    if scale:
+                        values = {"amplitude": share * scale, "time": time, "delay": instant(machine, axis)}
+                        own = compensated(own, axis, "friction_pulse", values)
+                found[i, j] = circles.errors(own, fmus=fmus)
+                done += 1
+        progress("pulses", total, total)
+        return cls((scales[0], scales[1]), found)
+
+    def sizes(self, axis: int, amplitudes: Array, time: Array) -> Array:
+        """(candidates, pairs) errors [m] of an axis; amplitudes (candidates, pairs) [m/s], time (candidates,) [s].
+
+        Linear between the points of the grid, over the amplitude and the logarithm of the time constant.
+        """
+        i, p = _between(np.array(SHARES), amplitudes / self.scales[axis])
+        j, q = _between(np.log(TIMES), np.log(time)[:, None])
+        of, pairs = self.errors[..., axis, :], np.arange(amplitudes.shape[1])
+        p, q = p[..., None], q[..., None]
+        low = (1 - p) * of[i, j, pairs] + p * of[i + 1, j, pairs]
+        high = (1 - p) * of[i, j + 1, pairs] + p * of[i + 1, j + 1, pairs]
+        return size((1 - q) * low + q * high)
+
+
+def _between(grid: Array, x: Array) -> tuple[NDArray[np.int64], Array]:
+    """Index of the interval of the grid that x lies in, and its share of it; beyond the ends as there."""
+    i = np.clip(np.searchsorted(grid, x) - 1, 0, len(grid) - 2)
+    return i, np.clip((x - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)
+
+
+def amplitude(values: Mapping[str, float | bool | int], a: Array) -> Array:
+    """Amplitude [m/s] of a pulse over the acceleration [m/s^2], as the control's manual draws it."""
+    if not values.get("adaptation"):
+        return np.full(np.shape(a), float(values["amplitude"]))
+    edges = [float(values[f"acceleration_{i}"]) for i in (1, 2, 3)]
+    row = np.array([[values["amplitude"], values["amplitude_min"], *edges]], dtype=np.float64)
+    return np.asarray(_characteristic(row, a)[0])
+
+
+def _characteristic(x: Array, a: Array) -> Array:
+    """(candidates, pairs) amplitudes; x (candidates, 5): dn_max, dn_min, a_1, a_2, a_3."""
+    top, low, a_1, a_2, a_3 = (x[:, i, None] for i in range(5))
+    share = np.clip((a - a_2) / np.maximum(a_3 - a_2, 1e-12), 0.0, 1.0)
+    return np.asarray(np.where(a < a_1, top * a / a_1, top + (low - top) * share))
+
+
+def pulse(
+    grid: PulseGrid, axis: int, accelerations: Array, objective: str, *, adapted: bool
+) -> dict[str, float | bool]:
+    """The values of an axis that score best on the grid: a random population, its best ones varied ever less.
+
+    accelerations: (pairs,) [m/s^2]. The random numbers are the same in every call.
+    """
+    before, scale = size(grid.errors[0, 0, :, axis]), grid.scales[axis]
+    edges = math.log(accelerations.min()) - 0.5, math.log(accelerations.max()) + 0.5
+    low = np.array([0.0, math.log(TIMES[0]), *([0.0, edges[0], edges[0], edges[0]] if adapted else [])])
+    high = np.array([1.0, math.log(TIMES[-1]), *([1.0, edges[1], edges[1], edges[1]] if adapted else [])])
+
+    def costs(x: Array) -> Array:
+        top, time = scale * x[:, 0], np.exp(x[:, 1])
+        at = np.repeat(top[:, None], len(accelerations), axis=1)
+        if adapted:
+            at = _characteristic(np.column_stack([top, scale * x[:, 2], np.exp(x[:, 3:6])]), accelerations)
+        errors = grid.sizes(axis, at, time)
+        return score(errors / before, errors, objective)
+
+    random = np.random.default_rng(1)
+    population = random.uniform(low, high, (POPULATION, len(low)))
+    width = 0.25 * (high - low)
+    for _ in range(ROUNDS):
+        population[:, 3:] = np.sort(population[:, 3:], axis=1)
+        best = population[np.argsort(costs(population), kind="stable")[:KEPT]]
+        varied = best[random.integers(0, KEPT, POPULATION - KEPT)]
+        varied = varied + width * random.normal(size=varied.shape)
+        population = np.clip(np.concatenate([best, varied]), low, high)
+        width = width * NARROWER
+    population[:, 3:] = np.sort(population[:, 3:], axis=1)
+    x = population[int(np.argmin(costs(population)))]
+    values: dict[str, float | bool] = {"amplitude": scale * float(x[0]), "time": float(np.exp(x[1]))}
+    if adapted:
+        values |= {"adaptation": True, "amplitude_min": scale * float(x[2])}
+        values |= {f"acceleration_{i}": float(np.exp(edge)) for i, edge in enumerate(x[3:6], start=1)}
+    return values
+
+
+def instant(machine: Machine, axis: str) -> float:
+    """Delay of a pulse [s] behind T_dyn: it begins where the axis itself reverses, its lag less T_dyn."""
+    drive = machine.shipped_drive(axis, "tuning of a compensation")
+    return max(0.0, axis_lag(drive) - drive.T_dyn)
+
+
+def table(
+    circles: Circles, machine: Machine, objective: str, *, fmus: Path | None, progress: Progress, axes: Sequence[str]
+) -> Found:
+    """Torques over the commanded speed, all at least 0, by coordinate steps of both axes in the same runs."""
+    plane = circles.plane
+    level = {axis: machine.shipped_friction(axis, "tuning of a compensation").F_C for axis in axes}
+    delay = {axis: _delay(machine, axis) for axis in axes}
+    before = size(circles.errors(machine, fmus=fmus))
+    torques = {axis: np.zeros(len(SPEEDS)) for axis in axes}
+    runs = 1
+
+    def values_of(axis: str, at: Array) -> dict[str, float | bool | int]:
+        values: dict[str, float | bool | int] = {"points": len(SPEEDS), "distance": DISTANCE, "delay": delay[axis]}
+        values |= {f"speed_{i}": speed for i, speed in enumerate(SPEEDS)}
+        return values | {f"torque_{i}": float(torque) for i, torque in enumerate(at)}
+
+    def scores(candidates: Mapping[str, Array]) -> dict[str, float]:
+        nonlocal runs
+        own = machine
+        for axis, at in candidates.items():
+            own = compensated(own, axis, "friction_table", values_of(axis, at))
+        errors = size(circles.errors(own, fmus=fmus))
+        runs += 1
+        return {
+            axis: float(score(errors[:, k] / before[:, k], errors[:, k], objective))
+            for k, axis in enumerate(plane)
+            if axis in candidates
+        }
+
+    best = scores(torques)
+    directions = [np.ones(len(SPEEDS)), *np.eye(len(SPEEDS)), *(_from(i) for i in range(1, len(SPEEDS)))]
+    total, done = len(STEPS) * len(directions) * 2, 0
+    for step in STEPS:
+        for direction in directions:
+            for sign in (1.0, -1.0):
+                progress("torques", done, total)
+                done += 1
+                tried = {axis: np.maximum(torques[axis] + sign * step * level[axis] * direction, 0.0) for axis in axes}
+                if all(np.array_equal(tried[axis], torques[axis]) for axis in axes):
+                    continue
+                found = scores(tried)
+                for axis in axes:
+                    if found[axis] < best[axis]:
+                        best[axis], torques[axis] = found[axis], tried[axis]
+    progress("torques", total, total)
+    return Found("table", {axis: values_of(axis, torques[axis]) for axis in axes}, runs)
+
+
+def _from(i: int) -> Array:
+    return np.concatenate([np.zeros(i), np.ones(len(SPEEDS) - i)])
+
+
+def _delay(machine: Machine, axis: str) -> float:
+    """So that the torque acts when the axis reverses: its lag less that of its torque, less T_dyn + T_sym [s]."""
+    drive = machine.shipped_drive(axis, "tuning of a compensation")
+    assert isinstance(drive, Drive)
+    return lag_of(drive, machine.cycles).delay - drive.T_dyn - drive.T_sym

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from feedsim.analysis.circularity import quadrant
 from feedsim.analysis.figures import Array
-from feedsim.cosim import run
+from feedsim.cosim.run import run
 from feedsim.cosim.feedforward import TorqueFeedforward
 from feedsim.errors import InputError
 from feedsim.motions.circular import Arc

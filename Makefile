@@ -230,6 +230,9 @@ pictures: fmus $(VENV)/.run ## draw README's and docs' pictures anew (docs/image
 	$(PY) docs/pictures.py $(ARGS)
 	$(PY) docs/diagrams.py
 
+causes: fmus $(VENV)/.run ## put causes into the machine, diagnose its circles, write docs/causes.md and its picture (minutes)
+	$(PY) docs/causes.py
+
 pose-study: fmus $(VENV)/.run ## how a grid of poses converges, against the full model (some minutes; docs/position-dependence.md)
 	$(PY) benchmarks/pose_grid.py
 

@@ -1,0 +1,130 @@
+"""The table of docs/causes.md, and its picture: causes put into the machine, and what the diagnosis says.
+
+May use: the package. Start reading at main(). `make causes` runs it; every figure follows from the units in fmus/.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from feedsim import cosim, scenario
+from feedsim.analysis import Diagnosis
+from feedsim.analysis.circle import name
+from feedsim.analysis.circle.words import worth_telling
+from feedsim.analysis.circle_figures import UNITS, diagnosed
+from feedsim.analysis.circularity import contour
+from feedsim.analysis.evaluate import CircleTask, tasks
+from feedsim.report.style import BLUE, VERMILLION
+
+HERE = Path(__file__).resolve().parent
+CIRCLE = HERE.parent / "scenarios" / "xz_circle.yaml"
+FEEDS, RADII = (1000, 3000, 10000), (30, 60, 100)  # mm/min, mm
+BEGIN, END = "<!-- causes: begin -->", "<!-- causes: end -->"
+SHOWN = (3000, 60)  # of the picture
+INDIRECT = tuple(f"machine.axes.{axis}.drive.measuring.indirect=true" for axis in "XZ")
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What it is called, the settings that put it in, the term that is expected; whether the tool is looked at."""
+
+    title: str
+    settings: tuple[str, ...]
+    term: str = ""
+    at_tool: bool = False
+
+
+CAUSES = (
+    Cause("none", ()),
+    Cause("play of X, 8 um (measured at the motors)", ("machine.axes.X.play=8 um", *INDIRECT), "lost_motion X"),
+    Cause("too much backlash compensation of X, 8 um",
+          ("machine.axes.X.drive.backlash_compensation.value=8 um",), "lost_motion X"),
+    Cause("scale of X, 50 um/m", ("machine.axes.X.drive.measuring.linear=50 um/m",), "scale"),
+    Cause("squareness X-Z, 50 um/m (at the tool)",
+          ("machine.geometry.squareness_XZ=50 um/m",), "squareness", True),
+    Cause("K_v of X 1 % low, no feedforward", (
+        "machine.axes.X.drive.k_ffw=0", "machine.axes.Z.drive.k_ffw=0",
+        "machine.axes.X.drive.K_v=3.96 (m/min)/mm", "machine.axes.Z.drive.K_v=4 (m/min)/mm",
+    ), "servo"),
+)  # fmt: skip
+
+
+def main() -> None:
+    """Write table and picture anew."""
+    rows, shown = [], {}
+    for cause in CAUSES:
+        for feed in FEEDS:
+            cells = []
+            for radius in RADII:
+                found, paths = diagnosis(cause, feed, radius)
+                cells.append(words(found, cause))
+                if (feed, radius) == SHOWN:
+                    shown[cause.title] = paths
+                print(cause.title, feed, radius, cells[-1], flush=True)
+            rows.append((cause.title if feed == FEEDS[0] else "", feed, cells))
+    picture(shown, HERE / "images" / "causes.svg")
+    page = HERE / "causes.md"
+    text = page.read_text(encoding="utf-8")
+    head, rest = text.split(BEGIN)
+    page.write_text(f"{head}{BEGIN}\n{table(rows)}{END}{rest.split(END)[1]}", encoding="utf-8")
+
+
+def diagnosis(cause: Cause, feed: float, radius: float) -> tuple[Diagnosis, list[tuple[np.ndarray, np.ndarray]]]:
+    """What is found, and angle [rad] and deviation [m] of the turns."""
+    settings = (f"motions.0.radius={radius} mm", f"motions.0.feed={feed} mm/min", *cause.settings)
+    run = cosim.run(scenario.load(CIRCLE, list(settings)), fmus=HERE.parent / "fmus")
+    (task,) = (each for each in tasks(run.scenario, run.program) if isinstance(each, CircleTask))
+    columns = ("tcp.x_X", "tcp.x_Z") if cause.at_tool else None
+    found = diagnosed(run.trace, task.turns, task.pitch, task.gain, task.drag, columns)
+    assert found is not None
+    turns = [contour(run.trace, turn, columns) for turn in task.turns]
+    return found, [(turn.angle, turn.deviation) for turn in turns]
+
+
+def words(found: Diagnosis, cause: Cause) -> str:
+    """The causes that are told, the first first, without friction's peaks, which this machine always has."""
+    told = []
+    for term in worth_telling(found):
+        if term.key in ("peaks", "offset"):
+            continue
+        factor, unit = UNITS[term.unit]
+        text = f"{name(term)} {factor * term.value:.3g} +- {factor * term.half:.2g} {unit}"
+        told.append(f"**{text}**" if f"{term.key} {term.axis}".strip() == cause.term else text)
+    return "; ".join(told) or "none"
+
+
+def table(rows: Sequence[tuple[str, float, list[str]]]) -> str:
+    head = f"| cause | feed | {' | '.join(f'R {radius} mm' for radius in RADII)} |\n|---|---|{'---|' * len(RADII)}\n"
+    return head + "".join(f"| {title} | {feed / 1000:g} m/min | {' | '.join(cells)} |\n" for title, feed, cells in rows)
+
+
+def picture(shown: dict[str, list[tuple[np.ndarray, np.ndarray]]], file: Path) -> None:
+    """A small circle for each, deviation from the programmed one magnified to the same share of the radius."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "causes", "svg.fonttype": "path", "font.size": 8})
+    from matplotlib import pyplot
+
+    figure, places = pyplot.subplots(2, 3, figsize=(9, 6.2))
+    for place, (title, turns) in zip(places.flat, shown.items(), strict=True):
+        largest = max(float(np.abs(deviation).max()) for _, deviation in turns)
+        circle = np.linspace(0, 2 * np.pi, 400)
+        place.plot(np.cos(circle), np.sin(circle), color="#b0b0b0", linewidth=0.7)
+        for (angle, deviation), colour in zip(turns, (BLUE, VERMILLION), strict=True):
+            r = 1 + 0.35 * deviation / largest
+            order = np.argsort(angle)
+            place.plot((r * np.cos(angle))[order], (r * np.sin(angle))[order], color=colour, linewidth=1)
+        place.set_title(f"{title}\nlargest deviation {1e6 * largest:.3g} um")
+        place.set_aspect("equal")
+        place.axis("off")
+    figure.tight_layout()
+    figure.savefig(file, metadata={"Date": None, "Creator": None})
+
+
+if __name__ == "__main__":
+    main()

@@ -42,6 +42,7 @@ EXAMPLES = {
     "compare": ["a.csv", "a.csv", "--report", "a.html", "--junit", "a.xml", "--json", "a.json"],
     "convert": ["a.csv", "--column", "time=time:s", "--column", "x=Z.x_a:m", "--out", "b.csv"],
     "schema": ["scenario"],
+    "completion": ["bash"],
     "sweep": ["{scenarios}/studies/z_stop.yaml", "--dry-run"],
 }
 
@@ -102,6 +103,7 @@ def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: s
     needs = LEAVES[name].needs
     arguments = {"identify": ["a.csv"], "circle": ["a.csv"], "frf": ["a"], "show": ["a"], "compensate": ["a"]}
     record = {
+        "tune compensation": ["a"],
         "replay": ["a", "--machine", "a"],
         "identify-drive": ["a"],
         "identify-modes": ["a", "--machine", "a"],

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from feedsim.analysis.circularity import quadrant
 from feedsim.analysis.figures import Array
-from feedsim.cosim.run import run
 from feedsim.cosim.feedforward import TorqueFeedforward
+from feedsim.cosim.run import run
 from feedsim.errors import InputError
 from feedsim.motions.circular import Arc
 from feedsim.motions.dwell import Dwell

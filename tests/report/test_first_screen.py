@@ -6,6 +6,7 @@ What is folded opens by keyboard, by links and on paper; numbers that a page sho
 from __future__ import annotations
 
 import html as markup
+import os
 import re
 import shutil
 from collections.abc import Iterator
@@ -236,3 +237,24 @@ def test_the_diagnosis_names_the_same_peaks_as_the_figures() -> None:
         largest = max(abs(peak.height) for peak in causes["XZ"].peaks if peak.axis == axis)
         assert abs(figures[f"XZ.peak_{axis}"].value) == pytest.approx(1e6 * largest)
     assert np.isfinite(figures["XZ.G"].value)
+
+
+@pytest.mark.skipif(
+    "FEEDSIM_AXE" not in os.environ, reason="FEEDSIM_AXE names axe.min.js of axe-core (npm pack axe-core)"
+)
+@pytest.mark.parametrize("name", NAMES)
+def test_axe_core_finds_nothing(name: str, browser: Any, files: dict[str, Path]) -> None:
+    """Folded and unfolded, on light and dark screens; the page's policy is set aside for the tester's script."""
+    context = browser.new_context(bypass_csp=True, viewport={"width": 1400, "height": 900})
+    page = context.new_page()
+    page.goto(files[name].as_uri())
+    page.wait_for_timeout(300)
+    page.evaluate(Path(os.environ["FEEDSIM_AXE"]).read_text(encoding="utf-8"))
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        for unfolded in (False, True):
+            page.evaluate("all => document.querySelectorAll('details').forEach(each => { each.open = all; })", unfolded)
+            page.wait_for_timeout(100)
+            found = page.evaluate("axe.run(document)")["violations"]
+            assert not found, [(each["id"], each["nodes"][0]["html"][:120]) for each in found]
+    context.close()

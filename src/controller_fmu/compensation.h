@@ -18,8 +18,8 @@
  *
  * s is the sign of n, and at rest the last one; x the way since s changed. Linear between the points, held beyond.
  *
- * Of real controls the order within a cycle, the exact shape of the pulse and the instant are not public: the instant is
- * the setting `delay`. Pure functions, no FMI. */
+ * Of real controls the order within a cycle, the exact shape of the pulse and the instant are not public: the instant
+ * is the setting `delay`. Pure functions, no FMI. */
 #ifndef FEEDSIM_COMPENSATION_H
 #define FEEDSIM_COMPENSATION_H
 

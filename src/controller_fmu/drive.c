@@ -69,8 +69,8 @@ static void control(const Drive *p, DriveState *x, double *lines, const DriveInp
         if (begins) {
             begin(p, x, lines, in, x_s);
         }
-        double n_new = position_step(&p->position, &x->position, lines + p->x_ring, lines + p->n_ring, x_s, in->n_ffw,
-                                     in->x_a);
+        double n_new =
+            position_step(&p->position, &x->position, lines + p->x_ring, lines + p->n_ring, x_s, in->n_ffw, in->x_a);
         if (p->pulse.used) {
             n_new += pulse_step(&p->pulse, &x->pulse, in->n_ffw);
         }

@@ -141,18 +141,17 @@ static void derive_effects(const Scalars *v, Drive *p) {
 /* Friction compensations. Accelerations and speeds of points have to rise: a table between them would have no value. */
 static bool derive_compensation(Unit *unit, const Scalars *v, Drive *p) {
     FrictionPulse *u = &p->pulse;
-    *u = (FrictionPulse){
-        .used = fabs(v->friction_pulse_amplitude) > 0 ||
-                (v->friction_pulse_adaptation != 0 && fabs(v->friction_pulse_amplitude_min) > 0),
-        .adaptation = v->friction_pulse_adaptation != 0,
-        .I_P = v->I_P,
-        .T_pos = v->T_pos,
-        .amplitude = v->friction_pulse_amplitude,
-        .min = v->friction_pulse_amplitude_min,
-        .acceleration = {v->friction_pulse_acceleration_1, v->friction_pulse_acceleration_2,
-                         v->friction_pulse_acceleration_3},
-        .T = v->friction_pulse_time,
-        .wait = fmax(0.0, v->T_dyn + v->friction_pulse_delay)};
+    *u = (FrictionPulse){.used = fabs(v->friction_pulse_amplitude) > 0 ||
+                                 (v->friction_pulse_adaptation != 0 && fabs(v->friction_pulse_amplitude_min) > 0),
+                         .adaptation = v->friction_pulse_adaptation != 0,
+                         .I_P = v->I_P,
+                         .T_pos = v->T_pos,
+                         .amplitude = v->friction_pulse_amplitude,
+                         .min = v->friction_pulse_amplitude_min,
+                         .acceleration = {v->friction_pulse_acceleration_1, v->friction_pulse_acceleration_2,
+                                          v->friction_pulse_acceleration_3},
+                         .T = v->friction_pulse_time,
+                         .wait = fmax(0.0, v->T_dyn + v->friction_pulse_delay)};
     bool good = true;
     for (int i = 0; u->used && u->adaptation && i < 2; ++i) {
         if (u->acceleration[i] > u->acceleration[i + 1]) {

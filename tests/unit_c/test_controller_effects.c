@@ -187,8 +187,7 @@ static void pulse_begins_at_the_reversal_and_decays(void) {
     const double I_P = 0.003, T_pos = 1e-3, T = 0.02;
     for (int late = 0; late < 4; ++late) {
         const double wait = 0.7e-3 * late;
-        const FrictionPulse p = {
-            .used = true, .I_P = I_P, .T_pos = T_pos, .amplitude = 6e-4, .T = T, .wait = wait};
+        const FrictionPulse p = {.used = true, .I_P = I_P, .T_pos = T_pos, .amplitude = 6e-4, .T = T, .wait = wait};
         PulseState x = {.n = 0.0};
         for (int k = 0; k < 100; ++k) {
             const double n = 0.35 - 0.02 * k; /* reverses between 17 and 18 */

@@ -26,6 +26,8 @@ from feedsim.jobs.tune_compensation import tune_compensation as tune_compensatio
 from feedsim.scenario import Machine as Machine
 from feedsim.scenario import Scenario as Scenario
 from feedsim.scenario import load_machine as load_machine
+from feedsim.scenario.load import load_scenario as load_scenario
 from feedsim.trace import Trace as Trace
+from feedsim.trace.csv import read_trace as read_trace
 
 __version__: str

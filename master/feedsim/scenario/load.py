@@ -39,6 +39,9 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     return draft.scenario()
 
 
+load_scenario = load  # its name in `import feedsim`
+
+
 @dataclass
 class Draft:
     """A scenario before it is checked: the tree of its files and what is changed in it.

@@ -57,6 +57,9 @@ def read_csv(
         raise InputError(f"{table.head}: {error}") from None
 
 
+read_trace = read_csv  # its name in `import feedsim`
+
+
 def read_signals(
     path: str | Path,
     columns: Mapping[str, tuple[str, str | None]],

@@ -19,9 +19,12 @@ work_of(file).then(async work => {
   for (const { state, axis, keep, frequency } of asked) {
     try {
       if (frequency) {
-        const system = work.linear(state), gain = {};
-        for (const each of system.axes) gain[each] = system.position_reference(each, frequency);
-        found.push({ gain, loops: await judge(work.linear(state, work.judged_plant), file.machine.locked) });
+        const system = work.linear(state), loops = system.position_loops(frequency), gain = {}, drag = {};
+        for (const each of system.axes) {
+          gain[each] = system.position_reference(each, loops);
+          drag[each] = system.drag(each, loops);
+        }
+        found.push({ gain, drag, loops: await judge(work.linear(state, work.judged_plant), file.machine.locked) });
         continue;
       }
       const run = await work.run(state), trace = {};

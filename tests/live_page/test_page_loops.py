@@ -57,6 +57,8 @@ def test_loops_are_judged_as_by_a_run(name: str, tmp_path: Path) -> None:
         its_gain = position_reference(system, axis, np.array([frequency]), feedforward=True)[0]
         # The last bits of exp and of sums over modes; a wrong block shows in the third digit.
         assert complex(*page["gain"][axis]) == pytest.approx(its_gain, rel=1e-9), (name, axis)
+        its_drag = system.closing({axis: "position"}).transfer(np.array([frequency]), f"{axis}.x_a", f"{axis}.M_add")[0]
+        assert complex(*page["drag"][axis]) == pytest.approx(its_drag, rel=1e-7), (name, axis)
 
 
 def _same(mine: Any, value: Any) -> bool:

@@ -2,7 +2,8 @@
 const PEAK = { OVER: 1, LEAST: 3, SEEN: 5.5, ELSEWHERE: 1.5, SELDOM: 1e-3, BLUR: 0.015, FLOOR: 1e-9 }, FORM = [3, 4, 5], LEAST_SAMPLES = 180, ANGLES = 720;
 const SWING = { FLOOR: 10e-9, LINES: 7, AROUND: 101, STANDS_OUT: 10, FIRST_ORDER: 13, FINE: 0.05, AHEAD: 5 * RADIANS, BEHIND: 60 * RADIANS };
 
-// Turns of one circle taken apart; null where they have too few samples. known: {pitch, gain, students}; gain: axis -> [re, im].
+// Turns of one circle taken apart; null where they have too few samples. known: {pitch, gain, drag, students}; gain: axis -> [re, im];
+// drag: axis -> the same at the odd multiples of the circle's frequency.
 function diagnosed(trace, turns, known) {
   const turn = turns[0], paths = [];
   for (const each of turns) {
@@ -10,7 +11,7 @@ function diagnosed(trace, turns, known) {
     if (angle.length < LEAST_SAMPLES) return null;
     paths.push({ angle, deviation, sense: each.sense, phase: time.map(t => (t - time[0]) * (2 * Math.PI / (each.end - each.begin))) });
   }
-  return diagnose({ axes: turn.axes, radius: turn.radius, speed: 2 * Math.PI * turn.radius / (turn.end - turn.begin), pitch: known.pitch, gain: known.gain || {} }, paths, known.students);
+  return diagnose({ axes: turn.axes, radius: turn.radius, speed: 2 * Math.PI * turn.radius / (turn.end - turn.begin), pitch: known.pitch, gain: known.gain || {}, drag: known.drag || {} }, paths, known.students);
 }
 
 function diagnose(circle, whole, students) {
@@ -21,12 +22,12 @@ function diagnose(circle, whole, students) {
   const G = range_of(e), high = e.indexOf(largest(e)), low = e.indexOf(least(e)), peaks = paths.flatMap((path, k) => peaks_of(circle, found, k, path.sense));
   const terms = Object.entries(parts).map(([name, part]) => {
     const [key, axis] = name.split(" "), [value, half, unit] = value_of(circle, found, peaks, key, axis), size = range_of(part);
-    const term = { key, axis, value: key === "rest" ? size : value, half, unit, size, share: G > 0 ? (part[high] - part[low]) / G : 0 };
+    const term = { key, axis, value: key === "rest" ? size : value, half, unit, size, share: G > 0 ? (part[high] - part[low]) / G : 0, gain: G - range_of(e.map((each, k) => each - part[k])) };
     const seen = key === "radius" ? Math.abs(term.value) : size;
     return { ...term, certain: seen > PEAK.FLOOR && (Number.isNaN(half) || Math.abs(term.value) > half) };
   });
-  const order = term => term.certain ? -term.share : 1;
-  terms.sort((a, b) => order(a) - order(b) || b.size - a.size);
+  const last = term => Number(!term.certain || term.key === "rest"), order = term => -Math.round(term.gain / PEAK.FLOOR);
+  terms.sort((a, b) => last(a) - last(b) || order(a) - order(b) || b.size - a.size);
   return { circle, senses: paths.map(path => path.sense), G, terms, peaks, vibrations: vibrations_of(circle, found, whole), lag: lag_of(circle), form: form_of(found), noise: found.noise, left_out: found.left_out };
 }
 

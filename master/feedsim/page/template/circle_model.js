@@ -2,7 +2,8 @@
 // which both axes' positions are known. What is fitted, and why, stands there; a test holds both to the same digits.
 const RADIANS = Math.PI / 180;
 const MODEL = {
-  AHEAD: 2, BEHIND: [30, 45, 60], CALM: 0.05, NEXT: 4, TAIL: 2, TAIL_FLOOR: 10e-9, DECAYS: [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 21, 25, 30], FALLEN: 2, BLOCK: 6, PASSES: 6, PITCHES: 2,
+  AHEAD: 2, BEHIND: [30, 45, 60], CALM: 0.05, NEXT: 4, TAIL: 2, TAIL_FLOOR: 10e-9, DECAYS: [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 21, 25, 30], FALLEN: 2, BLOCK: 6, PASSES: 6, PITCHES: 2, REPEATS: 2,
+  KNOWN: 0.2, PLAY: 0.2e-6, TURNS: 10, PERIOD: 2048,
   MOST: 8000, BIWEIGHT: 4.685, SETTLED: 1e-13, UNUSUAL: 0.6745,
 };
 
@@ -11,36 +12,48 @@ const concatenated = parts => { const found = new Float64Array(parts.reduce((sum
 const split_like = (values, parts) => { let at = 0; return parts.map(part => values.slice(at, at += part.length)); };
 const enough_pitches = (circle, axis) => axis in circle.pitch && 2 * circle.radius >= MODEL.PITCHES * circle.pitch[axis];
 
-// circle: {axes, radius, speed, pitch}; paths: {angle, deviation, sense, phase}.
+// circle: {axes, radius, speed, pitch, gain, drag}; paths: {angle, deviation, sense, phase}.
 function fit_circle(circle, paths, students) {
+  const found = fit_calm(circle, paths, students, false);
+  if (Math.max(found.of("lost_0"), found.of("lost_1")) < MODEL.PLAY) return found;
+  const other = fit_calm(circle, paths, students, true);
+  return behind(other) < behind(found) ? other : found;
+}
+
+// What is left behind the reversals, in squares.
+const behind = found => found.residual.reduce((sum, off, p) => off.reduce((own, each, k) => own + (found.reversal[p][k] >= 0 ? each * each : 0), sum), 0);
+
+function fit_calm(circle, paths, students, play) {
   let found = null;
   for (const degrees of MODEL.BEHIND) {
-    found = fit_windowed(circle, paths, degrees * RADIANS, students);
+    found = fit_windowed(circle, paths, degrees * RADIANS, students, play);
     if (calm(found)) break;
   }
   return found;
 }
 
-function fit_windowed(circle, paths, window, students) {
+function fit_windowed(whole, paths, window, students, play) {
+  const known = whole.axes.every(axis => axis in whole.drag), asked = whole.axes.filter(axis => axis in whole.pitch), free = known ? whole.radius * (Math.PI / 2 - window - MODEL.AHEAD * RADIANS) : Infinity;
+  const circle = { ...whole, pitch: Object.fromEntries(Object.entries(whole.pitch).filter(([, pitch]) => MODEL.REPEATS * pitch <= free)) };
   const both = new Set(paths.map(path => path.sense)).size === 2, count = paths.reduce((sum, path) => sum + path.angle.length, 0);
-  let values = {}, tails = { columns: [], spread: [] }, residual = null, undone, parts, windows, names, matrix, robust, kept, blocks;
+  let values = play ? { play: 1 } : {}, tails = { columns: [], spread: [] }, residual = null, undone, parts, windows, names, matrix, robust, kept, blocks;
   for (let number = 0; number < MODEL.PASSES; number++) {
     undone = paths.map(path => undo(circle, path, values));
-    parts = undone.map((each, k) => columns_of(circle, each, paths[k].sense, both));
+    parts = undone.map((each, k) => columns_of(circle, each, paths[k].sense, both, values));
     windows = undone.map((each, k) => windows_of(each, paths[k].sense, window));
     names = Object.keys(parts[0]);
     matrix = names.map(name => concatenated(parts.map(part => part[name])));
     const deviation = concatenated(undone.map(each => each.deviation)), which = concatenated(windows.map(each => each.which)), since = concatenated(windows.map(each => each.since));
     if (number === 2) {
       const around = usual(undone.map(each => each.angle), split_like(residual, paths.map(path => path.angle)), windows.map(each => each.which));
-      tails = tails_of(undone, paths, left_of(residual, which, since, window, around), window, count);
+      tails = known ? known_tails(circle, undone, paths, residual, which) : tails_of(undone, paths, left_of(residual, which, since, window, around), window, count);
     }
     const rows = rows_where(which, each => each < 0), taken = column => Float64Array.from(rows, k => column[k]);
     blocks = numbered(taken(concatenated(undone.map((each, k) => each.angle.map(angle => 1000 * k + Math.floor(angle / (MODEL.BLOCK * RADIANS)))))));
     kept = [...matrix, ...tails.columns].map(taken);
     robust = robust_fit(kept, taken(deviation), tails.spread, blocks);
     const step = robust.values.slice(0, names.length);
-    values = Object.fromEntries(names.map((name, i) => [name, (values[name] || 0) + step[i]]));
+    values = { ...values, ...Object.fromEntries(names.map((name, i) => [name, (values[name] || 0) + step[i]])) };
     const made = combined(matrix, step, count);
     residual = deviation.map((each, k) => each - made[k]);
     if (number > 1 && largest(step.map(Math.abs)) < MODEL.SETTLED) { robust.rows = rows; break; }
@@ -52,7 +65,7 @@ function fit_windowed(circle, paths, window, students) {
   return {
     names, values: names.map(name => values[name]), covariance, student, angle: undone.map(each => each.angle), residual: split_like(residual, paths.map(path => path.angle)), window, noise: robust.noise,
     reversal: windows.map(each => each.which), since: windows.map(each => each.since), tail: split_like(tail, paths.map(path => path.angle)), columns: parts,
-    left_out: circle.axes.filter(axis => axis in circle.pitch && !enough_pitches(circle, axis)), of: name => names.includes(name) ? values[name] : 0,
+    left_out: asked.filter(axis => !enough_pitches(circle, axis)), unsure: known ? MODEL.KNOWN * largest([0, ...Array.from(robust.rows, k => Math.abs(tail[k]))]) : 0, of: name => names.includes(name) ? values[name] : 0,
   };
 }
 
@@ -64,7 +77,7 @@ function half_of(found, ...names) {
   const along = length > 0 ? part.map(each => each / length) : rows.map(() => 1 / Math.sqrt(rows.length));
   let sum = 0;
   rows.forEach((i, a) => rows.forEach((j, b) => { sum += along[a] * found.covariance[i][j] * along[b]; }));
-  return found.student * Math.sqrt(Math.max(sum, 0));
+  return Math.hypot(found.student * Math.sqrt(Math.max(sum, 0)), found.unsure);
 }
 
 // Standard deviation of the model's own deviation where it is known least well, behind the reversals.
@@ -89,7 +102,7 @@ function undo(circle, path, values) {
   const a = 1 + r + k, d = 1 + r - k, determinant = a * d - q * q, turned = [Math.atan2(q, a), Math.atan2(d, q)], n = path.angle.length;
   const x = path.angle.map((each, i) => (R + path.deviation[i]) * Math.cos(each)), y = path.angle.map((each, i) => (R + path.deviation[i]) * Math.sin(each));
   const p = [x.map(each => each - of("offset_0")), y.map(each => each - of("offset_1"))], angle = p[0].map((each, i) => Math.atan2(p[1][i], each));
-  for (const [name, [axis, displacement]] of Object.entries(displacements(circle, angle, [x, y], path.sense, turned))) {
+  for (const [name, [axis, displacement]] of Object.entries(displacements(circle, angle, [x, y], path.sense, turned, values))) {
     const value = of(name);
     if (value) for (let i = 0; i < n; i++) p[axis][i] -= value * displacement[i];
   }
@@ -102,9 +115,13 @@ function undo(circle, path, values) {
   return { positions: [x, y], angle: plain, deviation, turned };
 }
 
-function displacements(circle, angle, positions, sense, turned) {
+// Play of `values` is used up behind a reversal before it is lost.
+function displacements(circle, angle, positions, sense, turned, values) {
   const found = {};
-  for (const i of [0, 1]) found[`lost_${i}`] = [i, angle.map(each => 0.5 * sense * sign_of(Math.sin(each - turned[i])))];
+  for (const i of [0, 1]) {
+    const lost = values.play ? values[`lost_${i}`] || 0 : 0, part = each => lost > 0 ? Math.min(Math.max(circle.radius * (1 - Math.cos(modulo(sense * (each - turned[i]), Math.PI))) / lost - 0.5, -0.5), 0.5) : 0.5;
+    found[`lost_${i}`] = [i, angle.map(each => sense * sign_of(Math.sin(each - turned[i])) * part(each))];
+  }
   circle.axes.forEach((axis, i) => {
     if (!enough_pitches(circle, axis)) return;
     const rate = 2 * Math.PI / circle.pitch[axis];
@@ -114,11 +131,11 @@ function displacements(circle, angle, positions, sense, turned) {
   return found;
 }
 
-function columns_of(circle, undone, sense, both) {
+function columns_of(circle, undone, sense, both, values) {
   const { angle } = undone, along = [angle.map(Math.cos), angle.map(Math.sin)], oblique = angle.map(each => Math.sin(2 * each));
   const found = { offset_0: along[0], offset_1: along[1], radius: angle.map(() => 1), scale: angle.map(each => Math.cos(2 * each)), squareness: oblique };
   if (both) found.servo = oblique.map(each => sense * each);
-  for (const [name, [axis, displacement]] of Object.entries(displacements(circle, angle, undone.positions, sense, undone.turned))) found[name] = displacement.map((each, k) => along[axis][k] * each);
+  for (const [name, [axis, displacement]] of Object.entries(displacements(circle, angle, undone.positions, sense, undone.turned, values))) found[name] = displacement.map((each, k) => along[axis][k] * each);
   return found;
 }
 
@@ -184,6 +201,34 @@ function tails_of(undone, paths, left, window, count) {
       return since < Math.PI ? Math.abs(wave(angle)) * Math.exp((window - since) / decay) : 0;
     }))));
     spread.push(MODEL.TAIL * size);
+  });
+  return { columns, spread };
+}
+
+// Where the loops' response is known: of each axis the periodic response to its friction, and its first two slopes.
+function known_tails(circle, undone, paths, residual, which) {
+  const columns = [], spread = [], step = 2 * Math.PI / MODEL.PERIOD, within = MODEL.TURNS * RADIANS;
+  circle.axes.forEach((axis, i) => {
+    const peak = largest([0, ...residual.filter((_, k) => which[k] >= 0 && which[k] % 2 === i).map(Math.abs)]);
+    if (peak < MODEL.TAIL_FLOOR) return;
+    const courses = [0, 1, 2].map(() => new Float64Array(MODEL.PERIOD));
+    circle.drag[axis].forEach(([re, im], at) => {
+      const k = 2 * at + 1;
+      for (let n = 0; n < MODEL.PERIOD; n++) {
+        const c = Math.cos(step * ((k * n) % MODEL.PERIOD)), s = Math.sin(step * ((k * n) % MODEL.PERIOD)), along = (re * c - im * s) / k, across = (re * s + im * c) / k;
+        courses[0][n] += across;
+        courses[1][n] += k * along;
+        courses[2][n] -= k * k * across;
+      }
+    });
+    const whole = largest(courses[0].map(Math.abs)), wave = [Math.cos, Math.sin][i];
+    [MODEL.TAIL, within, within ** 2].forEach((size, order) => {
+      columns.push(concatenated(undone.map((each, p) => each.angle.map(angle => {
+        const at = modulo(paths[p].sense * (angle - each.turned[i]), 2 * Math.PI) / step, low = Math.floor(at), part = at - low, own = courses[order];
+        return wave(angle) * (own[low % MODEL.PERIOD] * (1 - part) + own[(low + 1) % MODEL.PERIOD] * part) / whole;
+      }))));
+      spread.push(size * peak);
+    });
   });
   return { columns, spread };
 }

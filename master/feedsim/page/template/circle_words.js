@@ -17,7 +17,7 @@ const term_of = (diagnosis, key) => diagnosis.terms.find(term => term.key === ke
 function told_terms({ terms, G }) {
   const able = terms.filter(term => term.certain && term.key !== "rest" && term.key !== "radius"), found = able.filter(term => term.share >= SAID.LITTLE && term.size >= SAID.LITTLE * G);
   const besides = able.filter(term => !found.includes(term) && term.key !== "offset" && term.size >= SAID.BESIDES * G);
-  return [...found.sort((a, b) => b.share - a.share), ...besides.sort((a, b) => b.size - a.size)];
+  return [...found.sort((a, b) => b.gain - a.gain || b.share - a.share), ...besides.sort((a, b) => b.size - a.size)];
 }
 
 // Why the circle is not round, in a sentence or two.

@@ -201,21 +201,41 @@ class LinearSystem {
     return { loop, measured };
   }
 
-  // x_a over x_s of the closed position loops at a frequency, n_ffw being the setpoint's derivative over the lead.
-  position_reference(axis, frequency) {
-    const { cycles: { T_pos }, I_P } = this.machine, m = this.drives[0].ticks, s = [0, 2 * Math.PI * frequency], A = this.axes.length, own = this.axes.indexOf(axis);
-    let slow = this.axes.map(() => this.axes.map(() => NONE)), fast = null, ramps = null;
+  // Of the closed position loops at a frequency what all axes' responses share: positions per answer of the position
+  // controllers, and positions and their measured values per torque at the motor but for the current loop.
+  position_loops(frequency) {
+    const { cycles: { T_pos } } = this.machine, m = this.drives[0].ticks, s = [0, 2 * Math.PI * frequency];
+    let slow = this.axes.map(() => this.axes.map(() => NONE)), fast = null, ramps = null, pushed = null;
     for (let k = 0; k < m; k++) {
       const at = [0, s[1] + 2 * Math.PI * k / T_pos], { motor: { n, x } } = this.ports(at), torques = this.drives.map(drive => drive.torque(at)), { loop, measured } = this.torque_loop(at, torques, n, x);
       const given = this.drives.map((drive, i) => this.axes.map((_, j) => i === j ? mul(torques[i][0], drive.from_setpoint(at)) : NONE)), M = solved(with_one(loop), given).x, ramp = this.drives.map(drive => drive.ramp(at));
       slow = matrix_product(measured, M).map((row, i) => row.map((each, j) => plus(slow[i][j], mul(each, ramp[j]))));
-      if (k === 0) { fast = matrix_product(x, M); ramps = ramp; }
+      if (k === 0) {
+        const torque = solved(with_one(loop), this.axes.map((_, i) => this.axes.map((__, j) => i === j ? torques[i][0] : NONE))).x;
+        fast = matrix_product(x, M);
+        ramps = ramp;
+        pushed = { x: matrix_product(x, torque), measured: matrix_product(measured, torque) };
+      }
     }
-    const answer = this.drives.map((drive, i) => [i === own ? plus(scaled(drive.gain, drive.setpoint_delay(s)), mul(scaled(1 / I_P[axis], s), drive.feedforward(s))) : NONE]);
-    const answers = solved(with_one(slow.map((row, i) => row.map(each => scaled(this.drives[i].gain, each)))), answer).x;
-    let found = NONE;
-    for (let j = 0; j < A; j++) found = plus(found, mul(fast[own][j], mul(ramps[j], answers[j][0])));
-    return found;
+    return { s, fast, ramps, pushed, controlled: with_one(slow.map((row, i) => row.map(each => scaled(this.drives[i].gain, each)))) };
+  }
+
+  // The position of an axis as the position controllers answer.
+  answering({ fast, ramps, controlled }, own, answer) {
+    const answers = solved(controlled, answer.map(each => [each])).x;
+    return answers.reduce((sum, each, j) => plus(sum, mul(fast[own][j], mul(ramps[j], each[0]))), NONE);
+  }
+
+  // x_a over x_s, n_ffw being the setpoint's derivative over the lead.
+  position_reference(axis, loops) {
+    const own = this.axes.indexOf(axis), { s } = loops;
+    return this.answering(loops, own, this.drives.map((drive, i) => i === own ? plus(scaled(drive.gain, drive.setpoint_delay(s)), mul(scaled(1 / this.machine.I_P[axis], s), drive.feedforward(s))) : NONE));
+  }
+
+  // x_a over M_add, a torque at the motor but for the current loop [m/(N.m)].
+  drag(axis, loops) {
+    const own = this.axes.indexOf(axis), { pushed } = loops;
+    return plus(pushed.x[own][own], this.answering(loops, own, this.drives.map((drive, i) => scaled(-drive.gain, pushed.measured[i][own]))));
   }
 }
 

@@ -14,6 +14,9 @@ function applied(data, state) {
   return { motions, parameters: [...own.values()] };
 }
 
+// Of the loops' response to friction: frequencies up to this [Hz], and up to this multiple of the circle's.
+const DRAG = { HIGHEST: 200, MOST: 401 };
+
 class Work {
   constructor(data, module, files, given) {
     this.data = data;
@@ -54,10 +57,15 @@ class Work {
 
   // Why the circles of a run are not round.
   causes(state, { trace, tasks, figures }) {
-    const { machine } = this.data, system = this.linear(state), gain = {}, circle = tasks.find(each => each.kind === "circle");
+    const { machine } = this.data, system = this.linear(state), gain = {}, drag = {}, circle = tasks.find(each => each.kind === "circle");
     if (!circle) return {};
-    for (const axis of circle.axes) gain[axis] = system.position_reference(axis, 1 / (circle.turn.end - circle.turn.begin));
-    return causes_of(trace, tasks, figures, { pitch: Object.fromEntries(machine.axes.map(axis => [axis, 2 * Math.PI * machine.I_P[axis]])), gain, students: machine.students });
+    const first = 1 / (circle.turn.end - circle.turn.begin), highest = Math.max(2, Math.min(DRAG.HIGHEST / first, 0.4 / machine.cycles.T_c / first, DRAG.MOST));
+    const loops = Array.from({ length: Math.ceil((highest - 1) / 2) }, (_, k) => system.position_loops((2 * k + 1) * first));
+    for (const axis of circle.axes) {
+      gain[axis] = system.position_reference(axis, loops[0]);
+      drag[axis] = loops.map(each => system.drag(axis, each));
+    }
+    return causes_of(trace, tasks, figures, { pitch: Object.fromEntries(machine.axes.map(axis => [axis, 2 * Math.PI * machine.I_P[axis]])), gain, drag, students: machine.students });
   }
 
   // All that a run warns of; null where the newest knob has ended it.

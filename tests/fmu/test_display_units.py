@@ -58,7 +58,7 @@ PEOPLES = {
     "s": {"ms", "us", "s"},
     "1/s": {"(m/min)/mm"},
     "m/rad": {"mm/rad"},
-    "m/s": {"m/min"},
+    "m/s": {"m/min", "mm/min"},  # mm/min: what machine data of a friction pulse are in
     "N/m": {"N/um"},
     "J": {"uJ", "J"},
     "H": {"mH"},

@@ -36,6 +36,7 @@ TYPES = {
     "N/m": ("Stiffness", "TranslationalSpringConstant"),
     "N.s/m": ("Damping", "TranslationalDampingConstant"),
     "m/s": ("Velocity", "Velocity"),
+    "m/s2": ("Acceleration", "Acceleration"),
     "J": ("Energy", "Energy"),
     "W": ("Power", "Power"),
     "N.m": ("Torque", "Torque"),

@@ -38,10 +38,12 @@ class SweepResult(Result):
     """A study with its runs: ``result["Z.overshoot"]`` is a column of its table.
 
     account: table, study, design and what they come to. folder: where table, journal and record of the study are.
+    resumed: runs that the folder had before.
     """
 
     account: Account
     folder: Path
+    resumed: int = 0
     _kept: TemporaryFolder | None = field(default=None)  # which lives as long as this
 
     kind = "sweep"
@@ -101,7 +103,8 @@ class SweepResult(Result):
     def lines(self) -> Sequence[str]:
         """The answer to the goal of the study, and how many runs there are and have failed."""
         failed = int((~self.ok).sum())
-        words = f", {failed} of them failed (their messages are in the table)" if failed else ""
+        words = f", {self.resumed} of them before" if self.resumed else ""
+        words += f", {failed} of them failed (their messages are in the table)" if failed else ""
         return [*page.goal_words(self.account), f"{self.study.name}: {len(self)} runs{words}"]
 
     def report(self) -> Report:
@@ -176,7 +179,11 @@ def sweep(
     temporary = TemporaryFolder() if out is None else None
     folder = temporary.path if temporary is not None else Path(out or "")
 
+    resumed = 0
+
     def progress(now: Progress) -> None:
+        nonlocal resumed
+        resumed = now.resumed
         watch.progress(loaded.name, now.done, now.total, now.resumed, f"{now.failed} failed" if now.failed else "")
 
     with kept(folder, page.check_writable, watch, inputs_of(loaded), texts, force=force):
@@ -200,7 +207,7 @@ def sweep(
             raise
         if out is not None:
             page.write(table, loaded, planned, folder, drawn=figures)
-        return SweepResult(page.account_of(table, loaded, planned, folder), folder, temporary)
+        return SweepResult(page.account_of(table, loaded, planned, folder), folder, resumed, temporary)
 
 
 def inputs_of(study: Study) -> list[Path]:

@@ -75,5 +75,5 @@ def test_cases_lie_over_each_other(
     assert values == pytest.approx([1e6 * table["Z.overshoot"].min(), 1e6 * table["Z.overshoot"].max()], rel=1e-12)
     assert "machine.axes.Z.friction.F_C" in summary["differing"]
     page = (tmp_path / "over" / "report.html").read_text(encoding="utf-8")
-    assert '<figure id="stop" class="chart"' in page
+    assert '<figure id="stop" class="chart lead"' in page
     assert "least Z.overshoot" in page

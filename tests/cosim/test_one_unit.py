@@ -22,9 +22,10 @@ from fmpy.fmi2 import (
 )
 from fmpy.model_description import ModelDescription
 
-from feedsim import load_scenario, run
+from feedsim import load_scenario
 from feedsim.cosim import Run
 from feedsim.cosim.one_unit import pack_whole
+from feedsim.cosim.run import run
 from feedsim.errors import InputError
 from feedsim.nc import Program, plan
 from feedsim.scenario import Scenario

@@ -298,12 +298,12 @@ def test_motion_of_a_loaded_axis_in_one_direction(
     if status == 0:
         found = json.loads((tmp_path / "own" / "summary.json").read_text())["axes"]["Y"]["parameters"]["M_0"]
         assert found["status"] == "undetermined"
-        assert "motion in one direction tells M_0" in found["reason"]
+        assert "motion in one direction determines only M_0" in found["reason"]
         assert found["value"] == pytest.approx(true, rel=0.1)
         assert abs(found["value"] - true) <= 2 * found["sigma"]
     else:
         assert status == 2
-        said = re.search(r"tells M_0 ([+-]) friction alone: ([\d.]+) N.m", capsys.readouterr().err)
+        said = re.search(r"determines only M_0 ([+-]) friction: ([\d.]+) N.m", capsys.readouterr().err)
         assert said is not None
         assert said[1] == ("+" if by > 0 else "-")
         friction = load_machine(machine).axes["Y"].friction.F_C

@@ -105,7 +105,7 @@ def test_how_many_modes_are_meant() -> None:
     assert [count_of_modes(text, False) for text in ("0", "5", "auto", 3)] == [0, 5, None, 3]
     assert count_of_modes("0", True) == 0
     for text in ("6", "many", "-1"):
-        with pytest.raises(InputError, match=f"--modes {text}: 0 to 5, or auto"):
+        with pytest.raises(InputError, match=f"modes {text}: 0 to 5, or auto"):
             count_of_modes(text, False)
-    with pytest.raises(InputError, match="the structure is that of --machine"):
+    with pytest.raises(InputError, match="the structure is that of machine"):
         count_of_modes("auto", True)

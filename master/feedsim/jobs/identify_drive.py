@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import Figure, Named
-from feedsim.arguments import Changes, Value, quantity
+from feedsim.arguments import Changes, Value, quantity, spelt
 from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.records import Asked
@@ -166,7 +166,8 @@ def count_of_modes(modes: int | str, structure_known: bool) -> int | None:
     """0 to 5, or None of "auto". InputError: neither, or modes where the machine has its own."""
     text = str(modes)
     if text != "auto" and not (text.isdecimal() and int(text) <= MOST_MODES):
-        raise InputError(f"--modes {text}: 0 to {MOST_MODES}, or auto")
+        raise InputError(f"{spelt('modes')} {text}: 0 to {MOST_MODES}, or auto")
     if structure_known and text != "0":
-        raise InputError(f"--modes {text}: the structure is that of --machine; leave one of the two out")
+        known = f"the structure is that of {spelt('machine')}"
+        raise InputError(f"{spelt('modes')} {text}: {known}; leave one of the two out")
     return None if text == "auto" else int(text)

@@ -166,7 +166,7 @@ def fitted(
     names = tuple(values)
     G = np.array([values[name] for name in names])
     if not np.all(np.abs(G) > 0):
-        raise InputError("a frequency response is 0 at a line: its logarithm is not told; leave the line out (--band)")
+        raise InputError("a frequency response is 0 at a line: which has no logarithm; leave the line out (--band)")
     weight = 1 / np.hypot(np.array([relative[name] for name in names]), MODEL)
     problem = _Lines(np.asarray(2j * pi * frequency, dtype=np.complex128), G, weight)
     every = np.arange(len(frequency), dtype=np.int64)
@@ -280,7 +280,7 @@ def _of(names: tuple[str, ...], problem: _Lines, x: Array, count: int, predicted
     J = problem.jacobian(shape, x, lines)
     scale = np.linalg.norm(J, axis=0) + 1e-300
     inverse = np.linalg.pinv((J / scale).T @ (J / scale), hermitian=True)
-    # What lines leave may be less than what a linear model is not better than: intervals are not told by it then.
+    # Residuals may be smaller than the error of a linear model, which then sets the intervals.
     variance = max(float(r @ r) / max(len(r) - len(x), 1), 1.0)
     sigma = np.sqrt(np.maximum(np.diag(inverse) * variance, 0.0)) / scale
     modes = []

@@ -41,16 +41,16 @@ class Begin:
 def start_values(each: AxisRecord) -> Begin:
     """Parameters of drive and friction to begin fits with, by the rigid line of the record.
 
-    Motion in one direction tells the sum of constant load and friction alone, and little motion in the other one hardly
-    more. Then friction has several shares of that torque, each of which is a start: from a wrong one a fit does not
-    come back.
+    Motion in one direction determines only the sum of constant load and friction. Little motion in the other one
+    determines hardly more. Then friction has several shares of that torque, each of which is a start: from a wrong one
+    a fit does not come back.
 
     Raises InputError: the axis does not move or does not accelerate.
     """
     if float(np.ptp(each.setpoint[each.rows])) < LEAST_TRAVEL * each.I_P:
         raise InputError(
             f"{each.record.name}, axis {each.axis}: the setpoint moves by "
-            f"{1e6 * float(np.ptp(each.setpoint[each.rows])):.3g} um; a drive is told by motion of "
+            f"{1e6 * float(np.ptp(each.setpoint[each.rows])):.3g} um; a drive is identified from motion of "
             f"{1e6 * LEAST_TRAVEL * each.I_P:.3g} um at least"
         )
     rows = np.flatnonzero(each.rows)
@@ -79,8 +79,10 @@ def start_values(each: AxisRecord) -> Begin:
     if line["F_C"] > 0 and "M_0" in spread:
         starts.append(_values(each, J, J_sigma, line["M_0"], max(line["F_C"], least), line["sigma_2"]))
     sign = "+" if way > 0 else "-"
-    told = f"motion in one direction tells M_0 {sign} friction alone: {load:.3g} N.m at {1e3 * n * each.I_P:.3g} mm/s"
-    return Begin(starts, told)
+    only = (
+        f"motion in one direction determines only M_0 {sign} friction: {load:.3g} N.m at {1e3 * n * each.I_P:.3g} mm/s"
+    )
+    return Begin(starts, only)
 
 
 def _values(

@@ -209,14 +209,14 @@ class Problem:
     def weigh(self, found: Tuned) -> None:
         """Take what is left with what was found as what a residual is worth.
 
-        What is left of either channel hangs together over rows, and counts by as many as say something of their own:
+        What is left of either channel is correlated over rows, and counts by as many as say something of their own:
         so the channels are weighed against each other, and against what is usual.
         """
         position, torque = found.position, found.torque
         least = LEAST["torque"] * rms(self.each.record.torque[self.rows]) if self.each.record.driven else 1.0
         self.weights = {
-            "position": max(rms(position), LEAST["position"]) * sqrt(together(position)),
-            "torque": max(rms(torque), least) * sqrt(together(torque)),
+            "position": max(rms(position), LEAST["position"]) * sqrt(correlation_length(position)),
+            "torque": max(rms(torque), least) * sqrt(correlation_length(torque)),
         }
 
     def fitted(
@@ -262,7 +262,7 @@ class Problem:
         return Tuned(names, values, point, least.residuals(point), least.jacobian(point))
 
 
-def together(residuals: Array) -> float:
+def correlation_length(residuals: Array) -> float:
     """How many neighbouring residuals say the same: the sum of their autocorrelation to where it ends, 1 at least."""
     centred = residuals - np.mean(residuals)
     spectrum = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2

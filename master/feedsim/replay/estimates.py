@@ -1,0 +1,173 @@
+"""What a fit of a drive is worth: its values with intervals, what is not determined, and what is refused.
+
+Intervals are those of residuals that are correlated over stretches of time, as errors of a model are. Start reading at
+estimates_of().
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import hypot, nan
+
+import numpy as np
+
+from feedsim import variables
+from feedsim.errors import InputError
+from feedsim.identify.parameters import estimate
+from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms
+from feedsim.identify.result import NORMAL_95, Estimate
+from feedsim.replay.closed_loop import AxisRecord
+from feedsim.replay.elastic import KEYS, ElasticMode, modes_of
+from feedsim.replay.tuning import Problem, Tuned, correlation_length
+from feedsim.trace.trace import Array
+
+VAGUE = 0.5  # relative half width of an interval beyond which a value is not determined
+POOR = 0.3  # share of the torque, or of the lag, that a fit may leave
+EXACT = 1e-5  # of the travel: a position that a fit leaves within it is met, however small the lag
+ONE_WAY = 0.15  # share of the mean torque to which the constant load has to be known where the axis moves one way
+SHAPE = 0.25  # standard deviation of the friction, of itself, where only its usual shape separates it from the load
+HIDDEN = 0.8  # share of the usual deviation that is left: the record does not determine the value
+_CONTROLLER = variables.parameters("controller")
+ON_THE_MODEL = (
+    "without the control's own speed setpoint or following error it rests on an axis that is taken to be rigid"
+)
+ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "J", "M_0", "F_C", "F_S", "v_s", "F_log",
+         "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
+
+
+def refuse_poor(each: AxisRecord, found: Tuned) -> None:
+    """Raises InputError: the fit leaves so much that its parameters are those of no axis."""
+    signal = {
+        "torque": (rms(found.torque), rms(each.record.torque[each.moving]), 1.0, "N.m", "torque"),
+        "position": (rms(found.position), rms((each.setpoint - each.position)[each.moving]), 1e6, "um",
+                     "distance of the position behind its setpoint"),
+    }  # fmt: skip
+    exact = rms(found.position) <= EXACT * float(np.ptp(each.position[each.moving]))  # the setpoint may be the encoder
+    for channel, (left, whole, scale, unit, meaning) in signal.items():
+        judged = each.record.driven if channel == "torque" else not exact
+        if judged and left > POOR * whole:
+            raise InputError(
+                f"{each.record.name}, axis {each.axis}: the best fit leaves {scale * left:.3g} {unit} rms of a "
+                f"{meaning} of {scale * whole:.3g} {unit} rms while the axis moves; at most {100 * POOR:.0f} % are "
+                "allowed. No drive is identified: check signs, units and pitch, give a longer window with motion in "
+                "both directions, or a machine to begin with (--machine)"
+            )
+
+
+def estimates_of(
+    problem: Problem,
+    found: Tuned,
+    unseen: tuple[float, float],
+    taps: Taps | None,
+    speed: SpeedSetpoint | None,
+    known: bool,
+) -> dict[str, Estimate]:
+    """In the parameters of drive and friction, with intervals."""
+    values = problem.start | dict(found.values)
+    covariance = _covariance(problem, found, unseen)
+    spread = dict(zip(found.names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    result: dict[str, Estimate] = {}
+
+    def put(name: str, value: float, sigma: float, by: str) -> None:
+        result[name] = _judged(name, value, sigma, spread.get(by, nan) / problem.spread(by, values))
+
+    for name in found.names:
+        if name not in ("K_i", "excess", "K_v", "T_dyn") and not name.startswith("mode_"):
+            put(name, values[name], spread[name], name)
+    ratio = np.array([(n == "K_p") / values["K_p"] - (n == "K_i") / values["K_i"] for n in found.names])
+    T_n = values["K_p"] / values["K_i"]
+    put("T_n", T_n, T_n * float(np.sqrt(ratio @ covariance @ ratio)), "K_p")
+    if speed is not None:
+        result["K_v"] = _judged("K_v", values["K_v"], speed.sigma[0], 0.0)
+    else:
+        put("K_v", values["K_v"], spread["K_v"], "K_v")
+        if not known:
+            result["K_v"] = replace(result["K_v"], status="undetermined", reason=ON_THE_MODEL)
+    if taps is not None:
+        result["T_dyn"] = _judged("T_dyn", problem.T_dyn(values), hypot(spread["T_sym"], taps.sigma), 0.0)
+    else:
+        put("T_dyn", values["T_dyn"], spread["T_dyn"], "T_dyn")
+        if not known:
+            result["T_dyn"] = replace(result["T_dyn"], status="undetermined", reason=ON_THE_MODEL)
+    if "excess" in found.names:
+        rise = np.array([(n == "F_C") * (1 + values["excess"]) + (n == "excess") * values["F_C"] for n in found.names])
+        put("F_S", values["F_C"] * (1 + values["excess"]), float(np.sqrt(rise @ covariance @ rise)), "excess")
+    if known:
+        result["J"] = replace(estimate("J", values["J"]), status="given", reason="of the machine's modes")
+    return {name: result[name] for name in ORDER if name in result}
+
+
+def one_way(each: AxisRecord, estimates: Mapping[str, Estimate], only: str) -> dict[str, Estimate]:
+    """Estimates of which constant load and Coulomb friction are known as their sum.
+
+    What separates them then is the usual shape of friction, no measurement. Where the torque is mostly that sum and
+    they are hardly separated, no machine follows from the record.
+
+    Raises InputError: so it is.
+    """
+    further = SHAPE * estimates["F_C"].value
+    estimates = {
+        name: replace(one, sigma=hypot(one.sigma, further)) if name in ("M_0", "F_C") else one
+        for name, one in estimates.items()
+    }
+    torque = each.record.torque[each.moving]
+    mean, half = abs(float(np.mean(torque))), NORMAL_95 * estimates["M_0"].sigma
+    if mean > float(np.std(torque)) and half > ONE_WAY * mean:
+        raise InputError(
+            f"{each.record.name}, axis {each.axis}: {only}; M_0 by itself is known to +-{half:.2g} N.m only, and at "
+            f"most +-{ONE_WAY * mean:.2g} N.m are allowed. No drive is identified: give a window with motion in both "
+            "directions, or a machine whose friction and load are known (--machine)"
+        )
+    undetermined = {name: replace(estimates[name], status="undetermined", reason=only) for name in ("M_0", "F_C")}
+    return {**estimates, **undetermined}
+
+
+def elastic_modes(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> tuple[ElasticMode, ...]:
+    """The elastic modes of a fit, with standard deviations."""
+    own = modes_of(found.values)
+    if not own:
+        return ()
+    spread = dict(zip(found.names, map(float, np.sqrt(np.diag(_covariance(problem, found, unseen)))), strict=True))
+    named = [[f"{key}_{k}" for key in KEYS] for k in range(1, len(own) + 1)]
+    modes = [replace(each, sigma=tuple(spread[name] for name in names)) for each, names in zip(own, named, strict=True)]
+    return tuple(sorted(modes, key=lambda each: each.frequency))
+
+
+def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:
+    """An estimate that says what it is worth. left: the deviation over the usual one."""
+    if name in _CONTROLLER:
+        row = _CONTROLLER[name]
+        found = Estimate(name, value, row.unit, row.short, sigma)
+    else:
+        found = estimate(name, value, sigma)
+    if left > HIDDEN:
+        return replace(found, status="undetermined", reason="the record hardly depends on it")
+    relative = name not in ("k_ffw", "T_sym", "T_dyn", "M_0", "asymmetry", "delay")
+    if relative and NORMAL_95 * sigma > VAGUE * abs(value):
+        return replace(
+            found,
+            status="undetermined",
+            reason=f"its interval is +-{100 * NORMAL_95 * sigma / abs(value):.0f} % of the value",
+        )
+    return found
+
+
+def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> Array:
+    """Covariance (P, P), of correlated residuals: every channel counts less by the rows over which they are correlated.
+
+    unseen: rms of position and torque that the others do not predict, in their weights. Where a model is not quite that
+    of the axis, a fit to little motion leaves too little. What it leaves of motion that it has not seen is the better
+    measure.
+    """
+    scale = np.array([problem.spread(name, found.values) for name in found.names])
+    J, r, count = found.jacobian, found.residuals, len(problem.rows)
+    channels = slice(0, count), slice(count, 2 * count)
+    prior = J[2 * count :].T @ J[2 * count :]
+    parts = [
+        (J[rows].T @ J[rows], correlation_length(r[rows]), max(float(np.mean(r[rows] ** 2)), left**2))
+        for rows, left in zip(channels, unseen, strict=True)
+    ]
+    whole = np.linalg.pinv(sum((part for part, _, _ in parts), prior), hermitian=True)
+    middle = sum((part * longer * variance for part, longer, variance in parts), prior)
+    return np.asarray(whole @ middle @ whole * np.outer(scale, scale))

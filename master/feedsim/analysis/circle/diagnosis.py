@@ -11,7 +11,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.circle.model import CircleUnderTest, Fit, TurnedPath, fit
+from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
+from feedsim.analysis.circle.model import Fit, fit
 from feedsim.analysis.circle.vibration import Vibration, averaged, vibrations
 from feedsim.analysis.figures import Array
 

@@ -17,8 +17,8 @@ import numpy as np
 
 from feedsim import units
 from feedsim.analysis.circle.doubts import OFF_FEED, check_feed, check_radius, checked, unusual_feed, unusual_radius
+from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.header import Told, own_format
-from feedsim.analysis.circle.model import CircleUnderTest, TurnedPath
 from feedsim.analysis.circularity import EVEN, PARTS, fitted_circle
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.circle.model import CircleUnderTest, Fit, TurnedPath, enough_pitches
+from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath, enough_pitches
+from feedsim.analysis.circle.model import Fit
 from feedsim.analysis.figures import Array
 
 FLOOR = 10e-9  # an amplitude of less [m] is not worth a word, and may be what the model of the circle leaves

@@ -1,4 +1,4 @@
-// The model of a circle that is not round and its robust fit: feedsim.analysis.circle (model.py, robust.py) once more, of turns of
+// The model of a circle that is not round and its robust fit: feedsim.analysis.circle (model.py, geometry.py, tails.py, robust.py) once more, of turns of
 // which both axes' positions are known. What is fitted, and why, stands there; a test holds both to the same digits.
 const RADIANS = Math.PI / 180;
 const MODEL = {

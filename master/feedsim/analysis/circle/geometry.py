@@ -1,0 +1,147 @@
+"""A circle that is measured, and what displaces its points: the ellipse, lost motion and pitch errors.
+
+model.py has the equations. Start reading at undo(), which takes known displacements off a path.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.analysis.figures import Array
+
+# Lost motion from which on its shape is looked at [m]; the mark that it is play.
+PLAY, PLAYED = 0.2e-6, "play"
+# Travel in pitches from which an error that repeats with the pitch differs from the circle's own shape.
+PITCHES = 2.0
+# More samples of a turn add nothing to its shape.
+MOST = 8000
+
+
+@dataclass(frozen=True)
+class CircleUnderTest:
+    """What is known of the circle: axes of its plane (first, second), radius [m], path speed [m/s]; the pitch of an
+    axis [m] where an error that repeats with it is looked for; where the drive of an axis is known, its response x_a
+    over x_s at the circle's frequency [1], and x_a over a torque at the motor at the odd multiples of it, from the
+    first on [m/(N.m)]."""
+
+    axes: tuple[str, str]
+    radius: float
+    speed: float
+    pitch: Mapping[str, float] = field(default_factory=dict)
+    gain: Mapping[str, complex] = field(default_factory=dict)
+    drag: Mapping[str, NDArray[np.complex128]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class TurnedPath:
+    """A measured turn at constant speed: angle about the programmed centre (N,) [rad], deviation of the radius
+    (N,) [m], and its sense, +1 from the first axis towards the second, else -1. In the order of the motion.
+
+    phase: where both axes' positions were measured over time, the angle by which the motion has turned (N,) [rad], from
+    0 on."""
+
+    angle: Array
+    deviation: Array
+    sense: int
+    phase: Array | None = None
+
+    def thinned(self) -> TurnedPath:
+        """At most MOST samples, evenly chosen."""
+        step = -(-len(self.angle) // MOST)
+        phase = None if self.phase is None else self.phase[::step]
+        return TurnedPath(self.angle[::step], self.deviation[::step], self.sense, phase)
+
+
+@dataclass(frozen=True, eq=False)
+class Undone:
+    """A path with its distortion undone: angle [rad] and deviation of the radius [m]; measured positions (2, N) [m],
+    and where the axes reverse at their half axis + [rad]."""
+
+    positions: Array
+    angle: Array
+    deviation: Array
+    turned: tuple[float, float]
+
+
+def enough_pitches(circle: CircleUnderTest, axis: str) -> bool:
+    """Whether the circle is large enough to tell an error that repeats with the pitch of ``axis``."""
+    return axis in circle.pitch and 2 * circle.radius >= PITCHES * circle.pitch[axis]
+
+
+def undo(circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float], by_program: bool) -> Undone:
+    """The path with what ``values`` say taken off: displacements of the axes first, then the ellipse.
+
+    by_program: its angles are the programmed ones, unless both axes' positions were measured.
+    """
+
+    def of(name: str) -> float:
+        return values.get(name, 0.0)
+
+    r, k = of("radius") / circle.radius, of("scale") / circle.radius
+    q = (of("squareness") + path.sense * of("servo")) / circle.radius
+    distortion = np.array([[1 + r + k, q], [q, 1 + r - k]])
+    # An axis is at its extreme where its row of the distortion points along u.
+    turned = (math.atan2(q, 1 + r + k), math.atan2(1 + r - k, q))
+    centre = np.array([[of("offset_0")], [of("offset_1")]])
+    angle = path.angle
+    if by_program and path.phase is None:
+        programmed = circle.radius * np.array([np.cos(angle), np.sin(angle)])
+        p = centre + distortion @ programmed
+        for name, (axis, displacement) in displacements(
+            circle, angle, programmed, path.sense, (0, math.pi / 2), values
+        ).items():
+            p[axis] += of(name) * displacement
+        angle = np.arctan2(p[1], p[0])
+    positions = (circle.radius + path.deviation) * np.array([np.cos(angle), np.sin(angle)])
+    p = positions - centre
+    angle = np.arctan2(p[1], p[0])
+    for name, (axis, displacement) in displacements(circle, angle, positions, path.sense, turned, values).items():
+        p[axis] -= of(name) * displacement
+    plain = np.linalg.solve(distortion, p)
+    return Undone(positions, np.arctan2(plain[1], plain[0]), np.hypot(plain[0], plain[1]) - circle.radius, turned)
+
+
+def displacements(
+    circle: CircleUnderTest,
+    angle: Array,
+    positions: Array,
+    sense: int,
+    turned: tuple[float, float],
+    values: Mapping[str, float],
+) -> dict[str, tuple[int, Array]]:
+    """Terms that displace one axis: its number, and the displacement for 1 m of the term. Play of `values` is used up
+    behind a reversal before it is lost."""
+    found = {}
+    for i in (0, 1):
+        side = sense * np.sign(np.sin(angle - turned[i]))
+        lost = values.get(f"lost_{i}", 0.0)
+        if lost > 0 and PLAYED in values:
+            since = sense * (angle - turned[i]) % math.pi
+            way = circle.radius * (1 - np.cos(since))
+            found[f"lost_{i}"] = (i, side * np.clip(way / lost - 0.5, -0.5, 0.5))
+        else:
+            found[f"lost_{i}"] = (i, 0.5 * side)
+    for i, axis in enumerate(circle.axes):
+        if enough_pitches(circle, axis):
+            phase = 2 * math.pi / circle.pitch[axis] * positions[i]
+            found[f"pitch_{i}_cos"], found[f"pitch_{i}_sin"] = (i, np.cos(phase)), (i, np.sin(phase))
+    return found
+
+
+def columns_of(
+    circle: CircleUnderTest, undone: Undone, sense: int, both: bool, values: Mapping[str, float]
+) -> dict[str, Array]:
+    """Radial deviation for 1 m of every term; ``both`` senses are there to tell a delay from an angle."""
+    angle = undone.angle
+    along = np.cos(angle), np.sin(angle)
+    found = {"offset_0": along[0], "offset_1": along[1], "radius": np.ones_like(angle), "scale": np.cos(2 * angle)}
+    found["squareness"] = np.sin(2 * angle)
+    if both:
+        found["servo"] = sense * np.sin(2 * angle)
+    moved = displacements(circle, angle, undone.positions, sense, undone.turned, values)
+    return found | {name: along[axis] * displacement for name, (axis, displacement) in moved.items()}

@@ -16,7 +16,8 @@ from feedsim.errors import InputError
 from feedsim.motions import Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.page import html
-from feedsim.report.run.report import report_of, summary
+from feedsim.report.run.files import summary
+from feedsim.report.run.report import report_of
 from feedsim.scenario import Machine
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.geometry.assemble import assemble

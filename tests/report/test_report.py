@@ -32,7 +32,8 @@ from feedsim.report.content import Report, Tile
 from feedsim.report.page import html, script
 from feedsim.report.provenance import archives, input_files
 from feedsim.report.results import write_report
-from feedsim.report.run.report import HEADER, real_time_factor, report_of, summary, tile
+from feedsim.report.run.files import summary
+from feedsim.report.run.report import HEADER, real_time_factor, report_of, tile
 from feedsim.report.run.words import moved_words
 from feedsim.report.style import PALETTE
 from feedsim.scenario import load

@@ -27,7 +27,8 @@ from feedsim.report.formatting import shown, typeset
 from feedsim.report.partial import Partial
 from feedsim.report.picture import Picture
 from feedsim.report.results import Content
-from feedsim.report.run.report import HEADER, TRY_IT, draw, is_leading, report_of, summary
+from feedsim.report.run.files import summary
+from feedsim.report.run.report import HEADER, draw, is_leading, report_of
 from feedsim.report.run.signals import signals_picture
 from feedsim.scenario import Scenario
 from feedsim.trace import Array
@@ -96,8 +97,8 @@ class RunResult(Run, Result):
 
     def report(self) -> Report:
         """Content of report.html."""
-        content = report_of(self, self.figures, draw(self, self.figures, self.causes), self.causes)
-        return replace(content, main=[TRY_IT, *content.main]) if self.page else content
+        pictures = draw(self, self.figures, self.causes)
+        return report_of(self, self.figures, pictures, self.causes, page=bool(self.page))
 
     def files(self) -> Mapping[str, Content]:
         """result.csv, log.csv where there is a log, machine.html where the page was asked for."""

@@ -15,8 +15,8 @@ from feedsim.report.content import Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.provenance import InputFile, axis_parameters, hashed, inputs_part, quantity
 from feedsim.report.results import REPORT, SUMMARY, check_place
+from feedsim.report.run.files import summary as summary_of_run
 from feedsim.report.run.report import motions_section, provenance
-from feedsim.report.run.report import summary as summary_of_run
 from feedsim.report.sections import figures_footer, figures_section, files_table
 from feedsim.report.style import remarked
 

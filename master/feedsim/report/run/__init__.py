@@ -1,10 +1,11 @@
 """What a run leaves: curves as CSV, summary.json, report.html and figures/*.png.
 
 May use the report's core, the analyses and the recorded traces.
-Start with report.py; pose.py has the plant's pose.
+Start with files.py, then report.py, the page; pose.py has the plant's pose.
 """
 
 from feedsim.report.provenance import input_paths
-from feedsim.report.run.report import answers, check_writable, files_of, growing, summary_line, write
+from feedsim.report.run.files import check_writable, files_of, growing, write
+from feedsim.report.run.report import answers, summary_line
 
 __all__ = ["answers", "check_writable", "files_of", "growing", "input_paths", "summary_line", "write"]

@@ -1,0 +1,226 @@
+"""What a run leaves in a folder: its rows, its report, summary.json, log, sheets and the machine page.
+
+Start reading at write().
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import (
+    CircleTask,
+    Diagnosis,
+    Figure,
+    diagnoses,
+    doubts,
+    tasks,
+)
+from feedsim.cosim import Run
+from feedsim.motions.circular import DIRECTIONS
+from feedsim.report.changes import changes_part
+from feedsim.report.page import sheet_html
+from feedsim.report.partial import PARTIAL, Partial
+from feedsim.report.provenance import (
+    figures_part,
+    input_files,
+    inputs_part,
+    machine_part,
+    quantity,
+    software,
+)
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.run import sheet
+from feedsim.report.run.diagnosis import diagnosis_part
+from feedsim.report.run.pose import pose_part
+from feedsim.report.run.report import (
+    COUPLING,
+    LOG,
+    PAGE,
+    RESULT,
+    answers,
+    draw,
+    real_time_factor,
+    report_of,
+    signal_unit,
+)
+from feedsim.scenario import Logging
+from feedsim.trace import Trace, write_csv
+from feedsim.tune import of_run
+
+FORMAT = 1
+
+
+def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless a run's results can be written to ``directory`` without one of ``inputs`` being lost.
+
+    inputs: files that are read. Leaves nothing behind.
+    """
+    check_place(
+        directory,
+        (RESULT, REPORT, SUMMARY, LOG, PAGE, sheet.HTML, sheet.CSV, PARTIAL),
+        inputs,
+        kind="run",
+        own=(PARTIAL,),
+    )
+
+
+def growing(directory: Path | str) -> Partial:
+    """What takes a run's rows while it goes on, for :func:`write`."""
+    return Partial(directory, RESULT)
+
+
+def write(
+    run: Run,
+    figures: Mapping[str, Figure],
+    directory: Path | str,
+    recorded: Partial | None = None,
+    causes: Mapping[str, Diagnosis] | None = None,
+    *,
+    drawn: Sequence[str] = (),
+    page: str = "",
+) -> tuple[Path, ...]:
+    """Write result.csv, summary.json, report.html, log.csv, if there is one, and figures; returns their paths.
+
+    figures: as from ``analysis.evaluate``. recorded: the run's rows where they have been written already, in the same
+    directory; the file becomes result.csv, or stays as it is where the results cannot be written. Files of an earlier
+    run are replaced. causes: as from ``analysis.diagnoses``, which is asked where they are not given. drawn: kinds of
+    files that figures/* are drawn as. page: the machine as a page that computes, which the report links. Raises
+    OutputError.
+    """
+    files = files_of(run, page, recorded)
+    causes = diagnoses(run) if causes is None else causes
+    report = report_of(run, figures, draw(run, figures, causes), causes, page=bool(page))
+    return write_report(
+        directory, report, partial(summary, run, figures, causes=causes), files, drawn, kind="run", own=(PARTIAL,)
+    )
+
+
+def files_of(run: Run, page: str = "", recorded: Partial | None = None) -> dict[str, Content]:
+    """Name -> content of all files besides the report; arguments as of :func:`write`."""
+
+    def result(path: Path) -> Path | None:
+        if recorded is None or not recorded.left:
+            write_csv(path, run.trace)
+            return None
+        recorded.finished()
+        return recorded.path
+
+    files: dict[str, Content] = {RESULT: result}
+    if run.log is not None:
+        files[LOG] = partial(write_csv, trace=run.log)
+    if page:
+        files[PAGE] = page
+    if sheets := sheet.sheets_of(run):
+        files[sheet.HTML] = sheet_html(run.scenario.name, sheets, sheet.RULE)
+        files[sheet.CSV] = sheet.table(sheets)
+    return files
+
+
+def summary(
+    run: Run, figures: Mapping[str, Figure], files: Sequence[str], causes: Mapping[str, Diagnosis] | None = None
+) -> dict[str, Any]:
+    """Content of summary.json; a figure that could not be determined has the value null."""
+    causes = causes or {}
+    scenario, machine = run.scenario, run.scenario.machine
+    return {
+        "format": FORMAT,
+        "answer": answers(run, figures, causes),
+        "warnings": [*run.warnings, *doubts(figures, causes)],
+        "figures": figures_part(figures),
+        "changes": changes_part(of_run(run, causes)),
+        "circles": _circles(run, causes),
+        "diagnosis": {prefix: diagnosis_part(diagnosis) for prefix, diagnosis in causes.items()},
+        "scenario": {
+            "name": scenario.name,
+            "file": scenario.file.name,
+            "note": scenario.note,
+            "set": list(scenario.settings),
+            "overrides": list(scenario.overrides),
+            "duration": quantity(run.program.duration, "s"),
+            "coupling": scenario.coupling.model_dump(),
+            "recording_interval": quantity(scenario.recording.interval, "s"),
+            "logging": logging_part(scenario.logging, run.log),
+            "motions": [
+                {
+                    "description": segment.description,
+                    "start": quantity(segment.start, "s"),
+                    "end": quantity(segment.end, "s"),
+                }
+                for segment in run.program.segments
+            ],
+        },
+        "loads": [
+            {
+                "acts": work.words,
+                "input": work.input,
+                "largest": quantity(work.peak, work.unit),
+                "work_on_machine": quantity(work.given, "J"),
+                "work_taken": quantity(work.taken, "J"),
+                "motor_while_it_acts": None
+                if work.drives is None
+                else {
+                    "work_in_run": quantity(work.drives.run, "J"),
+                    "work_in_record": quantity(work.drives.record, "J"),
+                },
+            }
+            for work in run.loads
+        ],
+        "machine": machine_part(machine),
+        "pose": pose_part(run.pose),
+        "inputs": inputs_part(input_files(scenario)),
+        "units": {name: dict(unit) for name, unit in run.units.items()},
+        "coupling": {
+            name: {"value": value, "unit": "J", "meaning": COUPLING[name.partition(".")[2]]}
+            for name, value in run.coupling.items()
+        },
+        "software": software(),
+        "performance": {
+            "wall_time": quantity(run.wall_time, "s"),
+            "real_time_factor": quantity(real_time_factor(run), "1"),
+            "cycle_loop": "native" if run.native else "Python",
+        },
+        "files": list(files),
+    }
+
+
+def _circles(run: Run, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
+    """The turns that figures are of: who lays them over others needs no scenario."""
+    found = [task for task in tasks(run.scenario, run.program) if task.prefix in causes] if causes else []
+    return {
+        task.prefix: [
+            {
+                "axes": list(turn.axes),
+                "centre": quantity(list(turn.centre), "m"),
+                "radius": quantity(turn.radius, "m"),
+                "direction": DIRECTIONS[turn.sense],
+                "begin": quantity(turn.begin, "s"),
+                "end": quantity(turn.end, "s"),
+            }
+            for turn in task.turns
+        ]
+        for task in found
+        if isinstance(task, CircleTask)
+    }
+
+
+def logging_part(logging: Logging | None, log: Trace | None) -> dict[str, Any] | None:
+    """Settings of a log in SI; None where there is none."""
+    if logging is None:
+        return None
+    return {
+        "interval": quantity(logging.interval, "s"),
+        "columns": list(log) if log is not None else [],
+        "noise": {
+            signal: {"value": level.value, "unit": "of the RMS" if level.relative else signal_unit(signal, log)}
+            for signal, level in logging.noise.given().items()
+        },
+        "quantisation": {
+            signal: {"value": step, "unit": signal_unit(signal, log)}
+            for signal, step in logging.quantisation.given().items()
+        },
+        "delay": {signal: quantity(delay, "s") for signal, delay in logging.delay.given().items()},
+        "seed": logging.seed,
+    }

@@ -86,15 +86,15 @@ def diagnosis(cause: Cause, feed: float, radius: float) -> tuple[Diagnosis, list
 
 
 def words(found: Diagnosis, cause: Cause) -> str:
-    """The causes that are told, the first first, without friction's peaks, which this machine always has."""
-    told = []
+    """The causes that a report names, the first first, without friction's peaks, which this machine always has."""
+    named = []
     for term in worth_telling(found):
         if term.key in ("peaks", "offset"):
             continue
         factor, unit = UNITS[term.unit]
         text = f"{name(term)} {factor * term.value:.3g} +- {factor * term.half:.2g} {unit}"
-        told.append(f"**{text}**" if f"{term.key} {term.axis}".strip() == cause.term else text)
-    return "; ".join(told) or "none"
+        named.append(f"**{text}**" if f"{term.key} {term.axis}".strip() == cause.term else text)
+    return "; ".join(named) or "none"
 
 
 def table(rows: Sequence[tuple[str, float, list[str]]]) -> str:

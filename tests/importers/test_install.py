@@ -1,4 +1,4 @@
-"""What `make test-importers` does to a machine: nothing, unless it is told to."""
+"""What `make test-importers` does to a machine: nothing, unless it is asked to."""
 
 from __future__ import annotations
 

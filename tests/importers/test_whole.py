@@ -33,9 +33,9 @@ def test_every_importer_gets_the_run(
     do = motion.experiment(step)
     system = motion.connected(fmus) if importer.name == "Maestro" else motion.system
     result = importer.run(system, do, tmp_path)
-    worst, told = whole.difference(result, motion, step)
+    worst, compared = whole.difference(result, motion, step)
     assert worst == 0.0
-    assert told >= len(motion.common(step, do.steps)[0]) - 1  # not each tells of the first or the last
+    assert compared >= len(motion.common(step, do.steps)[0]) - 1  # not each tells of the first or the last
 
 
 @pytest.mark.parametrize("single", SINGLE, ids=lambda single: single.name)
@@ -47,9 +47,9 @@ def test_importers_of_one_unit_get_the_run(
         pytest.skip(reason)
     motion, step = motions[case[0]], case[1]
     do = motion.experiment(step)
-    worst, told = whole.difference(single.run(motion.system, do, tmp_path), motion, step)
+    worst, compared = whole.difference(single.run(motion.system, do, tmp_path), motion, step)
     assert worst == 0.0
-    assert told == len(motion.common(step, do.steps)[0])
+    assert compared == len(motion.common(step, do.steps)[0])
 
 
 def test_another_step_or_motion_would_be_seen(motions: dict[str, whole.Whole], tmp_path: Path) -> None:

@@ -61,5 +61,7 @@ def run_sim(system: System, experiment: Experiment, folder: Path) -> Result:
 def run_runner(system: System, experiment: Experiment, folder: Path) -> Result:
     """fmu-runner by the program in `rust/`."""
     names = [name for _, name in experiment.record]
-    told = _call("fmu-runner", str(_only(system)), repr(experiment.step), str(experiment.steps), *names, folder=folder)
-    return _result(experiment, np.loadtxt(told.splitlines(), delimiter=",", ndmin=2))
+    output = _call(
+        "fmu-runner", str(_only(system)), repr(experiment.step), str(experiment.steps), *names, folder=folder
+    )
+    return _result(experiment, np.loadtxt(output.splitlines(), delimiter=",", ndmin=2))

@@ -168,8 +168,8 @@ def identify(
     inputs = [*files, *([Path(columns)] if columns is not None else [])]
     inputs += [file for _, file in subject.files] if subject is not None else []
     folder = None if out is None else Path(str(out).replace(AXIS, known.axis.lower()))
-    told = [f"{name}={value}" for name, value in settings.items()]
-    with kept(folder, page.check_writable, watch, inputs, told, force=force):
+    asked_for = [f"{name}={value}" for name, value in settings.items()]
+    with kept(folder, page.check_writable, watch, inputs, asked_for, force=force):
         for sentence in cosim.executing(archives / "friction.fmu", "friction law") if archives is not None else ():
             watch.announce(sentence)
         with FrictionLaw(archives) as law:

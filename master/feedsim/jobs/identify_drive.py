@@ -136,7 +136,7 @@ def identify_drive(
     cycle = quantity("position_cycle", position_cycle, "s", "1 ms") if position_cycle else None
     count = count_of_modes(modes, asked.machine is not None)
     archives = None if fmus is None else Path(fmus)
-    with kept(out, partial(page.check_writable, asked.axes), watch, asked.inputs, asked.told, force=force):
+    with kept(out, partial(page.check_writable, asked.axes), watch, asked.inputs, asked.asked_for, force=force):
         watch.progress("reading", 0, 1)
         records = asked.records
         if asked.machine is not None:

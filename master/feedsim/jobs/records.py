@@ -75,7 +75,7 @@ class Asked:
         return [self.recording.path, *(file for _, file in (self.subject.files if self.subject is not None else ()))]
 
     @property
-    def told(self) -> list[str]:
+    def asked_for(self) -> list[str]:
         """All that was asked for, as texts."""
         return [*self.changes, *(f"{name}={text}" for name, text in self.settings.items())]
 

@@ -126,7 +126,7 @@ def replay(
     own = asked.subject.machine
     archives = None if fmus is None else Path(fmus)
     inputs = [*asked.inputs, own.modes]
-    with kept(out, page.check_writable, watch, inputs, asked.told, force=force):
+    with kept(out, page.check_writable, watch, inputs, asked.asked_for, force=force):
         watch.progress("reading", 0, 3)
         records = asked.records
         announce(watch, own, archives)

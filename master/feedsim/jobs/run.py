@@ -149,13 +149,13 @@ class RunResult(Run, Result):
     def __repr__(self) -> str:
         figures = [f"{name} {figure}" for name, figure in self._leading().items()][:4]
         wrong = [each for each in self.findings if severity(each) != "note"]
-        told = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .findings"] if wrong else []
+        warned = [f"{len(wrong)} warning{'s'[: len(wrong) != 1]}, see .findings"] if wrong else []
         return "; ".join(
             [
                 f"Result of {self.scenario.name!r}: {self.program.duration:.4g} s, {len(self.trace)} rows, "
                 f"{len(self.trace.names)} columns",
                 *([", ".join(figures)] if figures else []),
-                *told,
+                *warned,
             ]
         )
 

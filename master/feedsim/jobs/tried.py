@@ -15,9 +15,9 @@ from feedsim.report.show import report as show_report
 from feedsim.scenario import load
 from feedsim.tune import Proposal, of_run
 
-# Figures whose change is told, by what stands behind the last dot.
-TOLD = ("G", "overshoot", "settling_time")
-TOLD_OF_AXES = ("peak_", "servo_mismatch")
+# Figures whose change is shown, by what stands behind the last dot.
+SHOWN = ("G", "overshoot", "settling_time")
+SHOWN_OF_AXES = ("peak_", "servo_mismatch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +49,19 @@ def tried(run: RunResult, directory: Path, *, fmus: Path | None = None, watch: W
     again = RunResult.of(cosim.run(changed, fmus=fmus, progress=watch.of(f"{scenario.name}, tried")))
     again.save(_second(directory))
     show(directory, _second(directory)).save(_overlaid(directory))
-    told = [
+    changed_figures = [
         f"tried: {name} {run.figures[name]} -> {figure}"
         for name, figure in again.figures.items()
         if name in run.figures and _leading(name)
     ]
-    return Tried(proposals, settings, (*change_lines(proposals), *told, f"-> {_overlaid(directory) / 'report.html'}"))
+    return Tried(
+        proposals, settings, (*change_lines(proposals), *changed_figures, f"-> {_overlaid(directory) / 'report.html'}")
+    )
 
 
 def _leading(name: str) -> bool:
     prefix, _, key = name.partition(".")
-    return key in TOLD or (key.startswith(TOLD_OF_AXES) and "." not in key and bool(prefix))
+    return key in SHOWN or (key.startswith(SHOWN_OF_AXES) and "." not in key and bool(prefix))
 
 
 def _second(directory: Path) -> Path:

@@ -173,9 +173,9 @@ def _factor(
             return float(units.factor(unit, each)), each
         except InputError:
             continue
-    told = f"is in {unit}" if unit else "has no unit in the file"
+    unit_words = f"is in {unit}" if unit else "has no unit in the file"
     raise InputError(
-        f"{path}: the {what} {channel.names[0]!r} {told}; a unit of {', '.join(allowed)} is needed: "
+        f"{path}: the {what} {channel.names[0]!r} {unit_words}; a unit of {', '.join(allowed)} is needed: "
         f"{channel.names[0]}:{allowed[0]}"
     )
 

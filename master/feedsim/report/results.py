@@ -84,12 +84,12 @@ def replaced(directory: Path, inputs: Sequence[Path], asked: Sequence[str]) -> s
         files = {each["sha256"] for each in before["inputs"]}
         settings = before.get("settings", {}).items()
         subject: dict[str, Any] = next((before[name] for name in ("scenario", "subject") if name in before), {})
-        told = [*subject.get("overrides", ()), *(f"{name}={value}" for name, value in settings)]
+        settings_before = [*subject.get("overrides", ()), *(f"{name}={value}" for name, value in settings)]
     except (KeyError, TypeError, AttributeError):
         return ""  # none, or one whose inputs are not known
-    if told == [*asked] and {sha256(path) for path in inputs} <= files:
+    if settings_before == [*asked] and {sha256(path) for path in inputs} <= files:
         return ""
-    was = f" ({', '.join(told)})" if told else ""
+    was = f" ({', '.join(settings_before)})" if settings_before else ""
     return f"{directory}: its result is of other parameters{was} and will be replaced; --out takes another folder"
 
 
@@ -230,12 +230,12 @@ def _stale(directory: Path, names: Sequence[str]) -> list[str]:
     before = _summary(directory)
     keeps = before.get("keeps", ())
     stay = {REPORT, SUMMARY, *names, *(keeps if isinstance(keeps, list) else ())}
-    told = "version" in before
+    enveloped = "version" in before
     return [
         name
         for name in _listed(directory) or ()
         if name not in stay
-        and (told or name in _OF_0_1 or name.startswith(f"{FIGURES}/"))
+        and (enveloped or name in _OF_0_1 or name.startswith(f"{FIGURES}/"))
         and _inside(name)
         and (directory / name).is_file()
     ]

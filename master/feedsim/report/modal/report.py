@@ -57,11 +57,11 @@ class ModesReport:
                 measured, "Hz", "largest response of the motor: of the measured lines"
             )
         if found.ratios is not None:
-            told = "inertia behind the first mode over that of the motor, (resonance/antiresonance)^2 - 1"
+            meaning = "inertia behind the first mode over that of the motor, (resonance/antiresonance)^2 - 1"
             for key, ratio, of in zip(
                 ("ratio", "ratio_measured"), found.ratios, ("fit", "measured lines"), strict=True
             ):
-                figures[f"{axis}.{key}"] = Figure(ratio, "1", f"{told}: of the {of}")
+                figures[f"{axis}.{key}"] = Figure(ratio, "1", f"{meaning}: of the {of}")
         per = f"(rad/s^2)/({found.measured.input_unit})"
         figures[f"{axis}.rigid"] = Figure(abs(fit.rigid[MOTOR]), per, "acceleration of the motor in rigid motion")
         for name, delay in fit.delay.items():

@@ -146,18 +146,18 @@ def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
     ]
     readings = 1e6 * found.deviations
     heads = ("Target [mm]", "Approach", *(f"{k + 1}" for k in range(visits.runs)), "x\u0305 [µm]", "s [µm]", "B [µm]")
-    rows, told = [], []
+    rows, csv_rows = [], []
     for i, target in enumerate(visits.targets):
         for side, arrow in enumerate("↑↓"):
             own = readings[side, i]
             last = minus(f"{1e6 * found.B[i]:.3f}") if side == 0 else ""
             rows.append((f"{1e3 * target:.6g}", arrow, *(minus(f"{value:.3f}") for value in own),
                          minus(f"{1e6 * found.mean[side, i]:.3f}"), f"{1e6 * found.s[side, i]:.3f}", last))  # fmt: skip
-            told += [("deviation", f"{1e3 * target:.9g}", "", arrow, str(k + 1), f"{value:.6f}", "um")
+            csv_rows += [("deviation", f"{1e3 * target:.9g}", "", arrow, str(k + 1), f"{value:.6f}", "um")
                      for k, value in enumerate(own)]  # fmt: skip
     results = _results(found.figures, SYMBOLS, sheet, OF_POSITIONING)
     picture = accuracy_picture(prefix, found, f"sheet-{prefix.replace('#', '-')}")
-    return Filled(f"Positioning of {prefix}", "ISO 230-2", conditions, heads, rows, results, picture, told)
+    return Filled(f"Positioning of {prefix}", "ISO 230-2", conditions, heads, rows, results, picture, csv_rows)
 
 
 def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
@@ -181,13 +181,13 @@ def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
     curves = [_deviation(run.trace, each, grid) for each in task.turns]
     rows = [(f"{angle:g}", *(minus(f"{curve[k]:.3f}") for curve in curves))
             for k, angle in enumerate(grid) if angle % 15 == 0]  # fmt: skip
-    told = [("radial deviation", "", f"{angle:g}", name, "", f"{curve[k]:.6f}", "um")
+    csv_rows = [("radial deviation", "", f"{angle:g}", name, "", f"{curve[k]:.6f}", "um")
             for name, curve in zip(names, curves, strict=True) for k, angle in enumerate(grid)]  # fmt: skip
     results = _results(figures, symbols, sheet, OF_CIRCLES)
     stem = f"sheet-{task.prefix.replace('#', '-')}"
     picture = contour_picture(run.trace, turn, stem, task.back, task.diagnosis(run.trace))
     heads = ("Angle [°]", *(f"{name} [µm]" for name in names))
-    return Filled(f"Circle {task.prefix}", "ISO 230-4", conditions, heads, rows, results, picture, told)
+    return Filled(f"Circle {task.prefix}", "ISO 230-4", conditions, heads, rows, results, picture, csv_rows)
 
 
 def _deviation(trace: Trace, turn: Turn, grid: np.ndarray) -> np.ndarray:

@@ -54,10 +54,10 @@ def next_step(run: Run, causes: Mapping[str, Diagnosis], change: str = "") -> Te
     file = run.scenario.file.name
     if change:
         return f"Try {change}:\n", code(f"feedsim run {file} --try")
-    told = [term.key for diagnosis in causes.values() for term in worth_telling(diagnosis)[:1]]
-    if told[:1] == ["peaks"]:
+    first_causes = [term.key for diagnosis in causes.values() for term in worth_telling(diagnosis)[:1]]
+    if first_causes[:1] == ["peaks"]:
         return "See what friction compensation takes away:\n", code(f"feedsim compensate {file}")
-    if told[:1] == ["servo"]:
+    if first_causes[:1] == ["servo"]:
         return "See how each axis answers:\n", code(f"feedsim frf {file}")
     return "Lay another run or a record over it:\n", code("feedsim show THIS_FOLDER OTHER_FOLDER")
 

@@ -78,12 +78,12 @@ def findings(judged: Judged) -> list[str]:
         f"{axis} on {pair.text}: {1e6 * before:.3g} -> {1e6 * after:.3g} um"
         for axis, pair, before, after in judged.worse
     ]
-    told: list[str] = [Wrong(f"worse with compensation than without: {', '.join(worse)}")] if worse else []
+    found: list[str] = [Wrong(f"worse with compensation than without: {', '.join(worse)}")] if worse else []
     if judged.found.kind == "model":
-        told.append(Note("the compensation has the friction of the machine itself; a real one is never known so well"))
+        found.append(Note("the compensation has the friction of the machine itself; a real one is never known so well"))
     else:
-        told.append(Note(UNKNOWN))
-    return told
+        found.append(Note(UNKNOWN))
+    return found
 
 
 def answers(judged: Judged) -> list[str]:

@@ -86,7 +86,7 @@ def _summary(path: Path) -> bool:
 
 
 _RUN = ("run", "validate", "frf", "compensate", "pack", "page", "ssp", "machine info", "machine show", "machine build",
-        "machine pack")  # fmt: skip
+        "machine pack", "tune compensation")  # fmt: skip
 _RECORDS = ("identify", "circle", "show", "compare", "convert", "identify-drive", "replay", "identify-modes")
 KINDS = (
     Kind("a study", ("sweep", "validate"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),
@@ -113,7 +113,7 @@ KINDS = (
     Kind("a table of modes, which a machine file names", (), _modes),
     Kind("a record", _RECORDS, _table),
     Kind("a record", ("identify", "convert", "identify-drive", "replay", "identify-modes"), _ends(".mat")),
-    Kind("a record", ("identify-drive", "replay", "identify", "convert"), _capture),
+    Kind("a capture of a control", ("identify-drive", "replay", "identify", "convert"), _capture),
 )
 
 

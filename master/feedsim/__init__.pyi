@@ -14,6 +14,13 @@ from feedsim.jobs.example import example as example
 from feedsim.jobs.frf import frf as frf
 from feedsim.jobs.identify import identify as identify
 from feedsim.jobs.identify_drive import identify_drive as identify_drive
+from feedsim.jobs.identify_modes import identify_modes as identify_modes
+from feedsim.jobs.machine import machine_build as machine_build
+from feedsim.jobs.machine import machine_info as machine_info
+from feedsim.jobs.machine import machine_show as machine_show
+from feedsim.jobs.machine_pack import machine_pack as machine_pack
+from feedsim.jobs.made import Made as Made
+from feedsim.jobs.pack import pack as pack
 from feedsim.jobs.replay import replay as replay
 from feedsim.jobs.result import Result as Result
 from feedsim.jobs.run import RunResult as RunResult
@@ -23,6 +30,8 @@ from feedsim.jobs.show import show as show
 from feedsim.jobs.subject import load as load
 from feedsim.jobs.sweep import sweep as sweep
 from feedsim.jobs.tune_compensation import tune_compensation as tune_compensation
+from feedsim.jobs.write_page import write_page as write_page
+from feedsim.jobs.write_ssp import write_ssp as write_ssp
 from feedsim.scenario import Machine as Machine
 from feedsim.scenario import Scenario as Scenario
 from feedsim.scenario import load_machine as load_machine

@@ -19,6 +19,7 @@ from feedsim.errors import InputError
 T = TypeVar("T")
 V = TypeVar("V")
 Value = float | str  # a number in SI units, or a text with a unit
+Band = str | tuple[float, float]  # lowest and highest frequency [Hz], or a text "1Hz..1000Hz"
 
 _AS_OPTIONS = ContextVar("as_options", default=False)
 
@@ -70,6 +71,22 @@ def amount(value: Value, unit: str, example: str = "", *, positive: bool = False
     if positive and number <= 0:
         raise InputError(f"more than zero is needed, e.g. {example}")
     return number
+
+
+def between(name: str, band: Band, lowest: str, highest: str) -> tuple[float, float]:
+    """Lowest and highest frequency [Hz] of an argument; lowest, highest: examples, with a unit. Raises InputError.
+
+    >>> between("band", "1Hz..1kHz", "1 Hz", "1000 Hz")
+    (1.0, 1000.0)
+    """
+    if isinstance(band, str):
+        first, dots, last = band.partition("..")
+        if not dots:
+            example = f"{lowest}..{highest}".replace(" ", "")
+            raise InputError(f"{spelt(name)} {band}: LOW..HIGH is needed, such as {example}")
+        return quantity(name, first, "Hz", lowest), quantity(name, last, "Hz", highest)
+    low, high = band
+    return quantity(name, low, "Hz", lowest), quantity(name, high, "Hz", highest)
 
 
 def by_name(name: str, values: Mapping[str, V], read: Callable[[str, V], T]) -> dict[str, T]:

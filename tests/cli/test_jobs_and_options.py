@@ -12,7 +12,7 @@ from feedsim.cli import COMMANDS
 from feedsim.cli.options import WRITES, Command, flat
 
 # What only a terminal needs: no progress bar and no summary, a text in place of the runs, a second run beside it.
-OF_THE_TERMINAL = {"quiet", "dry_run", "row", "try"}
+OF_THE_TERMINAL = {"quiet", "dry_run", "row", "try", "json"}
 OF_PYTHON = {"watch", "named"}  # who is told, and results under names of their own
 
 

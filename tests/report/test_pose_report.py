@@ -207,10 +207,12 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     ],
 )
 def test_cells_that_are_refused(texts: list[str], message: str) -> None:
-    from feedsim.cli.machine.pack import grid_axes
+    from feedsim.arguments import as_options
+    from feedsim.cli.options import pairs
+    from feedsim.jobs.machine_pack import EXAMPLE, grid_axes
 
-    with pytest.raises(InputError) as caught:
-        grid_axes(default_machine(), texts)
+    with pytest.raises(InputError) as caught, as_options():
+        grid_axes(default_machine(), pairs("poses", texts, f"{EXAMPLE} is the form"))
     assert message in str(caught.value)
 
 

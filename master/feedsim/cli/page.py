@@ -6,9 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from feedsim.cli.options import FMUS, Command, Option, names, settings
-from feedsim.cli.terminal import warn
-from feedsim.errors import OutputError
-from feedsim.outputs import begins_with, check_file
+from feedsim.cli.terminal import finish, watching
 
 TEXT = """Write one file of HTML that holds the scenario's machine: the compiled unit as WebAssembly, its modes, drives
 and frictions, and knobs. It opens from disk, in a mail, on a phone; contour, stop, torque and frequency response follow
@@ -22,24 +20,18 @@ EXAMPLES = """examples:
 
 def page(options: Namespace) -> None:
     """feedsim page."""
-    from feedsim import cosim, nc, scenario
-    from feedsim import page as room
-    from feedsim.analysis import check
-    from feedsim.page.content import content
-    from feedsim.page.html import MARK
-    from feedsim.report.provenance import input_paths
+    from feedsim.jobs.write_page import write_page
 
-    if not options.out.absolute().parent.is_dir():
-        raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
-    asked = scenario.load(options.scenario, options.overrides)
-    check_file(options.out, [options.scenario, *input_paths(asked)], ours=begins_with(MARK), what="page")
-    program = nc.plan(asked)
-    content(asked, program, options.knobs or (), options.fmus)  # what cannot be shown should not be run
-    check(asked, program)
-    run = cosim.run(asked, program=program, fmus=options.fmus)
-    warn(run.warnings)
-    size = room.write(run, options.out, options.knobs or (), options.fmus)
-    print(f"{options.out}: {size / 1000:.0f} kB; axes {', '.join(asked.machine.axes)}; open it in a browser")
+    with watching(quiet=False, unit=" cycles", shortened=True) as watch:
+        made = write_page(
+            options.scenario,
+            options.out,
+            knobs=options.knobs or (),
+            fmus=options.fmus,
+            set=options.overrides,
+            watch=watch,
+        )
+    finish(False, made.findings, f"{options.out}: {made.answers[0]}")
 
 
 COMMAND = Command(
@@ -57,4 +49,5 @@ COMMAND = Command(
     needs=("run",),
     description=TEXT,
     epilog=EXAMPLES,
+    job="write_page",
 )  # fmt: skip

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET, Command, Option, out, settings
-from feedsim.cli.terminal import finish, warn, watching
-from feedsim.errors import InputError, OutputError
-from feedsim.outputs import archive_with, check_file
-
-if TYPE_CHECKING:
-    from feedsim.ssp import Exported
+from feedsim.cli.terminal import finish, watching
+from feedsim.errors import InputError
 
 SSP_TEXT = """Write a scenario as one SSP file (System Structure and Parameterization 1.0): the plant packed with the
 machine, a controller and a friction unit per axis with their parameters, the setpoints of the motion in a unit that
@@ -88,36 +83,13 @@ def validate(options: Namespace) -> None:
 
 def write_ssp(options: Namespace) -> None:
     """feedsim ssp."""
-    from feedsim import scenario, ssp
-    from feedsim.files.source import is_ssp
-    from feedsim.report.provenance import input_paths
-    from feedsim.ssp.archive import STRUCTURE as SSD
+    from feedsim.jobs.write_ssp import write_ssp
 
-    if not is_ssp(options.out):
-        raise InputError(f"--out {options.out}: an SSP file ends in .ssp; simulators tell it by that")
-    if is_ssp(options.scenario):
-        raise InputError(f"{options.scenario}: is an SSP file already; a scenario is expected")
-    if not options.out.absolute().parent.is_dir():
-        raise OutputError(f"{options.out} cannot be written: no such folder: {options.out.parent}")
-    plan = scenario.load(options.scenario, [*options.overrides, *(["coupling.units=one"] if options.one else [])])
-    check_file(
-        options.out, [options.scenario, *input_paths(plan)], what="SSP file",
-        ours=archive_with(SSD, b'generationTool="feedsim'),
-    )  # fmt: skip
-    done = ssp.export(plan, options.out, fmus=options.fmus)
-    warn(done.warnings)
-    print(
-        f"{done.path}: {done.size / 1024:.0f} KiB, {_inside(done, plan.machine.cycles.T_c)}; "
-        f"runs on {', '.join(done.platforms) or 'no platform'}"
-    )
-
-
-def _inside(done: Exported, T_c: float) -> str:
-    if len(done.instances) == 1:
-        return f"one instance, {done.duration:.4g} s at any step; parameters in its archive"
-    return (
-        f"{len(done.instances)} instances, {done.duration:.4g} s at {T_c * 1e6:.6g} us; parameters in resources/*.ssv"
-    )
+    with watching(quiet=False) as watch:
+        made = write_ssp(
+            options.scenario, options.out, one=options.one, fmus=options.fmus, set=options.overrides, watch=watch
+        )
+    finish(False, made.findings, f"{options.out}: {made.answers[0]}")
 
 
 TRUST = """An FMU is a program, and so is an SSP, which holds some: to run it is to run its libraries with your rights.
@@ -168,4 +140,5 @@ SSP = Command(
     ),
     description=SSP_TEXT,
     epilog=SSP_EXAMPLES,
+    job="write_ssp",
 )

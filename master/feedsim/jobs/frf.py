@@ -11,7 +11,7 @@ from feedsim.analysis import Figure, Named, linear, responses, truncation
 from feedsim.analysis.campaign import Plan, run_campaign
 from feedsim.analysis.responses import Overlay, Responses, highest_frequency, read_overlays
 from feedsim.analysis.truncation import Truncation
-from feedsim.arguments import Changes, Value, listed, quantity, settings, spelt
+from feedsim.arguments import Band, Changes, Value, between, listed, quantity, settings, spelt
 from feedsim.cosim.plant import plant_modes
 from feedsim.cosim.trust import control as control_findings
 from feedsim.errors import FeedsimError, InputError
@@ -39,7 +39,6 @@ UNSTABLE = (
     "the control loops are unstable: {} growing solution(s) of the closed system. The figures of loops presume stable "
     "ones, and nothing was measured"
 )
-Band = str | tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -294,13 +293,7 @@ def _band(band: Band | None, machine: Machine) -> tuple[float, float]:
     """Lowest and highest frequency [Hz]."""
     if band is None:
         return LOWEST, min(HIGHEST, highest_frequency(machine))
-    if not isinstance(band, str):
-        low, high = band
-        return quantity("band", low, "Hz", "1 Hz"), quantity("band", high, "Hz", "1000 Hz")
-    first, dots, last = band.partition("..")
-    if not dots:
-        raise InputError(f"{spelt('band')} {band}: LOW..HIGH is needed, such as 1Hz..1000Hz")
-    return quantity("band", first, "Hz", "1 Hz"), quantity("band", last, "Hz", "1000 Hz")
+    return between("band", band, "1 Hz", "1000 Hz")
 
 
 def _count(name: str, number: int) -> int:

@@ -52,3 +52,11 @@ def announce(watch: Watch, machine: Machine, fmus: Path | None, coupling: Coupli
 
     for sentence in cosim.executed(machine, fmus, coupling):
         watch.announce(sentence)
+
+
+def announce_archive(watch: Watch, path: Path | None, who: str) -> None:
+    """The same of one archive that a user names, for the part that it plays; None: a shipped one."""
+    from feedsim import cosim
+
+    for sentence in cosim.executing(path, who) if path is not None else ():
+        watch.announce(sentence)

@@ -40,25 +40,32 @@ MARK = b'content="feedsim page"'
 def write(run: Run, out: Path, wanted: Sequence[str] = (), fmus: Path | None = None) -> int:
     """Write the page of a run's scenario, whole or not at all; returns its size [bytes].
 
+    wanted, fmus: as for :func:`page`. Raises InputError as that, and OutputError: `out` cannot be written.
+    """
+    content = page(run, wanted, fmus)
+    with written_whole(out) as file:
+        file.write(content)
+    return len(content)
+
+
+def page(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> bytes:
+    """The page of a run's scenario.
+
     wanted: patterns of the knobs, see :func:`feedsim.page.knobs.chosen`. fmus: folder of archives and module.
 
-    Raises:
-        InputError: there is no such page (:func:`feedsim.page.content.content`), or it is too large.
-        OutputError: `out` cannot be written.
+    Raises InputError: there is no such page (:func:`feedsim.page.content.content`), or it is too large.
     """
-    page = html(run, wanted, fmus).encode()
-    if len(page) > LARGEST:
+    content = html(run, wanted, fmus).encode()
+    if len(content) > LARGEST:
         raise InputError(
-            f"{run.scenario.file}: its page takes {len(page) / 1e6:.3g} MB; allowed are {LARGEST / 1e6:g} MB: "
+            f"{run.scenario.file}: its page takes {len(content) / 1e6:.3g} MB; allowed are {LARGEST / 1e6:g} MB: "
             "take fewer modes (feedsim machine build), no grid of poses, or shorter motions that a page does not plan"
         )
-    with written_whole(out) as file:
-        file.write(page)
-    return len(page)
+    return content
 
 
 def html(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
-    """The text of the page; arguments and errors as for :func:`write`."""
+    """The text of the page; arguments and errors as for :func:`page`."""
     held = content(run.scenario, run.program, wanted, fmus)
     scenario, machine = run.scenario, run.scenario.machine
     shown_tasks = [task for task in tasks(scenario, run.program) if isinstance(task, CircleTask | PositioningTask)]

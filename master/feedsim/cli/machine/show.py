@@ -2,87 +2,34 @@
 
 from __future__ import annotations
 
-import math
 from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from feedsim.cli.machine.figures import QUIET, SOURCE, STEP, figures
-from feedsim.cli.options import Command, Option
-from feedsim.cli.terminal import finish, results_in
-from feedsim.errors import InputError
-
-if TYPE_CHECKING:
-    from feedsim.structure.modes import Modes
-
-# A frequency that is asked for belongs to the nearest mode if that is not farther away than this share.
-NEAR = 0.1
+from feedsim.cli.machine.figures import POSITION, QUIET, SOURCE, STEP
+from feedsim.cli.options import Command, Option, pairs
+from feedsim.cli.terminal import finish, watching
 
 
 def show(options: Namespace) -> None:
     """feedsim machine show: compute, draw, write."""
-    from feedsim.report import machine as report
-    from feedsim.scenario.described import load_described
+    from feedsim.jobs.machine import machine_show
 
-    scale = _scale(options.scale)
-    if options.animate and not options.mode:
-        raise InputError("--animate: which mode? Give --mode too, e.g. --mode 21Hz")
-    described = load_described(options.machine)
-    if described.structure is None:
-        raise InputError(
-            f"{options.machine}: has a table of modes alone, and no table says where things are; a picture needs a "
-            "structure file (key structure, docs/structure.md)"
+    with watching(options.quiet) as watch:
+        result = machine_show(
+            options.machine,
+            options.out,
+            at=pairs("at", options.at, POSITION),
+            cutoff=options.cutoff,
+            static_correction=options.static_correction,
+            step=options.step,
+            mode=options.mode,
+            animate=options.animate,
+            scale=options.scale,
+            watch=watch,
         )
-    with results_in(options.out, report.check_writable, [file for _, file in described.files]):
-        found = figures(options, described, quiet=options.quiet)
-        chosen = list(dict.fromkeys(_mode(text, found.modes) for text in options.mode))
-        report.write(
-            described.structure, found, described.files, options.out, modes=chosen, scale=scale, animate=options.animate
-        )
-    shown = [f"mode {k}: {found.modes.frequency[k]:.2f} Hz, {found.moving[k]}" for k in chosen]
-    finish(options.quiet, (), f"{found.title} -> {options.out / 'report.html'}", *shown)
-
-
-def _mode(text: str, modes: Modes) -> int:
-    """Number of the mode that --mode means."""
-    import numpy as np
-
-    from feedsim import units
-
-    count = len(modes.frequency)
-    if text.isdecimal():
-        if int(text) >= count:
-            raise InputError(
-                f"--mode {text}: there are {count} modes, 0 to {count - 1}, up to {modes.frequency.max():.1f} Hz; "
-                "--cutoff gives more"
-            )
-        return int(text)
-    try:
-        f = units.parse(text, "Hz", "21 Hz")
-    except InputError as error:
-        raise InputError(f"--mode {text}: the number of a mode or a frequency is needed; {error}") from None
-    if not (math.isfinite(f) and f > 0):
-        raise InputError(f"--mode {text}: a frequency above 0 Hz is needed; rigid modes are chosen by their number")
-    k = int(np.argmin(np.abs(modes.frequency - f)))
-    if abs(modes.frequency[k] - f) > NEAR * f:
-        listed = ", ".join(f"{value:.4g}" for value in modes.frequency[modes.frequency > 0][:8])
-        raise InputError(
-            f"--mode {text}: no mode near; the nearest is {modes.frequency[k]:.4g} Hz (the first elastic ones: "
-            f"{listed or 'none'} Hz)"
-        )
-    return k
-
-
-def _scale(text: str) -> float:
-    if text == "auto":
-        return 1.0
-    try:
-        scale = float(text)
-    except ValueError:
-        scale = math.nan
-    if not (math.isfinite(scale) and 0 < scale <= 100):
-        raise InputError(f"--scale {text}: auto, or a factor above 0 and up to 100, is needed")
-    return scale
+    info = result.info
+    drawn = [f"mode {k}: {info.modes.frequency[k]:.2f} Hz, {info.moving[k]}" for k in result.modes]
+    finish(options.quiet, result.findings, f"{info.title} -> {options.out / 'report.html'}", *drawn)
 
 
 SHOW = Command(
@@ -105,4 +52,5 @@ SHOW = Command(
     "Draw the structure of a machine and its first modes, or chosen ones: PNG and SVG in DIR/figures, with "
     "report.html around them. MACHINE may be a scenario too.",
     needs=("figures",),
+    job="machine_show",
 )  # fmt: skip

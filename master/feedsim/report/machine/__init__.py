@@ -3,7 +3,3 @@
 May use the report's core and what `feedsim.structure` found.
 Start with report.py.
 """
-
-from feedsim.report.machine.report import check_writable, write
-
-__all__ = ["check_writable", "write"]

@@ -1,21 +1,21 @@
-"""The report on a machine's structure: pictures (PNG, SVG, GIF), summary.json and report.html, whole or not at all."""
+"""The report on a machine's structure: what report.html says, with pictures of the structure and of its modes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from feedsim.report.content import Animation, Paragraph, Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import display_unit, number, typeset
 from feedsim.report.machine.animation import mode_gif
 from feedsim.report.machine.model import model
 from feedsim.report.machine.pictures import mode_picture, mode_title, sheet_picture, structure_picture
-from feedsim.report.machine.record import MEANINGS, USUAL_EXCHANGE, exchange, moves, record
-from feedsim.report.picture import KINDS, Picture
+from feedsim.report.machine.record import MEANINGS, USUAL_EXCHANGE, exchange, moves
+from feedsim.report.picture import Picture
 from feedsim.report.provenance import hashed
-from feedsim.report.results import FIGURES, REPORT, SUMMARY, Content, check_place, write_report
+from feedsim.report.results import FIGURES, Content
 from feedsim.report.sections import provenance_section
 from feedsim.scenario.structure import Structure
 from feedsim.structure.info import MachineInfo
@@ -23,31 +23,20 @@ from feedsim.structure.info import MachineInfo
 FAR_BELOW = 0.1  # share of the limit of the exchange, up to which it is stable by far
 
 
-def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError unless the pictures can be written to ``directory`` without one of ``inputs`` being lost.
+@dataclass(frozen=True, eq=False)
+class Drawings:
+    """What a report shows of a machine: its pictures and animations, and the files of the latter."""
 
-    Leaves nothing behind.
-    """
-    check_place(directory, (REPORT, SUMMARY), inputs, kind="machine")
+    parts: Sequence[Picture | Animation]
+    files: Mapping[str, Content]
 
 
-def write(
-    structure: Structure,
-    info: MachineInfo,
-    files: Sequence[tuple[str, Path]],
-    directory: Path | str,
-    *,
-    modes: Sequence[int] = (),
-    scale: float = 1.0,
-    animate: bool = False,
-) -> tuple[Path, ...]:
-    """Write the structure's picture, and those of `modes`, or without any a sheet of the first ones.
+def drawn(
+    structure: Structure, info: MachineInfo, *, modes: Sequence[int] = (), scale: float = 1.0, animate: bool = False
+) -> Drawings:
+    """The structure's picture, and those of `modes`, or without any a sheet of the first ones.
 
-    Each as figures/*.png and *.svg, animated ones as *.gif; report.html, summary.json. Returns the paths.
-
-    Raises:
-        InputError: the model has no geometry.
-        OutputError: it cannot be written.
+    Raises InputError: the model has no geometry.
     """
     built = info.built
     assert built is not None
@@ -58,16 +47,9 @@ def write(
     elif (sheet := sheet_picture(info, built, of, scale)) is not None:
         pictures.append(sheet)
     gifs = {k: mode_gif(info, built, of, k, scale) for k in modes if animate}
-    animated: dict[str, Content] = {f"{FIGURES}/mode_{k}.gif": gif for k, gif in gifs.items()}
-
-    def summary(names: Sequence[str]) -> dict[str, Any]:
-        return record(info, files) | {"files": list(names)}
-
     caption = "One period, slowed down and exaggerated."
     moving = [Animation(mode_title(info, k), caption, gif) for k, gif in gifs.items()]
-    return write_report(
-        directory, report_of(info, files, [*pictures, *moving]), summary, animated, KINDS, kind="machine"
-    )
+    return Drawings([*pictures, *moving], {f"{FIGURES}/mode_{k}.gif": gif for k, gif in gifs.items()})
 
 
 def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Sequence[Picture | Animation]) -> Report:

@@ -19,7 +19,7 @@ from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
-from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
+from feedsim.report.results import REPORT, SUMMARY, Content, check_place
 from feedsim.report.sections import figures_footer, figures_section, provenance_section
 from feedsim.report.style import BLUE, MUTED, VERMILLION, Array, remarked
 from feedsim.scenario import Subject
@@ -86,8 +86,8 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     check_place(directory, (MODES, CURVES, REPORT, SUMMARY), inputs, kind=KIND)
 
 
-def write(report: ModesReport, directory: Path | str, *, drawn: Sequence[str] = ()) -> tuple[Path, ...]:
-    """Write all files; returns the paths. Raises OutputError."""
+def files_of(report: ModesReport) -> dict[str, Content]:
+    """Name -> content of the files besides report.html and summary.json."""
     found = report.found
     columns: dict[str, Complexes] = {}
     units: dict[str, str] = {}
@@ -96,9 +96,7 @@ def write(report: ModesReport, directory: Path | str, *, drawn: Sequence[str] = 
         columns |= {f"{name}": values, f"{name} fit": found.fit.response(name, found.measured.frequency)}
         units |= {f"{name}": unit, f"{name} fit": unit}
     response = FrequencyResponse(found.measured.frequency, columns, units)
-    files = {MODES: partial(write_modes, modes=found.table), CURVES: partial(write_response, response=response)}
-    content = partial(summary, report)
-    return write_report(directory, report_of(report), content, files, drawn, kind=KIND, keeps=(MODES,))
+    return {MODES: partial(write_modes, modes=found.table), CURVES: partial(write_response, response=response)}
 
 
 def report_of(report: ModesReport) -> Report:
@@ -215,9 +213,8 @@ def answers(report: ModesReport) -> list[str]:
     ]
 
 
-def summary_lines(report: ModesReport, directory: Path) -> list[str]:
+def summary_lines(report: ModesReport) -> list[str]:
     """For the terminal."""
-    lines = [f"modes of {report.found.axis} from {report.file.name} -> {directory / REPORT}"]
-    lines += [f"  {line}" for line in answers(report)]
+    lines = [f"  {line}" for line in answers(report)]
     lines += [f"    {name:<34} {figure}" for name, figure in report.figures.items()]
     return lines

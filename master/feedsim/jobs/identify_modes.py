@@ -1,0 +1,211 @@
+"""Elastic modes of an axis from measured responses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from feedsim.analysis import Figure, Named
+from feedsim.arguments import Band, Changes, Value, between, quantity, settings, spelt
+from feedsim.errors import InputError
+from feedsim.fields import no_axis
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch
+from feedsim.modal.identified import AxisModes
+from feedsim.modal.identified import identify_modes as identified
+from feedsim.modal.measured import Channel, from_responses, from_signals
+from feedsim.modal.rational import MOST_MODES
+from feedsim.report.content import Report
+from feedsim.report.modal import report as page
+from feedsim.report.results import Content
+from feedsim.scenario import Machine, load_subject
+from feedsim.structure import checked_modes
+from feedsim.trace.response_files import read_response
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModesResult(Result):
+    """Modes of an axis: what was found, and what it rests on."""
+
+    identified: page.ModesReport
+
+    kind = page.KIND
+
+    @property
+    def axis(self) -> AxisModes:
+        """Rigid motion, delays and modes of the axis; ``table`` is the machine's table with them."""
+        return self.identified.found
+
+    @property
+    def keeps(self) -> Sequence[str]:
+        """The table of modes: machine files name it."""
+        return (page.MODES,)
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """The response, and the files of the machine."""
+        return [self.identified.file, *(file for _, file in self.identified.subject.files)]
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """ "X.resonance_1", "X.antiresonance_1", "X.ratio", "X.motor_delay", ..."""
+        return Named(self.identified.figures)
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """What is to be known before the modes are believed."""
+        return self.identified.warnings
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """The modes, and how near the fit is to the measured lines."""
+        return page.answers(self.identified)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answers, and all figures."""
+        return page.summary_lines(self.identified)
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.identified)
+
+    def files(self) -> Mapping[str, Content]:
+        """The machine's table of modes, and the curves."""
+        return page.files_of(self.identified)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.identified, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, inputs)
+
+
+def identify_modes(
+    response: File,
+    machine: File,
+    axis: str | None = None,
+    *,
+    input: str | None = None,
+    motor: str | None = None,
+    scale: str | None = None,
+    sensor: Sequence[str] = (),
+    modes: int | Literal["auto"] | str = "auto",
+    band: Band | None = None,
+    period: int | None = None,
+    time: str | None = None,
+    interval: Value | None = None,
+    set: Changes = None,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> ModesResult:
+    """Elastic modes of an axis from a measured response: time signals, or a file of frequency responses.
+
+    Args:
+        response: time signals (with `input`) or frequency responses.
+        machine: machine file, machine folder or scenario: whose axis it is.
+        axis: None: the first one.
+        input: of time signals: torque or current, "NAME:UNIT"; of several runs "NAME,NAME:UNIT".
+        motor: angle, speed or acceleration of the motor, "NAME:UNIT"; None: the only response.
+        scale: position, speed or acceleration at the scale, or at the load.
+        sensor: further sensors.
+        modes: how many, 0 to 5; "auto": cross-validation decides.
+        band: lines that are used [Hz], or a text "11Hz..250Hz"; None: all that are excited.
+        period: of the excitation, in samples; None: it is looked for.
+        time: column of the time; None: time or t.
+        interval: of the samples, in place of a time [s].
+        set: changes of the machine, as behind ``--set``.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        figures, force: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, no such axis or signal, wrong arguments, a response that is none of an axis.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> fs.identify_modes("z_positioning.yaml", "machines/test_centre", "B")
+    Traceback (most recent call last):
+    feedsim.errors.InputError: axis B: the machine has no axis 'B'; it has X, Y, Z
+    """
+    texts = settings(set)
+    subject = load_subject(machine, texts)
+    chosen = _axis(axis, subject.machine)
+    path = Path(response)
+    outputs = {"motor": Channel.of(_motor(motor, input, path), spelt("motor"))}
+    if scale is not None:
+        outputs["scale"] = Channel.of(scale, spelt("scale"))
+    for text in sensor:
+        more = Channel.of(text, spelt("sensor"))
+        outputs[more.names[0]] = more
+    count = _count(modes)
+    asked = {
+        "axis": axis, "input": input, "motor": motor, "scale": scale, "modes": modes, "band": band, "period": period,
+        "interval": interval,
+    }  # fmt: skip
+    given = {name: str(value) for name, value in asked.items() if value is not None}
+    inputs = [path, *(file for _, file in subject.files)]
+    named = [f"{name}={text}" for name, text in given.items()]
+    with kept(out, page.check_writable, watch, inputs, [*texts, *named], force=force):
+        watch.progress("reading", 0, 2)
+        if input is not None:
+            step = quantity("interval", interval, "s", "0.4 ms") if interval else None
+            column = Channel.of(time, spelt("time")) if time else None
+            measured = from_signals(
+                path, Channel.of(input, spelt("input")), outputs, time=column, interval=step, period=period
+            )
+        else:
+            measured = from_responses(path, outputs)
+        if band is not None:
+            measured = measured.between(*_band(band))
+        watch.progress("fit", 1, 2)
+        found = identified(measured, checked_modes(subject.machine), chosen, count)
+        result = ModesResult(page.ModesReport(found, path, subject, given))
+        if out is not None:
+            result.save(out, figures=figures, force=force)
+    return result
+
+
+def _axis(axis: str | None, machine: Machine) -> str:
+    chosen = axis or next(iter(machine.axes))
+    if chosen not in machine.axes:
+        raise InputError(f"{spelt('axis')} {chosen}: {no_axis(chosen, machine.axes)}")
+    return chosen
+
+
+def _motor(motor: str | None, input: str | None, response: Path) -> str:
+    """The motor's signal, or the only response of the file."""
+    if motor is not None:
+        return motor
+    if input is not None:
+        raise InputError(
+            f"{spelt('input')} without {spelt('motor')}: which signal is the motor's? For example "
+            f"{spelt('motor')} n_act:rpm"
+        )
+    if len(names := read_response(response).names) != 1:
+        raise InputError(f"{response}: which response is the motor's? {spelt('motor')} NAME; there is {names}")
+    return names[0]
+
+
+def _count(modes: int | str) -> int | None:
+    """How many modes; None: cross-validation decides."""
+    text = str(modes)
+    if text == "auto":
+        return None
+    if not (text.isdecimal() and int(text) <= MOST_MODES):
+        raise InputError(f"{spelt('modes')} {text}: 0 to {MOST_MODES}, or auto")
+    return int(text)
+
+
+def _band(band: Band) -> tuple[float, float]:
+    low, high = between("band", band, "11 Hz", "250 Hz")
+    if not 0 < low < high:
+        raise InputError(f"{spelt('band')} {band}: the lower end is not below the upper one")
+    return low, high

@@ -1,0 +1,442 @@
+"""A machine at a pose: its figures, its modes computed from its structure, and pictures of both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feedsim.analysis import Figure, Named
+from feedsim.arguments import Value, lengths, quantity, spelt
+from feedsim.errors import InputError
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch
+from feedsim.outputs import begins_with, forced, replacing
+from feedsim.report.content import Report
+from feedsim.report.machine import record as shown
+from feedsim.report.picture import KINDS
+from feedsim.report.provenance import to_json
+from feedsim.report.results import Content, check_place, write_results, write_text
+from feedsim.scenario.described import Described, load_described
+from feedsim.scenario.structure import Structure
+from feedsim.scenario.structure.geometry import GeometryStructure
+from feedsim.structure.build import build
+from feedsim.structure.info import MachineInfo, info_of_model, info_of_table
+from feedsim.structure.modes import Modes, checked_modes, read_modes, write_modes
+from feedsim.structure.table_check import stale
+
+# Exchange step where no machine file says what the control cycle is [s].
+USUAL_STEP = 125e-6
+USUAL_MODES = 20  # that are listed
+MODES, RECORD = "modes.csv", "build.json"
+# A frequency that is asked for belongs to the nearest mode if that is not farther away than this share.
+NEAR = 0.1
+Positions = Mapping[str, Value]  # axis -> position [m], or a text with a unit
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MachineResult(Result):
+    """A machine at a pose.
+
+    info: masses, inertias, coupling limits, modes. described: what its files say of it. modes: numbers of the modes
+    that are drawn; none: the first ones, on a sheet. listed: modes that ``lines`` list; None: all.
+    """
+
+    info: MachineInfo
+    described: Described
+    modes: Sequence[int] = ()
+    scale: float = 1.0
+    animate: bool = False
+    listed: int | None = USUAL_MODES
+
+    kind = "machine"
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files of the machine."""
+        return [file for _, file in self.described.files]
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """ "total_mass", "lowest_mode", "X.J_tot", "X.coupling_limit", ...; what is not known is not there."""
+        found = {"total_mass": Figure(self.info.total_mass, "kg", "mass of everything")}
+        elastic = self.info.modes.frequency[self.info.modes.frequency > 0].tolist()
+        if elastic:
+            found["lowest_mode"] = Figure(elastic[0], "Hz", "frequency of the first mode that is not rigid")
+        for axis in self.info.axes:
+            for key, (unit, meaning) in shown.MEANINGS.items():
+                found[f"{axis.name}.{key}"] = Figure(getattr(axis, key), unit, meaning)
+        return Named((name, figure) for name, figure in found.items() if math.isfinite(figure.value))
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """What is to be known before the modes are believed."""
+        return self.info.warnings
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """The lowest mode and what moves in it, and whether the exchange with friction is stable."""
+        from feedsim.report.machine.report import answers
+
+        return answers(self.info)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """All figures, as a table."""
+        return shown.text(self.info, self.listed).split("\n")
+
+    @property
+    def structure(self) -> Structure:
+        """What the modes are computed from. Raises InputError: the machine has a table of modes alone."""
+        if self.described.structure is None:
+            raise InputError(
+                f"{self.described.name}: has a table of modes alone, and no table says where things are; a picture "
+                "needs a structure file (key structure, docs/structure.md)"
+            )
+        return self.described.structure
+
+    @cached_property
+    def _drawn(self) -> Any:
+        from feedsim.report.machine.report import drawn
+
+        return drawn(self.structure, self.info, modes=self.modes, scale=self.scale, animate=self.animate)
+
+    def report(self) -> Report:
+        """Content of report.html: the structure, and modes."""
+        from feedsim.report.machine.report import report_of
+
+        return report_of(self.info, self.described.files, self._drawn.parts)
+
+    def files(self) -> Mapping[str, Content]:
+        """Modes in motion, where they are asked for."""
+        animated: Mapping[str, Content] = self._drawn.files
+        return animated
+
+    def record(self) -> dict[str, Any]:
+        """All figures in full precision, for a JSON file."""
+        return shown.record(self.info, self.described.files)
+
+    @property
+    def json(self) -> str:
+        """The record as text, with the table of modes among the inputs."""
+        modes = [("modes", self.described.modes)] if self.described.modes else []
+        return to_json(shown.record(self.info, [*self.described.files, *modes]))
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return self.record() | {"files": list(names)}
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        check_place(folder, ("report.html", "summary.json"), inputs, kind=self.kind)
+
+    def save(
+        self, folder: str | Path, *, figures: Sequence[str] = KINDS, force: bool = False, control: str = ""
+    ) -> tuple[Path, ...]:
+        """As :meth:`Result.save`; the pictures are drawn as files unless `figures` says otherwise."""
+        return super().save(folder, figures=figures, force=force, control=control)
+
+
+class BuildResult(MachineResult):
+    """Modes that were computed from a structure: the table that runs read, and how it came about."""
+
+    kind = "machine build"
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """What was computed, in one line."""
+        solution = self.info.solution
+        assert solution is not None
+        frequency = self.info.modes.frequency
+        elastic = frequency[frequency > 0]
+        count = len(elastic) - solution.corrections
+        lowest = ", ".join(f"{f:.4g}" for f in elastic[: min(5, count)])
+        extra = f" and {solution.corrections} pseudo-modes" if solution.corrections else ""
+        return [
+            f"{self.info.title}: {solution.shapes.shape[0]} degrees of freedom, {len(frequency) - len(elastic)} rigid "
+            f"and {count} elastic modes{extra}{f', lowest {lowest} Hz' if lowest else ''}"
+        ]
+
+    def files(self) -> Mapping[str, Content]:
+        """The table of modes, and the record of its origin."""
+        return {MODES: lambda path: write_modes(path, self.info.modes), RECORD: to_json(self.record())}
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        check_place(folder, (MODES, RECORD), inputs, kind=self.kind, own=_of_build(folder))
+
+    def save(
+        self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False, control: str = ""
+    ) -> tuple[Path, ...]:
+        """Write modes.csv and build.json, without report and pictures. Whole or not at all. Raises OutputError."""
+        place = Path(folder)
+
+        def fill(fresh: Path, names: Sequence[str]) -> None:
+            write_modes(fresh / MODES, self.info.modes)
+            write_text(fresh / RECORD, to_json(self.record()))
+
+        with replacing(force or forced()):
+            self.check_writable(place, self.inputs)
+            return write_results(place, (MODES, RECORD), (), fill, kind=self.kind, own=_of_build(place))
+
+
+def _of_build(folder: Path) -> Sequence[str]:
+    """Files of an earlier build, which has no summary that lists them."""
+    return (MODES, RECORD) if begins_with(b'"format"')(folder / RECORD) else ()
+
+
+def machine_info(
+    machine: File,
+    *,
+    at: Positions | None = None,
+    cutoff: Value | None = None,
+    static_correction: bool = False,
+    step: Value | None = None,
+    modes: int | str | None = USUAL_MODES,
+    watch: Watch = SILENT,
+) -> MachineResult:
+    """Masses, inertias, leads, coupling limits and modes of a machine.
+
+    Args:
+        machine: machine file, structure file, a folder with either, or a scenario.
+        at: axis -> position [m], or a text with a unit; other axes stay at the machine's pose.
+        cutoff: modes above are dropped [rad/s], or a text "1500Hz"; None: that of the structure.
+        static_correction: append pseudo-modes that make up for the static compliance of the dropped modes.
+        step: exchange step of the coupling limit [s]; None: the machine's control cycle.
+        modes: that ``lines`` list; None or "all": all of them.
+        watch: who hears how far the job is.
+
+    Raises InputError: a faulty file or pose, no structure for what was asked, a structure that cannot be solved.
+
+    >>> import feedsim as fs
+    >>> fs.machine_info("machines/test_centre").figures["X.lead"].unit
+    'm/rad'
+    """
+    most = _listed(modes)
+    described = load_described(machine)
+    info = _info(machine, described, at or {}, cutoff, static_correction, step, watch)
+    return MachineResult(info, described, listed=most)
+
+
+def machine_build(
+    machine: File,
+    out: File | None = None,
+    *,
+    at: Positions | None = None,
+    cutoff: Value | None = None,
+    static_correction: bool = False,
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> BuildResult:
+    """Compute the modes of a machine from its structure.
+
+    Args:
+        machine: machine file, structure file, a folder with either, or a scenario.
+        out: folder for modes.csv and build.json; None: :meth:`Result.save` does it.
+        at, cutoff, static_correction, watch: as of :func:`machine_info`.
+        force: as of :meth:`Result.save`.
+
+    Raises:
+        InputError: as of :func:`machine_info`; the machine has no structure.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> fs.machine_build("machines/test_centre", at={"Z": "100 mm"}).info.pose["Z"]
+    0.1
+    """
+    described = load_described(machine)
+    if described.structure is None:
+        raise InputError(
+            f"{machine}: has no key structure; modes are computed from a structure file (docs/structure.md)"
+        )
+
+    def check(folder: Path, inputs: Sequence[Path]) -> None:
+        check_place(folder, (MODES, RECORD), inputs, kind=BuildResult.kind, own=_of_build(folder))
+
+    with kept(out, check, watch, [file for _, file in described.files], force=force):
+        info = _info(machine, described, at or {}, cutoff, static_correction, None, watch, fresh=True)
+        result = BuildResult(info, described)
+        if out is not None:
+            result.save(out, force=force)
+    return result
+
+
+def machine_show(
+    machine: File,
+    out: File | None = None,
+    *,
+    at: Positions | None = None,
+    cutoff: Value | None = None,
+    static_correction: bool = False,
+    step: Value | None = None,
+    mode: Sequence[int | str] = (),
+    animate: bool = False,
+    scale: float | str = "auto",
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> MachineResult:
+    """Draw the structure of a machine and its modes.
+
+    Args:
+        machine: machine file, structure file, a folder with either, or a scenario.
+        out: folder for report and pictures; None: :meth:`Result.save` does it.
+        at, cutoff, static_correction, step, watch: as of :func:`machine_info`.
+        mode: modes to draw: numbers, or frequencies such as "21Hz" for the nearest ones; none: the first ones.
+        animate: every mode of `mode` as a GIF, too.
+        scale: deflections are drawn this many times as large as usual; "auto": a tenth of the machine.
+        force: as of :meth:`Result.save`.
+
+    Raises:
+        InputError: as of :func:`machine_info`; no structure or no geometry; no such mode.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> fs.machine_show("machines/test_centre", mode=["21Hz"]).kind
+    'machine'
+    """
+    factor = _scale(scale)
+    if animate and not mode:
+        raise InputError(f"{spelt('animate')}: which mode? Give {spelt('mode')} too, e.g. {spelt('mode')} 21Hz")
+    described = load_described(machine)
+    if described.structure is None:
+        raise InputError(
+            f"{machine}: has a table of modes alone, and no table says where things are; a picture needs a structure "
+            "file (key structure, docs/structure.md)"
+        )
+
+    def check(folder: Path, inputs: Sequence[Path]) -> None:
+        check_place(folder, ("report.html", "summary.json"), inputs, kind=MachineResult.kind)
+
+    with kept(out, check, watch, [file for _, file in described.files], force=force):
+        info = _info(machine, described, at or {}, cutoff, static_correction, step, watch)
+        chosen = list(dict.fromkeys(_mode(each, info.modes) for each in mode))
+        result = MachineResult(info, described, chosen, factor, animate)
+        if out is not None:
+            result.save(out, force=force)
+    return result
+
+
+def _info(
+    machine: File,
+    described: Described,
+    at: Positions,
+    cutoff: Value | None,
+    static_correction: bool,
+    step: Value | None,
+    watch: Watch,
+    *,
+    fresh: bool = False,
+) -> MachineInfo:
+    """The figures of a machine, its modes computed where there is a structure. fresh: the table is being made anew."""
+    loaded = described.machine
+    h = loaded.cycles.T_c if loaded else USUAL_STEP
+    if step is not None:
+        h = quantity("step", step, "s", "125 us", positive=True)
+    friction = loaded.shipped_frictions if loaded else None
+    if described.structure is None:
+        assert loaded is not None
+        for option, given in (("at", at), ("cutoff", cutoff), ("static_correction", static_correction)):
+            if given:
+                raise InputError(
+                    f"{spelt(option)}: {machine} has a table of modes alone; other modes need a structure file (key "
+                    "structure, docs/structure.md)"
+                )
+        return info_of_table(described.name, described.note, checked_modes(loaded), described.pose, h, friction)
+    limit = None if cutoff is None else quantity("cutoff", cutoff, "rad/s", "1500 Hz", positive=True)
+    pose = {**described.pose, **positions(at)}
+    _check_complete(described.structure, pose)
+    built = build(
+        described.structure, pose, cutoff=limit, static_correction=static_correction,
+        progress=lambda text: watch.progress(text, 0, 1),
+    )  # fmt: skip
+    as_it_is = pose == dict(described.pose) and limit is None and not static_correction and not fresh
+    warnings = _stale(described, built.solution.modes) if as_it_is else []
+    return info_of_model(described.name, described.note, built, h, friction, warnings)
+
+
+def _stale(described: Described, modes: Modes) -> list[str]:
+    """That the machine's table of modes is another one than its structure gives."""
+    machine = described.machine
+    if machine is None or described.modes is None:
+        return []
+    how = stale(read_modes(described.modes, list(machine.axes)), modes)
+    if not how:
+        return []
+    return [
+        f"{described.modes} is not what {machine.structure} gives at the machine's pose: {how}. Shown is the "
+        "structure; runs take the table. Build it anew (feedsim machine build --force), or name the structure that "
+        "it belongs to"
+    ]
+
+
+def _check_complete(structure: Structure, pose: Mapping[str, float]) -> None:
+    if not isinstance(structure, GeometryStructure):
+        return
+    if missing := [axis for axis in structure.axes if axis not in pose]:
+        middle = {axis: 5e2 * sum(structure.axes[axis].travel) for axis in missing}
+        example = " ".join(f"{axis}={position:.6g}mm" for axis, position in middle.items())
+        raise InputError(
+            f"{structure.name or 'structure'}: nothing says where axis {', '.join(missing)} stands; the structure can "
+            f"be assembled at any position: give one, e.g. {spelt('at')} {example}"
+        )
+
+
+def positions(at: Positions) -> dict[str, float]:
+    """Axis -> position [m]. Raises InputError."""
+    return lengths("at", at, "800mm")
+
+
+def _listed(modes: int | str | None) -> int | None:
+    """How many modes are listed; None: all."""
+    if modes is None or modes == "all":
+        return None
+    if not str(modes).isdecimal():
+        raise InputError(f"{spelt('modes')} {modes}: a whole number, or all, is needed")
+    return int(modes)
+
+
+def _mode(asked: int | str, modes: Modes) -> int:
+    """Number of the mode that is meant."""
+    from feedsim import units
+
+    count, text = len(modes.frequency), str(asked)
+    option = f"{spelt('mode')} {text}"
+    if text.isdecimal():
+        if int(text) >= count:
+            raise InputError(
+                f"{option}: there are {count} modes, 0 to {count - 1}, up to {modes.frequency.max():.1f} Hz; "
+                f"{spelt('cutoff')} gives more"
+            )
+        return int(text)
+    try:
+        f = units.parse(text, "Hz", "21 Hz")
+    except InputError as error:
+        raise InputError(f"{option}: the number of a mode or a frequency is needed; {error}") from None
+    if not (math.isfinite(f) and f > 0):
+        raise InputError(f"{option}: a frequency above 0 Hz is needed; rigid modes are chosen by their number")
+    k = int(np.argmin(np.abs(modes.frequency - f)))
+    if abs(modes.frequency[k] - f) > NEAR * f:
+        first = ", ".join(f"{value:.4g}" for value in modes.frequency[modes.frequency > 0][:8])
+        raise InputError(
+            f"{option}: no mode near; the nearest is {modes.frequency[k]:.4g} Hz (the first elastic ones: "
+            f"{first or 'none'} Hz)"
+        )
+    return k
+
+
+def _scale(given: float | str) -> float:
+    if given == "auto":
+        return 1.0
+    try:
+        scale = float(given)
+    except ValueError:
+        scale = math.nan
+    if not (math.isfinite(scale) and 0 < scale <= 100):
+        raise InputError(f"{spelt('scale')} {given}: auto, or a factor above 0 and up to 100, is needed")
+    return scale

@@ -115,12 +115,17 @@ class Firefox:
 
     def _answer(self) -> Any:
         while b":" not in self._read:
-            self._read += self._socket.recv(1 << 16)
+            self._read += self._received()
         size, _, rest = self._read.partition(b":")
         while len(rest) < int(size):
-            rest += self._socket.recv(1 << 20)
+            rest += self._received()
         self._read = rest[int(size) :]
         return json.loads(rest[: int(size)])
+
+    def _received(self) -> bytes:
+        if not (some := self._socket.recv(1 << 20)):
+            raise RuntimeError(f"{FIREFOX} has closed the connection")
+        return some
 
     def call(self, name: str, **values: Any) -> Any:
         self._number += 1

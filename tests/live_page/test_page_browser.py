@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from feedsim import cli
-from page_browsers import WAIT, Opened, data_of
+from page_browsers import WAIT, Opened, data_of, number_of
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
@@ -86,6 +86,7 @@ def test_lessons_begin_unsolved_and_can_be_solved(browser: Any, files: dict[str,
         page = opened.page
         opened.settled()
         assert page.locator("#lessons button").count() == len(LESSONS[name])
+        page.locator("#lessons-part summary").press("Enter")
         for title, answer in LESSONS[name].items():
             page.locator("#lessons button", has_text=title).click()
             opened.settled()
@@ -156,6 +157,7 @@ def test_contrast_is_enough_and_motion_is_reduced_where_asked(
 ) -> None:
     with Opened(browser, files["xz_circle"], color_scheme=scheme, reduced_motion="reduce") as opened:
         opened.settled()
+        opened.page.locator("#lessons-part summary").click()
         opened.page.locator("#lessons button").first.click()
         opened.page.locator("#more").click()
         opened.page.locator("section[id^=why-] summary").click()
@@ -165,6 +167,23 @@ def test_contrast_is_enough_and_motion_is_reduced_where_asked(
         assert opened.page.evaluate(MOVING) == 0
         opened.page.locator("#lesson").evaluate("node => { node.style.color = 'rgb(120, 130, 140)'; }")
         assert opened.page.evaluate(CONTRAST) != [], "a grey that is hard to read is found"
+
+
+def test_a_peak_has_one_height_on_a_page(browser: Any, files: dict[str, Path]) -> None:
+    """In its tile, at its mark and in the answer; also after a knob was turned."""
+    with Opened(browser, files["xz_circle"]) as opened:
+        opened.settled()
+        for address in ("", "#machine.axes.Z.friction.F_C=1.2", "#machine.axes.Z.drive.K_v=55"):
+            if address:
+                opened.turn_to(address)
+            answer = opened.page.locator("section[id^=why-] .answer").inner_text()
+            marks = opened.page.locator("#contour-XZ text").all_text_contents()
+            for axis in "XZ":
+                tile = opened.page.locator(f"#keys [data-figure='XZ.peak_{axis}'] b").inner_text()
+                own = [float(mark.split()[1]) for mark in marks if mark.startswith(axis) and "µm" in mark]
+                assert own
+                assert max(own) == pytest.approx(number_of(tile), abs=0.0051)
+                assert f" {tile}," in answer
 
 
 def test_tiles_say_what_is_and_what_was(browser: Any, files: dict[str, Path]) -> None:

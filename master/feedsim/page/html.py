@@ -144,8 +144,9 @@ def _pictures(run: Run, shown: Sequence[CircleTask | PositioningTask]) -> Iterab
     for task in shown:
         end = _slug(task.prefix)
         if isinstance(task, CircleTask):
-            yield _figure(contour_picture(run.trace, task.turn, f"contour-{end}", task.back))
-            if (diagnosis := task.diagnosis(run.trace)) is not None:
+            diagnosis = task.diagnosis(run.trace)
+            yield _figure(contour_picture(run.trace, task.turn, f"contour-{end}", task.back, diagnosis))
+            if diagnosis is not None:
                 yield _why(task.prefix, end, diagnosis)
             if (torque := torque_picture(run.trace, task.turn, signs, f"torque-{end}")) is not None:
                 yield _figure(torque, bare=True)
@@ -195,7 +196,11 @@ def _keys(shown_tasks: Sequence[CircleTask | PositioningTask], figures: Mapping[
     for task in shown_tasks:
         if isinstance(task, CircleTask):
             words = {"G": "circular deviation G"}
-            words |= {f"glitch_{axis}": f"quadrant glitch where {axis} reverses" for axis in task.turn.axes}
+            for axis in task.turn.axes:  # the one height of a peak on a page, where a diagnosis has it
+                known = f"{task.prefix}.peak_{axis}" in figures
+                words[f"{'peak' if known else 'glitch'}_{axis}"] = (
+                    f"reversal peak, {axis} reverses" if known else f"quadrant glitch where {axis} reverses"
+                )
             words |= {"G_b": "circular deviation G(b) of both directions"} if task.back is not None else {}
         else:
             axis = task.approach.axis

@@ -241,6 +241,7 @@ function causes_of(trace, tasks, figures, known) {
     found[prefix] = {
       figures: Object.fromEntries(Object.entries(cause_figures(diagnosis)).map(([name, figure]) => [`${prefix}.${name}`, figure])), answer: answer_of(diagnosis), swinging: swinging_words(diagnosis),
       rows: diagnosis.terms.map(term => cause_row(diagnosis, term)),
+      peaks: diagnosis.peaks.map(({ name, sense, height }) => ({ name, sense, height })),
       doubts: misleading(diagnosis, own).map(sentence => `${prefix}: ${sentence}`),
     };
   }

@@ -6,7 +6,7 @@ const has = (held, axes, names) => axes.every(axis => names.every(name => held.k
 const figure_of = (view, end) => { const name = Object.keys(view.found.figures).find(each => each.endsWith(end) && !each.includes("tool.") && !each.includes("clockwise.")); return name ? view.found.figures[name][0] : null; };
 const COMPENSATION = "drive.backlash_compensation.value";
 const written_of = (held, end) => held.written[Object.keys(held.written).find(each => each.endsWith(end))][0];
-const um = value => `${value.toFixed(1)} µm`;
+const um = value => value === null ? "…" : `${value.toFixed(1)} µm`;
 
 // Of a turn: half the difference of its radii at 45° and 135°, what axes of unequal delay make.
 function oblique({ found }) {
@@ -32,8 +32,8 @@ const LESSONS = [
     turn: held => ["F_C", "F_S", "sigma_0"].map(name => key_of(held.plane[1], `friction.${name}`)),
     text: ({ plane: [, b] }) => [`Where ${b} reverses, its friction changes sign. The drive needs a moment to turn its torque over; meanwhile the axis stands, and the contour leaves the circle.`,
       `Halve the friction of ${b} (F_C, then F_S) and see what becomes of the glitch. Then put it back and make the bristles softer (sigma_0): the change of sign takes a longer way.`],
-    look: (held, view) => { const at = figure_of(view, `glitch_${held.plane[1]}`), first = written_of(held, `.glitch_${held.plane[1]}`);
-      return { done: at < 0.6 * first, text: `The glitch of ${held.plane[1]} is ${um(at)}, at first ${um(first)}.` }; },
+    look: (held, view) => { const at = figure_of(view, `.peak_${held.plane[1]}`), first = written_of(held, `.peak_${held.plane[1]}`);
+      return { done: at !== null && at < 0.6 * first, text: `The peak where ${held.plane[1]} reverses is ${um(at)} high, at first ${um(first)}.` }; },
     after: "Less friction to turn over, a smaller glitch. On a real machine friction is what it is: the last lesson turns the drive.",
   },
   {
@@ -64,10 +64,10 @@ const LESSONS = [
     turn: held => ["K_v", "K_p", "T_n"].map(name => key_of(held.plane[1], `drive.${name}`)),
     text: ({ plane: [, b] }) => [`A stiffer drive turns its torque over sooner: K_v and K_p of ${b} up, T_n down, and the glitch shrinks. The open position loop below shows what that costs.`,
       `Bring the glitch of ${b} to two thirds, and keep 6 dB and 30° of margin.`],
-    look: (held, view) => { const b = held.plane[1], at = figure_of(view, `glitch_${b}`), first = written_of(held, `.glitch_${b}`), { loop } = view;
-      if (!loop || loop.axis !== b || !loop.frequency.length) return { done: false, text: `The glitch of ${b} is ${um(at)}; show the frequency response of ${b} to see its margins.` };
+    look: (held, view) => { const b = held.plane[1], at = figure_of(view, `.peak_${b}`), first = written_of(held, `.peak_${b}`), { loop } = view;
+      if (!loop || loop.axis !== b || !loop.frequency.length) return { done: false, text: `The peak where ${b} reverses is ${um(at)} high; show the frequency response of ${b} to see its margins.` };
       const dB = 20 * Math.log10(loop.gain_margin), kept = !loop.growing && dB >= 6 && loop.phase_margin >= 30;
-      return { done: kept && at < 0.667 * first, text: `The glitch of ${b} is ${um(at)}, at first ${um(first)}; margins ${dB.toFixed(1)} dB and ${loop.phase_margin.toFixed(0)}°${kept ? "" : ": too little"}.` }; },
+      return { done: kept && at !== null && at < 0.667 * first, text: `The peak where ${b} reverses is ${um(at)} high, at first ${um(first)}; margins ${dB.toFixed(1)} dB and ${loop.phase_margin.toFixed(0)}°${kept ? "" : ": too little"}.` }; },
     after: "The margin is of this structure and this pose. Elsewhere the machine may be softer: docs/position-dependence.md.",
   },
 ];

@@ -43,6 +43,7 @@ function answered({ data }) {
     view.causes = data.causes;
     for (const each of Object.values(data.causes)) Object.assign(view.found.figures, each.figures);
     show_causes();
+    for (const task of view.found.tasks) if (data.causes[task.prefix]) draw_chart(`contour-${slug(task.prefix)}`, contour_now(task));
     show_figures();
     lesson_look();
     return;
@@ -67,6 +68,8 @@ function answered({ data }) {
   } else {
     view.found = data.found;
     view.causes = null;
+    for (const section of document.querySelectorAll("section[id^=why-]")) section.classList.add("stale");
+    by("warned").classList.add("stale");
     show();
   }
   if (again) ask();
@@ -123,13 +126,16 @@ function draw_on() {
   document.documentElement.dataset.shown = String(drawing); // of the answers, for those who wait
 }
 
+// A kept state, where it has the circles and stops of the present one.
+const comparable = () => view.kept && view.kept.tasks.map(each => each.prefix).join() === view.found.tasks.map(each => each.prefix).join() ? view.kept : null;
+const contour_now = task => contour_chart(task, view.found, comparable(), view.causes?.[task.prefix]?.peaks);
+
 function show() {
   tell("");
-  const { found, kept } = view, charts = [];
-  const same = kept && kept.tasks.map(each => each.prefix).join() === found.tasks.map(each => each.prefix).join() ? kept : null;
+  const { found, kept } = view, charts = [], same = comparable();
   for (const task of found.tasks) {
     const end = slug(task.prefix);
-    if (task.kind === "circle") charts.push([`contour-${end}`, () => contour_chart(task, found, same)], [`torque-${end}`, () => torque_chart(task, found, same, HELD.signs)]);
+    if (task.kind === "circle") charts.push([`contour-${end}`, () => contour_now(task)], [`torque-${end}`, () => torque_chart(task, found, same, HELD.signs)]);
     else charts.push([`stop-${end}`, () => stop_chart(task, found, same, HELD.signs)]);
   }
   charts.push(["following", () => following_chart(HELD.moved, found, kept)]);
@@ -138,8 +144,6 @@ function show() {
   drawing = asked;
   draw_on();
   show_figures();
-  for (const section of document.querySelectorAll("section[id^=why-]")) section.classList.add("stale");
-  by("warned").classList.add("stale");
   lesson_look();
 }
 

@@ -37,7 +37,8 @@ function ring_step(most) {
   return [1, 2, 5, 10].map(each => each * decade).find(each => Math.max(most, 0.1) <= 1.5 * each);
 }
 
-function contour_chart(task, found, kept) {
+// peaks: heights over the fitted rest of the circle, once they are known; until then the marks carry no number.
+function contour_chart(task, found, kept, peaks) {
   const { turn, back } = task, seen = contour(found.trace, turn), curves = [], unrolled = [];
   const draw = (name, measured, colour, look = {}) => {
     const y = measured.deviation.map(each => each * 1e6), degrees = measured.angle.map(each => modulo(each * 180 / Math.PI, 360));
@@ -50,10 +51,11 @@ function contour_chart(task, found, kept) {
   draw("linear scales", seen, "blue", { width: 1.6 });
   if (back) draw(`linear scales, ${back.sense > 0 ? "counterclockwise" : "clockwise"}`, contour(found.trace, back), "green", { dash: "dotted", width: 1.2 });
   const most = largest(seen.deviation.map(Math.abs)) * 1e6, ring = ring_step(most);
-  const marks = seen.glitches.map(each => mark(each.angle, each.deviation * 1e6, `${each.name.replace("-", "−")}: ${fixed(each.height * 1e6, 2)} µm`));
+  const heights = peaks && new Map(peaks.filter(each => each.sense === turn.sense).map(each => [each.name, each.height]));
+  const marks = seen.glitches.filter(each => !heights || heights.get(each.name)).map(each => mark(each.angle, each.deviation * 1e6, heights ? `${each.name.replace("-", "−")}: ${fixed(heights.get(each.name) * 1e6, 2)} µm` : ""));
   return { widths: [1.2, 1], panels: [
     { kind: "polar", title: `Contour error, ${turn.axes.join("-")}, R ${number(turn.radius * 1e3)} mm`, axes: turn.axes, radius: turn.radius * 1e3, ring, rings: most < 1.1 * ring ? 1 : 2, curves, marks,
-      sense: back ? 0 : turn.sense, note: "quadrant glitches\n(less the median)" },
+      sense: back ? 0 : turn.sense, note: "" },
     panel("Over the angle", axis_of(`angle from ${turn.axes[0]}+`, "°", { span: [0, 360] }), axis_of("radius deviation", "µm"), unrolled, {
       levels: [ZERO, level(seen.median * 1e6, "median (scales)", { dash: "dotted" })], marks: marks.map(each => ({ ...each, x: modulo(each.x * 180 / Math.PI, 360), text: "" })), linked: "angle" }),
   ] };

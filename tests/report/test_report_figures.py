@@ -21,7 +21,7 @@ from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import ring_step
 from feedsim.report.run.report import draw
-from feedsim.report.style import LARGEST_SVG, drawing
+from feedsim.report.style import LARGEST_SVG, SIMULATED, drawing
 from feedsim.scenario import Axis, CircleTest, Positioning
 from report_helpers import FakeRun, circle_run, positioning_run, run_of, small_run
 from scenario_helpers import default_machine, scenario
@@ -297,9 +297,11 @@ def test_a_circle_driven_both_ways_is_drawn_both_ways() -> None:
     circle = Circle(plane=("X", "Z"), radius=0.015, feed=0.1, turns=3, direction="both")
     run = run_of(scenario(circle, Dwell(duration=0.25), evaluate=(CircleTest(),)))
     picture = next(picture for picture in draw(run, evaluate(run)) if picture.stem == "contour-XZ")
-    assert "Dotted: clockwise, from" in picture.caption
+    assert "Dashed: clockwise, from" in picture.caption
     polar = picture.chart.panels[0] if picture.chart else None
     assert isinstance(polar, Polar)
+    there, back = sorted((c for c in polar.curves if c.name.startswith("linear")), key=lambda each: len(each.name))
+    assert [(each.colour, each.dash) for each in (there, back)] == [(SIMULATED, ""), (SIMULATED, "dashed")]
     turned = {curve.name: np.diff(np.unwrap(curve.x)) for curve in polar.curves}
     assert np.all(turned["linear scales"] > 0)
     assert np.all(turned["linear scales, clockwise"] < 0)

@@ -31,7 +31,15 @@ Array = NDArray[np.float64]
 
 INK, MUTED, GRID, PAPER = "#1b1f24", "#59636e", "#d4dae1", "#fefefe"
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#b0528a", "#b87a00", "#3d9bd0"
+# What a colour means, in every picture. Axes are told by panel or label, the second direction of a circle by dashes.
+SIMULATED = AFTER = BLUE
+RECORDED = BEFORE = INK
 SETPOINT = MUTED
+AT_TOOL = ORANGE
+LEFT = VERMILLION  # what is left, stands out or lies outside
+ALLOWED = GREEN  # bands that are allowed or targets
+FRICTION = PURPLE
+OTHERWISE = SKY  # simulated in another way: another set, another side
 
 # CSS variable, colour on light ground (= in the drawing), colour on dark ground
 PALETTE = (

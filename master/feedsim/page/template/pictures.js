@@ -15,7 +15,7 @@ const axis_of = (label, unit, look = {}) => ({ label, unit, log: false, span: nu
 const mark = (x, y, text, colour = "vermillion") => ({ x, y, text, colour, hollow: false });
 const panel = (title, x, y, curves, more = {}) => ({ kind: "xy", title, x, y, curves, levels: [], bands: [], marks: [], linked: "", note: "", height: 1, ...more });
 const TIME = axis_of("time", "s"), ZERO = level(0, "", { dash: "" }), COLOURS = ["blue", "vermillion", "green", "purple", "orange", "sky"];
-const KEPT = { colour: "purple", dash: "dotted", width: 1.3 };
+const KEPT = { colour: "ink", dash: "dotted", width: 1.3 };
 
 // Rows that a curve needs at most: of each bin of the others its extremes.
 function thinned(x, y, most = 3000) {
@@ -49,7 +49,7 @@ function contour_chart(task, found, kept, peaks) {
   if (kept) draw("kept", contour(kept.trace, kept.tasks.find(each => each.prefix === task.prefix).turn), KEPT.colour, KEPT);
   draw("tool point", contour(found.trace, turn, turn.axes.map(axis => `tcp.x_${axis}`)), "orange", { dash: "dashed", width: 1.2 });
   draw("linear scales", seen, "blue", { width: 1.6 });
-  if (back) draw(`linear scales, ${back.sense > 0 ? "counterclockwise" : "clockwise"}`, contour(found.trace, back), "green", { dash: "dotted", width: 1.2 });
+  if (back) draw(`linear scales, ${back.sense > 0 ? "counterclockwise" : "clockwise"}`, contour(found.trace, back), "blue", { dash: "dashed", width: 1.2 });
   const most = largest(seen.deviation.map(Math.abs)) * 1e6, ring = ring_step(most);
   const heights = peaks && new Map(peaks.filter(each => each.sense === turn.sense).map(each => [each.name, each.height]));
   const marks = seen.glitches.filter(each => !heights || heights.get(each.name)).map(each => mark(each.angle, each.deviation * 1e6, heights ? `${each.name.replace("-", "−")}: ${fixed(heights.get(each.name) * 1e6, 2)} µm` : ""));
@@ -66,9 +66,9 @@ function torque_chart(task, found, kept, signs) {
   for (const axis of task.axes) {
     const sign = signs[axis], part = trace => { const [a, b] = rows_within(trace.time, task.turn.begin, task.turn.end); return name => trace[name].slice(a, b + 1); };
     const now = part(found.trace), speed = now(`${axis}.n_a`), torque = name => now(name).map(each => sign * each), near = 0.12 * (largest(speed.map(Math.abs)) || 1);
-    const both = (x, look) => [over("motor M_a", x, torque(`${axis}.M_a`), "blue", { width: 1.2, ...look }), over("friction M_fr", x, torque(`${axis}.M_fr`), "vermillion", { width: 1.2, ...look })];
+    const both = (x, look) => [over("motor M_a", x, torque(`${axis}.M_a`), "blue", { width: 1.2, ...look }), over("friction M_fr", x, torque(`${axis}.M_fr`), "purple", { width: 1.2, ...look })];
     const y = axis_of(sign > 0 ? "torque" : "torque, sign reversed", "N·m"), n_a = axis_of("motor speed n_a", "rad/s"), loops = () => {
-      const found = [curve("motor M_a", speed, torque(`${axis}.M_a`), "blue", { width: 1.2, ascending: false }), curve("friction M_fr", speed, torque(`${axis}.M_fr`), "vermillion", { width: 1.2, ascending: false })];
+      const found = [curve("motor M_a", speed, torque(`${axis}.M_a`), "blue", { width: 1.2, ascending: false }), curve("friction M_fr", speed, torque(`${axis}.M_fr`), "purple", { width: 1.2, ascending: false })];
       if (kept) { const before = part(kept.trace); found.unshift(curve("kept", before(`${axis}.n_a`), before(`${axis}.M_fr`).map(each => sign * each), KEPT.colour, { ...KEPT, ascending: false })); }
       return found;
     };
@@ -93,7 +93,7 @@ function stop_chart(task, found, kept, signs) {
     panel("Distance beyond the target", axis_of("time after the end of the NC motion", "ms", { span: [-30, last] }), axis_of(task.sense > 0 ? "beyond the target" : "beyond the target, to minus", "µm", { span: [-1.45 * most, 1.45 * most] }), curves, {
       levels: [ZERO, level(0, "", { upright: true, dash: "dotted" })], bands: [{ name: "", x: null, low: -band, high: band, colour: "green" }], marks, height: 1.15,
       note: Number.isNaN(settled) ? "settling time not determined" : `settled to ±${number(band)} µm after ${fixed(settled, 1)} ms` }),
-    panel(`Driving torque of axis ${axis}${sign < 0 ? ", sign reversed" : ""}`, TIME, axis_of("torque", "N·m"), [over("motor torque M_a", t, of(`${axis}.M_a`, sign), "blue"), over("friction torque M_fr", t, of(`${axis}.M_fr`, sign), "vermillion", { width: 1.2 })], { levels: [end, ZERO], linked: "t" }),
+    panel(`Driving torque of axis ${axis}${sign < 0 ? ", sign reversed" : ""}`, TIME, axis_of("torque", "N·m"), [over("motor torque M_a", t, of(`${axis}.M_a`, sign), "blue"), over("friction torque M_fr", t, of(`${axis}.M_fr`, sign), "purple", { width: 1.2 })], { levels: [end, ZERO], linked: "t" }),
   ] };
 }
 

@@ -17,6 +17,7 @@ from feedsim.analysis.circularity import axis_letters
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report import sections
 from feedsim.report.changes import changes_section
+from feedsim.report.chart import Dash
 from feedsim.report.content import Bullets, Report, Section, Tile, code, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, typeset
@@ -25,11 +26,11 @@ from feedsim.report.provenance import figures_part, hashed, inputs_part, quantit
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.run import circle_plots
 from feedsim.report.run.diagnosis import diagnosis_part, diagnosis_section
-from feedsim.report.style import BLUE, MUTED, VERMILLION, Array
+from feedsim.report.style import RECORDED, SIMULATED, Array
 from feedsim.tune import of_circle
 
 FORMAT = 1
-COLOURS = {1: BLUE, -1: VERMILLION}  # by the sense of the turn
+DASHES: dict[int, Dash] = {1: "", -1: "dashed"}  # by the sense of the turn
 TILES = {"G": "circular deviation G", "G_b": "bidirectional deviation G(b)", "H": "circular hysteresis H"}
 
 
@@ -126,13 +127,15 @@ def picture(circle: CircleUnderTest, recorded: RecordedCircle, diagnosis: Diagno
     caption = (
         f"Radius {circle.radius * 1e3:.6g} mm. Radius deviation magnified "
         f"{on.magnification:,.0f} times; rings at ±{on.ring:g} µm about the "
-        f"circle{', about its fitted centre' if recorded.centred else ''}. Dashed: the fitted model without peaks."
+        f"circle{', about its fitted centre' if recorded.centred else ''}. Dotted: the fitted model without peaks."
     )
     curves = [
-        circle_plots.turned(DIRECTIONS[turn.sense], COLOURS[turn.sense], turn.angle, turn.deviation) for turn in turns
+        circle_plots.turned(DIRECTIONS[turn.sense], RECORDED, turn.angle, turn.deviation, DASHES[turn.sense])
+        for turn in turns
     ]
     curves += [
-        circle_plots.turned("model without peaks", MUTED, each.angle, each.deviation, "dashed", 0.9) for each in fitted
+        circle_plots.turned("model without peaks", SIMULATED, each.angle, each.deviation, "dotted", 1.1)
+        for each in fitted
     ]
     title = f"Recorded circle in the plane {plane}"
     return Picture(f"circle-{plane}", title, caption, circle_plots.circle_chart(on, curves))

@@ -8,7 +8,7 @@ from feedsim.compare import Comparison, Curves, Variable, along, seconds
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Mark, Panel
 from feedsim.report.formatting import display_unit, minus, powers
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, GREEN, MUTED, VERMILLION, Array
+from feedsim.report.style import ALLOWED, LEFT, MUTED, RECORDED, SIMULATED, Array
 
 MOST = 4  # variables in a picture
 AROUND = 60  # rows of the result to either side of the worst one
@@ -46,19 +46,20 @@ def _panels(variable: Variable) -> list[Panel]:
     assert curves is not None
     unit = display_unit(variable.unit)
     time = Axis("time", "s")
-    reference = Curve("reference", *_held(curves), MUTED, width=1.2)
-    colour = VERMILLION if variable.outside else MUTED
+    reference = Curve("reference", *_held(curves), RECORDED, width=1.2)
+    colour = LEFT if variable.outside else MUTED
     whole = Panel(
-        variable.name, time, Axis(variable.name, unit), [reference, Curve("result", curves.time, curves.values, BLUE)],
+        variable.name, time, Axis(variable.name, unit),
+        [reference, Curve("result", curves.time, curves.values, SIMULATED)],
         [Level(variable.time, "worst", upright=True, colour=colour, dash="dotted")],
-        [Band("tolerance", curves.lower, curves.upper, curves.time, GREEN), *_shaded(curves, slice(None))],
+        [Band("tolerance", curves.lower, curves.upper, curves.time, ALLOWED), *_shaded(curves, slice(None))],
         linked=variable.name,
     )  # fmt: skip
     part = _around(variable, curves)
     near = curves.time[part]
     expected = along(curves.reference_time, curves.reference, near)
-    left = [Curve("result", near, curves.values[part] - expected, BLUE)]
-    band = Band("tolerance", curves.lower[part] - expected, curves.upper[part] - expected, near, GREEN)
+    left = [Curve("result", near, curves.values[part] - expected, SIMULATED)]
+    band = Band("tolerance", curves.lower[part] - expected, curves.upper[part] - expected, near, ALLOWED)
     marks = []
     if np.isfinite(variable.value):
         there = variable.value - along(curves.reference_time, curves.reference, np.array([variable.time]))
@@ -76,7 +77,7 @@ def _held(curves: Curves) -> tuple[Array, Array]:
 
 
 def _shaded(curves: Curves, part: slice) -> list[Band]:
-    return [Band("outside", -FAR, FAR, np.array(ends), VERMILLION) for ends in _spans(curves, part)]
+    return [Band("outside", -FAR, FAR, np.array(ends), LEFT) for ends in _spans(curves, part)]
 
 
 def _around(variable: Variable, curves: Curves) -> slice:

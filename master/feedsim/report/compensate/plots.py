@@ -15,7 +15,7 @@ from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import TIME, reversed_note, torque_axis
 from feedsim.report.run.circle_plots import circle, circle_chart, turned
-from feedsim.report.style import BLUE, GREEN, ORANGE, VERMILLION, Array
+from feedsim.report.style import AFTER, BEFORE, FRICTION, OTHERWISE, Array
 
 AROUND = 0.03  # s to either side of a reversal
 
@@ -47,7 +47,7 @@ def _contour_picture(turn: Turn, before: Contour, after: Contour, plane: str) ->
 
 
 def _both(before: Contour, after: Contour) -> list[tuple[str, str, Contour]]:
-    return [("without", VERMILLION, before), ("with compensation", BLUE, after)]
+    return [("without", BEFORE, before), ("with compensation", AFTER, after)]
 
 
 def _reversals_picture(turn: Turn, before: Contour, after: Contour, plane: str) -> Picture:
@@ -96,8 +96,8 @@ def _torque_picture(compensation: Compensation) -> Picture | None:
     panels = []
     for axis in axes_of:
         curves = [
-            Curve("feedforward M_ff", torque.time, signs[axis] * torque[f"{axis}.M_ff"], GREEN),
-            Curve("friction M_fr", real.time, signs[axis] * real[f"{axis}.M_fr"], ORANGE, "dashed"),
+            Curve("feedforward M_ff", torque.time, signs[axis] * torque[f"{axis}.M_ff"], OTHERWISE),
+            Curve("friction M_fr", real.time, signs[axis] * real[f"{axis}.M_fr"], FRICTION, "dashed"),
         ]
         reversal = _reversal(real.time, real[f"{axis}.n_a"])
         near = Axis("time", "s", span=(reversal - AROUND, reversal + AROUND))
@@ -132,14 +132,14 @@ def _errors_picture(compensation: Compensation) -> Picture:
     without = Level(compensation.figures["after.G"].value, upright=True, dash="dotted")
     rows = {name: float(i) for i, name in enumerate(reversed(names))}
     curves = []
-    for offset, low, colour in ((0.19, True, VERMILLION), (-0.19, False, BLUE)):
+    for offset, low, colour in ((0.19, True, OTHERWISE), (-0.19, False, AFTER)):
         chosen = [each for each in others if (each.change < 0) == low]
         x = np.array([value for each in chosen for value in (0.0, each.quality.G * 1e6, math.nan)])
         y = np.array([value for each in chosen for value in (*(2 * [rows[each.what] + offset]), math.nan)])
         share = next((each.change for each in chosen), 0.0)
         curves.append(Curve(minus(f"{share:+.3g} %"), x, y, colour, width=8.0))
     axis = Axis("", names=list(rows), span=(-0.6, len(rows) - 0.4))
-    points = [Curve("", np.array(error), np.array(G), BLUE, width=width, dots=width > 2) for width in (1.4, 2.4)]
+    points = [Curve("", np.array(error), np.array(G), AFTER, width=width, dots=width > 2) for width in (1.4, 2.4)]
     G_axis = Axis("circular deviation G", "µm")
     panels = [Panel("Delay", Axis("error of the delay", "ms"), G_axis, points)]
     if others:

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from feedsim.linear.margins import Bandwidth, Margins, Pair
 from feedsim.report import chart
 from feedsim.report.chart import Axis, Chart, Level, Mark, Panel
-from feedsim.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, Array
+from feedsim.report.style import GREEN, INK, OTHERWISE, PURPLE, RECORDED, SIMULATED, Array
 
 Complexes = NDArray[np.complex128]
 Kind = Literal["closed form", "measured", "overlaid"]
 
 HIGH_COHERENCE = 0.99
-COLOURS = {"closed form": BLUE, "measured": VERMILLION}
-OTHERS = (GREEN, PURPLE, ORANGE)  # of several overlaid curves
+COLOURS = {"closed form": SIMULATED, "measured": OTHERWISE}
+OTHERS = (RECORDED, GREEN, PURPLE)  # of several overlaid curves
 LOWEST_DB = -400.0  # what is exactly zero
 ALIKE = 1.01  # crossings closer than this ratio are one
 EDGE = 1e-9  # of a frequency: quotients of times carry rounding

@@ -14,7 +14,18 @@ from feedsim.report.chart import Axis, Chart, Curve, Grid, Level, Panel
 from feedsim.report.formatting import counted
 from feedsim.report.identify.stribeck_plots import FRICTION, SPEED, TIME, ZERO, plateaus_picture, stribeck_picture
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, VERMILLION, Array
+from feedsim.report.style import (
+    BLUE,
+    GREEN,
+    MUTED,
+    ORANGE,
+    OTHERWISE,
+    PURPLE,
+    RECORDED,
+    SIMULATED,
+    VERMILLION,
+    Array,
+)
 
 MOST_LOOPS = 6
 COLUMNS = 3
@@ -58,8 +69,8 @@ def loops_picture(found: Identification, stage: Dynamic, over: Over) -> Picture 
     for stretch in shown:
         x, axis = _abscissa(stretch, found.I_P, over)
         curves = [
-            Curve("measured", x, stretch.measured, BLUE, width=1.9, dots=True, most=2000),
-            Curve("model", x, stretch.model, VERMILLION, width=1.2, most=2000),
+            Curve("measured", x, stretch.measured, RECORDED, width=1.9, dots=True, most=2000),
+            Curve("model", x, stretch.model, SIMULATED, width=1.2, most=2000),
         ]
         panels.append(Panel(describe(stretch, found.I_P), axis, FRICTION, curves, ZEROS))
     chart = Chart(panels, (1.0,) * columns)
@@ -126,13 +137,13 @@ def open_loop_picture(found: Identification, balance: Balance) -> Picture | None
     above, below = [], []
     for k, drift in enumerate(drifts):
         position = [
-            Curve("recorded", drift.time, mm * drift.angle, INK, width=1.6),
-            Curve("open loop, before", drift.time, mm * (drift.angle - drift.before), BLUE, width=1.1),
-            Curve(after, drift.time, mm * (drift.angle - drift.after), VERMILLION, "dashed", 1.1),
+            Curve("recorded", drift.time, mm * drift.angle, RECORDED, width=1.6),
+            Curve("open loop, before", drift.time, mm * (drift.angle - drift.before), OTHERWISE, "dashed", 1.1),
+            Curve(after, drift.time, mm * (drift.angle - drift.after), SIMULATED, width=1.1),
         ]
         error = [
-            Curve("open loop, before", drift.time, mm * drift.before, BLUE, width=1.1),
-            Curve(after, drift.time, mm * drift.after, VERMILLION, width=1.1),
+            Curve("open loop, before", drift.time, mm * drift.before, OTHERWISE, "dashed", 1.1),
+            Curve(after, drift.time, mm * drift.after, SIMULATED, width=1.1),
         ]
         above.append(Panel(drift.record, TIME, Axis("position", "mm"), position, linked=f"t{k}"))
         below.append(Panel("", TIME, Axis("recorded less open loop", "mm"), error, [ZERO], linked=f"t{k}", height=0.8))

@@ -10,16 +10,16 @@ import numpy as np
 from feedsim.identify.parameters import torque as motor_torque
 from feedsim.identify.record import Record
 from feedsim.identify.result import NORMAL_95, Identification, Plateau, Stationary
-from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
+from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Panel
 from feedsim.report.formatting import counted, powers
 from feedsim.report.identify.quantities import MM_PER_MIN, curve_error, is_curve, speeds_of
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, GREEN, ORANGE, PURPLE, VERMILLION, Array
+from feedsim.report.style import ORANGE, OTHERWISE, RECORDED, SIMULATED, Array
 
 SPEED, TIME = Axis("motor speed", "rad/s"), Axis("time", "s")
 FRICTION = Axis("friction torque", "N·m")
 ZERO = Level(0.0, dash="")
-DIRECTIONS = ((1, BLUE, "positive"), (-1, VERMILLION, "negative"))
+DIRECTIONS = ((1, "positive"), (-1, "negative"))  # the second one paler
 FEW_DECADES = 20  # ratio of speeds below which they are shown on a linear axis
 MOST_RECORDS = 3  # with plateaus, that are shown over time
 
@@ -61,12 +61,12 @@ def _curves(found: Identification, stage: Stationary) -> Chart:
     half = NORMAL_95 * stage.sigma
     bands, below_bands = [], []
     if is_curve(stage):
-        bands = [Band("95 % band", stage.torque - half, stage.torque + half, stage.speeds, GREEN)]
+        bands = [Band("95 % band", stage.torque - half, stage.torque + half, stage.speeds, SIMULATED)]
         share = 100 * half / stage.torque
-        below_bands = [Band("95 % band", -share, share, stage.speeds, GREEN)]
-    curves = [Curve("curve" if found.prior else "stage 1 alone", stage.speeds, stage.torque, GREEN, width=1.8)]
+        below_bands = [Band("95 % band", -share, share, stage.speeds, SIMULATED)]
+    curves = [Curve("curve" if found.prior else "stage 1 alone", stage.speeds, stage.torque, SIMULATED, width=1.8)]
     below = []
-    for sign, colour, word in DIRECTIONS:
+    for sign, word in DIRECTIONS:
         chosen = sorted((p for p in stage.plateaus if p.speed * sign > 0), key=lambda p: abs(p.speed))
         if not chosen:
             continue
@@ -75,11 +75,12 @@ def _curves(found: Identification, stage: Stationary) -> Chart:
         spread = NORMAL_95 * np.array([p.sigma for p in chosen])
         expected = _of_direction(values, sign, speed)
         name = f"plateaus, {word} direction"
-        curves += _with_bars(name, speed, friction, spread, colour)
-        below += _with_bars(name, speed, 100 * (friction / expected - 1), 100 * spread / expected, colour)
+        curves += _with_bars(name, speed, friction, spread, sign < 0)
+        below += _with_bars(name, speed, 100 * (friction / expected - 1), 100 * spread / expected, sign < 0)
         if values["asymmetry"]:
             shown = _of_direction(values, sign, stage.speeds)
-            curves.append(Curve(f"curve, {word} direction", stage.speeds, shown, colour, "dashed", 0.9))
+            dash: Dash = "dashed" if sign > 0 else "dotted"
+            curves.append(Curve(f"curve, {word} direction", stage.speeds, shown, SIMULATED, dash, 0.9))
     if not found.prior:
         curves += _delivered(found, stage)
     axis = Axis(SPEED.label, SPEED.unit, log=True)
@@ -88,7 +89,7 @@ def _curves(found: Identification, stage: Stationary) -> Chart:
     ordinate = replace(FRICTION, span=(0.0, 1.08 * top), also=("at the slide", "N", 1 / found.I_P))
     return Chart([
         Panel(stribeck_title(found, stage), above, ordinate, curves, bands=bands, linked="n", height=1.5),
-        Panel("Deviation from the curve", axis, Axis("deviation", "%"), below, [Level(0.0, colour=GREEN, dash="")],
+        Panel("Deviation from the curve", axis, Axis("deviation", "%"), below, [Level(0.0, colour=SIMULATED, dash="")],
               below_bands, linked="n"),
     ])  # fmt: skip
 
@@ -105,17 +106,17 @@ def _delivered(found: Identification, stage: Stationary) -> list[Curve]:
     first = stage.estimates.get("M_0")
     more = values["M_0"] - first.value if first is not None else 0.0
     return [
-        Curve(f"identified set, {mark}", stage.speeds, _of_direction(values, sign, stage.speeds) + sign * more, PURPLE,
-              "" if sign > 0 else "dotted", 1.3)
+        Curve(f"identified set, {mark}", stage.speeds, _of_direction(values, sign, stage.speeds) + sign * more,
+              OTHERWISE, "" if sign > 0 else "dotted", 1.3)
         for sign, mark in ((1, "+"), (-1, "−"))
     ]  # fmt: skip
 
 
-def _with_bars(name: str, x: Array, y: Array, spread: Array, colour: str) -> list[Curve]:
+def _with_bars(name: str, x: Array, y: Array, spread: Array, faint: bool) -> list[Curve]:
     gaps = np.full(len(x), np.nan)
     bars = Curve(name, np.column_stack([x, x, gaps]).ravel(), np.column_stack([y - spread, y + spread, gaps]).ravel(),
-                 colour, width=0.9)  # fmt: skip
-    return [Curve(name, x, y, colour, width=3.0, dots=True), bars]
+                 RECORDED, width=0.9, faint=faint)  # fmt: skip
+    return [Curve(name, x, y, RECORDED, width=3.0, dots=True, faint=faint), bars]
 
 
 def plateaus_picture(found: Identification, stage: Stationary, records: Sequence[Record]) -> Picture | None:
@@ -146,10 +147,10 @@ def _over_time(shown: Sequence[tuple[Record, Sequence[Plateau]]], I_P: float) ->
         ends = np.array([t for plateau in own for t in (plateau.begin, plateau.end, *gap)])
         means = np.array([m for plateau in own for m in (plateau.torque, plateau.torque, *gap)])
         torques = [
-            Curve("motor torque", record.time, record.torque, BLUE, width=0.9),
-            Curve("mean of a plateau", ends, means, VERMILLION, width=2.2),
+            Curve("motor torque", record.time, record.torque, RECORDED, width=0.9),
+            Curve("mean of a plateau", ends, means, SIMULATED, width=2.2),
         ]
-        speed = Curve("speed", record.time, _speed(record) * I_P * MM_PER_MIN, BLUE, width=0.9)
+        speed = Curve("speed", record.time, _speed(record) * I_P * MM_PER_MIN, RECORDED, width=0.9)
         title = f"{record.name}: {counted(len(own), 'plateau')}"
         panels += [
             Panel(title, TIME, Axis("torque", "N·m"), torques, [ZERO], zones, linked=f"t{k}"),

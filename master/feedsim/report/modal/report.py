@@ -21,7 +21,7 @@ from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
 from feedsim.report.results import REPORT, SUMMARY, Content, check_place
 from feedsim.report.sections import figures_footer, figures_section, provenance_section
-from feedsim.report.style import BLUE, MUTED, VERMILLION, Array, remarked
+from feedsim.report.style import OTHERWISE, RECORDED, SIMULATED, Array, remarked
 from feedsim.scenario import Subject
 from feedsim.structure.modes import write_modes
 from feedsim.trace.response import Complexes, FrequencyResponse
@@ -152,9 +152,9 @@ def _bode(found: AxisModes) -> Picture:
         factor = scale / np.abs(found.own[MOTOR][0]) if scale else 1.0
         sign = np.sign(found.fit.rigid[name]) or 1.0
         return [
-            Curve("measured", frequency, of(found.measured.values[name]), MUTED, dots=True, width=2.0),
-            Curve("fit", frequency, of(found.fit.response(name, frequency)), BLUE),
-            Curve("machine", frequency, of(own * factor * sign), VERMILLION),
+            Curve("measured", frequency, of(found.measured.values[name]), RECORDED, dots=True, width=2.0),
+            Curve("fit", frequency, of(found.fit.response(name, frequency)), SIMULATED),
+            Curve("machine", frequency, of(own * factor * sign), OTHERWISE, "dashed"),
         ]
 
     def decibel(values: Any) -> Array:

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from feedsim.replay.compare import TO_RPM, Comparison
-from feedsim.report.chart import Axis, Chart, Curve, Level, Panel
+from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, MUTED, PURPLE, VERMILLION, Array
+from feedsim.report.style import LEFT, RECORDED, SIMULATED, Array
 from feedsim.trace import Mark
 
 SHOWN = {"m": (1e6, "µm"), "rad/s": (TO_RPM, "rpm"), "N.m": (1.0, "N·m")}
 MOST_MARKS = 25  # lines in a picture that can still be told apart
+MOST_NAMES, LONGEST_NAME = 9, 16  # names of them side by side in a panel, and their characters
 
 
 def pictures_of(comparison: Comparison, marks: Sequence[Mark]) -> list[Picture]:
@@ -35,29 +36,44 @@ def _over_time(found: Comparison, marks: Sequence[Mark]) -> Picture:
     within = [mark for mark in marks if time[0] <= mark.time <= time[-1]][:MOST_MARKS]
     title = f"Axis {found.axis}: the record and its replay"
     caption = "The recorded setpoints through the simulated axis, in closed loop, beside what was recorded." + (
-        " Dotted: begin of a block of the program." if within else ""
+        " Dotted: begin of a block of the program, with its name where there is room." if within else ""
     )
     blocks = [Level(mark.time, upright=True, dash="dotted") for mark in within]
-    panels = [_panel(what, ordinate, "µm", time, recorded=lag,
-                     simulated=lag - 1e6 * channels["position"].error[rows])]  # fmt: skip
+    titled = [replace(level, text=name) for level, name in zip(blocks, names_of(within, time), strict=True)]
+    panels = [_panel(what, ordinate, "µm", time,
+                     simulated=lag - 1e6 * channels["position"].error[rows], recorded=lag)]  # fmt: skip
     for name, channel in channels.items():
         factor, unit = SHOWN[channel.unit]
         curves = {"what is left": factor * channel.error[rows]}
         if name == "torque":
-            both = {"recorded": factor * channel.recorded[rows], "simulated": factor * channel.simulated[rows]}
+            both = {"simulated": factor * channel.simulated[rows], "recorded": factor * channel.recorded[rows]}
             curves = {**both, **curves}
         panels.append(
             _panel(f"What is left of the {name}" if name != "torque" else "Torque", name, unit, time, **curves)
         )
-    chart = Chart([replace(panel, levels=[*panel.levels, *blocks]) for panel in panels])
+    upper = replace(panels[0], levels=[*panels[0].levels, *titled])
+    chart = Chart([upper, *(replace(panel, levels=[*panel.levels, *blocks]) for panel in panels[1:])])
     return Picture(f"replay-{found.axis}", title, caption, chart)
 
 
-LOOKS = {"recorded": MUTED, "simulated": BLUE, "what is left": VERMILLION}
+def names_of(marks: Sequence[Mark], time: Array) -> list[str]:
+    """What stands at the line of each block; "" where the name before it takes the room."""
+    found: list[str] = []
+    free = -np.inf
+    for mark in marks:
+        text = mark.text if len(mark.text) <= LONGEST_NAME else mark.text[: LONGEST_NAME - 1].rstrip() + "…"
+        found.append(text if mark.time >= free else "")
+        free = mark.time + np.ptp(time) / MOST_NAMES if found[-1] else free
+    return found
+
+
+# Colour and width: the record lies on the simulation, which is wider.
+LOOKS = {"recorded": (RECORDED, 1.0), "simulated": (SIMULATED, 2.2), "what is left": (LEFT, 1.2)}
 
 
 def _panel(title: str, ordinate: str, unit: str, time: Array, **curves: Array) -> Panel:
-    own = [Curve(name.replace("_", " "), time, y, LOOKS[name], width=1.2) for name, y in curves.items()]
+    looks = [(name.replace("_", " "), y, *LOOKS[name]) for name, y in curves.items()]
+    own = [Curve(name, time, y, colour, width=width) for name, y, colour, width in looks]
     axis = Axis("time of the record", "s")
     return Panel(title, axis, Axis(ordinate, unit), own, [Level(0.0, dash="")], linked="t", height=0.9)
 
@@ -77,14 +93,14 @@ def _left(found: Comparison) -> Picture:
         panels.append(
             Panel(f"What is left of the {name}: spectrum", Axis("frequency", "Hz", log=True),
                   Axis("amplitude", unit, log=True),
-                  [Curve("amplitude", frequency[1:], factor * amplitude[1:], PURPLE)])
+                  [Curve("amplitude", frequency[1:], factor * amplitude[1:], LEFT)])
         )  # fmt: skip
+        over_both: tuple[tuple[str, Array, Dash], ...] = (
+            ("forwards", forwards, ""),
+            ("backwards", backwards, "dashed"),
+        )
         seen = np.isfinite(forwards) | np.isfinite(backwards)
-        over = [
-            Curve(word, 1e3 * centre[seen], factor * y[seen], colour, width=width, dots=width > 2)
-            for word, y, colour in (("forwards", forwards, BLUE), ("backwards", backwards, VERMILLION))
-            for width in (1.4, 2.2)
-        ]
+        over = [Curve(word, 1e3 * centre[seen], factor * y[seen], LEFT, dash, 1.4) for word, y, dash in over_both]
         panels.append(
             Panel(
                 f"What is left of the {name}: mean over the position",

@@ -9,7 +9,7 @@ from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Panel
 from feedsim.report.content import Section, Table
 from feedsim.report.formatting import minus, number
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, VERMILLION
+from feedsim.report.style import OTHERWISE, SIMULATED
 
 HEADS = (
     "Target [mm]", "Mean upwards [µm]", "s upwards [µm]", "Mean downwards [µm]", "s downwards [µm]", "B [µm]", "R [µm]"
@@ -19,7 +19,7 @@ NOTE = (
     "approaches from below (upwards) and from above (downwards), reversal value B and bidirectional repeatability R. "
     "Letters after ISO 230-2."
 )
-SIDES = (("approached upwards", BLUE), ("approached downwards", VERMILLION))
+SIDES = (("approached upwards", SIMULATED), ("approached downwards", OTHERWISE))
 
 
 def accuracy_picture(prefix: str, found: Accuracy, stem: str) -> Picture:

@@ -10,7 +10,21 @@ from feedsim.analysis.positioning import PLATEAU
 from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Mark, Panel, column_of
 from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture
-from feedsim.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, SETPOINT, SKY, VERMILLION
+from feedsim.report.style import (
+    ALLOWED,
+    AT_TOOL,
+    BLUE,
+    FRICTION,
+    GREEN,
+    INK,
+    LEFT,
+    ORANGE,
+    PURPLE,
+    SETPOINT,
+    SIMULATED,
+    SKY,
+    VERMILLION,
+)
 from feedsim.trace import Trace, release
 
 TIME = Axis("time", "s")
@@ -64,7 +78,7 @@ def _positioning(trace: Trace, approach: Approach, figures: Figures, band: float
     if f"{axis}.M_a" in trace.columns:
         curves = [Curve("motor torque M_a", part.time, sign * part[f"{axis}.M_a"])]
         if f"{axis}.M_fr" in part.columns:
-            curves.append(Curve("friction torque M_fr", part.time, sign * part[f"{axis}.M_fr"], VERMILLION, width=1.2))
+            curves.append(Curve("friction torque M_fr", part.time, sign * part[f"{axis}.M_fr"], FRICTION, width=1.2))
         levels = [end, Level(0.0, dash="")]
         if approach.steady is not None and math.isfinite(level := _value(figures, "plateau_torque")):
             ends = tuple(approach.steady[0] + share * (approach.steady[1] - approach.steady[0]) for share in PLATEAU)
@@ -80,8 +94,8 @@ def _beyond(trace: Trace, approach: Approach, figures: Figures, band: float) -> 
     curves = []
     reach = [2.2 * band * 1e6]
     looks: tuple[tuple[str, str, str, Dash], ...] = (
-        (TOOL, f"tcp.x_{approach.axis}", ORANGE, "dashed"),
-        (SCALE, f"{approach.axis}.x_a", BLUE, ""),
+        (TOOL, f"tcp.x_{approach.axis}", AT_TOOL, "dashed"),
+        (SCALE, f"{approach.axis}.x_a", SIMULATED, ""),
     )
     for name, signal, colour, dash in looks:
         if signal in trace.columns:
@@ -99,7 +113,7 @@ def _beyond(trace: Trace, approach: Approach, figures: Figures, band: float) -> 
         after = min(int(x.searchsorted(settled)), len(y) - 1)
         side = math.copysign(band * 1e6, y[after] or 1.0)
         if settled <= last:
-            marks.append(Mark(settled, side, f"last outside ±{band * 1e6:g} µm: {settled:.1f} ms", VERMILLION))
+            marks.append(Mark(settled, side, f"last outside ±{band * 1e6:g} µm: {settled:.1f} ms", LEFT))
         else:
             note = f"still outside ±{band * 1e6:g} µm until {settled:.1f} ms"
     return Panel(
@@ -109,7 +123,7 @@ def _beyond(trace: Trace, approach: Approach, figures: Figures, band: float) -> 
              span=(-1.45 * max(reach), 1.45 * max(reach))),
         curves,
         [Level(0.0, dash=""), Level(0.0, upright=True, dash="dotted")],
-        [Band("", -band * 1e6, band * 1e6, colour=GREEN)],
+        [Band("", -band * 1e6, band * 1e6, colour=ALLOWED)],
         marks,
         note=note,
         height=1.15,

@@ -14,7 +14,7 @@ from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Mark, Panel, P
 from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import TIME, TOOL, reversed_note, torque_axis
-from feedsim.report.style import BLUE, GREEN, ORANGE, VERMILLION, Array
+from feedsim.report.style import AT_TOOL, FRICTION, LEFT, SIMULATED, Array
 from feedsim.trace import Trace
 
 RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
@@ -43,15 +43,15 @@ def contour_picture(
     tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
     if all(name in trace.columns for name in tool):
         by_tool = contour(trace, turn, tool)
-        curves.append(turned(TOOL, ORANGE, by_tool.angle, by_tool.deviation, "dashed", 1.2))
-    curves.append(turned("linear scales", BLUE, by_scale.angle, by_scale.deviation, width=1.6))
+        curves.append(turned(TOOL, AT_TOOL, by_tool.angle, by_tool.deviation, "dashed", 1.2))
+    curves.append(turned("linear scales", SIMULATED, by_scale.angle, by_scale.deviation, width=1.6))
     over = ""
     if back is not None:
         other = contour(trace, back)
         curves.append(
-            turned(f"linear scales, {DIRECTIONS[back.sense]}", GREEN, other.angle, other.deviation, "dotted", 1.2)
+            turned(f"linear scales, {DIRECTIONS[back.sense]}", SIMULATED, other.angle, other.deviation, "dashed", 1.2)
         )
-        over = f" Dotted: {DIRECTIONS[back.sense]}, from {back.begin:.4f} to {back.end:.4f} s."
+        over = f" Dashed: {DIRECTIONS[back.sense]}, from {back.begin:.4f} to {back.end:.4f} s."
     title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
     caption = (
         f"Radius {turn.radius * 1e3:.6g} mm, {DIRECTIONS[turn.sense]} from {turn.axes[0]} to {turn.axes[1]}, turn from "
@@ -66,7 +66,7 @@ def contour_picture(
         "median of the turn."
     )
     marks = [
-        Mark(glitch.angle, glitch.deviation * 1e6, f"{minus(glitch.name)}: {height * 1e6:.2f} µm", VERMILLION)
+        Mark(glitch.angle, glitch.deviation * 1e6, f"{minus(glitch.name)}: {height * 1e6:.2f} µm", LEFT)
         for glitch in by_scale.glitches
         if (height := heights.get(glitch.name, 0.0 if heights else glitch.height))
     ]
@@ -106,9 +106,9 @@ def _torques(part: Trace, axes: Sequence[str], signs: Mapping[str, int]) -> Char
     panels = []
     for axis in axes:
         sign, speed = signs.get(axis, 1), part[f"{axis}.n_a"]
-        torques = [("motor M_a", sign * part[f"{axis}.M_a"], BLUE)]
+        torques = [("motor M_a", sign * part[f"{axis}.M_a"], SIMULATED)]
         if f"{axis}.M_fr" in part.columns:
-            torques.append(("friction M_fr", sign * part[f"{axis}.M_fr"], VERMILLION))
+            torques.append(("friction M_fr", sign * part[f"{axis}.M_fr"], FRICTION))
         ordinate = torque_axis(sign)
         n_a = Axis("motor speed n_a", "rad/s")
         near = Axis(n_a.label, n_a.unit, span=_about_zero(0.12 * float(np.abs(speed).max() or 1.0)))

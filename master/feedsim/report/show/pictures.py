@@ -18,17 +18,19 @@ from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import ZOOM_AFTER, ZOOM_BEFORE
 from feedsim.report.run.circle_plots import circle, circle_chart, turned
 from feedsim.report.style import (
-    BLUE,
+    BEFORE,
     GREEN,
     ORANGE,
     PURPLE,
+    RECORDED,
+    SIMULATED,
     SKY,
     VERMILLION,
     Array,
 )
 from feedsim.trace import Trace
 
-COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
+MORE = (SKY, GREEN, PURPLE, ORANGE, VERMILLION)  # of further results
 ABSCISSA = Axis("time from the first row", "s")
 AFTER = Axis("time after the end of the motion", "ms", span=(-1e3 * ZOOM_BEFORE, 1e3 * ZOOM_AFTER))
 FREQUENCY = Axis("frequency", "Hz", log=True)
@@ -54,9 +56,17 @@ class _Curve:
     deviation: Array
 
 
-def _dash(k: int) -> Dash:
+def looks_of(sources: Sequence[Source]) -> list[tuple[str, Dash]]:
+    """Colour and dash of every source: records as records; of results alone the first is what was before."""
     kinds: tuple[Dash, ...] = ("", "dashed", "dotted")
-    return kinds[k // len(COLOURS) % len(kinds)]
+    records = [not source.figures and not source.parameters for source in sources]
+    names = [SIMULATED, *MORE] if any(records) else [BEFORE, SIMULATED, *MORE]
+    found: list[tuple[str, Dash]] = []
+    for k, recorded in enumerate(records):
+        number = sum(each == recorded for each in records[:k])
+        own = [RECORDED] if recorded else names
+        found.append((own[number % len(own)], kinds[number // len(own) % len(kinds)]))
+    return found
 
 
 def pictures_of(sources: Sequence[Source]) -> list[Picture]:
@@ -98,8 +108,9 @@ def contour_picture(sources: Sequence[Source], prefix: str) -> Picture | None:
         f"Rings at ±{on.ring:g} µm about the programmed circle; clockwise turns are drawn thin. Where the radii are "
         "not the same, the deviation is what is compared."
     )
+    looks = looks_of(sources)
     shown = [
-        turned(source.name, COLOURS[k % len(COLOURS)], curve.angle, curve.deviation, _dash(k),
+        turned(source.name, looks[k][0], curve.angle, curve.deviation, looks[k][1],
                1.4 if turn.sense > 0 else 0.8)
         for k, source, turns, drawn in curves
         for turn, curve in zip(turns, drawn, strict=True)
@@ -121,7 +132,8 @@ _Own = tuple[int, Array, Array]
 
 
 def _curves(sources: Sequence[Source], own: Sequence[_Own]) -> list[Curve]:
-    return [Curve(sources[k].name, x, y, COLOURS[k % len(COLOURS)], _dash(k), 1.2) for k, x, y in own]
+    looks = looks_of(sources)
+    return [Curve(sources[k].name, x, y, *looks[k], 1.2) for k, x, y in own]
 
 
 def _over_time(

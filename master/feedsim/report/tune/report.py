@@ -12,19 +12,20 @@ from feedsim.analysis import Figure
 from feedsim.control import Name, names_of
 from feedsim.findings import Note, Wrong
 from feedsim.report import sections
-from feedsim.report.chart import Axis, Chart, Curve, Panel
+from feedsim.report.chart import Axis, Chart, Curve, Dash, Panel
 from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
-from feedsim.report.style import BLUE, MUTED, VERMILLION
+from feedsim.report.style import AFTER, BEFORE
 from feedsim.tune.circles import Pair
 from feedsim.tune.compensation import Judged
 from feedsim.tune.compensators import amplitude
 from feedsim.units import convert
 from feedsim.variables import parameters
 
+DASHES: tuple[Dash, ...] = ("", "dashed", "dotted")  # of axes in one panel
 SETTINGS, SHEET = "settings.yaml", "sheet.csv"
 GROUPS = {"pulse": "friction_pulse", "pulse_characteristic": "friction_pulse", "table": "friction_table"}
 CONTROLS = {"pulse": "sinumerik", "pulse_characteristic": "sinumerik", "table": "twincat"}
@@ -218,7 +219,7 @@ def pictures_of(judged: Judged) -> list[Picture]:
             f"{axis}", across, Axis("error at the reversals", "µm"),
             [Curve(name, accelerations, 1e6 * errors[:, k], colour, dots=True)
              for name, errors, colour in (
-                 ("without", judged.held_before, VERMILLION), ("with", judged.held_after, BLUE))],
+                 ("without", judged.held_before, BEFORE), ("with", judged.held_after, AFTER))],
         )
         for axis, k in zip(judged.axes, judged.columns, strict=True)
     ]  # fmt: skip
@@ -232,8 +233,8 @@ def pictures_of(judged: Judged) -> list[Picture]:
     if judged.found.kind == "pulse_characteristic":
         a = np.geomspace(accelerations.min() / 2, accelerations.max() * 1.5, 200)
         curves = [
-            Curve(axis, a, 6e4 * amplitude(values, a), colour)
-            for (axis, values), colour in zip(judged.found.values.items(), (BLUE, VERMILLION, MUTED), strict=False)
+            Curve(axis, a, 6e4 * amplitude(values, a), AFTER, dash)
+            for (axis, values), dash in zip(judged.found.values.items(), DASHES, strict=False)
         ]
         panel = Panel("Amplitude of the pulse", across, Axis("amplitude", "mm/min"), curves)
         found.append(

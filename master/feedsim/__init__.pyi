@@ -30,6 +30,7 @@ from feedsim.jobs.show import show as show
 from feedsim.jobs.subject import load as load
 from feedsim.jobs.sweep import sweep as sweep
 from feedsim.jobs.tune_compensation import tune_compensation as tune_compensation
+from feedsim.jobs.tune_drive import tune_drive as tune_drive
 from feedsim.jobs.write_page import write_page as write_page
 from feedsim.jobs.write_ssp import write_ssp as write_ssp
 from feedsim.scenario import Machine as Machine

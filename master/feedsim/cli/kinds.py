@@ -86,7 +86,7 @@ def _summary(path: Path) -> bool:
 
 
 _RUN = ("run", "validate", "frf", "compensate", "pack", "page", "ssp", "machine info", "machine show", "machine build",
-        "machine pack", "tune compensation")  # fmt: skip
+        "machine pack", "tune compensation", "tune drive")  # fmt: skip
 _RECORDS = ("identify", "circle", "show", "compare", "convert", "identify-drive", "replay", "identify-modes")
 KINDS = (
     Kind("a study", ("sweep", "validate"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),

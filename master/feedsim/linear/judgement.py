@@ -13,9 +13,9 @@ n = 0, c = 0): M_fr = (1 + gamma)/2 sigma_0 (angle) + (sigma_1 + sigma_2) n, the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -52,6 +52,7 @@ IMAGES = 1
 # of CHANGE: limits and margins lie there.
 SECTOR, COUNTS, CHANGE = 1.0, 8.0, 0.2
 ROUNDS = 12  # of halving steps at most
+REAL = 1e-3  # [rad] from -180 degrees: as much of a phase is rounding, at half the sampling rate
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def judge(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
     if not axes:
         return ()
     frictions = machine.shipped_frictions
-    held = tuple(_Bristles.of(frictions[name]) if name in frictions else None for name in axes)
+    held = tuple(Bristles.of(frictions[name]) if name in frictions else None for name in axes)
     driven = tuple((name, axis.drive, axis.I_P) for name, axis in axes.items() if isinstance(axis.drive, Drive))
     return _judged_axes(driven, held, machine.cycles, modes)
 
@@ -106,10 +107,10 @@ def locked_modes(machine: Machine, modes: Modes) -> tuple[Floats, Floats, Floats
     drives = tuple(LinearDrive(machine.shipped_drive(name, "a page"), machine.cycles, axis.I_P)
                    for name, axis in machine.axes.items())  # fmt: skip
     axes = tuple(machine.axes)
-    return _Sampled(axes, drives, (None,) * len(axes), ModalPlant.of(modes, axes)).locked()
+    return Sampled(axes, drives, (None,) * len(axes), ModalPlant.of(modes, axes)).locked()
 
 
-class _Bristles(NamedTuple):
+class Bristles(NamedTuple):
     """All that the loops know of an axis's friction: stiffness [N.m/rad] and dampings [N.m.s/rad] where it sticks."""
 
     stiffness: float
@@ -117,7 +118,7 @@ class _Bristles(NamedTuple):
     sigma_2: float
 
     @classmethod
-    def of(cls, friction: Friction) -> _Bristles:
+    def of(cls, friction: Friction) -> Bristles:
         k = 0.5 * (1 + friction.gamma) if friction.W > 0 else 1.0
         return cls(k * friction.sigma_0, friction.sigma_1, friction.sigma_2)
 
@@ -125,12 +126,12 @@ class _Bristles(NamedTuple):
 # Most of the time of a short run; in a study many runs have the same loops, whatever else differs.
 @lru_cache(maxsize=8)
 def _judged_axes(
-    driven: tuple[tuple[str, Drive, float], ...], held: tuple[_Bristles | None, ...], cycles: Cycles, modes: Modes
+    driven: tuple[tuple[str, Drive, float], ...], held: tuple[Bristles | None, ...], cycles: Cycles, modes: Modes
 ) -> tuple[Loop, ...]:
     """`driven`: name, drive and I_P of the axes judged; `held`: what holds each at rest, where that is known."""
     axes = tuple(name for name, _, _ in driven)
     drives = tuple(LinearDrive(drive, cycles, I_P) for _, drive, I_P in driven)
-    return _Sampled(axes, drives, held, ModalPlant.of(modes, axes)).judged()
+    return Sampled(axes, drives, held, ModalPlant.of(modes, axes)).judged()
 
 
 def _judged(
@@ -180,6 +181,8 @@ def _limits(L: Complexes, within: tuple[float, float]) -> Floats:
     through = np.flatnonzero((np.signbit(angle[1:]) != np.signbit(angle[:-1])) & (np.abs(turn) < np.pi))
     share = -angle[through] / turn[through]
     factors = np.exp(-(size[through] + share * np.diff(size)[through]))
+    if abs(angle[-1]) < REAL:  # half the sampling rate: the mirror image of the contour meets it there
+        factors = np.append(factors, np.exp(-size[-1]))
     return np.sort(factors[(factors > within[0]) & (factors < within[1])])
 
 
@@ -203,36 +206,47 @@ def _windings(values: Complexes) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sampled:
+class Sampled:
     """The axes that are judged, and what their loops consist of."""
 
     axes: tuple[str, ...]
     drives: tuple[LinearDrive, ...]
-    bristles: tuple[_Bristles | None, ...]
+    bristles: tuple[Bristles | None, ...]
     plant: ModalPlant
 
-    def judged(self) -> tuple[Loop, ...]:
-        """All loops in all states."""
+    def judged(self, axes: Sequence[int] | None = None) -> tuple[Loop, ...]:
+        """All loops in all states; axes: indices of those asked for."""
+        return self.judged_with_levels(axes)[0]
+
+    def judged_with_levels(self, axes: Sequence[int] | None = None) -> tuple[tuple[Loop, ...], Floats, Complexes]:
+        """The same, with the frequencies (F,) [Hz] of the speed loops and their determinants (2, 1 + asked, F)."""
+        asked = tuple(range(len(self.axes))) if axes is None else tuple(axes)
         cycles = self.drives[0].cycles
-        speed = self._along(self._speed_level, self._frequencies(0.5 / cycles.T_c, self._free_resonances()))
-        position = self._along(self._position_level, self._frequencies(0.5 / cycles.T_pos, self._locked_resonances()))
+        frequency, speed = self._along(
+            partial(self._speed_level, asked), self._frequencies(0.5 / cycles.T_c, self.free_resonances())
+        )
+        _, position = self._along(
+            partial(self._position_level, asked), self._frequencies(0.5 / cycles.T_pos, self.locked_resonances())
+        )
         found: list[Loop] = []
         kind: Kind
         for k, state in enumerate(STATES):
             of_speed = -_windings(speed[k, 0])
             closed = of_speed - _windings(position[k, 0])
-            for i, (axis, drive) in enumerate(zip(self.axes, self.drives, strict=True)):
+            for j, i in enumerate(asked):
+                axis, drive = self.axes[i], self.drives[i]
                 for kind, level, gain, growing, inner in (
                     ("speed", speed[k], drive.drive.K_p, of_speed, 0),
                     ("position", position[k], drive.drive.K_v, closed, of_speed),
                 ):
                     if gain > 0:
-                        L = level[0] / level[1 + i] - 1
+                        L = level[0] / level[1 + j] - 1
                         found.append(_judged(axis, kind, state, gain, L, growing, closed, inner))
-        return tuple(found)
+        return tuple(found), frequency, speed
 
-    def _along(self, level: Callable[[Complexes], Complexes], frequency: Floats) -> Complexes:
-        """A level's determinants (2, 1 + A, F) along half its contour, close enough together that none jumps."""
+    def _along(self, level: Callable[[Complexes], Complexes], frequency: Floats) -> tuple[Floats, Complexes]:
+        """Half of a level's contour [Hz] and its determinants there (2, 1 + asked, F), close enough together that none
+        jumps."""
         with np.errstate(over="ignore", invalid="ignore"):
             values = level(_s(frequency))
         if not np.isfinite(values).all():
@@ -252,7 +266,7 @@ class _Sampled:
             between = 0.5 * (frequency[wide] + frequency[wide + 1])
             values = np.insert(values, wide + 1, level(_s(between)), axis=2)
             frequency = np.insert(frequency, wide + 1, between)
-        return values
+        return frequency, values
 
     def _frequencies(self, highest: float, near: Floats) -> Floats:
         """Frequencies to begin with [Hz], 0, `highest` and points about resonances included."""
@@ -260,7 +274,7 @@ class _Sampled:
         fast = np.geomspace(1.0, highest, math.ceil(math.log(highest) / STEP))
         return np.unique(np.concatenate([[0.0], slow, fast, near[(near > 0) & (near < highest)]]))
 
-    def _free_resonances(self) -> Floats:
+    def free_resonances(self) -> Floats:
         """Frequencies [Hz] about the modes that show in the speed loops: K_p n/M is n^2 K_p/(2 D omega) at the peak."""
         plant, elastic = self.plant, self.plant.omega_0 > 0
         seen = np.maximum(np.abs(plant.rotor), np.abs(plant.scale) / self._leads)[elastic].max(axis=1)
@@ -268,7 +282,7 @@ class _Sampled:
         omega, damping = plant.omega_0[elastic], plant.damping[elastic]
         return _about(omega, damping, seen * driven / np.maximum(2 * damping * omega, GROWTH))
 
-    def _locked_resonances(self) -> Floats:
+    def locked_resonances(self) -> Floats:
         """The same of the position loops."""
         omega, damping, peak = self.locked()
         return _about(omega, damping, max(drive.drive.K_v for drive in self.drives) * peak)
@@ -295,12 +309,13 @@ class _Sampled:
     def _leads(self) -> Floats:
         return np.array([drive.I_P for drive in self.drives])
 
-    def _speed_level(self, s: Complexes) -> Complexes:
-        """(2, 1 + A, F) determinants of the speed loops, position loops open: all closed, and each open in turn."""
-        return np.stack([_determinants(loop, fixed) for _, loop, fixed in self._speed_loops(s)])
+    def _speed_level(self, asked: Sequence[int], s: Complexes) -> Complexes:
+        """(2, 1 + asked, F) determinants of the speed loops, position loops open: all closed, and those of the axes
+        asked for open in turn."""
+        return np.stack([_determinants(loop, fixed, asked) for _, loop, fixed in self._speed_loops(s)])
 
-    def _position_level(self, s: Complexes) -> Complexes:
-        """(2, 1 + A, F) the same of the position loops, speed loops closed."""
+    def _position_level(self, asked: Sequence[int], s: Complexes) -> Complexes:
+        """(2, 1 + asked, F) the same of the position loops, speed loops closed."""
         A, m, T_pos = len(self.axes), self.drives[0].ticks, self.drives[0].cycles.T_pos
         components = range(-IMAGES, IMAGES + 1) if m > 2 * IMAGES else range(m)
         every = (s[:, None] + 2j * np.pi * np.array(components) / T_pos).ravel()
@@ -312,17 +327,17 @@ class _Sampled:
         for x, loop, _ in self._speed_loops(every):
             torques = np.linalg.solve(np.eye(A) + loop, np.eye(A) * answer[:, None])
             sampled = (x @ torques).reshape(len(s), len(components), A, A).sum(axis=1)
-            found.append(_determinants(gains[:, None] * sampled, np.zeros_like(sampled)))
+            found.append(_determinants(gains[:, None] * sampled, np.zeros_like(sampled), asked))
         return np.stack(found)
 
     def _speed_loops(self, s: Complexes) -> Iterator[tuple[Complexes, Complexes, Complexes]]:
         """Per state, (C, A, A) each: positions per torque, what the speed loops take off the torques, and what of that
         does not go through the speed controllers."""
         A = len(self.axes)
-        n_M, x_M = n_fr, x_fr = self._ports(s, "linear")
+        n_M, x_M = n_fr, x_fr = self.ports(s, "linear")
         ideal = np.array([drive.drive.ideal_current_loop for drive in self.drives])
         if ideal.any():
-            held = self._ports(s, "held")
+            held = self.ports(s, "held")
             n_M, x_M = (np.asarray(np.where(ideal, h, linear)) for h, linear in zip(held, (n_M, x_M), strict=True))
         through, past = (np.empty((len(s), A, 1), dtype=np.complex128) for _ in range(2))
         for i, drive in enumerate(self.drives):
@@ -344,7 +359,7 @@ class _Sampled:
                     seen[:, i] = V[:, None] * x[:, i]
             yield x, through * seen + past * n, past * n
 
-    def _ports(self, s: Complexes, hold: Hold) -> tuple[Complexes, Complexes]:
+    def ports(self, s: Complexes, hold: Hold) -> tuple[Complexes, Complexes]:
         """(C, A, A) speeds and positions of the axes per torque."""
         plant, A = self.plant, len(self.axes)
         speeds = (plant.rotor[:, :, None] * plant.rotor[:, None]).reshape(-1, A * A)
@@ -378,10 +393,10 @@ def _about(omega: Floats, damping: Floats, peak: Floats) -> Floats:
     return np.asarray((omega[shows, None] + width[:, None] * ABOUT).ravel() / (2 * np.pi))
 
 
-def _determinants(loop: Complexes, opened: Complexes) -> Complexes:
-    """(1 + A, C) determinants of 1 + loop (C, A, A), and of that with each row in turn taken from `opened`."""
-    A = loop.shape[1]
-    every = np.repeat(loop[None], 1 + A, axis=0)
-    for i in range(A):
-        every[1 + i, :, i] = opened[:, i]
-    return np.asarray(np.linalg.det(np.eye(A) + every))
+def _determinants(loop: Complexes, opened: Complexes, rows: Sequence[int]) -> Complexes:
+    """(1 + rows, C) determinants of 1 + loop (C, A, A), and of that with each of the rows in turn taken from
+    `opened`."""
+    every = np.repeat(loop[None], 1 + len(rows), axis=0)
+    for k, i in enumerate(rows):
+        every[1 + k, :, i] = opened[:, i]
+    return np.asarray(np.linalg.det(np.eye(loop.shape[1]) + every))

@@ -132,7 +132,7 @@ class Circles:
         program = plan(own)
         centre = (middle[first], middle[second])
         arcs = [segment for segment, motion in zip(program.segments, own.motions, strict=True) if motion.kind == "arc"]
-        turns = tuple(_turn(program, plane, centre, segment.start, segment.end) for segment in arcs)
+        turns = tuple(turn_of(program, plane, centre, segment.start, segment.end) for segment in arcs)
         return cls(own, program, plane, tuple(pairs), turns, (centre,) * len(pairs))
 
     def with_machine(self, machine: Machine) -> Scenario:
@@ -167,7 +167,7 @@ def _interval(machine: Machine) -> float:
     return max(1, round(INTERVAL / machine.cycles.T_c)) * machine.cycles.T_c
 
 
-def _turn(
+def turn_of(
     program: Program, plane: tuple[str, str], centre: tuple[float, float], start: float, end: float
 ) -> tuple[float, float]:
     """Begin and end [s] of the turn that counts, by the setpoints."""

@@ -1,0 +1,217 @@
+"""A drive tuned within stability margins on a simulated machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from feedsim import scenario as scenarios
+from feedsim.analysis import Figure
+from feedsim.arguments import Changes, Value, quantity, settings, spelt
+from feedsim.errors import InputError
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result, in_words_of
+from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.report.content import Report
+from feedsim.report.provenance import input_paths
+from feedsim.report.results import Content
+from feedsim.report.tune import drive as page
+from feedsim.scenario import Machine
+from feedsim.scenario.structure.load import load_structure
+from feedsim.structure import Modes
+from feedsim.structure.build import build
+from feedsim.tune.changed import Changed
+from feedsim.tune.drive import EVALUATIONS, Limits, Tuned
+from feedsim.tune.drive import tune_drive as tune
+from feedsim.tune.drive_program import check_axis
+from feedsim.units import parse
+
+LEAST_EVALUATIONS = 20
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TuneDriveResult(Result):
+    """A tuned drive. tuned: its values, margins and motions. control: in whose names values are shown, too."""
+
+    tuned: Tuned
+    control: str = ""
+
+    kind = page.KIND
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files of the scenario."""
+        return input_paths(self.tuned.scenario)
+
+    @property
+    def changes(self) -> Sequence[Changed]:
+        """Every value to type: axis, parameter, old and new."""
+        return self.tuned.changes
+
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """ "Z.peak_reduction", "Z.overshoot_before", "Z.gain_margin_after" ..."""
+        return page.figures_of(self.tuned)
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """Motions that get worse, and what the values rest on."""
+        return page.findings(self.tuned)
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """What the tuned drive does, or why there is none."""
+        return page.answers(self.tuned)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answer, and the values to type."""
+        return [*self.answers, *page.lines_of(self.tuned, self.control)]
+
+    def files(self) -> Mapping[str, Content]:
+        """Values to load, values to type, and a drive file for every axis that changes."""
+        found = {page.SETTINGS: page.settings(self.tuned), page.SHEET: page.sheet(self.tuned, self.control)}
+        return {**found, **page.drives(self.tuned)}
+
+    @property
+    def keeps(self) -> Sequence[str]:
+        """Drive files, which machine files and scenarios may name."""
+        return tuple(page.drives(self.tuned))
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.tuned, self.control)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.tuned, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, list(self.tuned.scenario.machine.axes), inputs)
+
+
+def tune_drive(
+    scenario: File,
+    axis: str,
+    *,
+    gain_margin: Value = 8.0,
+    phase_margin: Value = 40.0,
+    encoder_noise: Value = 10e-6,
+    at: Sequence[str] = (),
+    evaluations: int = EVALUATIONS,
+    set: Changes = None,
+    fmus: File | None = None,
+    out: File | None = None,
+    figures: Sequence[str] = (),
+    force: bool = False,
+    control: str = "",
+    watch: Watch = SILENT,
+) -> TuneDriveResult:
+    """Tune the drive of an axis within margins: K_p, T_n, K_v, T_sym, T_dyn, reference model, current filters.
+
+    Margins hold at the pose of the machine file and at further ones, for elastic modes 10 % lower and higher. Moves and
+    circles of the axis are run; the result is judged on others.
+
+    Args:
+        scenario: file whose machine is meant; a circle in it names the second axis of the circles.
+        axis: whose drive is tuned.
+        gain_margin: least gain margin [dB]. phase_margin: least phase margin [deg].
+        encoder_noise: standard deviation of the motor encoder's angle per control cycle [rad]; the torque that it makes
+            stays below 2 % of the torque limit, or below what it is with the present drive.
+        at: further poses at which the margins hold, such as "X=100mm,Z=600mm"; the machine names its structure.
+        evaluations: candidates per start of the search, of which there are two.
+        set: changes of the scenario, as behind ``--set``.
+        fmus: folder of the archives.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        figures, force: as of :meth:`Result.save`.
+        control: names of parameters, in reports and sheets: sinumerik, twincat, heidenhain, linuxcnc.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty file, no such axis, units of other makers, a pose that cannot be had.
+        SimulationError: a unit failed.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> result = fs.tune_drive("z_positioning.yaml", "Z", evaluations=20)
+    >>> [change.parameter for change in result.changes][:1], float(result.figures["Z.gain_margin_after"]) > 8
+    (['drive.K_v'], True)
+    """
+    limits = Limits(
+        _positive("gain_margin", gain_margin, "dB", "8 dB"),
+        _positive("phase_margin", phase_margin, "deg", "40 deg"),
+        _positive("encoder_noise", encoder_noise, "rad", "10 urad", zero=True),
+    )
+    if evaluations < LEAST_EVALUATIONS:
+        raise InputError(f"{spelt('evaluations')} {evaluations}: at least {LEAST_EVALUATIONS} are needed")
+    changes = settings(set)
+    plan = scenarios.load(scenario, changes)
+    try:
+        check_axis(plan, axis)
+    except InputError as error:
+        raise InputError(f"{spelt('axis')} {axis}: {error}") from None
+    archives = None if fmus is None else Path(fmus)
+    axes = list(plan.machine.axes)
+
+    def check(folder: Path, inputs: Sequence[Path]) -> None:
+        page.check_writable(folder, axes, inputs)
+
+    with in_words_of(control), kept(out, check, watch, input_paths(plan), changes, force=force):
+        announce(watch, plan.machine, archives, plan.coupling)
+        poses = _poses(plan.machine, at, watch)
+        tuned = tune(plan, axis, limits, poses, fmus=archives, progress=watch.progress, evaluations=evaluations)
+        result = TuneDriveResult(tuned, control)
+        if out is not None:
+            result.save(out, figures=figures, force=force, control=control)
+    return result
+
+
+def _positive(name: str, value: Value, unit: str, example: str, *, zero: bool = False) -> float:
+    found = _decibels(value, name) if unit == "dB" else quantity(name, value, unit, example)
+    if found < 0 or (found == 0 and not zero):
+        raise InputError(f"{spelt(name)} {value}: more than zero is needed, e.g. {example}")
+    return found
+
+
+def _decibels(value: Value, name: str) -> float:
+    if not isinstance(value, str):
+        return float(value)
+    number = value.strip().removesuffix("dB").strip()
+    try:
+        return float(number)
+    except ValueError:
+        raise InputError(f"{spelt(name)} {value}: a number of dB is needed, e.g. 8 dB") from None
+
+
+def _poses(machine: Machine, texts: Sequence[str], watch: Watch) -> dict[str, Modes]:
+    """Name -> modes of further poses, computed from the structure."""
+    found: dict[str, Modes] = {}
+    if texts and machine.structure is None:
+        raise InputError(
+            f"{machine.name}: has no structure to compute modes from at another pose; give it the key structure, or "
+            f"leave {spelt('at')} out"
+        )
+    for k, text in enumerate(texts):
+        pose = {axis: machine.pose[axis] for axis in machine.axes}
+        for part in text.split(","):
+            axis, equals, position = (each.strip() for each in part.partition("="))
+            if not equals or axis not in pose:
+                raise InputError(
+                    f"{spelt('at')} {text}: AXIS=POSITION is needed, e.g. Z=600mm; axes are {', '.join(pose)}"
+                )
+            pose[axis] = parse(position, "m", "600 mm")
+            low, high = machine.axes[axis].travel
+            if not low <= pose[axis] <= high:
+                raise InputError(
+                    f"{spelt('at')} {text}: {axis} is outside of its travel, {low * 1e3:.6g} to {high * 1e3:.6g} mm"
+                )
+        watch.progress("poses", k, len(texts))
+        assert machine.structure is not None
+        found[text] = build(load_structure(machine.structure), pose).solution.modes
+    if texts:
+        watch.progress("poses", len(texts), len(texts))
+    return found

@@ -1,0 +1,462 @@
+"""The report of a tuned drive: the values to type, the margins, and what moves and circles become."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feedsim.analysis import Figure
+from feedsim.control import Name, names_of
+from feedsim.findings import Note, Wrong
+from feedsim.report import sections
+from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
+from feedsim.report.content import Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.control import asked
+from feedsim.report.formatting import minus, typeset
+from feedsim.report.picture import Picture
+from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
+from feedsim.report.results import REPORT, SUMMARY, check_place
+from feedsim.report.style import BLUE, MUTED, ORANGE, VERMILLION
+from feedsim.scenario import Drive
+from feedsim.tune.changed import Changed
+from feedsim.tune.drive import NOISE, TORQUE, Case, Margins, Point, Tuned
+from feedsim.units import convert
+from feedsim.variables import parameters
+
+KIND = "tune-drive"
+SETTINGS, SHEET = "settings.yaml", "sheet.csv"
+BINDS = 0.06  # of a limit: a margin that is as near to it binds
+RIGID = (
+    "the machine has no elastic modes: the margins are those of rigid axes, and a real one resonates. Measure the "
+    "frequency response of the speed loop, and take its modes in (feedsim identify-modes), before you type a value"
+)
+COMPENSATED = "its friction compensation was set for the present drive: tune that anew (feedsim tune compensation)"
+CHECK = (
+    "The values are as good as the machine file. At the machine: type them, measure the frequency response of the "
+    "speed loop, then run one circle"
+)
+
+
+def check_writable(directory: Path | str, axes: Sequence[str], inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
+    files = (REPORT, SUMMARY, SETTINGS, SHEET, *map(drive_file, axes))
+    check_place(directory, files, inputs, kind=KIND)
+
+
+def figures_of(tuned: Tuned) -> dict[str, Figure]:
+    """Errors, margins and torque before and after."""
+    axis, first = tuned.axis, tuned.judged[0]
+    figures: dict[str, Figure] = {}
+    for name, key, unit, scale, words in (
+        ("peak", "peak", "um", 1e6, f"largest deviation of the radius from its median where {axis} reverses"),
+        ("overshoot", "overshoot", "um", 1e6, f"largest distance of {axis} beyond its target"),
+        ("settling_time", "settling", "ms", 1e3, f"longest time of {axis} to +-1 um after the end of a motion"),
+    ):
+        for when, errors in (("before", first.before), ("after", first.after)):
+            value = scale * float(np.max(getattr(errors, key)))
+            figures[f"{axis}.{name}_{when}"] = Figure(value, unit, f"{words}, {when} tuning; motions held out")
+    for name, words in (("peak", "peak where the axis reverses"), ("overshoot", "overshoot")):
+        nominal = _reductions(first, name)
+        every = np.concatenate([_reductions(case, name) for case in tuned.judged])
+        figures[f"{axis}.{name}_reduction"] = Figure(
+            float(np.median(nominal)), "%", f"median reduction of the {words}, motions held out"
+        )
+        figures[f"{axis}.{name}_reduction_least"] = Figure(
+            float(every.min()), "%", f"least reduction of the {words}, motions held out, modes and friction changed too"
+        )
+    for when, margins in (("before", tuned.before), ("after", tuned.after)):
+        where = "over all loops of the axis, poses and modes"
+        figures[f"{axis}.gain_margin_{when}"] = Figure(margins.gain, "dB", f"least gain margin {where}, {when} tuning")
+        figures[f"{axis}.phase_margin_{when}"] = Figure(
+            margins.phase, "deg", f"least phase margin {where}, {when} tuning"
+        )
+        figures[f"{axis}.noise_torque_{when}"] = Figure(
+            margins.noise * tuned.limits.encoder_noise, "N.m",
+            f"standard deviation of the motor torque by the encoder's noise, {when} tuning",
+        )  # fmt: skip
+    return figures
+
+
+def _reductions(case: Case, name: str) -> Any:
+    before, after = (np.maximum(getattr(errors, name), 1e-9) for errors in (case.before, case.after))
+    return 100 * (1 - after / before)
+
+
+def worse(tuned: Tuned) -> list[str]:
+    """Motions that get worse by more than 5 %, in words."""
+    return [
+        f"{motion} ({case.name}): {1e6 * before:.3g} -> {1e6 * after:.3g} um"
+        for case in tuned.judged
+        for motion, _, before, after in case.worse
+    ]
+
+
+def findings(tuned: Tuned) -> list[str]:
+    """What is to be known before the values are typed."""
+    found: list[str] = []
+    if bad := worse(tuned):
+        found.append(Wrong(f"worse than before on motions that were not used for tuning: {'; '.join(bad)}"))
+    limits, before = tuned.limits, tuned.before
+    if before.gain < limits.gain_margin or before.phase < limits.phase_margin:
+        found.append(
+            f"{tuned.axis}: the drive as it is has {_decibels(before.gain)} and {before.phase:.3g} deg of "
+            f"{limits.gain_margin:g} dB and {limits.phase_margin:g} deg ({before.gain_of}; {before.phase_of})"
+        )
+    if not tuned.elastic:
+        found.append(RIGID)
+    drive = tuned.machine.shipped_drive(tuned.axis, "a report")
+    if tuned.changes and (getattr(drive, "friction_pulse", None) or getattr(drive, "friction_table", None)):
+        found.append(f"{tuned.axis}: {COMPENSATED}")
+    if tuned.changes:
+        found.append(Note(CHECK))
+    return found
+
+
+def answers(tuned: Tuned) -> list[str]:
+    """What the tuned drive does, or why there is none."""
+    axis, after, figures = tuned.axis, tuned.after, figures_of(tuned)
+    margins = f"{_decibels(after.gain)} and {after.phase:.3g} deg"
+    if tuned.kept:
+        return [f"{axis}: the drive stays as it is, {tuned.kept}. Its margins are {margins}."]
+    changed = ", with elastic modes 10 % lower and higher" if tuned.elastic else ""
+    found = [
+        f"{axis}: peaks at reversals fall by {_percent(figures[f'{axis}.peak_reduction'])}, overshoot by "
+        f"{_percent(figures[f'{axis}.overshoot_reduction'])} (medians of motions that were not used for tuning). "
+        f"Margins: {margins}{changed}."
+    ]
+    others = [change.axis for change in tuned.changes if change.axis != axis]
+    if others:
+        found.append(f"{', '.join(dict.fromkeys(others))}: T_dyn is raised, so that the axes stay equally late.")
+    return found
+
+
+def _percent(figure: Figure) -> str:
+    return f"{figure.value:.0f} %"
+
+
+def _decibels(value: float) -> str:
+    return f"{value:.3g} dB" if math.isfinite(value) else ("no limit of the gain" if value > 0 else "no stability")
+
+
+def why(tuned: Tuned) -> list[str]:
+    """Why this point: what it was chosen from, and which limits it touches."""
+    limits, after = tuned.limits, tuned.after
+    allowed = [point for point in tuned.points if point.allowed]
+    found = [
+        f"{tuned.evaluations[0]} candidates were judged in closed form, {tuned.evaluations[1]} ran, "
+        f"{len(allowed)} of those kept to all limits and were worse nowhere."
+    ]
+    if tuned.kept:
+        return found
+    touched = []
+    if after.gain < (1 + BINDS) * limits.gain_margin:
+        touched.append(f"the gain margin ({after.gain_of})")
+    if after.phase < (1 + BINDS) * limits.phase_margin:
+        touched.append(f"the phase margin ({after.phase_of})")
+    drive = tuned.scenario.machine.shipped_drive(tuned.axis, "a report")
+    if after.noise * limits.encoder_noise > (1 - BINDS) * NOISE * drive.M_max:
+        touched.append("the torque of encoder noise")
+    found.append(
+        f"Limits that it touches: {' and '.join(touched)}."
+        if touched
+        else "It touches no limit: further gain does not make the errors smaller on every motion."
+    )
+    if further := _beyond(tuned):
+        found.append(further)
+    found.append(
+        f"Least gain margin: {_decibels(after.gain)}, {after.gain_of}. Least phase margin: {after.phase:.3g}°, "
+        f"{after.phase_of}."
+    )
+    return found
+
+
+def _beyond(tuned: Tuned) -> str:
+    """What less margin would give."""
+    past = [
+        point for point in tuned.points
+        if point.margins.gain < tuned.limits.gain_margin or point.margins.phase < tuned.limits.phase_margin
+    ]  # fmt: skip
+    within = [point.ratio for point in tuned.points if point.allowed]
+    if not past or not within:
+        return ""
+    best = min(past, key=lambda point: point.ratio)
+    if best.ratio > 0.97 * min(within):
+        return "Candidates with less margin are no better."
+    return (
+        f"With less margin, {_decibels(best.margins.gain)} and {best.margins.phase:.3g}°, the errors would be "
+        f"{100 * (1 - best.ratio / min(within)):.0f} % smaller still."
+    )
+
+
+def names_for(tuned: Tuned, control: str) -> Mapping[str, Name]:
+    """Our parameter -> its name in the control that is asked for, or that the machine has; empty without one."""
+    known = control or asked(tuned.scenario.machine)
+    return names_of(known) if known else {}
+
+
+def settings(tuned: Tuned) -> str:
+    """The `set` group of a scenario with the values."""
+    head = "# Values of feedsim tune drive, for the group `set` of a scenario.\n"
+    lines = [f"  {change.key}: {change.text}" for change in tuned.changes]
+    return head + ("set:\n" + "\n".join(lines) + "\n" if lines else "set: {}\n")
+
+
+def drives(tuned: Tuned) -> dict[str, str]:
+    """Name -> text of a drive file for every axis that has changed: what a machine file or --set takes."""
+    head = f"# Drive of axis {{}} of {tuned.scenario.machine.name}, written by feedsim tune drive.\n"
+    return {
+        drive_file(axis): head.format(axis) + _drive_text(tuned.machine.shipped_drive(axis, "a file"))
+        for axis in dict.fromkeys(change.axis for change in tuned.changes)
+    }
+
+
+def drive_file(axis: str) -> str:
+    """Name of the file with the drive of an axis."""
+    return f"drive_{axis}.yaml"
+
+
+def _drive_text(drive: Drive) -> str:
+    """All values of a drive, with the digits that give them back exactly."""
+    table = parameters("controller")
+    groups: dict[str, list[str]] = {}
+    for name, value in drive.parameters().items():
+        group, _, key = name.rpartition(".")
+        if name.endswith(".type"):
+            groups.setdefault(group, []).append(f"{key}: {getattr(drive, group).type}")
+        elif isinstance(value, bool | str) or name not in table:
+            groups.setdefault(group, []).append(f"{key}: {str(value).lower()}")
+        else:
+            groups.setdefault(group, []).append(f"{key}: {value!r} {table[name].unit}".removesuffix(" 1").rstrip())
+    own = groups.pop("", [])
+    return "\n".join([*own, *(f"{group}: {{{', '.join(entries)}}}" for group, entries in groups.items())]) + "\n"
+
+
+def sheet(tuned: Tuned, control: str = "") -> str:
+    """Values to type: old and new, in the control's unit where its name is known."""
+    lines = ["axis,number,name,old,new,unit,unit confirmed,parameter"]
+    lines += [",".join(row) for row in rows(tuned, control)]
+    return "\n".join(lines) + "\n"
+
+
+def rows(tuned: Tuned, control: str = "") -> Iterator[tuple[str, ...]]:
+    """Axis, number, name, old, new, unit, whether the unit is confirmed, and our parameter."""
+    names = names_for(tuned, control)
+    for change in tuned.changes:
+        name = names.get(change.parameter)
+        if name is not None:
+            shown = (_in_control(name, change.old), _in_control(name, change.new))
+            cells = (name.number, name.name, *shown, name.unit, "yes" if name.confirmed else "no")
+        else:
+            cells = ("", "", *_shown(change), "")
+        yield (change.axis, *cells, change.parameter.removeprefix("drive."))
+
+
+def _in_control(name: Name, value: Any) -> str:
+    return value if isinstance(value, str) else "" if value is None else f"{name.shown(float(value)):.6g}"
+
+
+def _shown(change: Changed) -> tuple[str, str, str]:
+    """Old and new value in the unit that is shown, and the unit."""
+    row = parameters("controller").get(change.parameter.removeprefix("drive."))
+    unit = row.display_unit if row is not None and change.unit else ""
+
+    def text(value: Any) -> str:
+        if value is None:
+            return "none"
+        if isinstance(value, str | bool) or not unit:
+            return str(value)
+        return f"{convert(float(value), change.unit, unit):.6g}"
+
+    return text(change.old), text(change.new), unit
+
+
+def lines_of(tuned: Tuned, control: str = "") -> list[str]:
+    """A line for every value to type."""
+    found = []
+    for axis, number, name, old, new, unit, confirmed, parameter in rows(tuned, control):
+        what = f"{number} {name} ({parameter})" if number else parameter
+        doubt = " (unit not confirmed)" if confirmed == "no" else ""
+        found.append(f"  {axis}: {what} {old} -> {new}{'' if unit in ('', '1') else f' {unit}'}{doubt}")
+    return found
+
+
+def report_of(tuned: Tuned, control: str = "") -> Report:
+    """Content of the report."""
+    figures, machine, axis = figures_of(tuned), tuned.scenario.machine, tuned.axis
+    tiles = [
+        Tile(tile_value(figures[f"{axis}.{name}"]), label, typeset(figures[f"{axis}.{name}"].meaning))
+        for name, label in (
+            ("peak_reduction", "less peak at reversals"), ("overshoot_reduction", "less overshoot"),
+            ("gain_margin_after", "gain margin"), ("phase_margin_after", "phase margin"),
+        )
+        if math.isfinite(figures[f"{axis}.{name}"].value)
+    ]  # fmt: skip
+    notes = [note for note in (machine.note, tuned.scenario.note) if note]
+    limits = tuned.limits
+    facts = [
+        ("Scenario", f"{tuned.scenario.name} ({tuned.scenario.file.name})"),
+        ("Machine", machine.name),
+        ("Poses", ", ".join(tuned.poses)),
+        ("Limits", f"gain margin {limits.gain_margin:g} dB, phase margin {limits.phase_margin:g}°, torque "
+         f"{100 * TORQUE:g} % of its limit, torque of encoder noise {100 * NOISE:g} % of that limit"),
+        ("Encoder noise", f"{1e6 * limits.encoder_noise:g} µrad, standard deviation per control cycle"),
+        ("Judged in closed form, run", f"{tuned.evaluations[0]}, {tuned.evaluations[1]}"),
+    ]  # fmt: skip
+    return Report(
+        f"Drive of {axis}, tuned within margins" if not tuned.kept else f"Drive of {axis}, kept as it is",
+        machine.name,
+        answer=answers(tuned),
+        warnings=findings(tuned),
+        notes=notes,
+        tiles=tiles,
+        main=[
+            picture(tuned),
+            *values(tuned, control),
+            Section("Why this point", [Bullets(list(why(tuned)))]),
+            _margins(tuned),
+            *(_errors(case) for case in tuned.judged),
+            sections.figures_section(figures),
+        ],
+        provenance=sections.provenance_section(facts, input_files(tuned.scenario)),
+        footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
+        next_step=("Run with the new values:\n", code(command(tuned, "THIS_FOLDER"))) if tuned.changes else "",
+    )
+
+
+def command(tuned: Tuned, folder: str) -> str:
+    """The command line that runs the scenario with the new values."""
+    changed = dict.fromkeys(change.axis for change in tuned.changes)
+    sets = "".join(f" --set machine.axes.{axis}.drive={folder}/{drive_file(axis)}" for axis in changed)
+    return f"feedsim run {tuned.scenario.file.name}{sets}"
+
+
+def values(tuned: Tuned, control: str = "") -> Iterator[Part]:
+    """The values to type, which are not folded: they are what the report is for."""
+    lines: list[tuple[Text, ...]] = []
+    for axis, number, name, old, new, unit, confirmed, parameter in rows(tuned, control):
+        lines.append((axis, code(parameter), minus(old), minus(new), unit, number, name, confirmed))
+    if not lines:
+        return
+    named = bool(names_for(tuned, control))
+    heads = ("Axis", "Parameter", "Old", "New", "Unit", "Number", "Name in the control", "Unit confirmed")
+    count = 8 if named else 5
+    yield Paragraph("Values to type:")
+    yield Table("llrrllll"[:count], heads[:count], [line[:count] for line in lines])
+
+
+def _margins(tuned: Tuned) -> Section:
+    lines: list[tuple[Text, ...]] = []
+    for name, own in (("before", tuned.before), ("after", tuned.after)):
+        torque = f"{own.noise * tuned.limits.encoder_noise:.3g}"
+        lines.append((name, minus(_decibels(own.gain)), own.gain_of, minus(f"{own.phase:.3g}°"), own.phase_of, torque))
+    heads = ("", "Gain margin", "of", "Phase margin", "of", "Torque of noise [N·m]")
+    return Section("Margins", [Table("lrtrtr", heads, lines)])
+
+
+def _errors(case: Case) -> Section:
+    lines: list[tuple[Text, ...]] = []
+    for k, stop in enumerate(case.program.stops):
+        cells = []
+        for key, scale in (("overshoot", 1e6), ("miss", 1e6), ("settling", 1e3)):
+            for errors in (case.before, case.after):
+                cells.append(f"{scale * float(getattr(errors, key)[k]):.2f}")
+        lines.append((stop.text, *cells))
+    stops = Table(
+        "lrrrrrr",
+        ("Move", "Overshoot before [µm]", "after", "Largest error before [µm]", "after", "Settling before [ms]",
+         "after"),
+        lines,
+        "Largest error: distance from the target once the delayed setpoint has arrived.",
+    )  # fmt: skip
+    circles: list[tuple[Text, ...]] = [
+        (each.text, f"{1e6 * float(case.before.peak[k]):.2f}", f"{1e6 * float(case.after.peak[k]):.2f}")
+        for k, each in enumerate(case.program.circles)
+    ]
+    what = "Circle" if case.program.partner else "Sine of the radius and feed of a circle"
+    reversals = Table("lrr", (what, "Peak before [µm]", "after"), circles)
+    return Section(minus(f"Motions held out, {case.name}"), [stops, reversals])
+
+
+def picture(tuned: Tuned) -> Picture:
+    """Peaks of the candidates over their margin: how much each dB costs."""
+    panels = []
+    for title, label, unit, of, limit in (
+        ("Gain margin", "least gain margin", "dB", _gain, tuned.limits.gain_margin),
+        ("Phase margin", "least phase margin", "°", _phase, tuned.limits.phase_margin),
+    ):
+        points = [point for point in tuned.points if math.isfinite(of(point.margins))]
+        curves = [
+            Curve(name, *_xy(chosen, of), colour, dots=True, faint=faint)
+            for name, chosen, colour, faint in (
+                ("within all limits", [p for p in points if p.allowed], BLUE, False),
+                ("outside of a limit, or worse somewhere", [p for p in points if not p.allowed], ORANGE, True),
+            )
+            if chosen
+        ]
+        marks = []
+        for name, margins, peak, colour in (
+            ("before", tuned.before, _largest(tuned, "before"), VERMILLION),
+            ("chosen", tuned.after, _largest(tuned, "after"), BLUE),
+        ):
+            if math.isfinite(of(margins)) and not (tuned.kept and name == "chosen"):
+                marks.append(Mark(of(margins), peak, name, colour, hollow=True))
+        panels.append(
+            Panel(title, Axis(label, unit), Axis("largest peak at a reversal", "µm"), curves,
+                  levels=[Level(limit, "limit", upright=True, colour=MUTED)], marks=marks)
+        )  # fmt: skip
+    return Picture(
+        "tune-drive-margins", "Peaks at reversals against margin",
+        "Every point is a candidate that ran; margins are the least over loops, poses and modes.",
+        Chart(panels, (1.0, 1.0)),
+    )  # fmt: skip
+
+
+def _gain(margins: Margins) -> float:
+    return margins.gain
+
+
+def _phase(margins: Margins) -> float:
+    return margins.phase
+
+
+def _xy(points: Sequence[Point], of: Any) -> tuple[Any, Any]:
+    order = sorted(points, key=lambda point: of(point.margins))
+    return np.array([of(p.margins) for p in order]), np.array([1e6 * p.peak for p in order])
+
+
+def _largest(tuned: Tuned, when: str) -> float:
+    return 1e6 * float(np.max(getattr(tuned.searched, when).peak))
+
+
+def summary(tuned: Tuned, names: Sequence[str]) -> Mapping[str, Any]:
+    """Content of summary.json."""
+    limits = tuned.limits
+    return {
+        "answer": answers(tuned),
+        "axis": tuned.axis,
+        "changes": [
+            {"axis": each.axis, "parameter": each.parameter, "old": each.old, "new": each.new, "unit": each.unit}
+            for each in tuned.changes
+        ],
+        "kept": tuned.kept,
+        "limits": {
+            "gain_margin": limits.gain_margin, "phase_margin": limits.phase_margin,
+            "encoder_noise": limits.encoder_noise,
+        },
+        "why": why(tuned),
+        "evaluations": {"closed_form": tuned.evaluations[0], "runs": tuned.evaluations[1]},
+        "figures": figures_part(figures_of(tuned)),
+        "motions": [
+            {"case": case.name, "motion": motion, "figure": figure, "before": before, "after": after}
+            for case in tuned.judged
+            for motion, figure, before, after in case.rows
+        ],
+        "machine": machine_part(tuned.scenario.machine),
+        "inputs": inputs_part(input_files(tuned.scenario)),
+        "software": software(),
+        "files": list(names),
+    }  # fmt: skip

@@ -1,0 +1,201 @@
+"""What of a drive is tuned: parameters that are free, and those that follow from them.
+
+Free: K_p, T_n, K_v, omega_0, fit = K_p/(J omega_0/(2 D)), which is 1 where the reference model is what the speed loop
+does with its P part alone; T_sym against the lag of the speed loop; frequency and dampings of the current setpoint
+filters. A drive without a part lacks its parameters; switches stay as they are. Of a drive without filters one band
+stop is free, which may turn out to be off.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from feedsim.analysis.figures import Array
+from feedsim.scenario import Cycles, Drive, Filter, Machine
+from feedsim.tune.closed_forms import axis_lag, loop_lag, model_gain
+from feedsim.tune.proposals import NEUTRAL, NEUTRAL_SHARE
+from feedsim.units import convert
+from feedsim.variables import parameters
+
+DIGITS = 4  # of values that a person types
+FILTERS = ("filter_1", "filter_2", "filter_3", "filter_4")
+# Ranges as multiples of the present value.
+RANGES = {"K_p": (0.25, 6.0), "T_n": (0.1, 2.5), "K_v": (0.33, 3.0), "omega_0": (0.4, 5.0)}
+FIT = (0.5, 1.6)
+SYMMETRY = 0.25  # of the larger of neutral and present T_sym, either side
+NOTCH = {"f": (0.6, 1.7), "D_num": (0.3, 4.0), "D_den": (0.3, 2.0)}
+LEAST_DAMPING, MOST_DAMPING = 0.02, 1.5
+NEW_NOTCH = (0.05, 0.8)  # its frequency, in shares of half the sampling rate
+SHALLOW = 0.9  # D_num/D_den above which a new band stop is left off
+
+
+@dataclass(frozen=True)
+class Knob:
+    """A free parameter with its range; on a logarithmic scale or on a straight one."""
+
+    name: str
+    low: float
+    high: float
+    log: bool = True
+
+    def value(self, x: float) -> float:
+        """Of a place x from 0 to 1."""
+        if self.log:
+            return float(self.low * (self.high / self.low) ** x)
+        return self.low + (self.high - self.low) * x
+
+    def place(self, value: float) -> float:
+        """Of a value, 0 to 1."""
+        share = (
+            math.log(value / self.low) / math.log(self.high / self.low)
+            if self.log
+            else (value - self.low) / (self.high - self.low)
+        )
+        return min(max(share, 0.0), 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Knobs:
+    """The free parameters of a drive. J: inertia that a slow torque accelerates [kg.m2]."""
+
+    drive: Drive
+    cycles: Cycles
+    J: float
+
+    @cached_property
+    def all(self) -> tuple[Knob, ...]:
+        """In the order of places."""
+        d = self.drive
+        names = ["K_p", *(["T_n"] if d.speed_integrator else []), "K_v"]
+        fit = self._fit(d)
+        found = [self._ranged(name) for name in names if getattr(d, name)]
+        if fit is not None:
+            found += [self._ranged("omega_0"), Knob("fit", min(FIT[0], 0.9 * fit), max(FIT[1], 1.1 * fit))]
+        if d.k_ffw > 0 and math.isfinite(self._neutral(d)):
+            off, width = self._off(d), SYMMETRY * max(self._neutral(d), d.T_sym)
+            if width > 0:
+                found.append(Knob("off", min(-width, 1.1 * off), max(width, 1.1 * off), log=False))
+        highest = 0.5 / self.cycles.T_c
+        for name in self._filters:
+            each = getattr(d, name)
+            for part, (low, high) in NOTCH.items():
+                value = getattr(each, part)
+                if value is None or (part == "D_num" and each.type == "low_pass") or value <= 0:
+                    continue
+                top = 0.95 * highest if part == "f" else MOST_DAMPING
+                bottom = 0.0 if part == "f" else LEAST_DAMPING
+                found.append(
+                    Knob(f"{name}.{part}", min(max(low * value, bottom), value), max(min(high * value, top), value))
+                )
+        if not self._filters:
+            found += [
+                Knob("new.f", NEW_NOTCH[0] * highest, NEW_NOTCH[1] * highest),
+                Knob("new.depth", 0.05, 1.0),
+                Knob("new.D_den", 0.2, 1.0),
+            ]
+        return tuple(found)
+
+    @property
+    def present(self) -> Array:
+        """Places (n,) of the drive as it is."""
+        values = self._values(self.drive)
+        return np.array([knob.place(values[knob.name]) for knob in self.all])
+
+    def drive_at(self, x: Array) -> Drive:
+        """The drive at places (n,), its values rounded as a person types them."""
+        d = self.drive
+        at = {knob.name: knob.value(float(place)) for knob, place in zip(self.all, x, strict=True)}
+        new: dict[str, object] = {
+            name: typed(name, at[name]) for name in ("K_p", "T_n", "K_v", "omega_0") if name in at
+        }
+        if "fit" in at:
+            K_p, omega_0 = (float(new.get(name, getattr(d, name))) for name in ("K_p", "omega_0"))  # type: ignore[arg-type]
+            new["D"] = typed("D", self.J * omega_0 / (2 * K_p) * at["fit"])
+        for name in self._filters:
+            own = {part: typed(f"filter_1.{part}", at[f"{name}.{part}"]) for part in NOTCH if f"{name}.{part}" in at}
+            new[name] = getattr(d, name).model_copy(update=own)
+        if "new.f" in at and at["new.depth"] < SHALLOW:
+            shape = {"f": at["new.f"], "D_num": at["new.depth"] * at["new.D_den"], "D_den": at["new.D_den"]}
+            rounded = {part: typed(f"filter_1.{part}", value) for part, value in shape.items()}
+            new["filter_1"] = Filter(type="band_stop", f=rounded["f"], D_num=rounded["D_num"], D_den=rounded["D_den"])
+        changed = d.model_copy(update=new)
+        if "off" in at:
+            T_sym = max(0.0, self._neutral(changed) + at["off"])
+            changed = changed.model_copy(update={"T_sym": typed("T_sym", T_sym)})
+        return changed
+
+    @property
+    def _filters(self) -> tuple[str, ...]:
+        return tuple(name for name in FILTERS if getattr(self.drive, name).type != "off")
+
+    def _ranged(self, name: str) -> Knob:
+        low, high = RANGES[name]
+        value = float(getattr(self.drive, name))
+        return Knob(name, low * value, high * value)
+
+    def _values(self, d: Drive) -> dict[str, float]:
+        found = {name: float(getattr(d, name)) for name in RANGES if getattr(d, name)}
+        fit = self._fit(d)
+        if fit is not None:
+            found["fit"] = fit
+        found["off"] = self._off(d)
+        for name in self._filters:
+            found |= {f"{name}.{part}": float(getattr(getattr(d, name), part) or 0.0) for part in NOTCH}
+        if not self._filters:
+            found |= {"new.f": 0.5 / self.cycles.T_c * math.sqrt(NEW_NOTCH[0] * NEW_NOTCH[1]), "new.depth": 1.0}
+            found["new.D_den"] = 0.5
+        return found
+
+    def _fit(self, d: Drive) -> float | None:
+        gain = model_gain(d, self.J)
+        return None if gain is None or d.K_p <= 0 else d.K_p / gain
+
+    def _neutral(self, d: Drive) -> float:
+        return loop_lag(d, self.cycles, self.J)
+
+    def _off(self, d: Drive) -> float:
+        return d.T_sym - self._neutral(d)
+
+
+def typed(name: str, value: float) -> float:
+    """A value [SI] of a drive's parameter, rounded to DIGITS in the unit in which it is shown."""
+    row = parameters("controller")[name]
+    shown = float(f"{convert(value, row.unit, row.display_unit):.{DIGITS}g}")
+    return float(f"{convert(shown, row.display_unit, row.unit):.12g}")
+
+
+def matched(machine: Machine, axis: str, before: Machine) -> Machine:
+    """The machine with T_dyn such that `axis` is as late as the slowest other axis.
+
+    before: the machine as it was. Where the axis has become the slowest itself, those axes wait for it that were as
+    late as it was. Foreign drives and axes without position control are left out.
+    """
+    lags = {name: axis_lag(machine.shipped_drive(name, "matching")) for name in machine.axes}
+    others = {name: lag for name, lag in lags.items() if name != axis and math.isfinite(lag)}
+    if not others or not math.isfinite(lags[axis]):
+        return machine
+    own = machine.shipped_drive(axis, "matching")
+    bare = lags[axis] - own.T_dyn
+    was = axis_lag(before.shipped_drive(axis, "matching"))
+    target = max(bare, *others.values())
+    changes = {axis: target - bare}
+    for name, lag in others.items():
+        if abs(lag - was) <= max(NEUTRAL, NEUTRAL_SHARE * was) and target - lag > NEUTRAL:
+            changes[name] = machine.shipped_drive(name, "matching").T_dyn + target - lag
+    return with_drives(machine, {name: {"T_dyn": typed("T_dyn", T_dyn)} for name, T_dyn in changes.items()})
+
+
+def with_drives(machine: Machine, values: Mapping[str, Mapping[str, object]]) -> Machine:
+    """A machine with other values of its drives: axis -> parameter -> SI."""
+    axes = {
+        name: machine.axes[name].model_copy(
+            update={"drive": machine.shipped_drive(name, "tuning").model_copy(update=dict(own))}
+        )
+        for name, own in values.items()
+    }
+    return machine.model_copy(update={"axes": {**machine.axes, **axes}})

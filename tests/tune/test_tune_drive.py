@@ -1,0 +1,346 @@
+"""Tuning of drives: margins and noise against the state space, knobs, matching, the search, the command."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.linalg import solve_discrete_lyapunov
+
+from command_helpers import feedsim
+from feedsim.linear.candidates import Candidates
+from feedsim.linear.judgement import judge
+from feedsim.scenario import Machine, load, load_machine
+from feedsim.structure import Modes, checked_modes
+from feedsim.tune.changed import changed_values
+from feedsim.tune.circles import Pair
+from feedsim.tune.closed_forms import axis_lag, loop_lag
+from feedsim.tune.drive import Limits, tune_drive
+from feedsim.tune.drive_program import DriveProgram, Stop, circles_of, partner_of, stops_of
+from feedsim.tune.knobs import Knobs, matched, with_drives
+from feedsim.tune.search import least
+
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+Z = SCENARIOS / "z_positioning.yaml"
+ONE = SCENARIOS / "one_axis.yaml"
+EMPS = SCENARIOS / "machines" / "emps"
+
+
+# --- margins: own state space, own Nyquist ---------------------------------------------------------------------------
+
+
+def rigid_machine(K_p: float, T_n: float, K_v: float) -> tuple[Machine, Modes]:
+    """One rigid axis with an ideal current loop, no friction at rest worth the name, T_pos = 4 T_c."""
+    machine = load_machine(
+        ONE.parent / "machines" / "one_axis",
+        [
+            "axes.X.drive.ideal_current_loop=true", "axes.X.drive.filter_1={type: off}",
+            "axes.X.drive.reference_model=false", "axes.X.drive.ramp_speed_setpoint=false",
+            f"axes.X.drive.K_p={K_p} N.m.s/rad", f"axes.X.drive.T_n={T_n} s", f"axes.X.drive.K_v={K_v} 1/s",
+            "cycles.position=500 us",
+        ],
+    )  # fmt: skip
+    modes = checked_modes(machine)
+    rigid = modes.rigid
+    return machine, Modes(
+        modes.file, modes.frequency[rigid], modes.damping[rigid],
+        {name: shape[rigid] for name, shape in modes.ports.items()},
+    )  # fmt: skip
+
+
+def speed_loop(J: float, K_p: float, T_n: float, T_c: float, z: np.ndarray) -> np.ndarray:
+    """Torque held over T_c on an inertia; PI with the error of the present instant in: K_p (1 + T_c/T_n z/(z - 1))."""
+    return K_p * (1 + T_c / T_n * z / (z - 1)) * T_c / J / (z - 1)
+
+
+def margins_of(L: np.ndarray) -> tuple[float, float]:
+    """Least factor up or down to -1 [dB], and least distance of the phase to -180 degrees where |L| is 1."""
+    real = np.flatnonzero((np.signbit(L.imag[1:]) != np.signbit(L.imag[:-1])) & (L.real[1:] < 0))
+    real = [*real, len(L) - 1] if L.real[-1] < 0 else [*real]  # at half the sampling rate L is real
+    gain = min(abs(20 * math.log10(abs(L[k]))) for k in real)
+    unit = np.flatnonzero((np.abs(L[1:]) < 1) != (np.abs(L[:-1]) < 1))
+    return gain, min(abs(180 - abs(np.degrees(np.angle(L[k])))) for k in unit)
+
+
+@pytest.mark.parametrize(("K_p", "T_n", "K_v"), [(0.25, 0.02, 60.0), (1.2, 0.004, 120.0)])
+def test_margins_of_a_rigid_axis_by_hand(K_p: float, T_n: float, K_v: float) -> None:
+    """The speed loop as a rational function of z; the position loop as a state space over T_pos, lifted by hand."""
+    machine, modes = rigid_machine(K_p, T_n, K_v)
+    axis, T_c, T_pos = machine.axes["X"], machine.cycles.T_c, machine.cycles.T_pos
+    J = modes.J_tot("X")
+    found = Candidates(machine, modes, "X").judge(axis.drive)
+    moving = {loop.kind: loop for loop in found.loops if loop.state == "moving"}
+
+    f = np.geomspace(0.5, 0.5 / T_c, 400_000)
+    gain, phase = margins_of(speed_loop(J, K_p, T_n, T_c, np.exp(2j * np.pi * f * T_c)))
+    assert 20 * math.log10(moving["speed"].gain_margin) == pytest.approx(gain, abs=0.15)  # polygon of the contour
+    assert moving["speed"].phase_margin == pytest.approx(phase, abs=0.5)
+
+    # states n, x, sum of errors; over a control cycle with the speed setpoint held
+    def cycle(state: np.ndarray, n_s: float) -> np.ndarray:
+        n, x, total = state
+        total = total + (n_s - n)
+        M = K_p * (n_s - n) + K_p * T_c / T_n * total
+        return np.array([n + M * T_c / J, x + axis.I_P * (n * T_c + M * T_c**2 / (2 * J)), total])
+
+    def over(state: np.ndarray, n_s: float) -> np.ndarray:
+        for _ in range(round(T_pos / T_c)):
+            state = cycle(state, n_s)
+        return state
+
+    A = np.column_stack([over(unit, 0.0) for unit in np.eye(3)])
+    B = over(np.zeros(3), 1.0)
+    f = np.geomspace(0.5, 0.5 / T_pos, 60_000)
+    z = np.exp(2j * np.pi * f * T_pos)
+    x = np.linalg.solve(z[:, None, None] * np.eye(3) - A, np.broadcast_to(B[:, None], (len(z), 3, 1)))[:, 1, 0]
+    gain, phase = margins_of(K_v / axis.I_P * x)
+    assert 20 * math.log10(moving["position"].gain_margin) == pytest.approx(gain, abs=0.15)
+    assert moving["position"].phase_margin == pytest.approx(phase, abs=0.5)
+
+
+def test_torque_of_encoder_noise_by_lyapunov() -> None:
+    """White noise of the angle through the closed speed loop: the covariance of its states."""
+    K_p, T_n = 0.4, 0.01
+    machine, modes = rigid_machine(K_p, T_n, 60.0)
+    J, T_c = modes.J_tot("X"), machine.cycles.T_c
+    # states: speed, sum of errors, last noise; measured speed n + (w_k - w_(k-1))/T_c
+    K_i = K_p * T_c / T_n
+    C = np.array([-K_p - K_i, K_i, (K_p + K_i) / T_c])  # torque of the states
+    D = -(K_p + K_i) / T_c  # and of the present noise
+    A = np.vstack([np.array([1.0, 0, 0]) + C * T_c / J, [-1.0, 1.0, 1 / T_c], [0.0, 0.0, 0.0]])
+    B = np.array([[D * T_c / J], [-1 / T_c], [1.0]])
+    P = solve_discrete_lyapunov(A, B @ B.T)
+    expected = math.sqrt(float(C @ P @ C) + D**2)
+    assert Candidates(machine, modes, "X").judge(machine.axes["X"].drive).noise == pytest.approx(expected, rel=5e-3)
+
+
+def test_candidates_are_judged_as_machines_are() -> None:
+    """What is kept of the structure changes nothing: another drive, judged alone and as a part of its machine."""
+    machine = load(Z).machine
+    modes = checked_modes(machine)
+    candidates = Candidates(machine, modes, "Z")
+    for values in ({}, {"K_p": 11.0, "T_n": 0.006, "omega_0": 1500.0}, {"K_p": 5.0, "K_v": 120.0}, {"K_p": 60.0}):
+        other = with_drives(machine, {"Z": values})
+        found = candidates.judge(other.axes["Z"].drive)
+        expected = [loop for loop in judge(other, modes) if loop.axis == "Z"]
+        assert len(found.loops) == len(expected) == 4
+        for one, two in zip(found.loops, expected, strict=True):
+            assert (one.kind, one.state, one.growing, one.unstable) == (two.kind, two.state, two.growing, two.unstable)
+            # both are polygons along the contour, on different frequencies
+            assert one.gain_margin == pytest.approx(two.gain_margin, rel=5e-3)
+            assert one.phase_margin == pytest.approx(two.phase_margin, abs=0.3)
+
+
+# --- knobs and matching ----------------------------------------------------------------------------------------------
+
+
+def test_the_present_drive_is_a_place() -> None:
+    machine = load(Z).machine
+    drive = machine.axes["Z"].drive
+    knobs = Knobs(drive, machine.cycles, checked_modes(machine).J_tot("Z"))
+    assert [knob.name for knob in knobs.all][:6] == ["K_p", "T_n", "K_v", "omega_0", "fit", "off"]
+    again = knobs.drive_at(knobs.present)
+    for name in ("K_p", "T_n", "K_v", "omega_0", "D", "T_sym"):
+        assert getattr(again, name) == pytest.approx(getattr(drive, name), rel=2e-3), name
+    assert again.filter_1.f == pytest.approx(drive.filter_1.f, rel=1e-3)
+    assert (again.M_max, again.current, again.k_ffw) == (drive.M_max, drive.current, drive.k_ffw)
+
+
+def test_dependent_parameters_follow() -> None:
+    machine = load(Z).machine
+    J = checked_modes(machine).J_tot("Z")
+    knobs = Knobs(machine.axes["Z"].drive, machine.cycles, J)
+    names = [knob.name for knob in knobs.all]
+    x = knobs.present
+    x[names.index("K_p")] = 0.7
+    x[names.index("fit")] = knobs.all[names.index("fit")].place(1.0)
+    x[names.index("off")] = knobs.all[names.index("off")].place(0.0)
+    drive = knobs.drive_at(x)
+    assert pytest.approx(J * drive.omega_0 / (2 * drive.K_p), rel=1e-3) == drive.D
+    assert drive.T_sym == pytest.approx(loop_lag(drive, machine.cycles, J), rel=1e-3)
+    shown = [float(f"{value:.4g}") for value in (drive.K_p, 1e3 * drive.T_n, drive.omega_0, drive.D)]
+    assert [drive.K_p, 1e3 * drive.T_n, drive.omega_0, drive.D] == pytest.approx(shown, rel=1e-12)
+
+
+def test_a_drive_without_parts_lacks_their_knobs() -> None:
+    machine = load_machine(EMPS)
+    knobs = Knobs(machine.axes["X"].drive, machine.cycles, checked_modes(machine).J_tot("X"))
+    assert [knob.name for knob in knobs.all] == ["K_p", "K_v", "new.f", "new.depth", "new.D_den"]
+    assert knobs.drive_at(knobs.present).filter_1.type == "off"
+
+
+def test_axes_stay_equally_late() -> None:
+    machine = load(Z).machine
+
+    def lags(own: Machine) -> list[float]:
+        return [axis_lag(each.drive) for each in own.axes.values()]
+
+    sooner = matched(with_drives(machine, {"Z": {"T_sym": 2e-3}}), "Z", machine)
+    assert lags(sooner) == pytest.approx([4.854e-3] * 3, abs=1e-9)
+    assert sooner.axes["X"] is machine.axes["X"]
+    later = matched(with_drives(machine, {"Z": {"T_sym": 6e-3}}), "Z", machine)
+    assert lags(later) == pytest.approx([6e-3] * 3, abs=1e-6)
+    apart = with_drives(machine, {"X": {"T_dyn": 1e-3}})
+    waits = matched(with_drives(apart, {"Z": {"T_sym": 7e-3}}), "Z", apart)
+    assert waits.axes["X"] is apart.axes["X"]  # was not matched before either
+
+
+def test_changed_values_are_listed() -> None:
+    machine = load(Z).machine
+    other = with_drives(machine, {"Z": {"K_v": 100.0}, "X": {"T_dyn": 1e-3}})
+    found = changed_values(machine, other)
+    assert [(each.machine, each.axis, each.parameter, each.old, each.new, each.unit) for each in found] == [
+        ("Test centre", "X", "drive.T_dyn", 0.0, 1e-3, "s"),
+        ("Test centre", "Z", "drive.K_v", pytest.approx(66.6667, rel=1e-5), 100.0, "1/s"),
+    ]
+    assert found[1].setting == "machine.axes.Z.drive.K_v=100.0 1/s"
+    again = load(Z, [each.setting for each in found]).machine
+    assert not changed_values(other, again)
+
+
+# --- the search ------------------------------------------------------------------------------------------------------
+
+
+def test_the_search_finds_a_constrained_least() -> None:
+    """A quadratic with a long valley, the half space beyond a plane forbidden: the projection by Lagrange."""
+    H, c = np.diag([1.0, 30.0, 300.0, 5.0]), np.array([0.3, 0.6, 0.7, 0.2])
+    a, b = np.full(4, 0.5), 1.1
+
+    def rank(x: np.ndarray) -> tuple[float, float]:
+        return max(0.0, b - float(a @ x)), float((x - c) @ H @ (x - c))
+
+    inverse = np.linalg.inv(H)
+    expected = c + inverse @ a * (b - a @ c) / (a @ inverse @ a)
+    expected = np.clip(expected, 0, 1)
+    _, (violation, value) = least(rank, np.full(4, 0.7), step=0.2, evaluations=900, seed=1)
+    assert violation == 0
+    free = (expected - c) @ H @ (expected - c)
+    assert value == pytest.approx(free, rel=0.1, abs=0.02)
+
+
+def test_the_search_is_the_same_every_time() -> None:
+    def rank(x: np.ndarray) -> tuple[float, float]:
+        return 0.0, float(((x - 0.4) ** 2).sum())
+
+    one, two = (least(rank, np.full(3, 0.9), step=0.2, evaluations=100, seed=3) for _ in range(2))
+    assert np.array_equal(one[0], two[0])
+
+
+# --- motions ---------------------------------------------------------------------------------------------------------
+
+
+def test_errors_are_those_of_the_shipped_scenarios(fmus: Path) -> None:
+    """The stop and the circle whose figures the documentation has: 3.13 um overshoot, 7.90 um glitch."""
+    scenario = load(Z)
+    assert partner_of(scenario, "Z") == "X"
+    program = DriveProgram.of(scenario, "Z", "X", [Stop(0.1, 5 / 60)], [Pair(0.015, 0.05)])
+    errors = program.errors(scenario.machine, fmus=fmus)
+    assert 1e6 * errors.overshoot[0] == pytest.approx(3.13, abs=0.05)
+    assert 1e3 * errors.settling[0] == pytest.approx(99, abs=3)
+    assert 1e6 * errors.peak[0] == pytest.approx(7.90, rel=0.05)
+
+
+def test_one_axis_reverses_on_sines(fmus: Path) -> None:
+    scenario = load(ONE)
+    assert partner_of(scenario, "X") == ""
+    machine = scenario.machine
+    circles = circles_of(machine, "X", "", [(0.015, 0.05)])
+    program = DriveProgram.of(scenario, "X", "", [], circles)
+    errors = program.errors(machine, fmus=fmus)
+    # without friction a sine stays a sine: what is left is 100 times smaller
+    free = {"F_C": 1e-6, "F_S": 1e-6, "F_log": 0.0, "sigma_0": 1e-3, "sigma_1": 0.0, "sigma_2": 0.0}
+    axis = machine.axes["X"]
+    own = axis.model_copy(update={"friction": axis.friction.model_copy(update=free)})
+    without = program.errors(machine.model_copy(update={"axes": {"X": own}}), fmus=fmus)
+    assert errors.peak[0] > 1e-6
+    assert without.peak[0] < 0.03 * errors.peak[0]
+
+
+def test_motions_stay_within_limits() -> None:
+    machine = load(SCENARIOS / "one_axis.yaml", ["machine.axes.X.travel=[290 mm, 312 mm]"]).machine
+    stops = stops_of(machine, "X", [(0.1, 0.1), (0.02, 0.1), (0.1, 9.0)])
+    at = 0.3
+    for stop in stops:
+        at += stop.distance
+        assert 0.29 <= at <= 0.312
+        assert stop.feed <= machine.axes["X"].max_speed
+    (circle,) = circles_of(machine, "X", "", [(0.05, 5.0)])
+    assert 2 * circle.radius < 0.022
+    assert circle.acceleration <= machine.axes["X"].max_acceleration
+
+
+# --- the whole -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def tuned(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The command on the default machine with a short search."""
+    folder = tmp_path_factory.mktemp("tuned")
+    command = ("tune", "drive", Z, "--axis", "Z", "--evaluations", "20", "--control", "sinumerik", "--out", "r")
+    done = feedsim(*command, fmus=fmus, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "MD32200 POSCTRL_GAIN (K_v) 4 -> " in done.stdout
+    return folder
+
+
+def test_peaks_and_overshoot_fall_within_margins(tuned: Path) -> None:
+    figures = {
+        name: figure["value"] for name, figure in json.loads((tuned / "r/summary.json").read_text())["figures"].items()
+    }
+    assert figures["Z.peak_reduction"] > 55
+    assert figures["Z.overshoot_reduction"] > 30
+    assert figures["Z.gain_margin_after"] >= 8
+    assert figures["Z.phase_margin_after"] >= 40
+    summary = json.loads((tuned / "r/summary.json").read_text())
+    assert (summary["kind"], summary["kept"]) == ("tune-drive", "")
+    assert all(row["after"] <= 1.05 * row["before"] + 5e-8 for row in summary["motions"])
+
+
+def test_values_that_are_typed_have_the_margins(tuned: Path) -> None:
+    """The files, loaded, judged anew with modes 10 % lower and higher."""
+    changes = yaml.safe_load((tuned / "r/settings.yaml").read_text())["set"]
+    by_settings = load(Z, [f"{key}={value}" for key, value in changes.items()]).machine
+    by_file = load(Z, [f"machine.axes.Z.drive={tuned / 'r/drive_Z.yaml'}"]).machine
+    assert by_settings.axes["Z"].drive == by_file.axes["Z"].drive
+    rows = list(csv.DictReader((tuned / "r/sheet.csv").open(newline="")))
+    assert {f"machine.axes.{row['axis']}.drive.{row['parameter']}" for row in rows} == {*changes}
+    gain = next(row for row in rows if row["number"] == "p1460")
+    assert float(gain["new"]) == pytest.approx(by_file.axes["Z"].drive.K_p, rel=1e-5)
+    modes = checked_modes(by_file)
+    for factor in (0.9, 1.0, 1.1):
+        scaled = Modes(modes.file, factor * modes.frequency, modes.damping, modes.ports)
+        own = [loop for loop in judge(by_file, scaled) if loop.axis == "Z"]
+        assert not any(loop.growing for loop in own)
+        assert min(20 * math.log10(loop.gain_margin) for loop in own) >= 8
+        assert min(loop.phase_margin for loop in own) >= 40
+
+
+def test_a_margin_that_nothing_has_keeps_the_drive(fmus: Path) -> None:
+    found = tune_drive(load(ONE), "X", Limits(30.0, 80.0, 1e-5), fmus=fmus, progress=lambda *_: None, evaluations=20)
+    assert found.kept
+    assert not found.changes
+    assert found.machine is load(ONE).machine or not changed_values(load(ONE).machine, found.machine)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--axis", "A"), "--axis A: no axis 'A'; there is X, Y, Z"),
+        (("--axis", "Z", "--gain-margin", "-1"), "--gain-margin -1: more than zero is needed"),
+        (("--axis", "Z", "--gain-margin", "much"), "--gain-margin much: a number of dB is needed"),
+        (("--axis", "Z", "--phase-margin", "3 mm"), "--phase-margin"),
+        (("--axis", "Z", "--evaluations", "3"), "--evaluations 3: at least 20 are needed"),
+        (("--axis", "Z", "--at", "Z=9m"), "--at Z=9m: Z is outside of its travel"),
+        (("--axis", "Z", "--at", "Q=1mm"), "--at Q=1mm: AXIS=POSITION is needed"),
+    ],
+)
+def test_bad_input(words: tuple[str, ...], message: str, fmus: Path, tmp_path: Path) -> None:
+    done = feedsim("tune", "drive", Z, *words, "--out", "r", fmus=fmus, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (tmp_path / "r").exists()

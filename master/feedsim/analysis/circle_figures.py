@@ -22,7 +22,8 @@ LEAST = 180
 MISLEADING, LEAST_MISLEADING = 0.2, 1e-6
 UNITS = {"s": (1e3, "ms"), "m": (1e6, "um"), "1": (1e6, "um/m"), "rad": (1e6, "um/m")}
 ORDER = (
-    "peaks", "servo", "squareness", "squareness_or_servo", "scale", "lost_motion", "pitch", "radius", "offset", "rest",
+    "peaks", "servo", "squareness", "squareness_or_servo", "scale", "lost_motion", "pitch", "straightness", "third",
+    "drift", "centres", "radius", "offset", "rest",
 )  # fmt: skip
 ANGLES = 720  # at which two directions are compared: every half degree
 
@@ -67,6 +68,10 @@ def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
         "lost_motion": "lost motion: step where {axis} reverses",
         "peaks": "reversal peak where {axis} reverses, the largest one over the fitted rest",
         "pitch": "amplitude of the error of {axis} that repeats with its pitch",
+        "straightness": "straightness of second order of the guide of {axis}, at the edge of the circle",
+        "third": f"straightness of third order at the edge of the circle, that of {first} less that of {second}",
+        "drift": "way of the centre in a turn",
+        "centres": "distance of the centres of both directions",
         "rest": "what no cause explains, from peak to valley",
     }  # fmt: skip
     for term in sorted(diagnosis.terms, key=lambda each: (ORDER.index(each.key), each.axis)):
@@ -92,6 +97,7 @@ def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
 def figure_name(term: Term) -> str:
     """Name of a term's figure, without the plane's."""
     names = {"servo": "servo_mismatch", "scale": "scale_mismatch", "peaks": "peak", "radius": "radius_change"}
+    names |= {"third": "straightness_third", "drift": "centre_drift", "centres": "centres_apart"}
     return f"{names.get(term.key, term.key)}{'_' if term.axis else ''}{term.axis}"
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import Diagnosis, Figure, Named
-from feedsim.analysis.circle import diagnose
+from feedsim.analysis.circle import diagnose, further
 from feedsim.analysis.circle.records import RecordedCircle, read_circle
 from feedsim.arguments import Value, lengths, listed, quantity, spelt
 from feedsim.errors import InputError
@@ -57,7 +57,7 @@ class CircleResult(Result):
     @property
     def lines(self) -> Sequence[str]:
         """The answer, and how the files were read."""
-        return [*self.answers, *(f"  {note}" for note in self.recorded.notes)]
+        return [*self.answers, *further(self.diagnosis), *(f"  {note}" for note in self.recorded.notes)]
 
     def report(self) -> Report:
         """Content of report.html."""

@@ -7,7 +7,7 @@ Start with model.py, the terms and their fit, weighted by robust.py; diagnosis.p
 from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, diagnose
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.vibration import Vibration
-from feedsim.analysis.circle.words import answer, name, sentence, swinging, worth_telling
+from feedsim.analysis.circle.words import answer, further, name, sentence, swinging, worth_telling
 
 __all__ = [
     "CircleUnderTest",
@@ -18,6 +18,7 @@ __all__ = [
     "Vibration",
     "answer",
     "diagnose",
+    "further",
     "name",
     "sentence",
     "swinging",

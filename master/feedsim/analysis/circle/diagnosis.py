@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.model import Fit, fit
+from feedsim.analysis.circle.setup import Offset
 from feedsim.analysis.circle.vibration import Vibration, averaged, vibrations
 from feedsim.analysis.figures import Array
 
@@ -34,7 +35,9 @@ class Term:
 
     Attributes:
         key: "offset", "radius", "scale", "squareness", "servo", "squareness_or_servo", "lost_motion", "peaks", "pitch"
-            or "rest". axis: the one it belongs to; "" where to the pair.
+            or "rest"; of records besides "straightness" (of second order), "third" (straightness of third order, that
+            of the first axis less that of the second), "drift" and "centres" (of both directions).
+        axis: the one it belongs to; "" where to the pair.
         value: in ``unit`` (SI); scale, servo: what the first axis travels further, answers later than the second.
         half: half of its interval of 95 %; NaN where it has none.
         size: difference of the largest and the smallest radial deviation that it makes alone [m].
@@ -92,6 +95,8 @@ class Diagnosis:
         centre: fitted, from the programmed one [m].
         left_out: axes for whose pitch the circle is too small.
         apart: how far turns of one sense contradict each other, from peak to valley [m]; 0 where each is the only one.
+        angles: by how much the written angles of a record are larger than the machine's; None where it is none.
+        hidden: part of the squareness's interval that guides bent in third order make [rad].
         rest: of every turn, what the model says without peaks: angle (N,) [rad], deviation (N,) [m].
     """
 
@@ -107,6 +112,8 @@ class Diagnosis:
     left_out: tuple[str, ...]
     centre: tuple[float, float]
     apart: float
+    angles: Offset | None
+    hidden: float
     rest: tuple[tuple[Array, Array], ...]
 
     def __getitem__(self, key: str) -> Term:
@@ -170,6 +177,8 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         left_out=found.left_out,
         centre=(found["offset_0"], found["offset_1"]),
         apart=_apart(paths),
+        angles=found.offset,
+        hidden=2 / circle.radius * found.hidden,
         rest=tuple(
             (path.angle, path.deviation - residual) for path, residual in zip(paths, found.residual, strict=True)
         ),
@@ -203,9 +212,25 @@ def _curves(found: Fit, paths: Sequence[TurnedPath], circle: CircleUnderTest) ->
                 named[f"pitch {axis}"] = made[f"pitch_{i}_cos"] + made[f"pitch_{i}_sin"]
             own = (found.reversal[k] >= 0) & (found.reversal[k] % 2 == i)
             named[f"peaks {axis}"] = np.where(own, found.residual[k], 0.0)
+        if circle.recorded:
+            named |= _set_up(circle, made)
         for name, curve in named.items():
             curves.setdefault(name, []).append(curve)
     return curves
+
+
+def _set_up(circle: CircleUnderTest, made: Mapping[str, Array]) -> dict[str, Array]:
+    """What only records have: bent guides, and a centre that moves."""
+    named = {f"straightness {axis}": made[f"bend_{i}"] for i, axis in enumerate(circle.axes)}
+    named |= {"third ": made["third"], "drift ": made["drift_0"] + made["drift_1"]}
+    if any(name.startswith("centre_") for name in made):
+        named["centres "] = np.sum([curve for name, curve in made.items() if name.startswith("centre_")], axis=0)
+    return named
+
+
+def _other(found: Fit) -> int:
+    """Number of the first path in the other direction than the first path; 1 where there is none."""
+    return next((k for k, sense in enumerate(found.senses) if sense != found.senses[0]), 1)
 
 
 def _value(circle: CircleUnderTest, found: Fit, peaks: Sequence[Peak], key: str, axis: str) -> tuple[float, float, str]:
@@ -225,6 +250,10 @@ def _value(circle: CircleUnderTest, found: Fit, peaks: Sequence[Peak], key: str,
         "servo": (("servo",), 2 / circle.speed, "s"),
         "lost_motion": ((f"lost_{number}",), 1.0, "m"),
         "pitch": ((f"pitch_{number}_cos", f"pitch_{number}_sin"), 1.0, "m"),
+        "straightness": ((f"bend_{number}",), 1.0, "m"),
+        "third": (("third",), 1.0, "m"),
+        "drift": (("drift_0", "drift_1"), 1.0, "m"),
+        "centres": ((f"centre_{_other(found)}_0", f"centre_{_other(found)}_1"), 1.0, "m"),
     }[key]
     value = math.hypot(found[names[0]], found[names[1]]) if len(names) == 2 else found[names[0]]
     return factor * value, factor * found.half(*names), unit
@@ -270,7 +299,7 @@ def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak
                 nothing,
                 height=height,
                 half=math.hypot(found.quantile * calm.spread(count), blur),
-                angle=float(found.angle[k][own[at]]),
+                angle=float(found.angle[k][own[at]]) + (found.offset.angle if found.offset else 0.0),
                 width=float(end - begin) / rate,
                 decay=float(_falls(since, relative, at, 1 / math.e, 1) - since[at]) / rate,
             )

@@ -27,7 +27,10 @@ class CircleUnderTest:
     """What is known of the circle: axes of its plane (first, second), radius [m], path speed [m/s]; the pitch of an
     axis [m] where an error that repeats with it is looked for; where the drive of an axis is known, its response x_a
     over x_s at the circle's frequency [1], and x_a over a torque at the motor at the odd multiples of it, from the
-    first on [m/(N.m)]."""
+    first on [m/(N.m)].
+
+    recorded: an instrument at the tool has measured it. Then guides may be bent, the centre may move while turns are
+    driven, and the angles may be off by a constant (setup.py)."""
 
     axes: tuple[str, str]
     radius: float
@@ -35,6 +38,11 @@ class CircleUnderTest:
     pitch: Mapping[str, float] = field(default_factory=dict)
     gain: Mapping[str, complex] = field(default_factory=dict)
     drag: Mapping[str, NDArray[np.complex128]] = field(default_factory=dict)
+    recorded: bool = False
+
+
+# Displacements for 1 m of a term that follow from time and turn alone: name -> number of the axis, (N,) [m].
+Moved = Mapping[str, tuple[int, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +68,13 @@ class TurnedPath:
 @dataclass(frozen=True, eq=False)
 class Undone:
     """A path with its distortion undone: angle [rad] and deviation of the radius [m]; measured positions (2, N) [m],
-    and where the axes reverse at their half axis + [rad]."""
+    where the axes reverse at their half axis + [rad], and what moved the centre."""
 
     positions: Array
     angle: Array
     deviation: Array
     turned: tuple[float, float]
+    moved: Moved
 
 
 def enough_pitches(circle: CircleUnderTest, axis: str) -> bool:
@@ -73,10 +82,13 @@ def enough_pitches(circle: CircleUnderTest, axis: str) -> bool:
     return axis in circle.pitch and 2 * circle.radius >= PITCHES * circle.pitch[axis]
 
 
-def undo(circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float], by_program: bool) -> Undone:
+def undo(
+    circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float], by_program: bool, moved: Moved
+) -> Undone:
     """The path with what ``values`` say taken off: displacements of the axes first, then the ellipse.
 
-    by_program: its angles are the programmed ones, unless both axes' positions were measured.
+    values: of the terms [m], and "angle", by which the written angles are larger [rad]. by_program: its angles are the
+    programmed ones, unless both axes' positions were measured. moved: what moved the centre.
     """
 
     def of(name: str) -> float:
@@ -88,22 +100,23 @@ def undo(circle: CircleUnderTest, path: TurnedPath, values: Mapping[str, float],
     # An axis is at its extreme where its row of the distortion points along u.
     turned = (math.atan2(q, 1 + r + k), math.atan2(1 + r - k, q))
     centre = np.array([[of("offset_0")], [of("offset_1")]])
-    angle = path.angle
+    angle = path.angle - of("angle")
     if by_program and path.phase is None:
         programmed = circle.radius * np.array([np.cos(angle), np.sin(angle)])
         p = centre + distortion @ programmed
-        for name, (axis, displacement) in displacements(
-            circle, angle, programmed, path.sense, (0, math.pi / 2), values
-        ).items():
+        own = displacements(circle, angle, programmed, path.sense, (0, math.pi / 2), values)
+        for name, (axis, displacement) in (own | dict(moved)).items():
             p[axis] += of(name) * displacement
         angle = np.arctan2(p[1], p[0])
     positions = (circle.radius + path.deviation) * np.array([np.cos(angle), np.sin(angle)])
     p = positions - centre
     angle = np.arctan2(p[1], p[0])
-    for name, (axis, displacement) in displacements(circle, angle, positions, path.sense, turned, values).items():
+    own = displacements(circle, angle, positions, path.sense, turned, values)
+    for name, (axis, displacement) in (own | dict(moved)).items():
         p[axis] -= of(name) * displacement
     plain = np.linalg.solve(distortion, p)
-    return Undone(positions, np.arctan2(plain[1], plain[0]), np.hypot(plain[0], plain[1]) - circle.radius, turned)
+    radius = np.hypot(plain[0], plain[1])
+    return Undone(positions, np.arctan2(plain[1], plain[0]), radius - circle.radius, turned, moved)
 
 
 def displacements(
@@ -130,6 +143,9 @@ def displacements(
         if enough_pitches(circle, axis):
             phase = 2 * math.pi / circle.pitch[axis] * positions[i]
             found[f"pitch_{i}_cos"], found[f"pitch_{i}_sin"] = (i, np.cos(phase)), (i, np.sin(phase))
+    if circle.recorded:
+        u, w = positions / circle.radius
+        found |= {"bend_0": (1, u**2), "bend_1": (0, w**2), "third": (1, u**3 - u / 2)}
     return found
 
 
@@ -143,5 +159,5 @@ def columns_of(
     found["squareness"] = np.sin(2 * angle)
     if both:
         found["servo"] = sense * np.sin(2 * angle)
-    moved = displacements(circle, angle, undone.positions, sense, undone.turned, values)
+    moved = displacements(circle, angle, undone.positions, sense, undone.turned, values) | dict(undone.moved)
     return found | {name: along[axis] * displacement for name, (axis, displacement) in moved.items()}

@@ -29,6 +29,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ from feedsim.analysis.circle.geometry import (
     undo,
 )
 from feedsim.analysis.circle.robust import SETTLED, covariance_of, robust_fit, rounding
+from feedsim.analysis.circle.setup import Offset, angle_offset, centre_moves
 from feedsim.analysis.circle.tails import NEXT, Tails, fading_tails, known_tails, what_is_left
 from feedsim.analysis.figures import Array
 
@@ -51,10 +53,16 @@ from feedsim.analysis.figures import Array
 AHEAD, BEHIND = 2.0, (30.0, 45.0, 60.0)
 # Just behind the window the deviation is calm if it is below this share of the peak, or not larger than noise makes it.
 CALM = 0.05
+# The same where the angles may be off by as much [deg]: edges are looked for within.
+AROUND = 10.0, 40.0
+# Of the difference in third order that bent guides show, what their sum may add to the squareness.
+HIDDEN = 0.45
 # Neighbouring samples share what disturbs them. Blocks of this angle [deg] do not, as far as intervals are concerned.
 BLOCK = 6.0
 # Friction is no clean step: the response to it outside the windows is known to this share.
 KNOWN = 0.2
+# Time in which a control that nobody knows lets a peak of friction fall to 1/e, or sooner [s].
+SETTLES = 0.05
 PASSES = 6
 REPEATS = 2.0  # and pitches that must lie between two windows, where the drives are known
 # The angle that is programmed and the one where the machine is differ by more than rounding from this deviation [m] on.
@@ -75,8 +83,9 @@ class Fit:
         columns: of every path, radial deviation for 1 m of each term, name -> (N,).
         window: how far behind a reversal is left out [rad].
         noise: standard deviation of a sample outside the windows [m].
-        left_out: pitch errors that the circle is too small for.
+        left_out: pitch errors that the circle is too small for. senses: of the paths.
         unsure: what a term may be off by as the loops' response is not known better [m].
+        offset: of the written angles; None where they are those of the machine's own scales.
     """
 
     names: tuple[str, ...]
@@ -92,7 +101,9 @@ class Fit:
     window: float
     noise: float
     left_out: tuple[str, ...]
+    senses: tuple[int, ...]
     unsure: float = 0.0
+    offset: Offset | None = None
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
@@ -113,7 +124,16 @@ class Fit:
         length = float(np.hypot(*part)) if len(rows) == 2 else 0.0
         along = part / length if length > 0 else np.full(len(rows), 1 / math.sqrt(len(rows)))
         own = self.quantile * math.sqrt(max(float(along @ self.covariance[np.ix_(rows, rows)] @ along), 0.0))
-        return math.hypot(own, self.unsure)
+        return math.hypot(own, self.unsure, self.hidden if "squareness" in names else 0.0)
+
+    @property
+    def hidden(self) -> float:
+        """What guides that are bent in third order may add to the squareness [m]; their sum does not show."""
+        if "third" not in self.names:
+            return 0.0
+        row = self.names.index("third")
+        size, variance = abs(float(self.values[row])), max(float(self.covariance[row, row]), SETTLED**2)
+        return HIDDEN * size * size**2 / (size**2 + 4 * variance)
 
 
 def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
@@ -122,21 +142,52 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     A path of angle and radius alone may have the programmed angle in place of the one where the machine was: that of
     both which leaves less is taken.
     """
-    found = _shaped(circle, paths, by_program=False)
+    if not circle.recorded:
+        return _told(circle, paths, 0.0)
+    wide = _fit(circle, paths, Left(*np.radians(AROUND)), Shape())
+    lost = [sum(wide[f"lost_{i}"] * columns[f"lost_{i}"] for i in (0, 1)) for columns in wide.columns]
+    signals = [residual + step for residual, step in zip(wide.residual, lost, strict=True)]
+    offset = angle_offset(paths, wide.angle, signals, [which < 0 for which in wide.reversal])
+    found = _told(circle, paths, offset.angle)
+    # What the angles may be off by moves every term that turns with them.
+    more, less = (_told(circle, paths, offset.angle + side * offset.deviation) for side in (1, -1))
+    moved = np.array([(more[name] - less[name]) / 2 for name in found.names])
+    return replace(found, covariance=found.covariance + np.outer(moved, moved), offset=offset)
+
+
+def _told(circle: CircleUnderTest, paths: Sequence[TurnedPath], angle: float) -> Fit:
+    """With angles that are larger than those of the machine by ``angle`` [rad]."""
+    found = _shaped(circle, paths, Shape(angle=angle))
     moved = sum(math.hypot(found[a], found[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))
     moved += abs(found["squareness"])
     if all(path.phase is not None for path in paths) or moved**2 < circle.radius * UNSEEN:
         return found
-    other = _shaped(circle, paths, by_program=True)
+    other = _shaped(circle, paths, Shape(by_program=True, angle=angle))
     return other if other.noise < found.noise else found
 
 
-def _shaped(circle: CircleUnderTest, paths: Sequence[TurnedPath], by_program: bool) -> Fit:
+class Left(NamedTuple):
+    """Angles ahead of a reversal and behind it that are left out [rad]."""
+
+    ahead: float
+    behind: float
+
+
+class Shape(NamedTuple):
+    """by_program: the angles are the programmed ones. play: lost motion is used up first. angle: by which the angles
+    are larger than those of the machine [rad]."""
+
+    by_program: bool = False
+    play: bool = False
+    angle: float = 0.0
+
+
+def _shaped(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
     """Lost motion as a step, or as play that is used up first, whichever leaves less behind the reversals."""
-    found = _windowed(circle, paths, by_program, play=False)
+    found = _windowed(circle, paths, shape)
     if max(found["lost_0"], found["lost_1"]) < PLAY:
         return found
-    other = _windowed(circle, paths, by_program, play=True)
+    other = _windowed(circle, paths, shape._replace(play=True))
     return other if _behind(other) < _behind(found) else found
 
 
@@ -145,28 +196,30 @@ def _behind(found: Fit) -> float:
     return sum(float((off[which >= 0] ** 2).sum()) for off, which in zip(found.residual, found.reversal, strict=True))
 
 
-def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], by_program: bool, play: bool) -> Fit:
+def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
     for degrees in BEHIND:
-        found = _fit(circle, paths, math.radians(degrees), by_program, play)
+        found = _fit(circle, paths, Left(math.radians(AHEAD), math.radians(degrees)), shape)
         if _calm(found):
             break
     return found
 
 
-def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, by_program: bool, play: bool) -> Fit:
+def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape: Shape) -> Fit:
+    window = out.behind
     both = len({path.sense for path in paths}) == 2
     asked = [axis for axis in circle.axes if axis in circle.pitch]
     # Where friction's response reaches far, an error must be seen to repeat between two windows.
     free = circle.radius * (math.pi / 2 - window - math.radians(AHEAD)) if circle.drag else math.inf
     circle = replace(circle, pitch={axis: p for axis, p in circle.pitch.items() if REPEATS * p <= free})
-    values: dict[str, float] = {PLAYED: 1.0} if play else {}
+    values: dict[str, float] = {"angle": shape.angle} | ({PLAYED: 1.0} if shape.play else {})
+    moves = centre_moves(paths) if circle.recorded else [{} for _ in paths]
     ends = np.cumsum([len(path.angle) for path in paths])[:-1]
     tails = Tails(np.empty((sum(len(path.angle) for path in paths), 0)), np.empty(0))
     residual: Array = np.empty(0)
     for number in range(PASSES):
-        undone = [undo(circle, path, values, by_program) for path in paths]
+        undone = [undo(circle, path, values, shape.by_program, moved) for path, moved in zip(paths, moves, strict=True)]
         parts = [columns_of(circle, each, path.sense, both, values) for each, path in zip(undone, paths, strict=True)]
-        windows = [_windows(each, path.sense, window) for each, path in zip(undone, paths, strict=True)]
+        windows = [_windows(each, path.sense, out) for each, path in zip(undone, paths, strict=True)]
         names = tuple(parts[0])
         matrix = np.concatenate([np.column_stack([part[name] for name in names]) for part in parts])
         deviation: Array = np.concatenate([each.deviation for each in undone])
@@ -206,8 +259,19 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], window: float, by
         window=window,
         noise=robust.noise,
         left_out=tuple(axis for axis in asked if not enough_pitches(circle, axis)),
-        unsure=KNOWN * float(np.abs(tail[kept]).max(initial=0.0)) if len(circle.drag) == 2 else 0.0,
+        senses=tuple(path.sense for path in paths),
+        unsure=_unsure(circle, tail[kept], residual[~kept], window),
     )
+
+
+def _unsure(circle: CircleUnderTest, tail: Array, peaks: Array, window: float) -> float:
+    """What a term may be off by, as nobody knows how a peak dies away [m]. tail, peaks: behind the windows, in them."""
+    if len(circle.drag) == 2:
+        return KNOWN * float(np.abs(tail).max(initial=0.0))
+    if not circle.recorded:
+        return 0.0
+    passed = window * circle.radius / circle.speed
+    return float(np.abs(peaks).max(initial=0.0)) * math.exp(-passed / SETTLES)
 
 
 def _blocks(undone: Sequence[Undone]) -> Array:
@@ -215,14 +279,14 @@ def _blocks(undone: Sequence[Undone]) -> Array:
     return np.concatenate([1000 * k + np.floor(each.angle / math.radians(BLOCK)) for k, each in enumerate(undone)])
 
 
-def _windows(undone: Undone, sense: int, window: float) -> tuple[NDArray[np.int64], Array]:
+def _windows(undone: Undone, sense: int, out: Left) -> tuple[NDArray[np.int64], Array]:
     """Behind which reversal each sample is, -1 where behind none, and the angle since then [rad]."""
     which = np.full(len(undone.angle), -1)
     since = np.full(len(undone.angle), math.inf)
     for k in range(4):
         at = undone.turned[k % 2] + (math.pi if k > 1 else 0.0)
         passed = (sense * (undone.angle - at) + math.pi) % (2 * math.pi) - math.pi
-        inside = (passed >= -math.radians(AHEAD)) & (passed < window)
+        inside = (passed >= -out.ahead) & (passed < out.behind)
         which[inside], since[inside] = k, passed[inside]
     return which, since
 

@@ -131,7 +131,7 @@ def read_circle(
     if radius is None:
         doubts += unusual_radius(nominal) or (unusual_feed(own) if own is not None and feed is None else [])
         notes.append(f"the programmed radius is taken to be {nominal * 1e3:.6g} mm, that of the recorded turns")
-    circle = CircleUnderTest(axes, nominal, speed, pitch or {})
+    circle = CircleUnderTest(axes, nominal, speed, pitch or {}, recorded=True)
     return RecordedCircle(circle, tuple(turns), centre is None, tuple(notes), tuple(doubts))
 
 

@@ -10,6 +10,10 @@ from feedsim.analysis.circle.diagnosis import Diagnosis, Term
 WORTH = 0.05
 # Noise that is this share of G leaves little to diagnose.
 NOISY = 0.3
+# An angle of the written angles [rad], and what they make uncertain [m], of which there is a word.
+ANGLE, UNCERTAIN = math.radians(0.5), 0.2e-6
+# Rate of a turn [rad/s] at which peaks of friction die away well within a quarter turn.
+SLOW = 2.0
 # Of a cause that lies elsewhere than where G is measured there is, if it alone makes so much of it.
 BESIDES = 0.25
 # Turns of one direction that differ by more than this share of G are not turns of one circle.
@@ -95,8 +99,66 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
             return _peaks(diagnosis, term)
         case "pitch":
             return f"{axis} errs by {_um(amount)} (amplitude) with every pitch of its drive: screw, or motor encoder"
+        case "straightness":
+            other = second if axis == first else first
+            return (
+                f"the guide of {axis} is bent by {_um(amount)} towards {other}{'+' if value > 0 else '-'} at the edges "
+                f"of the circle: straightness, or an error of {other}'s position that grows with its square"
+            )
+        case "third":
+            return (
+                f"guides are bent in third order by {_um(amount)} at the edges of the circle, {first}'s less "
+                f"{second}'s: straightness"
+            )
+        case "drift":
+            return f"the centre moves by {_um(amount)} in a turn: temperature, or a set-up that is not firm"
+        case "centres":
+            return (
+                f"the centres of {'both directions' if diagnosis.both else 'two turns'} lie {_um(amount)} apart: an "
+                "eccentric pivot or probe, or drift between the turns"
+            )
     form = ", ".join(f"order {n}: {_um(a)}" for n, a in diagnosis.form.items())
     return f"what no cause explains: {_um(term.size)} from peak to valley ({form})"
+
+
+def further(diagnosis: Diagnosis) -> list[str]:
+    """What one cannot tell from these turns, and which circle would: radius, feed or direction."""
+    circle = diagnosis.circle
+    if diagnosis.angles is None:
+        return []
+    of = {term.key: term for term in diagnosis.terms if not term.axis}
+    found = []
+    if abs(diagnosis.angles.angle) > ANGLE:
+        found.append(
+            f"the angles of the record are {math.degrees(diagnosis.angles.angle):.1f} deg off, as the places of the "
+            "reversals show; that is taken out"
+        )
+    if not diagnosis.both:
+        found.append("squareness and servo mismatch are one: a circle in the other direction separates them")
+    if of["third"].told:
+        found.append(
+            "squareness and guides that are bent in third order are not fully separated: a circle of half the radius "
+            f"does it ({circle.radius * 500:.3g} mm)"
+        )
+    turned = math.hypot(of["scale"].size, max(of[key].size for key in of if key.startswith("squareness"))) / 2
+    if not diagnosis.angles.seen and 4 * diagnosis.angles.deviation * turned > UNCERTAIN:
+        found.append(
+            "no reversal shows, so the angles of the record may be off, and scale mismatch and squareness are not "
+            f"fully separated: a slower circle of a smaller radius shows reversals ({circle.radius * 500:.3g} mm, "
+            f"{circle.speed * 3e4:.3g} mm/min)"
+        )
+    slow = SLOW * circle.radius
+    if circle.speed > 2 * slow:
+        found.append(
+            "the circle is fast: peaks of friction may take a quarter turn, and are then not separated from lost "
+            f"motion, scale and servo mismatch: a feed of {slow * 6e4:.2g} mm/min separates them"
+        )
+    if "centres" in of and of["centres"].told and of["centres"].size > UNCERTAIN:
+        found.append(
+            "an eccentric pivot and a drift between the turns are one: a second turn in the same direction separates "
+            "them"
+        )
+    return [f"{text[0].upper()}{text[1:]}." for text in found]
 
 
 def _lag(diagnosis: Diagnosis, change: float) -> str:
@@ -158,6 +220,8 @@ def name(term: Term) -> str:
         "servo": "servo mismatch", "squareness_or_servo": "squareness or servo mismatch",
         "lost_motion": f"lost motion of {term.axis}", "pitch": f"pitch error of {term.axis}",
         "peaks": f"reversal peaks of {term.axis}", "rest": "rest",
+        "straightness": f"straightness of {term.axis}", "third": "straightness of third order",
+        "drift": "drift of the centre", "centres": "distance of the centres",
     }  # fmt: skip
     return names[term.key]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, name, sentence, swinging
+from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, further, name, sentence, swinging
 from feedsim.analysis.circle_figures import UNITS
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report.content import Section, Table
@@ -35,6 +35,7 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
         note += f"\nThe circle is too small to tell errors that repeat with the pitch of {axes}."
     if words := swinging(diagnosis):
         note += f"\n{typeset(words)}"
+    note += "".join(f"\n{typeset(words)}" for words in further(diagnosis))
     heads = ("Cause", "Amount", "Alone [µm]", "Share of G [%]", "What it means, where to look")
     peaks = [(minus(peak.name), DIRECTIONS[peak.sense], *_peak(peak)) for peak in diagnosis.peaks]
     peak_heads = ("Reversal at", "Direction", "Peak [µm]", "±", "Width at half the height [ms]", "Falls to 1/e in [ms]")
@@ -83,9 +84,24 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for each in diagnosis.vibrations
         ],
+        **_of_records(diagnosis),
         "path_lag": None if diagnosis.lag is None else quantity(diagnosis.lag, "m"),
         "form": {str(order): quantity(amplitude, "m") for order, amplitude in diagnosis.form.items()},
         "noise": quantity(diagnosis.noise, "m"),
+    }
+
+
+def _of_records(diagnosis: Diagnosis) -> dict[str, Any]:
+    """What there is besides where an instrument has measured."""
+    if diagnosis.angles is None:
+        return {}
+    return {
+        "angle_offset": {
+            **quantity(diagnosis.angles.angle, "rad"),
+            "standard_deviation": diagnosis.angles.deviation,
+            "seen": diagnosis.angles.seen,
+        },
+        "further": further(diagnosis),
     }
 
 

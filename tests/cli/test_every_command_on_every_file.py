@@ -58,6 +58,7 @@ NEEDED = {
     "frf": ["--no-measure", "--no-full-model"],
     "circle": ["--feed", "1000 mm/min"],
     "sweep": ["--workers", "1"],
+    "machine import": ["--axes", "Z"],
 }
 # One file serves for both sides of what takes two.
 TWICE = ("compare",)
@@ -114,6 +115,7 @@ def place(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "header.csv").write_text("time [s],Z.x_a [m]\n")
     (folder / "noise.bin").write_bytes(bytes(range(256)) * 40)
     (folder / "nothing").mkdir()
+    (folder / "mill.tea").write_bytes(b"N32200 $MA_POSCTRL_GAIN[0,Z]=5\r\n\x00N32300 $MA_MAX_AX_ACCEL[0,Z]=2\r\n")
     (folder / "list.yaml").write_text("- 1\n- 2\n")
     (folder / "open.json").write_text('{"Header": {')
     capture = content({"X1|1": axis_signals(10.0, -1)})
@@ -152,7 +154,8 @@ SUBJECTS = (
     "one.ssp", "machine.fmu", "plant.fmu", "built", "built/modes.csv", "frf", "frf/frf.csv", "compensated",
     "compensated/feedforward.csv", "swept", "swept/table.csv", "swept/study.json", "shown", "compared.html",
     "compared.json", "compared.xml", "partial", "partial/result.partial.csv", "cut", "cut/result.csv", "line.csv",
-    "empty.csv", "text.csv", "header.csv", "noise.bin", "nothing", "missing.yaml", "missing/folder",
+    "empty.csv", "text.csv", "header.csv", "noise.bin", "mill.tea", "nothing",
+    "missing.yaml", "missing/folder",
 )  # fmt: skip
 
 

@@ -30,6 +30,10 @@ class Name:
         unit: of the control's value. factor: our value in SI over the control's value.
         si: unit of our value; "" of a switch.
         confirmed: whether a public source with meaning and unit was opened. source: which.
+        key: what files of the control call it, without indices.
+        acts: conditions under which it acts, in words that `feedsim.control.conditions` reads.
+        codes: the control's number -> our value, of an enumeration. times: parameters of the control whose ratio our
+        value is the control's value times.
     """
 
     control: str
@@ -41,10 +45,14 @@ class Name:
     si: str
     confirmed: bool
     source: str
+    key: str = ""
+    acts: str = ""
+    codes: tuple[tuple[int, bool | str], ...] = ()
+    times: tuple[str, ...] = ()
 
     def shown(self, value: float) -> float:
         """The control's value of an SI value."""
-        return value / self.factor
+        return next((float(code) for code, ours in self.codes if ours == value), value / self.factor)
 
     def ours(self, value: float) -> float:
         """The SI value of a value of the control."""
@@ -64,17 +72,33 @@ def table() -> tuple[Name, ...]:
         return tuple(
             Name(
                 row["control"], row["parameter"], row["number"], row["name"], row["unit"], float(row["factor"]),
-                row["SI unit"], row["confirmed"] == "yes", row["source"],
+                row["SI unit"], row["confirmed"] == "yes", row["source"], row["key"] or _key(row), row["acts"],
+                _codes(row["codes"]), tuple(row["times"].split("/")) if row["times"] else (),
             )
             for row in csv.DictReader(file)
         )  # fmt: skip
+
+
+def _key(row: Mapping[str, str]) -> str:
+    """Machine data are filed by their names, all else by its number."""
+    return row["name"] if row["number"].startswith("MD") else row["number"].partition(".")[0]
+
+
+def _codes(text: str) -> tuple[tuple[int, bool | str], ...]:
+    """Of "1: true; 3: false"."""
+    pairs = [part.split(": ") for part in text.split("; ") if part]
+    return tuple((int(code), {"true": True, "false": False}.get(ours, ours)) for code, ours in pairs)
 
 
 def names_of(control: str) -> Mapping[str, Name]:
     """Our parameter -> its name in a control. InputError: no such control."""
     if control not in CONTROLS:
         raise InputError(f"control {control!r} is not known; known are {', '.join(CONTROLS)}")
-    return {each.parameter: each for each in table() if each.control == control}
+    found: dict[str, Name] = {}
+    for each in table():
+        if each.control == control:
+            found.setdefault(each.parameter, each)
+    return found
 
 
 def known(number: str) -> Name | None:

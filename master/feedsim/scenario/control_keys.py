@@ -22,7 +22,9 @@ def translated(key: str, value: Source) -> tuple[str, Source]:
     if name is None:
         return key, value
     where = prefix.removesuffix(".drive")
-    if "axes" not in where.split("."):
+    if name.parameter.startswith("cycles."):
+        where = "machine"
+    elif "axes" not in where.split("."):
         where = f"machine.axes.{where or '*'}"
     text = _text(name, value.data, f"{value.mark(()).where}: ")
     return f"{where}.{name.parameter}", Source(text, {(): value.mark(())})
@@ -81,10 +83,15 @@ def _text(name: Name, value: Any, where: str) -> Any:
             f"{where}{name.number} is {ours}, but its unit is not confirmed by a public source ({name.source}); "
             f"give {ours} with its unit"
         )
-    if not name.si and value in (0, 1, False, True):
+    if name.codes:
+        known = {code: ours for code, ours in name.codes}
+        if isinstance(value, bool) or value not in known:
+            raise InputError(f"{where}{name.number} is {brief(value)}; of {', '.join(map(str, known))}")
+        return known[value]
+    if not name.si and name.unit != "1" and value in (0, 1, False, True):
         return bool(value)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(
             f"{where}{name.number} is {brief(value)}; a number in the control's unit, {name.unit}, is expected"
         )
-    return f"{name.ours(value)!r} {name.si}"
+    return value if not name.si else f"{name.ours(value)!r} {name.si}"

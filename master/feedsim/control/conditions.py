@@ -1,0 +1,108 @@
+"""Conditions under which a parameter of a control acts, as the column `acts` of the table has them.
+
+Clauses stand between semicolons:
+
+    FFW_MODE=1|3            it acts where FFW_MODE is 1 or 3
+    p1657=1 or p1660=p1658  one of the two is enough
+    BACKLASH_FACTOR=1?      as the first one, and where the file has no such parameter as well
+    FFW_MODE=0: 0           there our value is 0; "off": the group of parameters is switched off
+    ~p1461=100              else there is a doubt: what is taken holds for a part alone
+
+A name is one of the control; behind a dot stands a bit, in brackets an element. On the right stands a number or another
+name, which a minus may precede. May use nothing. Start reading at judged().
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+Look = Callable[[str], "float | bool | str | None"]  # name -> value; None: the file has none, or several
+_TERM = re.compile(r"^(?P<name>[\w.@-]+?)(?P<element>\[\d+\])?=(?P<right>[^:?]+)(?P<free>\?)?$")
+CLOSE = 1e-9
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What conditions say.
+
+    state: "acts", "inactive", "unknown" (a parameter is missing), "case" (our value is `value`). reason: in words.
+    doubts: what limits a value that is taken.
+    """
+
+    state: Literal["acts", "inactive", "unknown", "case"]
+    value: str = ""
+    reason: str = ""
+    doubts: tuple[str, ...] = ()
+
+
+def judged(acts: str, look: Look) -> Judged:
+    """What the conditions say of a file; look: a parameter's value there."""
+    doubts = []
+    clauses = [clause.strip() for clause in acts.split(";") if clause.strip()]
+    for clause in clauses:
+        term, colon, value = clause.partition(": ")
+        if colon and _holds(term, look)[0]:
+            return Judged("case", value.strip(), f"{term}")
+    for clause in clauses:
+        if ": " in clause:
+            continue
+        if clause.startswith("~"):
+            holds, name = _holds(f"{clause[1:]}?", look)
+            if holds is False:
+                doubts.append(f"{name} is {shown(look(name))}, not {clause[1:].partition('=')[2]}")
+            continue
+        found = [_holds(term.strip(), look) for term in clause.split(" or ")]
+        if any(holds for holds, _ in found):
+            continue
+        unknown = [name for holds, name in found if holds is None]
+        if unknown:
+            reason = f"it acts where {clause.removesuffix('?')}, and the file has no {unknown[0]} (--assume)"
+            return Judged("unknown", reason=reason)
+        name = found[0][1]
+        return Judged("inactive", reason=f"it acts where {clause.removesuffix('?')}; {name} is {shown(look(name))}")
+    return Judged("acts", doubts=tuple(doubts))
+
+
+def tied(acts: str) -> list[tuple[str, str, float]]:
+    """Pairs of parameters that are to be equal: name, other, and the sign of the other."""
+    found = []
+    for clause in re.split(r";| or ", acts):
+        term = _TERM.match(clause.strip().lstrip("~"))
+        if term and re.match(r"^-?[pA-Z]\w*$", term["right"].strip()) and not term["right"].strip().isupper():
+            right = term["right"].strip()
+            found.append((term["name"] + (term["element"] or ""), right.lstrip("-"), -1.0 if right[0] == "-" else 1.0))
+    return found
+
+
+def shown(value: float | bool | str | None) -> str:
+    """A value as messages have it."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _holds(term: str, look: Look) -> tuple[bool | None, str]:
+    """Whether a term holds, None where the file does not say; and the name that it is of."""
+    found = _TERM.match(term)
+    assert found is not None, term
+    name = found["name"] + (found["element"] or "")
+    value = look(name)
+    if value is None:
+        return (True if found["free"] else None), name
+    for right in found["right"].split("|"):
+        right = right.strip()
+        if re.match(r"^[+-]?[\d.]", right):
+            wanted: float | bool | str | None = float(right)
+        else:
+            other = look(right.lstrip("-"))
+            if other is None:
+                return (True if found["free"] else None), right.lstrip("-")
+            wanted = -float(other) if right.startswith("-") and not isinstance(other, str) else other
+        if isinstance(value, str) or isinstance(wanted, str):
+            if value == wanted:
+                return True, name
+        elif wanted is not None and math.isclose(float(value), float(wanted), rel_tol=CLOSE, abs_tol=1e-300):
+            return True, name
+    return False, name

@@ -1,0 +1,409 @@
+"""Values of our parameters, in SI, out of what files of a control hold; and what could not be taken, with the reason.
+
+Nothing is guessed. A value is taken where the file has it once, where it acts, where its unit is confirmed by a public
+source (or by who calls), and where nothing contradicts it. May use errors. Start reading at read().
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from feedsim.control.archive import Archive, Entry, scalar
+from feedsim.control.conditions import Judged, judged, shown
+from feedsim.control.names import Name, table
+from feedsim.errors import InputError
+
+Value = float | bool | str
+ALL = "all"
+# What SINUMERIK's machine data are in, where MD10220 and MD10230 say nothing else: gains in 1000/min.
+USUAL_MASK, USUAL_GAIN = 0x200, 1000 / 60
+# Software limits beyond this are none [m].
+NO_LIMIT = 1e4
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A value of ours. axis: ours; "" of the machine. value: SI. entry, archive: where it stands; None of a case."""
+
+    axis: str
+    name: Name
+    value: Value
+    entry: Entry | None
+    archive: Archive | None
+
+    @property
+    def parameter(self) -> str:
+        """Below the axis, or below the machine."""
+        return self.name.parameter
+
+    @property
+    def where(self) -> str:
+        """File and line."""
+        return f"{self.archive.name}:{self.entry.line}" if self.archive and self.entry else ""
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A value that was not taken. text: as the file has it. weight: "doubt", or "note" of what does not act."""
+
+    axis: str
+    name: Name
+    text: str
+    reason: str
+    where: str = ""
+    weight: str = "doubt"
+
+
+@dataclass
+class Reading:
+    """What was found: values, refusals, doubts about values that were taken, and notes."""
+
+    control: str
+    axes: Mapping[str, str]
+    taken: list[Taken] = field(default_factory=list)
+    refused: list[Refused] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    places: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Sought:
+    """A parameter in the files of an axis: its entries, of all elements, and whether one of them was taken."""
+
+    entries: Sequence[tuple[Archive, Entry]]
+    chosen: tuple[Archive, Entry] | None
+    problem: str = ""
+
+
+def read(
+    archives: Sequence[Archive],
+    axes: Mapping[str, str],
+    *,
+    places: Mapping[str, Sequence[str]] = {},
+    assume: Mapping[str, str] = {},
+    checked: Collection[str] = (),
+) -> Reading:
+    """Values of axes.
+
+    Args:
+        archives: files of one control.
+        axes: our axis -> the archive's.
+        places: our axis -> drive objects or lists that are its own.
+        assume: parameter -> value, of what the files do not hold, such as a condition.
+        checked: numbers whose unit the caller has checked at the control; "all".
+
+    Raises:
+        InputError: files of several controls, no such axis, a list that may be of several axes.
+    """
+    controls = {archive.control for archive in archives}
+    if len(controls) > 1:
+        raise InputError(f"files of several controls: {', '.join(sorted(controls))}; import one control at a time")
+    rows = [name for name in table() if name.control in controls]
+    numbers = {name.number for name in rows}
+    if unknown := [each for each in checked if each != ALL and each not in numbers]:
+        raise InputError(f"{unknown[0]} is no number of the table of names of the control {controls.pop()}")
+    found = Reading(controls.pop(), dict(axes))
+    for axis, theirs in axes.items():
+        view = View(archives, axis, theirs, places.get(axis, ()), axes, assume)
+        found.places[axis] = view.places
+        found.notes += view.notes
+        for name in rows:
+            _read(found, view, name, checked)
+    _of_machine(found)
+    return found
+
+
+class View:
+    """Files as one axis sees them."""
+
+    def __init__(
+        self, archives: Sequence[Archive], axis: str, theirs: str, places: Sequence[str], axes: Mapping[str, str],
+        assume: Mapping[str, str],
+    ) -> None:  # fmt: skip
+        self.axis, self.archives, self.assume = axis, archives, assume
+        self.notes: list[str] = []
+        self.known = _identified(archives, theirs)
+        self.places = tuple(places) if places else self._own_places(theirs, axes)
+        known = [place for archive in archives for place in archive.places]
+        for place in self.places:
+            if place not in known:
+                raise InputError(f"no drive object or list {place!r}; the files have {', '.join(known) or 'none'}")
+        if not self.known and not self.places:
+            has = list(dict.fromkeys(each for archive in archives for each in _axes_of(archive)))
+            lists = [f"{place}{f' ({name})' if name else ''}" for archive in archives
+                     for place, name in archive.places.items()]  # fmt: skip
+            raise InputError(
+                f"no axis {theirs!r}; the files have {', '.join(has[:40]) or 'no axes'}"
+                + (f"; lists that drives can be chosen from: {', '.join(lists[:40])}" if lists else "")
+            )
+
+    def _own_places(self, theirs: str, axes: Mapping[str, str]) -> tuple[str, ...]:
+        """Drive object or list of the axis: that of its name, or the only one of the only axis."""
+        every = {place: name for archive in self.archives for place, name in archive.places.items()
+                 if _holds_parameters(archive, place)}  # fmt: skip
+        named = [place for place, name in every.items() if theirs.upper() in (name.upper(), place.upper())]
+        if len(named) == 1:
+            self.notes.append(f"{self.axis}: parameters of the drive are those of {named[0]}, which has its name")
+            return tuple(named)
+        if len(every) == 1 and len(axes) == 1:
+            return tuple(every)
+        if every:
+            shown_ = ", ".join(f"{place}{f' ({name})' if name else ''}" for place, name in every.items())
+            self.notes.append(
+                f"{self.axis}: which drive is that of the axis is not known, so no parameter of a drive is taken; the "
+                f"files have {shown_}: name it, --drives {self.axis}={next(iter(every))}"
+            )
+        return ()
+
+    def entries(self, *keys: str) -> list[tuple[Archive, Entry]]:
+        """Entries of a key, by name or number, that are of this axis, or of the whole machine."""
+        return [
+            (archive, entry)
+            for archive in self.archives
+            for entry in dict.fromkeys(entry for key in keys for entry in _by_key(archive).get(key, ()))
+            if (not entry.axis or entry.axis in self.known) and (not entry.place or entry.place in self.places)
+        ]
+
+    def sought(self, *keys: str, element: int = 0) -> Sought:
+        """The one entry of an element, index 0 or none; or why there is none."""
+        every = self.entries(*keys)
+        own = [each for each in every if (each[1].index or 0) == element]
+        if not own:
+            return Sought(every, None, "" if not every else f"the file has elements of it, but not [{element}]")
+        if len({_comparable(entry.text) for _, entry in own}) > 1:
+            lines = ", ".join(f"{archive.name}:{entry.line} ({entry.text[:20]})" for archive, entry in own[:4])
+            return Sought(every, None, f"the files have several values: {lines}")
+        return Sought(every, own[-1])
+
+    def value(self, name: str) -> Value | None:
+        """Value of a parameter or of one of its bits or elements; None: none, several, or no value."""
+        if name in self.assume:
+            return scalar(self.assume[name])
+        key, _, element = name.removesuffix("]").partition("[")
+        key, _, bit = key.partition(".") if key[:1] == "p" else (key, "", "")
+        if key in self.assume and not element:
+            value: Value = scalar(self.assume[key])
+        else:
+            chosen = self.sought(key, element=int(element or 0)).chosen
+            if chosen is None:
+                return None
+            try:
+                value = scalar(chosen[1].text)
+            except ValueError:
+                return None
+        if bit:
+            return None if isinstance(value, str) else float((int(value) >> int(bit)) & 1)
+        return float(value) if isinstance(value, bool) else value
+
+
+def _holds_parameters(archive: Archive, place: str) -> bool:
+    """Whether a drive object has what an axis needs; control units and infeeds have not."""
+    names = [name for name in table() if name.control == archive.control and not name.parameter.startswith("cycles.")]
+    keys = {key for name in names for key in (name.key, name.number)}
+    return any(entry.place == place and entry.key in keys for entry in archive.entries)
+
+
+def _by_key(archive: Archive) -> Mapping[str, Sequence[Entry]]:
+    kept = archive.__dict__.get("_by_key")
+    if kept is None:
+        kept = {}
+        for entry in archive.entries:
+            for key in {entry.key, entry.number} - {""}:
+                kept.setdefault(key, []).append(entry)
+        archive.__dict__["_by_key"] = kept
+    found: Mapping[str, Sequence[Entry]] = kept
+    return found
+
+
+def _axes_of(archive: Archive) -> Iterator[str]:
+    for axis in dict.fromkeys(entry.axis for entry in archive.entries if entry.axis):
+        name = archive.axis_names.get(axis, "")
+        yield f"{axis} ({name})" if name and name != axis else axis
+
+
+def _identified(archives: Sequence[Archive], theirs: str) -> frozenset[str]:
+    """What the files call the axis: its name, and AX1 or JOINT_0 by the table of names."""
+    found = set()
+    for archive in archives:
+        used = {entry.axis for entry in archive.entries if entry.axis}
+        by_name = {name.upper(): axis for axis, name in archive.axis_names.items()}
+        for each in (
+            theirs.upper(),
+            by_name.get(theirs.upper(), ""),
+            archive.axis_names.get(theirs.upper(), "").upper(),
+        ):
+            if each in used:
+                found.add(each)
+    return frozenset(found)
+
+
+def _comparable(text: str) -> object:
+    try:
+        return scalar(text)
+    except ValueError:
+        return text
+
+
+def _read(found: Reading, view: View, name: Name, checked: Collection[str]) -> None:
+    sought = view.sought(name.key, name.number)
+    if not sought.entries:
+        _case(found, view, name)
+        return
+    if sought.chosen is None:
+        archive, entry = sought.entries[0]
+        found.refused.append(Refused(view.axis, name, entry.text, sought.problem, f"{archive.name}:{entry.line}"))
+        return
+    archive, entry = sought.chosen
+    where = f"{archive.name}:{entry.line}"
+
+    def refuse(reason: str, weight: str = "doubt") -> None:
+        found.refused.append(Refused(view.axis, name, entry.text, reason, where, weight))
+
+    said = judged(name.acts, view.value)
+    if said.state == "case":
+        _of_case(found, view, name, said)
+        return
+    if said.state != "acts":
+        refuse(said.reason, "note" if said.state == "inactive" else "doubt")
+        return
+    if name.number.startswith("MD") and {entry.number, entry.key} - {"", name.number, name.key}:
+        refuse(f"the file has {entry.number} {entry.key}, the table of names {name.number} {name.key}")
+        return
+    if entry.doubt and name.number not in checked and ALL not in checked:
+        refuse(entry.doubt)
+        return
+    try:
+        raw = view.value(name.number) if "." in name.number and name.number[0] == "p" and not name.number.startswith(
+            "pid"
+        ) else scalar(entry.text)  # fmt: skip
+    except ValueError:
+        refuse("no number")
+        return
+    if reason := _unit(view, name, entry, checked):
+        refuse(reason)
+        return
+    value, reason = _converted(view, name, entry, raw)
+    if reason or value is None:
+        refuse(reason)
+        return
+    found.taken.append(Taken(view.axis, name, value, entry, archive))
+    found.doubts += [
+        f"{view.axis}: {name.number} {name.name} is taken, but {text}: it holds for a part of the range alone"
+        for text in said.doubts
+    ]
+    others = {_comparable(each.text) for _, each in sought.entries if (each.index or 0) != 0}
+    if name.number.startswith("MD") and others - {_comparable(entry.text)}:
+        found.notes.append(
+            f"{view.axis}: {name.number} {name.name} has other values in other elements (parameter sets, encoders); "
+            "element 0 is taken"
+        )
+    elif others - {_comparable(entry.text)} and name.number != "p115":
+        found.doubts.append(
+            f"{view.axis}: {name.number} {name.name} differs between data sets; that of index 0 is taken"
+        )
+
+
+def _case(found: Reading, view: View, name: Name) -> None:
+    """A parameter that the files do not have may have a value by what switches it off."""
+    if name.acts:
+        said = judged(name.acts, view.value)
+        if said.state == "case":
+            _of_case(found, view, name, said)
+
+
+def _of_case(found: Reading, view: View, name: Name, said: Judged) -> None:
+    value: Value = {"true": True, "false": False}.get(said.value, said.value)
+    if isinstance(value, str) and value != "off":
+        value = float(value)
+    condition = said.reason.partition("=")[0]
+    archive, entry = view.sought(condition.partition(".")[0]).chosen or (None, None)
+    found.taken.append(Taken(view.axis, name, value, entry, archive))
+
+
+def _unit(view: View, name: Name, entry: Entry, checked: Collection[str]) -> str:
+    """Why the unit of a value is not sure; "" where it is."""
+    if entry.unit and name.unit not in ("", "1"):
+        stated, ours = (_plain_unit(each) for each in (entry.unit, name.unit))
+        if stated != ours:
+            return f"the file has it in {entry.unit!r}, the table of names in {name.unit}"
+        return ""
+    if name.control == "sinumerik" and name.number.startswith("MD"):
+        if 0 in (view.value("SCALING_SYSTEM_IS_METRIC"), view.value("MD10240")) and (
+            "mm" in name.unit or "m/" in name.unit
+        ):
+            return "the machine's basic system is inch (MD10240)"
+        mask = view.value("MD10220")
+        if mask is not None and mask != USUAL_MASK and name.unit not in ("", "1"):
+            return f"MD10220 is {shown(mask)}: machine data are in units of the machine's maker"
+        gain = view.value("MD10230[9]")
+        if name.unit == "1000/min" and isinstance(gain, float) and not math.isclose(gain, USUAL_GAIN, rel_tol=1e-3):
+            return f"MD10230[9] is {shown(gain)}: the gain is in another unit than 1000/min"
+    if not name.confirmed and name.number not in checked and ALL not in checked:
+        return (
+            f"no public source that was opened states its unit; {name.unit or 'its meaning'} is supposed. Check it at "
+            f"the control: --checked {name.number}"
+        )
+    return ""
+
+
+def _plain_unit(text: str) -> str:
+    plain = text.lower().replace("arms", "a").replace("rms", "").replace("³", "^3").replace("²", "^2").replace("µ", "u")
+    return "".join(c for c in plain if c not in " .·*[]()").replace("percent", "%")
+
+
+def _converted(view: View, name: Name, entry: Entry, raw: Value | None) -> tuple[Value | None, str]:
+    if raw is None or isinstance(raw, str):
+        return None, "no number"
+    if name.codes:
+        value = next((ours for code, ours in name.codes if float(raw) == code), None)
+        return value, "" if value is not None else f"{shown(float(raw))} is none of " + ", ".join(
+            f"{code} ({ours})" for code, ours in name.codes
+        )
+    if not name.si and name.unit != "1":
+        if raw not in (0.0, 1.0):
+            return None, f"{shown(float(raw))} is neither 0 nor 1"
+        return bool(raw), ""
+    if not math.isfinite(float(raw)):
+        return None, "no finite number"
+    number = name.ours(float(raw)) * entry.scale
+    for k, other in enumerate(name.times):
+        ratio = view.value(other)
+        if ratio is None:
+            return (
+                None,
+                f"it is multiplied by {' / '.join(name.times)}, and the file has no {other} (--assume {other}=1)",
+            )
+        if isinstance(ratio, str) or ratio == 0:
+            return None, f"{other} is {shown(ratio)}"
+        number = number * float(ratio) if k == 0 else number / float(ratio)
+    if name.parameter.startswith("travel") and abs(number) >= NO_LIMIT:
+        return None, "so far out that it is no limit"
+    if name.parameter == "drive.p":
+        return (int(number), "") if number == int(number) else (None, "no whole number")
+    return number, ""
+
+
+def _of_machine(found: Reading) -> None:
+    """Values of the whole machine, which every axis has found: kept once, where they are the same."""
+    machine = [each for each in found.taken if each.parameter.startswith("cycles.")]
+    found.taken = [each for each in found.taken if each not in machine]
+    refused: dict[str, Refused] = {}
+    for each in found.refused:
+        if each.name.parameter.startswith("cycles."):
+            refused.setdefault(
+                each.name.number, Refused("", each.name, each.text, each.reason, each.where, each.weight)
+            )
+    found.refused = [each for each in found.refused if not each.name.parameter.startswith("cycles.")]
+    found.refused += refused.values()
+    for parameter in dict.fromkeys(each.parameter for each in machine):
+        own = [each for each in machine if each.parameter == parameter]
+        if len({each.value for each in own}) > 1:
+            values = ", ".join(f"{each.axis} {each.entry.text if each.entry else ''}" for each in own)
+            found.refused.append(
+                Refused("", own[0].name, "", f"it is one for all axes of a machine file; here {values}", own[0].where)
+            )
+        else:
+            found.taken.append(Taken("", own[0].name, own[0].value, own[0].entry, own[0].archive))

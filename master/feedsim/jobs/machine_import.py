@@ -1,0 +1,213 @@
+"""A machine file out of the files of a control."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import Figure, Named
+from feedsim.arguments import listed, spelt
+from feedsim.control import Archive, Reading, opened, read
+from feedsim.control.archive import LARGEST, scalar
+from feedsim.errors import InputError
+from feedsim.files.regular import content
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch
+from feedsim.report.content import Report
+from feedsim.report.control_files import imported as page
+from feedsim.report.results import Content
+from feedsim.scenario.imported import Imported, imported
+from feedsim.scenario.machine import Machine
+
+Pairs = str | Sequence[str] | Mapping[str, str] | None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MachineImportResult(Result):
+    """A machine file with values of a control.
+
+    archives: the files as they are. reading: values that were taken and refused. made: the machine file.
+    inputs_read: the files.
+    """
+
+    archives: Sequence[Archive]
+    reading: Reading
+    made: Imported
+    inputs_read: Sequence[Path]
+
+    kind = page.KIND
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files of the control and of the machine."""
+        return self.inputs_read
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """ "values.taken", "values.not_taken", "lines.not_understood", ..."""
+        return Named(page.figures_of(self.archives, self.reading, self.made))
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """Values that were not taken, keys that are missing, lines that were not understood."""
+        return page.findings(self.archives, self.reading, self.made)
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """How many values each axis has."""
+        return page.answers(self.archives, self.reading, self.made)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answers."""
+        return [f"  {line}" for line in self.answers]
+
+    def files(self) -> Mapping[str, Content]:
+        """The machine's folder, and every value as a table."""
+        return {**self.made.files(), page.SHEET: page.sheet(self.reading, self.made)}
+
+    @property
+    def keeps(self) -> Sequence[str]:
+        """The files of the machine."""
+        return tuple(self.made.files())
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.archives, self.reading, self.made, self.inputs_read)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.archives, self.reading, self.made, self.inputs_read, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable(folder, inputs)
+
+
+def machine_import(
+    files: File | Sequence[File],
+    axes: Pairs = None,
+    machine: File | None = None,
+    *,
+    drives: Pairs = None,
+    assume: Pairs = None,
+    checked: str | Sequence[str] = (),
+    name: str | None = None,
+    out: File | None = None,
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> MachineImportResult:
+    """Fill drive, limits, filters and compensations of a machine file from the files of a control.
+
+    A value is taken where the file has it once, where it acts, and where a public source states its unit. All others
+    are named with the reason. No value is guessed.
+
+    Args:
+        files: of one control: machine data and archives of a SINUMERIK, parameters of SINAMICS, axis lists of TwinCAT
+            CNC, .xti of TwinCAT NC, tables of parameters, INI files of LinuxCNC.
+        axes: the control's axes, "X1,Y1"; with the machine's name ahead where it is another one, "X=X1,Y=Y1". None: all
+            axes of the machine.
+        machine: machine file or folder that the values are laid into; None: a draft that lacks what no control has.
+        drives: axis -> drive object or list that is its own, "X=PS000003"; several with "+" between them.
+        assume: parameter -> value, of what the files do not have, "FFW_MODE=3".
+        checked: numbers of the table whose unit was checked at the control; "all".
+        name: of a draft; None: that of the file.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        force: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a file of no known kind, no such axis, a faulty machine.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> from pathlib import Path
+    >>> data = ["N32200 $MA_POSCTRL_GAIN[0,AX1]=5", "N32300 $MA_MAX_AX_ACCEL[0,AX1]=2.5"]
+    >>> size = Path("mill.tea").write_text("\\n".join(data))
+    >>> result = fs.machine_import("mill.tea", "X=AX1", "machines/test_centre")
+    >>> [(each.parameter, each.value) for each in result.made.values]
+    [('drive.K_v', 83.33333333333334), ('max_acceleration', 2.5)]
+    """
+    paths = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
+    base = None if machine is None else Path(machine)
+    with kept(out, page.check_writable, watch, _inputs(paths, base), (), force=force):
+        archives = read_files(paths, watch)
+        reading = read(
+            archives,
+            _axes(axes, base, archives),
+            places={axis: tuple(text.split("+")) for axis, text in pairs("drives", drives).items()},
+            assume=_values(pairs("assume", assume)),
+            checked=listed(checked),
+        )
+        made = imported(reading, base, name or paths[0].stem)
+        result = MachineImportResult(archives, reading, made, _inputs(paths, base))
+        if out is not None:
+            result.save(out, force=force)
+    return result
+
+
+def read_files(paths: Sequence[Path], watch: Watch) -> list[Archive]:
+    """The files of a control. InputError: of several controls, or of none."""
+    archives = []
+    for k, path in enumerate(paths):
+        watch.progress("reading", k, len(paths))
+        archives.append(opened(path.name, content(path, LARGEST)))
+    return archives
+
+
+def pairs(name: str, given: Pairs) -> dict[str, str]:
+    """Key -> text of texts KEY=TEXT. InputError: no such form, or a key twice."""
+    if isinstance(given, Mapping):
+        return {str(key): str(value) for key, value in given.items()}
+    texts = () if given is None else listed(given)
+    found: dict[str, str] = {}
+    for text in texts:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not (key and equals and value):
+            raise InputError(f"{spelt(name)} {text}: NAME=VALUE is needed")
+        if key in found:
+            raise InputError(f"{spelt(name)} {text}: {key} is given twice")
+        found[key] = value
+    return found
+
+
+def _values(given: Mapping[str, str]) -> Mapping[str, str]:
+    for key, text in given.items():
+        try:
+            scalar(text)
+        except ValueError:
+            raise InputError(f"{spelt('assume')} {key}={text}: a number, TRUE, FALSE or 'H..' is needed") from None
+    return given
+
+
+def _axes(given: Pairs, machine: Path | None, archives: Sequence[Archive]) -> dict[str, str]:
+    """Machine's axis -> the control's."""
+    if isinstance(given, Mapping):
+        return {str(key): str(value) for key, value in given.items()}
+    texts = () if given is None else listed(given)
+    if not texts and machine is not None:
+        from feedsim.scenario import load_machine
+
+        return {axis: axis for axis in load_machine(machine).axes}
+    if not texts:
+        has = dict.fromkeys(entry.axis for archive in archives for entry in archive.entries if entry.axis)
+        names = {axis: name for archive in archives for axis, name in archive.axis_names.items()}
+        shown = ", ".join(f"{axis} ({names[axis]})" if axis in names else axis for axis in [*has][:40])
+        raise InputError(f"{spelt('axes')}: which axes? The files have {shown or 'lists without an axis: name one, X'}")
+    found: dict[str, str] = {}
+    for text in texts:
+        axis, equals, theirs = (part.strip() for part in text.partition("="))
+        if not axis or (equals and not theirs):
+            raise InputError(f"{spelt('axes')} {text}: AXIS or AXIS=NAME IN THE CONTROL is needed, such as X=X1")
+        if axis in found:
+            raise InputError(f"{spelt('axes')} {text}: {axis} is named twice")
+        found[axis] = theirs or axis
+    return found
+
+
+def _inputs(paths: Sequence[Path], machine: Path | None) -> list[Path]:
+    own = [] if machine is None else [machine / Machine.IN_FOLDER if machine.is_dir() else machine]
+    return [*paths, *own]

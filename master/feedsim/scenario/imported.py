@@ -1,0 +1,261 @@
+"""Values that a control's files hold, laid into a machine file; a value that the machine file cannot have is refused.
+
+May use control, files. Start reading at imported().
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from feedsim.control import Reading, Refused, Taken
+from feedsim.errors import InputError
+from feedsim.fields import Quantity
+from feedsim.files.checked import check, fetch, read_group
+from feedsim.files.problems import in_order
+from feedsim.files.source import Mark, Place, Source, copied
+from feedsim.scenario.control_keys import translate
+from feedsim.scenario.machine import Axis, Drive, Filter, Machine
+
+# Switches of the machine file follow from what was taken.
+SWITCHES = {"omega_0": "reference_model", "D": "reference_model"}
+# Files that a machine file names and that stay where they are; the modes go with it.
+_NAMED = ("structure", "plant")
+MODES = "modes.csv"
+_PLAIN = re.compile(r"^[A-Za-z_][\w .,/()%-]*$")
+_WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
+
+
+@dataclass
+class Imported:
+    """A machine file with values of a control.
+
+    Attributes:
+        tree: the keys of the file. base: machine that was given; None: a draft, to which `missing` is to be added.
+        values: those of the reading that the file has. refused: those that it cannot have, with the reason.
+        missing: keys that a machine file needs and that neither the files nor a machine have. before: place -> value of
+        the machine that was given, as its file has it.
+    """
+
+    tree: dict[str, Any]
+    base: Machine | None
+    values: list[Taken]
+    refused: list[Refused]
+    missing: list[str]
+    before: dict[Place, Any] = field(default_factory=dict)
+
+    def text(self) -> str:
+        """The machine file."""
+        remarks = {place_of(each): _remark(each) for each in self.values}
+        head = ["# Written by feedsim machine import; behind each value that a control's file holds stands its place."]
+        if self.missing:
+            head += ["# A draft: a machine file needs these keys besides:", *(f"#   {each}" for each in self.missing)]
+        return "\n".join([*head, *_lines(self.tree, (), remarks, 0)]) + "\n"
+
+    def files(self) -> dict[str, str | bytes]:
+        """Name -> content, of the whole folder."""
+        modes = {} if self.base is None else {MODES: self.base.modes.read_bytes()}
+        return {Machine.IN_FOLDER: self.text(), **modes}
+
+
+def place_of(each: Taken) -> Place:
+    """The place of a value in a machine file."""
+    parts = tuple(int(part) if part.isdecimal() else part for part in each.parameter.split("."))
+    if each.value == "off" and parts[-1] != "type":
+        parts = parts[:-1]
+    return ("axes", each.axis, *parts) if each.axis else parts
+
+
+def imported(reading: Reading, machine: Path | None, name: str) -> Imported:
+    """Lay the values of a reading into a machine file; machine: file or folder; None: a draft. name: of a draft.
+
+    A value, or a group of values that belong together, is refused where the machine file would be wrong with it.
+    InputError: the machine is faulty, or has not one of the axes.
+    """
+    source, base = _base(machine, name, reading)
+    found = Imported(source.data, base, [], [], [])
+    before = _faults(source)
+    for group in _groups(reading.taken):
+        trial = source.copy()
+        for each in group:
+            _put(trial, each)
+        if [each.parameter for each in group] in (["travel.0"], ["travel.1"]):
+            found.refused.append(_not(group[0], "a machine file takes both ends of the travel or none"))
+            continue
+        new = [fault for fault in _faults(trial) if fault not in before and not _lacking(fault)]
+        if new:
+            reason = f"a machine file cannot have it: {new[0].partition(': ')[2] or new[0]}"
+            found.refused += [_not(each, reason) for each in group]
+            continue
+        for each in group:
+            found.before[place_of(each)] = _at(source.data, place_of(each))
+        source = trial
+        found.values += group
+    source.data["control"] = reading.control
+    found.tree = source.data
+    faults = _faults(source)
+    found.missing = [fault.partition(": ")[2] for fault in in_order(faults)]
+    if base is not None and found.missing:
+        raise InputError.of(str(machine), in_order(faults))
+    return found
+
+
+def _not(each: Taken, reason: str) -> Refused:
+    return Refused(each.axis, each.name, each.entry.text if each.entry else "", reason, each.where)
+
+
+def _base(machine: Path | None, name: str, reading: Reading) -> tuple[Source, Machine | None]:
+    if machine is None:
+        note = "Imported from a control; what its files do not hold is missing"
+        axes: dict[str, Any] = {axis: {"drive": {}} for axis in reading.axes}
+        tree = {"name": name, "note": note, "control": reading.control, "axes": axes}
+        return Source(tree, {(): Mark("the draft", Path())}), None
+    from feedsim.scenario.load import load_machine
+
+    base = load_machine(machine)
+    path = machine / Machine.IN_FOLDER if machine.is_dir() else machine
+    for axis in reading.axes:
+        if axis not in base.axes:
+            has = ", ".join(base.axes)
+            raise InputError(
+                f"{path}: has no axis {axis!r}; it has {has}: name the machine's axis first, "
+                f"{next(iter(base.axes))}={reading.axes[axis]}"
+            )
+        base.shipped_drive(axis, "values of a control")
+    source = read_group(path)
+    faults: list[str] = []
+    fetch(source, Machine, (), faults)
+    translate(source, ("axes",), faults)
+    source.data["modes"] = MODES
+    for key in _NAMED:
+        if isinstance(source.data.get(key), str):
+            source.data[key] = str(Path(source.data[key]).resolve())
+    for axis in source.data["axes"].values():
+        for role in ("drive", "friction"):
+            if isinstance(axis.get(role), dict) and isinstance(axis[role].get("fmu"), str):
+                axis[role]["fmu"] = str(Path(axis[role]["fmu"]).resolve())
+    order = [key for key in ("name", "note", "control") if key in source.data or key == "control"]
+    source.data = {**{key: source.data.get(key, "") for key in order}, **source.data}
+    source.data["control"] = reading.control
+    return source, base
+
+
+def _faults(source: Source) -> list[str]:
+    faults: list[str] = []
+    tree = source.copy()
+    if isinstance(tree.data.get("modes"), str):
+        tree.data["modes"] = str(Path(__file__))  # it is written with the file; that there is one is all that counts
+    check(tree, Machine, faults)
+    return faults
+
+
+def _lacking(fault: str) -> bool:
+    return ": missing" in fault
+
+
+def _groups(taken: Sequence[Taken]) -> Iterator[list[Taken]]:
+    """Values that can only go together: those of a filter, of the pulse, of the reference model, both ends of a way."""
+    found: dict[tuple[str, str], list[Taken]] = {}
+    for each in taken:
+        way, _, last = each.parameter.rpartition(".")
+        group = way if way not in ("", "drive", "cycles") else SWITCHES.get(last, last)
+        found.setdefault((each.axis, group), []).append(each)
+    yield from found.values()
+
+
+def _put(source: Source, each: Taken) -> None:
+    place = place_of(each)
+    data: Any = source.data
+    for key, following in pairwise(place):
+        if isinstance(data, dict) and not isinstance(data.get(key), dict | list):
+            data[key] = ["", ""] if isinstance(following, int) else {}
+        data = data[key]
+    last = place[-1]
+    data[last] = written(each)
+    if each.value == "off" and last != "type":
+        del data[last]
+
+
+def written(each: Taken) -> Any:
+    """A value as a machine file has it: with the unit that people write."""
+    value = each.value
+    if isinstance(value, bool | str | int):
+        return value
+    quantity = _quantity(each.parameter)
+    unit = quantity.unit if quantity is not None else each.name.si
+    return f"{value!r} {unit}".removesuffix(" 1") if unit not in ("", "1") else value
+
+
+def _quantity(parameter: str) -> Quantity | None:
+    first, _, rest = parameter.partition(".")
+    if first == "drive":
+        model: Any = Filter if rest.startswith("filter_") else Drive
+        info = model.model_fields.get(rest.rpartition(".")[2])
+        return Quantity.of(info) if info is not None else None
+    info = Axis.model_fields.get(first)
+    return Quantity.of(info) if info is not None else None
+
+
+def _at(data: Any, place: Place) -> Any:
+    for key in place:
+        if isinstance(data, dict):
+            data = data.get(str(key))
+        elif isinstance(data, list) and isinstance(key, int) and key < len(data):
+            data = data[key]
+        else:
+            return None
+    return copied(data)
+
+
+def _remark(each: Taken) -> str:
+    if each.entry is None:
+        return f"{each.name.number} {each.name.name}"
+    return f"{each.name.number} {each.name.name} = {each.entry.text[:40]} ({each.where})"
+
+
+def _lines(data: Mapping[str, Any], place: Place, remarks: Mapping[Place, str], depth: int) -> Iterator[str]:
+    """A tree as YAML, a key a line."""
+    pad = "  " * depth
+    for key, value in data.items():
+        own = (*place, key)
+        head = f"{pad}{_scalar(key)}:"
+        if isinstance(value, dict) and value:
+            yield head
+            yield from _lines(value, own, remarks, depth + 1)
+        elif isinstance(value, list):
+            told = "; ".join(remarks[(*own, k)] for k in range(len(value)) if (*own, k) in remarks)
+            yield _told(f"{head} {_flow(value)}", told)
+        else:
+            yield _told(f"{head} {_flow(value)}", remarks.get(own, ""))
+
+
+def _told(text: str, remark: str) -> str:
+    plain = "".join(c if c.isprintable() else "." for c in remark)
+    return f"{text:<36}  # {plain}" if remark else text
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_scalar(key)}: {_flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_flow(item) for item in value) + "]"
+    return _scalar(value)
+
+
+def _scalar(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if value is None:
+        return "null"
+    if isinstance(value, int | float):
+        return repr(value)
+    text = str(value)
+    quantity = re.match(r"^-?[\d.]+(e[+-]?\d+)? [\w./^()]+$", text)
+    if quantity or (_PLAIN.match(text) and text.lower() not in _WORDS and ", " not in text and not text.endswith(" ")):
+        return text
+    return json.dumps(text, ensure_ascii=False)

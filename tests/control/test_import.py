@@ -1,0 +1,393 @@
+"""Files of controls: what is read from them, in SI, and what is refused; values by hand."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from feedsim.control import Reading, opened, read
+from feedsim.control.archive import scalar
+from feedsim.errors import InputError
+
+NC = """; start-up data, written by hand
+%_N_INITIAL_INI
+;$PATH=/_N_INI_DIR
+CHANDATA(1)
+N10000 $MN_AXCONF_MACHAX_NAME_TAB[0]="X1"
+N10000 $MN_AXCONF_MACHAX_NAME_TAB[1]="Y1" ; the second one
+N10240 $MN_SCALING_SYSTEM_IS_METRIC=1
+N20050 $MC_AXCONF_GEOAX_ASSIGN_TAB[0]=1
+CHANDATA(2)
+N30300 $MA_IS_ROT_AX[AX1]=FALSE
+N31030 $MA_LEADSCREW_PITCH[AX1]=10
+N31050 $MA_DRIVE_AX_RATIO_DENOM[0,AX1]=1
+N31060 $MA_DRIVE_AX_RATIO_NUMERA[0,AX1]=2
+N32200 $MA_POSCTRL_GAIN[0,AX1]=5
+N32200 $MA_POSCTRL_GAIN[1,AX1]=2.5
+N32200 $MA_POSCTRL_GAIN[0,AX2]=.15EX1 '2C3D
+   $MA_VELO_FFW_WEIGHT[0,AX1] = 0.95 ; without a number
+N32620 $MA_FFW_MODE[AX1]=3
+N32620 $MA_FFW_MODE[AX2]=0
+N32610 $MA_VELO_FFW_WEIGHT[0,AX2]=1
+N32810 $MA_EQUIV_SPEEDCTRL_TIME[0,AX1]=0.0035
+N32900 $MA_DYN_MATCH_ENABLE[AX1]=1
+N32910 $MA_DYN_MATCH_TIME[0,AX1]=1.2E-3
+N32300 $MA_MAX_AX_ACCEL[0,AX1]=2.5
+N32450 $MA_BACKLASH[0,AX1]=0.012
+M17
+"""
+DRIVE = """[SINUMERIK_HEADER]
+VERSION=1
+[SINAMICS_HEADER]
+PD_FILE_NAME=PS000003.TEA
+[PARAMETER]
+p115[0]=125
+p115[1]=125
+p1400[0]='H8029'
+p1433[0]=120
+p1434[0]=1.25
+p1460[0]=7.5
+p1460[1]=9
+p1462[0]=12.5
+p1520[0]=80
+p1521[0]=-80
+p1656[0]='H0003'
+p1657[0]=2
+p1658[0]=455
+p1659[0]=0.9
+p1660[0]=455
+p1661[0]=0.1
+p1662[0]=1
+p1663[0]=1999
+p1664[0]=0.7
+p1665[0]=2000
+p1666[0]=0.7
+p316[0]=1.6
+p314[0]=4
+r2=31
+"""
+
+
+def values(found: Reading, axis: str) -> dict[str, object]:
+    return {each.parameter: each.value for each in found.taken if each.axis == axis}
+
+
+def reasons(found: Reading) -> dict[str, str]:
+    return {each.name.number: each.reason for each in found.refused if each.weight == "doubt"}
+
+
+def test_machine_data() -> None:
+    found = read([opened("nc.tea", NC.encode())], {"X": "X1", "Y": "AX2"})
+    assert values(found, "X") == {
+        "drive.K_v": pytest.approx(5000 / 60),
+        "drive.k_ffw": 0.95,
+        "drive.symmetry_lag": False,
+        "drive.T_dyn": 0.0012,
+        "pitch": pytest.approx(0.005),  # two turns of the motor for one of the screw
+        "max_acceleration": 2.5,
+        "drive.backlash_compensation.value": pytest.approx(12e-6),
+    }
+    # Without feedforward weight and symmetry are those of none, whatever the file has.
+    assert values(found, "Y") == {"drive.K_v": pytest.approx(1500 / 60), "drive.k_ffw": 0.0, "drive.T_sym": 0.0}
+    assert reasons(found)["MD32810"].startswith("no public source that was opened states its unit; s is supposed")
+    assert any("MD32200 POSCTRL_GAIN has other values in other elements" in note for note in found.notes)
+
+
+def test_a_unit_that_was_checked() -> None:
+    archive = opened("nc.tea", NC.encode())
+    for checked in (["MD32810"], "all", ["all"]):
+        found = read([archive], {"X": "X1"}, checked=[checked] if isinstance(checked, str) else checked)
+        assert values(found, "X")["drive.T_sym"] == 0.0035
+    with pytest.raises(InputError, match="MD999 is no number of the table of names"):
+        read([archive], {"X": "X1"}, checked=["MD999"])
+
+
+def test_parameters_of_a_drive() -> None:
+    found = read([opened("ps.tea", DRIVE.encode())], {"X": "X"})
+    assert values(found, "X") == {
+        "drive.K_p": 7.5,
+        "drive.T_n": pytest.approx(0.0125),
+        "drive.reference_model": True,
+        "drive.omega_0": pytest.approx(2 * math.pi * 120),
+        "drive.D": 1.25,
+        "drive.M_max": 80.0,
+        "drive.filter_1.type": "second_order",
+        "drive.filter_1.f": 455.0,
+        "drive.filter_1.D_den": 0.9,
+        "drive.filter_1.D_num": 0.1,
+        "drive.filter_2.type": "low_pass",
+        "drive.filter_2.f": 1999.0,
+        "drive.filter_2.D_den": 0.7,
+        "drive.filter_3.type": "off",
+        "drive.filter_4.type": "off",
+        "drive.K_t": pytest.approx(1.6 / math.sqrt(2)),
+        "drive.p": 4,
+    }
+    assert values(found, "") == {"cycles.control": 125e-6}
+    assert [text for text in found.doubts if "p1460" in text and "differs between data sets" in text]
+
+
+@pytest.mark.parametrize(
+    ("change", "number", "reason"),
+    [
+        (("p1660[0]=455", "p1660[0]=450"), "p1658", "it acts where p1657=1 or p1660=p1658"),
+        (("p1657[0]=2", "p1657[0]=5"), "p1657", "5 is none of 1 (low_pass), 2 (second_order)"),
+        (("p1521[0]=-80", "p1521[0]=-60"), "p1520", "it acts where p1521=-p1520"),
+        (("p115[1]=125", "p115[1]=250"), "p115", "it acts where p115[1]=p115"),
+        (("p1460[0]=7.5", "p1460[0]=7,5"), "p1460", "no number"),
+        (("p1460[0]=7.5", 'p1460[0]="7.5"'), "p1460", "no number"),
+        (("p1460[0]=7.5", "p1460[0]=7.5\np1460[0]=8"), "p1460", "the files have several values"),
+        (("p1460[0]=7.5\n", ""), "p1460", "the file has elements of it, but not [0]"),
+        (("p1400[0]='H8029'\n", ""), "p1433", "and the file has no p1400.3"),
+    ],
+)
+def test_values_of_a_drive_that_are_refused(change: tuple[str, str], number: str, reason: str) -> None:
+    found = read([opened("ps.tea", DRIVE.replace(*change).encode())], {"X": "X"})
+    assert number not in {each.name.number for each in found.taken}
+    told = next(each.reason for each in found.refused if each.name.number == number)
+    assert reason in told
+
+
+@pytest.mark.parametrize(
+    ("change", "number", "reason"),
+    [
+        (("N10240 $MN_SCALING_SYSTEM_IS_METRIC=1", "N10240 $MN_SCALING_SYSTEM_IS_METRIC=0"), "MD31030", "is inch"),
+        (("CHANDATA(2)", "N10220 $MN_SCALING_USER_DEF_MASK='H0'"), "MD32200", "MD10220 is 0"),
+        (("CHANDATA(2)", "N10230 $MN_SCALING_FACTORS_USER_DEF[9]=1"), "MD32200", "another unit than 1000/min"),
+        (("[AX1]=FALSE", "[AX1]=TRUE"), "MD31030", "it acts where IS_ROT_AX=0"),
+        (("N31050 $MA_DRIVE_AX_RATIO_DENOM[0,AX1]=1\n", ""), "MD31030", "and the file has no MD31050"),
+        (("RATIO_DENOM[0,AX1]=1", "RATIO_DENOM[0,AX1]=0"), "MD31030", "MD31050 is 0"),
+        (("N32620 $MA_FFW_MODE[AX1]=3", "N32620 $MA_FFW_MODE[AX1]=4"), "MD32610", "it acts where FFW_MODE=1|3"),
+        (("N32620 $MA_FFW_MODE[AX1]=3\n", ""), "MD32610", "and the file has no FFW_MODE"),
+        (("N32450 $MA_BACKLASH", "N32451 $MA_BACKLASH"), "MD32450", "the file has MD32451 BACKLASH"),
+        (("BACKLASH[0,AX1]=0.012", "BACKLASH[0,AX1]=R5"), "MD32450", "no number"),
+        (("N32200 $MA_POSCTRL_GAIN[0,AX1]=5", "IF R1==1\nN32200 $MA_POSCTRL_GAIN[0,AX1]=5\nENDIF"), "MD32200", "an IF"),
+        (("POSCTRL_GAIN[1,AX1]=2.5", "POSCTRL_GAIN[0,X1]=2.5"), "MD32200", "several values: nc.tea:14 (5), nc"),
+    ],
+)  # fmt: skip
+def test_machine_data_that_are_refused(change: tuple[str, str], number: str, reason: str) -> None:
+    assert change[0] in NC
+    found = read([opened("nc.tea", NC.replace(*change).encode())], {"X": "X1"})
+    assert number not in {each.name.number for each in found.taken}
+    assert reason in next(each.reason for each in found.refused if each.name.number == number)
+
+
+PULSE = """N32490 $MA_FRICT_COMP_MODE[0,AX1]=1
+N32500 $MA_FRICT_COMP_ENABLE[0,AX1]=1
+N32510 $MA_FRICT_COMP_ADAPT_ENABLE[0,AX1]=1
+N32520 $MA_FRICT_COMP_CONST_MAX[0,AX1]=17.1
+N32530 $MA_FRICT_COMP_CONST_MIN[0,AX1]=34
+N32540 $MA_FRICT_COMP_TIME[0,AX1]=0.055
+N32550 $MA_FRICT_COMP_ACCEL1[0,AX1]=0.02
+"""
+
+
+def test_a_friction_pulse() -> None:
+    found = read([opened("p.tea", PULSE.encode())], {"X": "AX1"}, checked=["all"])
+    assert values(found, "X") == {
+        "drive.friction_pulse.amplitude": pytest.approx(17.1e-3 / 60),
+        "drive.friction_pulse.amplitude_min": pytest.approx(34e-3 / 60),
+        "drive.friction_pulse.time": 0.055,
+        "drive.friction_pulse.adaptation": True,
+        "drive.friction_pulse.acceleration_1": 0.02,
+    }
+    off = opened("p.tea", PULSE.replace("ENABLE[0,AX1]=1", "ENABLE[0,AX1]=0", 1).encode())
+    assert values(read([off], {"X": "AX1"}), "X") == {"drive.friction_pulse.amplitude": "off"}
+    neural = opened("p.tea", PULSE.replace("MODE[0,AX1]=1", "MODE[0,AX1]=2").encode())
+    found = read([neural], {"X": "AX1"}, checked=["all"])
+    assert values(found, "X") == {}
+    assert found.refused[0].reason == "it acts where FRICT_COMP_MODE=1; FRICT_COMP_MODE is 2"
+
+
+def test_what_the_files_do_not_have_is_assumed() -> None:
+    text = NC.replace("N32620 $MA_FFW_MODE[AX1]=3\n", "").replace("N31050 $MA_DRIVE_AX_RATIO_DENOM[0,AX1]=1\n", "")
+    found = read([opened("nc.tea", text.encode())], {"X": "X1"}, assume={"FFW_MODE": "1", "MD31050": "1"})
+    assert values(found, "X")["drive.k_ffw"] == 0.95
+    assert values(found, "X")["pitch"] == pytest.approx(0.005)
+
+
+@pytest.mark.parametrize("at", range(1, 42, 3))
+def test_a_record_that_cuts_a_line_takes_the_value_with_it(at: int) -> None:
+    """A container has binary heads between its records; a head within a line must not leave a part of a number."""
+    line = "N32200 $MA_POSCTRL_GAIN[0,AX1]=16.625"
+    whole = NC.replace("N32200 $MA_POSCTRL_GAIN[0,AX1]=5\n", line[:at] + "\x00\x01head\x00\x02" + line[at:] + "\n")
+    found = read([opened("a.arc", whole.encode("latin-1"))], {"X": "AX1"})
+    value = values(found, "X").get("drive.K_v")
+    assert value is None or value == pytest.approx(16625 / 60)
+    assert values(found, "X")["max_acceleration"] == 2.5
+
+
+def test_a_container_with_drives() -> None:
+    """Heads run into the first line of a text, as archives have them."""
+    second = DRIVE.replace("PS000003", "PS000004").replace("p1460[0]=7.5", "p1460[0]=3").replace("p1460[1]=9\n", "")
+    name = "".join(f"p199[{k}]={ord(c)}\n" for k, c in enumerate("SERVO_Y"))
+    heads = [f"\x00\\_NC_ACT.DIR\\_N_PS00000{n}_TEAPS00000{n}.TEA\x00\x07/_N_SYSTEM_DRV/" for n in (3, 4)]
+    data = ("\x02\x00_N_INITIAL_INI\x00" + NC + heads[0] + DRIVE + heads[1] + second + name).encode("latin-1")
+    archive = opened("all.arc", data)
+    assert archive.container
+    assert archive.places == {"PS000003": "", "PS000004": "SERVO_Y"}
+    found = read([archive], {"X": "X1", "Y": "Y1"})
+    assert "drive.K_p" not in values(found, "X")
+    assert "the files have PS000003, PS000004 (SERVO_Y): name it, --drives X=PS000003" in found.notes[0]
+    found = read([archive], {"X": "X1", "Y": "Y1"}, places={"X": ["PS000003"], "Y": ["PS000004"]})
+    assert (values(found, "X")["drive.K_p"], values(found, "Y")["drive.K_p"]) == (7.5, 3.0)
+    with pytest.raises(InputError, match="no drive object or list 'PS9'; the files have PS000003, PS000004"):
+        read([archive], {"X": "X1"}, places={"X": ["PS9"]})
+    with pytest.raises(InputError, match=r"no axis 'Q'; the files have AX1 \(X1\), AX2 \(Y1\)"):
+        read([archive], {"X": "Q"})
+    named = opened("all.arc", data.replace(b"p199[0]=83", b"p199[0]=89").replace(b"p199[1]=69", b"p199[1]=0"))
+    assert named.places["PS000004"] == "YRVO_Y"
+
+
+TABLE = """Parameter;Name;Value;Unit
+p1460[0];Speed controller P gain;7.5;Nms/rad
+p1462[0];Speed controller integral time;12,5;ms
+p1520[0];Torque limit;80000;mNm
+"p1715[0]";"Current controller; P gain";"10.4";"V/A"
+S-0-0100;nothing
+"""
+
+
+def test_tables() -> None:
+    found = read([opened("list.csv", TABLE.replace("S-0-0100;nothing\n", "").encode("utf-8-sig"))], {"X": "X"})
+    assert values(found, "X") == {"drive.K_p": 7.5, "drive.current.K_p": 10.4}  # the file states the unit of p1715
+    assert reasons(found)["p1462"] == "no number"  # 12,5 may be two numbers
+    assert reasons(found)["p1520"] == "the file has it in 'mNm', the table of names in N.m"
+    idn = "IDN,Text,Value\nS-0-0100,Velocity loop gain,0.6\nS-0-0296,Feedforward,95\nP-AXIS-00099,kv,5000\n"
+    found = read([opened("ax.csv", idn.encode("utf-16"))], {"X": "X"})
+    assert values(found, "X") == {"drive.k_ffw": pytest.approx(0.95), "drive.K_v": 50.0}
+    assert "no public source" in reasons(found)["S-0-0100"]  # N.m.s/rad or A.s/rad, by a bit of another parameter
+    unsure = opened("ax.csv", b"S-0-0100,0.6,0.7\nS-0-0101,5\n")
+    assert [each.reason for each in unsure.odd] == ["which cell is the value is not known"]
+
+
+def test_a_list_of_twincat_cnc() -> None:
+    text = (
+        "# X axis\nkopf.log_achs_name   X_Achse\ngetriebe[0].kv   5000   # 0.01/s\ngetriebe[1].kv  100\n"
+        "getriebe[0].dynamik.vb_max 500000\ngetriebe[0].dynamik.a_max 14400\ngetriebe[0].lose 120\nodd\n"
+    )
+    found = read([opened("x.lis", text.encode())], {"X": "X_Achse"})
+    assert values(found, "X") == {
+        "drive.K_v": 50.0,
+        "max_speed": pytest.approx(0.5),
+        "max_acceleration": pytest.approx(14.4),
+        "drive.backlash_compensation.value": pytest.approx(12e-6),
+    }
+    assert found.doubts == ["X: P-AXIS-00099 getriebe[i].kv differs between data sets; that of index 0 is taken"]
+
+
+def test_an_xti_of_twincat_nc() -> None:
+    text = (
+        '<?xml version="1.0"?>\n<TcSmItem><!-- <Velo Maximum="9"/> --><Axis Id="1"><Name>X</Name><AxisPara>\n'
+        "<Dynamic AccelerationMaximum=\"1500\"/><Velo Maximum='250'/></AxisPara></Axis></TcSmItem>"
+    )
+    archive = opened("axis.xti", text.encode())
+    assert values(read([archive], {"X": "X"}), "X") == {}
+    found = read([archive], {"X": "X"}, checked=["Velo@Maximum", "Dynamic@AccelerationMaximum"])
+    assert values(found, "X") == {"max_speed": 0.25, "max_acceleration": 1.5}
+
+
+INI = """[EMC]
+MACHINE = mill
+[EMCMOT]
+SERVO_PERIOD = 1000000
+[TRAJ]
+COORDINATES = X Z
+LINEAR_UNITS = inch
+[JOINT_0]
+TYPE = LINEAR
+MAX_VELOCITY = 10 # inch/s
+MAX_ACCELERATION = 100
+MIN_LIMIT = 0
+MAX_LIMIT = 20
+BACKLASH = 0.001
+P = 50
+[JOINT_1]
+UNITS = mm
+MAX_VELOCITY = 200
+BACKLASH = 0.02
+COMP_FILE = z.comp
+"""
+
+
+def test_linuxcnc() -> None:
+    found = read([opened("mill.ini", INI.encode())], {"X": "X", "Z": "JOINT_1"})
+    assert values(found, "X") == {
+        "max_speed": pytest.approx(0.254),
+        "max_acceleration": pytest.approx(2.54),
+        "travel.0": 0.0,
+        "travel.1": pytest.approx(0.508),
+        "drive.backlash_compensation.value": pytest.approx(25.4e-6),
+    }
+    assert values(found, "Z") == {"max_speed": pytest.approx(0.2)}
+    assert values(found, "") == {"cycles.position": 0.001}
+    assert "its wiring is in the HAL file" in reasons(found)["pid.Pgain"]
+    assert reasons(found)["BACKLASH"] == "COMP_FILE takes its place"
+    found = read([opened("mill.ini", INI.replace("TYPE = LINEAR", "TYPE = ANGULAR").encode())], {"X": "X"})
+    assert values(found, "X") == {}
+    found = read([opened("mill.ini", INI.replace("= inch", "= furlong").encode())], {"X": "X"})
+    assert values(found, "X") == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("5", 5.0), ("-.5", -0.5), ("5.", 5.0), ("1e-3", 1e-3), ("1.5EX-3", 1.5e-3), ("+2", 2.0), ("TRUE", True),
+        ("false", False), ("'H8029'", 0x8029), ("'B101'", 5.0), ('"X1"', "X1"), ("#x0000ffff", 65535.0),
+    ],
+)  # fmt: skip
+def test_scalars(text: str, value: object) -> None:
+    assert scalar(text) == value
+
+
+@pytest.mark.parametrize("text", ["", "5,0", "5 6", "(1,2)", "R5", "nan", "inf", "0x10", "'H'", "--5", "1e", "5'"])
+def test_no_scalars(text: str) -> None:
+    with pytest.raises(ValueError, match=r"no number|hexadecimal|invalid literal"):
+        scalar(text)
+
+
+def test_no_file_of_a_control() -> None:
+    for data in (b"", b"a,b\nc,d\n", bytes(range(256)) * 20, b"name: machine\n", b"<a></a>"):
+        with pytest.raises(InputError, match="holds no parameters of a control"):
+            opened("file", data)
+
+
+def test_files_of_several_controls() -> None:
+    with pytest.raises(InputError, match="files of several controls: linuxcnc, sinumerik"):
+        read([opened("a", NC.encode()), opened("b", INI.encode())], {"X": "X1"})
+
+
+SEEDS = [NC, DRIVE, TABLE, INI, 'getriebe[0].kv 5\n<TcSmItem><Axis><Velo Maximum="3"/></Axis>', "p1460[0]=1\n"]
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.data())
+def test_no_bytes_end_in_anything_but_a_sentence(data: st.DataObject) -> None:
+    raw = bytearray(data.draw(st.sampled_from(SEEDS)).encode())
+    for _ in range(data.draw(st.integers(0, 12))):
+        at = data.draw(st.integers(0, len(raw)))
+        piece = data.draw(
+            st.one_of(st.binary(max_size=6), st.sampled_from([b"[", b"]=", b"'H", b"\n", b"$MA_", b",AX1]"]))
+        )
+        raw[at : at + data.draw(st.integers(0, 8))] = piece
+    try:
+        archive = opened("file.arc", bytes(raw))
+        axes = [each.axis for each in archive.entries if each.axis][:1] or ["X"]
+        found = read([archive], {"X": axes[0]}, checked=["all"])
+    except InputError:
+        return
+    assert all(not isinstance(each.value, float) or math.isfinite(each.value) for each in found.taken)
+    assert all(archive.text[slice(*each.span)] == each.text for each in archive.entries)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=300))
+def test_any_bytes(data: bytes) -> None:
+    try:
+        opened("file", data)
+    except InputError:
+        return
+    assert data

@@ -18,6 +18,7 @@ from feedsim.jobs.identify_modes import identify_modes as identify_modes
 from feedsim.jobs.machine import machine_build as machine_build
 from feedsim.jobs.machine import machine_info as machine_info
 from feedsim.jobs.machine import machine_show as machine_show
+from feedsim.jobs.machine_export import machine_export as machine_export
 from feedsim.jobs.machine_import import machine_import as machine_import
 from feedsim.jobs.machine_pack import machine_pack as machine_pack
 from feedsim.jobs.made import Made as Made

@@ -59,6 +59,7 @@ NEEDED = {
     "circle": ["--feed", "1000 mm/min"],
     "sweep": ["--workers", "1"],
     "machine import": ["--axes", "Z"],
+    "machine export": ["--like", "mill.tea", "--axes", "Z"],
 }
 # One file serves for both sides of what takes two.
 TWICE = ("compare",)

@@ -133,6 +133,51 @@ def test_an_input_is_no_output(place: Path) -> None:
     assert "is an input and would be replaced" in done.stderr
 
 
+def test_back_into_the_control(place: Path) -> None:
+    words = ["machine", "export", "centre", "--like", "nc.tea", "drive.tea", "--axes", "X=X1", "--drives", "X=drive"]
+    done = feedsim(*words, "--out", "load", cwd=place)
+    assert done.returncode == 0, done.stderr
+    assert "X MD32200 POSCTRL_GAIN: 5 -> 4 1000/min" in done.stdout
+    old, new = (place / "nc.tea").read_bytes(), (place / "load" / "nc.tea").read_bytes()
+    changed = [(a, b) for a, b in zip(old.split(b"\n"), new.split(b"\n"), strict=True) if a != b]
+    assert changed == [
+        (b"N32200 $MA_POSCTRL_GAIN[0,AX1]=5\r", b"N32200 $MA_POSCTRL_GAIN[0,AX1]=4\r"),
+        (b"N32300 $MA_MAX_AX_ACCEL[0,AX1]=9.5\r", b"N32300 $MA_MAX_AX_ACCEL[0,AX1]=14.4\r"),
+        (b"N32610 $MA_VELO_FFW_WEIGHT[0,AX1]=0.9\r", b"N32610 $MA_VELO_FFW_WEIGHT[0,AX1]=1\r"),
+    ]
+    with (place / "load" / "sheet.csv").open() as file:
+        rows = {row["number"]: row for row in csv.DictReader(file)}
+    assert rows["MD32200"] | {"where": ""} == {
+        "axis": "X", "number": "MD32200", "name": "POSCTRL_GAIN", "old": "5", "new": "4", "unit": "1000/min",
+        "unit confirmed": "yes", "written": "yes", "reason": "", "where": "",
+    }  # fmt: skip
+    assert (rows["MD32810"]["new"], rows["MD32810"]["written"]) == ("0.004854", "no")
+    assert (rows["p1657"]["new"], rows["p1657"]["written"]) == ("2", "no")  # its bit of p1656 is 0
+    # What the new files hold, beside the machine: the same values, but for those that were to be typed.
+    again = fs.machine_import([place / "load" / "nc.tea", place / "load" / "drive.tea"], {"X": "X1"}, place / "centre",
+                              drives={"X": "drive"})  # fmt: skip
+    values = {each.parameter: each.value for each in again.made.values}
+    drive = load_machine(place / "centre").axes["X"].drive
+    assert values["drive.K_v"] == pytest.approx(drive.K_v, rel=1e-9)
+    assert (values["drive.K_p"], values["drive.T_n"]) == (drive.K_p, drive.T_n)
+
+
+def test_an_export_to_another_control(place: Path) -> None:
+    file = place / "centre" / "machine.yaml"
+    file.write_text(file.read_text().replace("\nmodes:", "\ncontrol: twincat\nmodes:", 1))
+    done = feedsim("machine", "export", "centre", "--like", "nc.tea", "--axes", "X=X1", "--out", "load", cwd=place)
+    assert done.returncode == 2
+    assert "is of the control twincat, the files are of sinumerik" in done.stderr
+    assert not (place / "load").exists()
+
+
+def test_an_export_never_replaces_its_input(place: Path) -> None:
+    done = feedsim("machine", "export", "centre", "--like", "nc.tea", "--axes", "X=X1", "--out", ".", "--force",
+                   cwd=place)  # fmt: skip
+    assert done.returncode != 0
+    assert "nc.tea: is an input and would be replaced" in done.stderr
+
+
 def test_in_python(place: Path) -> None:
     result = fs.machine_import(place / "nc.tea", {"X": "X1"}, place / "centre", checked="MD32810")
     assert result.made.values

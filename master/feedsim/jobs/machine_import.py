@@ -133,17 +133,17 @@ def machine_import(
     """
     paths = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
     base = None if machine is None else Path(machine)
-    with kept(out, page.check_writable, watch, _inputs(paths, base), (), force=force):
+    with kept(out, page.check_writable, watch, inputs_of(paths, base), (), force=force):
         archives = read_files(paths, watch)
         reading = read(
             archives,
-            _axes(axes, base, archives),
+            axes_of(axes, base, archives),
             places={axis: tuple(text.split("+")) for axis, text in pairs("drives", drives).items()},
-            assume=_values(pairs("assume", assume)),
+            assume=assumed(assume),
             checked=listed(checked),
         )
         made = imported(reading, base, name or paths[0].stem)
-        result = MachineImportResult(archives, reading, made, _inputs(paths, base))
+        result = MachineImportResult(archives, reading, made, inputs_of(paths, base))
         if out is not None:
             result.save(out, force=force)
     return result
@@ -174,16 +174,18 @@ def pairs(name: str, given: Pairs) -> dict[str, str]:
     return found
 
 
-def _values(given: Mapping[str, str]) -> Mapping[str, str]:
-    for key, text in given.items():
+def assumed(given: Pairs) -> Mapping[str, str]:
+    """Parameter -> text of --assume. InputError: no value of a control."""
+    found = pairs("assume", given)
+    for key, text in found.items():
         try:
             scalar(text)
         except ValueError:
             raise InputError(f"{spelt('assume')} {key}={text}: a number, TRUE, FALSE or 'H..' is needed") from None
-    return given
+    return found
 
 
-def _axes(given: Pairs, machine: Path | None, archives: Sequence[Archive]) -> dict[str, str]:
+def axes_of(given: Pairs, machine: Path | None, archives: Sequence[Archive]) -> dict[str, str]:
     """Machine's axis -> the control's."""
     if isinstance(given, Mapping):
         return {str(key): str(value) for key, value in given.items()}
@@ -208,6 +210,7 @@ def _axes(given: Pairs, machine: Path | None, archives: Sequence[Archive]) -> di
     return found
 
 
-def _inputs(paths: Sequence[Path], machine: Path | None) -> list[Path]:
+def inputs_of(paths: Sequence[Path], machine: Path | None) -> list[Path]:
+    """Files of the control, and that of the machine."""
     own = [] if machine is None else [machine / Machine.IN_FOLDER if machine.is_dir() else machine]
     return [*paths, *own]

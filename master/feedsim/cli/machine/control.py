@@ -39,6 +39,33 @@ def import_(options: Namespace) -> None:
     finish(options.quiet, result.findings, head, *result.lines)
 
 
+EXPORT_DESCRIPTION = """Write the values of a machine file into copies of a control's files, and a sheet of old and new
+values. The bytes of changed values differ, and no others. What cannot be written stands on the sheet, to be typed."""
+EXPORT_EPILOG = """examples:
+  feedsim machine export my_machine --like archive.tea --axes X=X1,Y=Y1 --out to_load
+  feedsim machine export my_machine --like nc.tea ps000003.tea --axes X=X1 --drives X=PS000003 --out to_load
+"""
+
+
+def export(options: Namespace) -> None:
+    """feedsim machine export."""
+    from feedsim.jobs.machine_export import machine_export
+
+    out: Path = options.out or Path("results") / f"export_{options.machine.stem}"
+    with watching(options.quiet) as watch:
+        result = machine_export(
+            options.machine,
+            options.like,
+            options.axes,
+            drives=options.drives,
+            assume=options.assume,
+            checked=options.checked,
+            out=out,
+            watch=watch,
+        )
+    finish(options.quiet, result.findings, f"{result.machine.name} -> {out / 'sheet.csv'}", *result.lines)
+
+
 FILES = Option("files", "FILE", "files of one control: archive, machine data, parameters of drives, lists, INI "
                "(docs/control_files.md)", nargs="+", type=Path)  # fmt: skip
 AXES = Option(
@@ -70,4 +97,17 @@ IMPORT = Command(
     IMPORT_DESCRIPTION,
     IMPORT_EPILOG,
     job="machine_import",
+)  # fmt: skip
+EXPORT = Command(
+    "export",
+    "write values of a machine file into copies of a control's files",
+    export,
+    (
+        Option("machine", "MACHINE", "machine file, or a folder with a machine.yaml", type=Path),
+        Option("--like", "FILE", "files of the control as it is now", nargs="+", type=Path, required=True),
+        AXES, DRIVES, ASSUME, CHECKED, out("export_<name of the machine's folder>"), QUIET,
+    ),
+    EXPORT_DESCRIPTION,
+    EXPORT_EPILOG,
+    job="machine_export",
 )  # fmt: skip

@@ -1,0 +1,165 @@
+"""Values of a machine file written back into the files of a control."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import Figure, Named
+from feedsim.arguments import listed, spelt
+from feedsim.control import Archive, names_of
+from feedsim.control.reading import Value
+from feedsim.control.writing import Written, changed
+from feedsim.errors import InputError
+from feedsim.jobs.folder import File, kept
+from feedsim.jobs.machine_import import Pairs, assumed, axes_of, inputs_of, pairs, read_files
+from feedsim.jobs.result import Result
+from feedsim.jobs.watch import SILENT, Watch
+from feedsim.report.content import Report
+from feedsim.report.control_files import exported as page
+from feedsim.report.results import Content
+from feedsim.scenario import load_machine
+from feedsim.scenario.machine import Machine
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MachineExportResult(Result):
+    """Files of a control with values of a machine file.
+
+    archives: the files as they were. written: files with changed values, and every difference. machine: whose values
+    they are. inputs_read: the files.
+    """
+
+    archives: Sequence[Archive]
+    written: Written
+    machine: Machine
+    axes: Mapping[str, str]
+    inputs_read: Sequence[Path]
+
+    kind = page.KIND
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files of the control and of the machine."""
+        return self.inputs_read
+
+    @property
+    def figures(self) -> Mapping[str, Figure]:
+        """ "values.changed", "values.to_type", "values.same"."""
+        return Named(page.figures_of(self.written))
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """Values that are to be typed, and what was not touched although it may matter."""
+        return page.findings(self.written)
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """How many values of each axis differ."""
+        return page.answers(self.written, self.axes)
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The answers, and every changed value."""
+        return [f"  {line}" for line in (*self.answers, *page.change_lines(self.written))]
+
+    def files(self) -> Mapping[str, Content]:
+        """Files with changed values, and the sheet to type."""
+        return {**page.named(self.written.contents), page.SHEET: page.sheet(self.written)}
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.archives, self.written, self.machine, self.axes, self.inputs_read)
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return page.summary(self.written, self.machine, self.axes, self.inputs_read, names)
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        page.check_writable([*page.named(self.written.contents)], folder, inputs)
+
+
+def machine_export(
+    machine: File,
+    like: File | Sequence[File],
+    axes: Pairs = None,
+    *,
+    drives: Pairs = None,
+    assume: Pairs = None,
+    checked: str | Sequence[str] = (),
+    out: File | None = None,
+    force: bool = False,
+    watch: Watch = SILENT,
+) -> MachineExportResult:
+    """Write the values of a machine file into copies of a control's files, and a sheet of old and new values.
+
+    The bytes of changed values differ, and no others. What cannot be written stands on the sheet, to be typed.
+
+    Args:
+        machine: machine file or folder.
+        like: files of the control, as it is now.
+        axes, drives, assume, checked: as of :func:`feedsim.machine_import`.
+        out: folder that the result is written to; None: :meth:`Result.save` does it.
+        force: as of :meth:`Result.save`.
+        watch: who hears how far the job is.
+
+    Raises:
+        InputError: a faulty machine, one of another control, files as of :func:`feedsim.machine_import`, a change that
+            would change another value.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> from pathlib import Path
+    >>> size = Path("mill.tea").write_text("N32200 $MA_POSCTRL_GAIN[0,AX1]=5 ; gain\\n")
+    >>> result = fs.machine_export("machines/test_centre", "mill.tea", "X=AX1")
+    >>> result.written.contents["mill.tea"]
+    b'N32200 $MA_POSCTRL_GAIN[0,AX1]=4 ; gain\\n'
+    """
+    paths = [Path(each) for each in ([like] if isinstance(like, str | Path) else like)]
+    base = Path(machine)
+    names = [path.name for path in paths]
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        raise InputError(f"{spelt('like')}: two files are called {twice}; their copies stand in one folder")
+    with kept(out, lambda folder, inputs: page.check_writable(page.kept_apart(names), folder, inputs), watch,
+              inputs_of(paths, base), (), force=force):  # fmt: skip
+        own = load_machine(base)
+        archives = read_files(paths, watch)
+        if own.control and own.control != archives[0].control:
+            raise InputError(f"{base}: is of the control {own.control}, the files are of {archives[0].control}")
+        chosen = axes_of(axes, base, archives)
+        for axis in chosen:
+            if axis not in own.axes:
+                raise InputError(f"{base}: has no axis {axis!r}; it has {', '.join(own.axes)}")
+            own.shipped_drive(axis, "an export to a control")
+        written = changed(
+            archives,
+            chosen,
+            {axis: values_of(own, archives[0].control, axis) for axis in chosen},
+            places={axis: tuple(text.split("+")) for axis, text in pairs("drives", drives).items()},
+            assume=assumed(assume),
+            checked=listed(checked),
+        )
+        result = MachineExportResult(archives, written, own, chosen, inputs_of(paths, base))
+        if out is not None:
+            result.save(out, force=force)
+    return result
+
+
+def values_of(machine: Machine, control: str, axis: str) -> dict[str, Value]:
+    """Our parameter -> SI value of an axis, of all that the control has a name for."""
+    found: dict[str, Value] = {}
+    for parameter in names_of(control):
+        value = reduce(_inside, parameter.split("."), machine.axes[axis])
+        if isinstance(value, bool | int | float | str):
+            found[parameter] = float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    return found
+
+
+def _inside(value: Any, step: str) -> Any:
+    if step.isdecimal() and isinstance(value, tuple):
+        return value[int(step)] if int(step) < len(value) else None
+    return getattr(value, step, None)

@@ -1,0 +1,160 @@
+"""The report of an export to a control's files: what was changed, what is to be typed, old and new values."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from feedsim.analysis import Figure
+from feedsim.control import Archive
+from feedsim.control.writing import Written
+from feedsim.findings import Note
+from feedsim.report.content import Report, Section, Table, Text, Tile, code
+from feedsim.report.formatting import counted, minus
+from feedsim.report.provenance import figures_part, hashed, inputs_part, software
+from feedsim.report.results import REPORT, SUMMARY, check_place
+from feedsim.report.sections import provenance_section
+from feedsim.scenario.machine import Machine
+
+KIND = "machine export"
+SHEET = "sheet.csv"
+MOST_NAMED = 3
+TOUCHED = "No byte of the files differs but those of the values that are listed as written."
+
+
+def kept_apart(names: Iterable[str]) -> list[str]:
+    """Names of the written files; one that a result has itself gets a word ahead."""
+    own = {REPORT, SUMMARY, SHEET, "figures"}
+    return [f"control_{name}" if name in own else name for name in names]
+
+
+def named(contents: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Name of the written file -> content."""
+    return dict(zip(kept_apart(contents), contents.values(), strict=True))
+
+
+def check_writable(files: Sequence[str], directory: Path | str, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError unless the results can be written to ``directory`` without one of ``inputs`` being lost."""
+    check_place(directory, (*files, REPORT, SUMMARY, SHEET), inputs, kind=KIND)
+
+
+def figures_of(written: Written) -> dict[str, Figure]:
+    """How many values differ."""
+    done = [each for each in written.changes if each.written]
+    return {
+        "values.changed": Figure(float(len(done)), "1", "values of the files that were changed"),
+        "values.to_type": Figure(
+            float(len(written.changes) - len(done)), "1", "values that could not be written, each with its reason"
+        ),
+        "values.same": Figure(float(len(written.same)), "1", "values of the files that are those of the machine file"),
+    }
+
+
+def findings(written: Written) -> list[str]:
+    """Values to type, and what was not touched."""
+    found: list[str] = []
+    typed = [each for each in written.changes if not each.written]
+    if typed:
+        shown = "; ".join(
+            f"{each.axis} {each.name.number} {each.name.name} {each.new} ({each.reason})" for each in typed[:MOST_NAMED]
+        )
+        more = f"; and {len(typed) - MOST_NAMED} more on the sheet" if len(typed) > MOST_NAMED else ""
+        found.append(f"{counted(len(typed), 'value')} not written: {shown}{more}")
+    return [*found, *(Note(text) for text in written.notes)]
+
+
+def answers(written: Written, axes: Mapping[str, str]) -> list[str]:
+    """How many values of each axis were changed."""
+    said = []
+    for axis, theirs in axes.items():
+        own = [each for each in written.changes if each.axis == axis]
+        done = sum(each.written for each in own)
+        said.append(f"{axis} ({theirs}): {counted(done, 'value')} changed, {len(own) - done} to type")
+    return said
+
+
+def change_lines(written: Written) -> list[str]:
+    """Every changed value, a line each."""
+    return [
+        f"{each.axis} {each.name.number} {each.name.name}: {each.old} -> {each.new} {each.name.unit}".rstrip()
+        for each in written.changes
+        if each.written
+    ]
+
+
+def sheet(written: Written) -> str:
+    """Old and new values as CSV, in the control's words."""
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    rows.writerow(["axis", "number", "name", "old", "new", "unit", "unit confirmed", "written", "reason", "where"])
+    for each in written.changes:
+        rows.writerow([
+            each.axis, each.name.number, each.name.name, each.old, each.new, each.name.unit,
+            "yes" if each.name.confirmed else "no", "yes" if each.written else "no", each.reason, each.where,
+        ])  # fmt: skip
+    return out.getvalue()
+
+
+def report_of(
+    archives: Sequence[Archive], written: Written, machine: Machine, axes: Mapping[str, str], inputs: Sequence[Path]
+) -> Report:
+    """Content of the report."""
+    figures = figures_of(written)
+    return Report(
+        f"{machine.name} for {', '.join(archive.name for archive in archives)}",
+        f"{archives[0].control} · {archives[0].form} · axes {', '.join(axes)}",
+        answer=answers(written, axes),
+        warnings=findings(written),
+        notes=[machine.note] if machine.note else [],
+        tiles=[
+            Tile(f"{int(figure.value)}", name.partition(".")[2].replace("_", " "), figure.meaning)
+            for name, figure in figures.items()
+        ],
+        next_step=("See what the control would have:\n", code("feedsim machine import FILE --axes AXES")),
+        main=[
+            _changes(written, True, "Values that were changed", TOUCHED),
+            _changes(written, False, "Values to type", "They are not in the files; the last column says why."),
+        ],
+        provenance=provenance_section(
+            [("Machine", machine.name), ("Control", archives[0].control)], hashed([("file", path) for path in inputs])
+        ),
+        footer="The same as a table: sheet.csv. Names and their sources: docs/control_names.md.",
+    )
+
+
+def _changes(written: Written, done: bool, title: str, note: str) -> Section | None:
+    rows: list[tuple[Text, ...]] = [
+        (
+            each.axis, code(each.name.number), each.name.name, minus(each.old) or "–", minus(each.new), each.name.unit,
+            "confirmed" if each.name.confirmed else "not confirmed", each.where or "–", each.reason or "–",
+        )
+        for each in written.changes
+        if each.written == done
+    ]  # fmt: skip
+    heads = ("Axis", "Number", "Name", "Old", "New", "Unit", "Unit is", "Where", "Remark")
+    return Section(title, [Table("lllrrlllp", heads, rows, note)]) if rows else None
+
+
+def summary(
+    written: Written, machine: Machine, axes: Mapping[str, str], inputs: Sequence[Path], names: Sequence[str]
+) -> Mapping[str, Any]:
+    """Content of summary.json."""
+    return {
+        "kind": KIND,
+        "answer": answers(written, axes),
+        "machine": machine.name,
+        "axes": dict(axes),
+        "figures": figures_part(figures_of(written)),
+        "changes": [
+            {"axis": each.axis, "parameter": each.name.parameter, "number": each.name.number, "old": each.old,
+             "new": each.new, "unit": each.name.unit, "written": each.written, "reason": each.reason,
+             "where": each.where}
+            for each in written.changes
+        ],
+        "software": software(),
+        "inputs": inputs_part(hashed([("file", path) for path in inputs])),
+        "files": list(names),
+    }  # fmt: skip

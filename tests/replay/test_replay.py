@@ -78,6 +78,21 @@ def test_another_machine_shows(log: Path, tmp_path: Path, capsys: pytest.Capture
     assert "WRONG: axis Z: the simulated position is off by more" in capsys.readouterr().err
 
 
+def test_what_does_not_fit_in_a_drive_is_a_change(log: Path, tmp_path: Path) -> None:
+    """T_sym beside 2 D/omega_0 + T_pos - T_c, the lag of the speed loop with the ramped setpoint."""
+    replayed(log, tmp_path / "as_is", "--control", "sinumerik")
+    assert "changes" not in json.loads((tmp_path / "as_is" / "summary.json").read_text())
+    replayed(log, tmp_path / "out", "--set", "axes.Z.drive.T_sym=2.9 ms", "--control", "sinumerik")
+    neutral = 2 * 1.214 / 915.3 + 1e-3 - 125e-6
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    (change,) = summary["changes"]
+    assert (change["parameter"], change["direction"]) == ("drive.T_sym", "higher")
+    assert change["proposed"] == pytest.approx(neutral, rel=1e-6)
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "What to change" in page
+    assert f"MD32810 EQUIV_SPEEDCTRL_TIME {neutral:.6g} s (unit not confirmed)" in page
+
+
 def test_a_torque_limit_that_the_record_does_not_have_is_told(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

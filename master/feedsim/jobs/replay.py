@@ -19,7 +19,11 @@ from feedsim.report.content import Report
 from feedsim.report.replay import report as page
 from feedsim.report.replay.report import Replayed
 from feedsim.report.results import Content
+from feedsim.scenario import Drive, Machine
+from feedsim.structure import checked_modes
 from feedsim.trace import Trace, write_csv
+from feedsim.tune import Proposal
+from feedsim.tune.proposals import of_drives
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,8 +65,8 @@ class ReplayResult(Result):
 
     @property
     def lines(self) -> Sequence[str]:
-        """The answers."""
-        return [f"  {line}" for line in self.answers]
+        """The answers, and what to change."""
+        return page.lines(self.replayed)
 
     def report(self) -> Report:
         """Content of report.html."""
@@ -136,8 +140,16 @@ def replay(
         sources = [each.provenance for each in asked.read.values()]
         found = [finding for each in comparisons for finding in each.findings]
         findings = dict.fromkeys([*found, *(text for source in sources for text in source.warnings)])
-        done = Replayed(comparisons, asked.subject, sources, asked.marks, asked.settings, [*findings])
+        done = Replayed(
+            comparisons, asked.subject, sources, asked.marks, asked.settings, [*findings], _proposals(own, asked.axes)
+        )
         result = ReplayResult(done, inputs)
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
     return result
+
+
+def _proposals(machine: Machine, axes: Sequence[str]) -> list[Proposal]:
+    """What of the drives does not fit together; none of drives of other makers."""
+    own = [axis for axis in axes if isinstance(machine.axes[axis].drive, Drive)]
+    return of_drives(machine, checked_modes(machine), own, "the drive does not fit together")

@@ -21,6 +21,7 @@ from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile
 from feedsim.report.control import control_section
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
+from feedsim.report.replay.beside import Beside, beside, beside_lines, beside_part, beside_section
 from feedsim.report.replay.plots import pictures_of
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.sections import figures_footer, figures_section, provenance_section
@@ -142,6 +143,7 @@ def report_of(report: DriveReport) -> Report:
             if (key := name.partition(".")[2]) in LEADING
         ],
         main=[
+            *([beside_section(report.subject.machine, _beside(report))] if report.subject is not None else []),
             *(_parameters(axis, one) for axis, one in drives.items()),
             *pictures,
             *(_parts(axis, one) for axis, one in drives.items() if one.parts),
@@ -155,6 +157,13 @@ def report_of(report: DriveReport) -> Report:
             "docs/replay.md",
         ),
     )
+
+
+def _beside(report: DriveReport) -> list[Beside]:
+    """Identified values beside those of the machine that was given."""
+    if report.subject is None:
+        return []
+    return beside(report.subject.machine, {axis: one.estimates for axis, one in report.found.drives.items()})
 
 
 def _parameters(axis: str, one: DriveFound) -> Section:
@@ -237,6 +246,7 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
             }
             for axis, one in report.found.drives.items()
         },
+        **({"beside_the_machine_file": beside_part(_beside(report))} if report.subject is not None else {}),
         "figures": figures_part(report.figures),
         "software": software(),
         "inputs": inputs_part(hashed(_files(report))),
@@ -282,4 +292,4 @@ def summary_lines(report: DriveReport) -> list[str]:
         lines.append(
             f"    of every quarter of the motion by a fit to the others: {1e6 * one.predicted[0]:.4g} um{torque}"
         )
-    return lines
+    return [*lines, *(beside_lines(report.subject.machine, _beside(report)) if report.subject is not None else ())]

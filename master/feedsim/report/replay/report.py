@@ -10,6 +10,7 @@ from typing import Any
 from feedsim.analysis import Figure
 from feedsim.identify import Provenance
 from feedsim.replay.compare import Comparison
+from feedsim.report.changes import change_lines, changes_part, changes_section
 from feedsim.report.content import Report, Section, Table, Tile, code, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import typeset
@@ -20,6 +21,7 @@ from feedsim.report.sections import figures_footer, figures_section, parameters_
 from feedsim.report.style import remarked
 from feedsim.scenario import Subject
 from feedsim.trace import Mark, Trace
+from feedsim.tune import Proposal
 
 REPLAY = "replay.csv"
 LEADING = {
@@ -34,7 +36,7 @@ class Replayed:
     """A replay with what it rests on.
 
     comparisons: of the axes. subject: the machine. sources: of the records. marks: events of the record, such as NC
-    blocks. settings: option -> value, as the user gave them.
+    blocks. settings: option -> value, as the user gave them. proposals: what of the drives does not fit together.
     """
 
     comparisons: Sequence[Comparison]
@@ -43,6 +45,7 @@ class Replayed:
     marks: Sequence[Mark]
     settings: Mapping[str, str]
     warnings: Sequence[str]
+    proposals: Sequence[Proposal] = ()
 
     @property
     def figures(self) -> dict[str, Figure]:
@@ -92,6 +95,7 @@ def report_of(replayed: Replayed) -> Report:
         main=[
             *pictures,
             figures_section(replayed.figures),
+            changes_section(replayed.proposals, machine),
             _events(replayed),
             control_section(machine),
             parameters_section(machine),
@@ -135,6 +139,7 @@ def summary(replayed: Replayed, files: Sequence[str]) -> dict[str, Any]:
         "machine": machine_part(replayed.subject.machine),
         "settings": dict(replayed.settings),
         "window": [quantity(float(time[0]), "s"), quantity(float(time[-1]), "s")],
+        **({"changes": changes_part(replayed.proposals)} if replayed.proposals else {}),
         "figures": figures_part(replayed.figures),
         "software": software(),
         "inputs": inputs_part(hashed(_files(replayed))),
@@ -154,3 +159,8 @@ def answers(replayed: Replayed) -> list[str]:
             text += f"; speed setpoint {own['speed_setpoint_rms']} rms"
         lines.append(text)
     return lines
+
+
+def lines(replayed: Replayed) -> list[str]:
+    """For the terminal: the answers, and what to change."""
+    return [f"  {line}" for line in (*answers(replayed), *change_lines(replayed.proposals))]

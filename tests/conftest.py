@@ -2,11 +2,14 @@
 
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
+
+import page_browsers
 
 if TYPE_CHECKING:
     from pint_registry import Registry
@@ -43,6 +46,13 @@ def _up_to_date(archives: list[Path]) -> bool:
         return False
     built = min(path.stat().st_mtime for path in archives)
     return all(path.stat().st_mtime <= built for path in _inputs() if path.is_file())
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, which the tests of a file share."""
+    with page_browsers.chromium() as started:
+        yield started
 
 
 @pytest.fixture(scope="session")

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote_plus, unquote
 
 import pytest
 
 pytest.importorskip("sphinx", reason="Sphinx is not installed (requirements-dev.lock)")
 ROOT = Path(__file__).resolve().parents[1]
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 # What newcomers type, and the page that has to be among the first eight which they get.
 SEARCHED = {
     "backlash": "glossary", "not round": "how-to/why-not-round", "ballbar": "how-to/ballbar",
@@ -105,21 +104,17 @@ def test_equations_are_set(site: Path) -> None:
     assert not re.search(r"\\(frac|sum|max|mathrm|left)", re.sub(r"<annotation.*?</annotation>", "", page, flags=re.S))
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)")
-def test_the_search_finds_pages_from_disk(site: Path) -> None:
+def test_the_search_finds_pages_from_disk(browser: Any, site: Path) -> None:
     """In a real browser, which asks for nothing but files of the site."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     asked: list[str] = []
-    with playwright.sync_playwright() as api:
-        browser = api.chromium.launch(executable_path=CHROMIUM, args=["--headless", "--no-sandbox", "--disable-gpu"])
-        page = browser.new_page()
-        page.on("request", lambda request: asked.append(request.url))
-        for words, target in SEARCHED.items():
-            page.goto((site / "search.html").as_uri() + f"?q={quote_plus(words)}")
-            page.wait_for_function(
-                "part => [...document.querySelectorAll('ul.search li > a')].slice(0, 8)"
-                ".some(each => each.href.includes(part))",
-                arg=f"/{target}.html", timeout=30_000,
-            )  # fmt: skip
-        browser.close()
+    page = browser.new_page()
+    page.on("request", lambda request: asked.append(request.url))
+    for words, target in SEARCHED.items():
+        page.goto((site / "search.html").as_uri() + f"?q={quote_plus(words)}")
+        page.wait_for_function(
+            "part => [...document.querySelectorAll('ul.search li > a')].slice(0, 8)"
+            ".some(each => each.href.includes(part))",
+            arg=f"/{target}.html", timeout=30_000,
+        )  # fmt: skip
+    page.close()
     assert not [url for url in asked if not url.startswith(("file:", "data:"))]

@@ -4,30 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from feedsim import cli
 from feedsim.cosim import fmus_directory
-from page_browsers import CHROMIUM, FIREFOX, FLAGS, Firefox
+from page_browsers import FIREFOX, Firefox
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Chromium."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (requirements-dev.lock)")
-    if CHROMIUM is None:
-        pytest.skip("no Chromium on this machine (Debian: apt install chromium)")
-    with api.sync_playwright() as started:
-        try:
-            found = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        except api.Error as error:
-            pytest.skip(f"Chromium does not start here: {str(error).splitlines()[0]}")
-        yield found
-        found.close()
 
 
 @pytest.fixture(scope="module")

@@ -186,6 +186,16 @@ def test_a_peak_has_one_height_on_a_page(browser: Any, files: dict[str, Path]) -
                 assert f" {tile}," in answer
 
 
+def test_the_signals_are_saved_as_they_are(browser: Any, files: dict[str, Path], tmp_path: Path) -> None:
+    with Opened(browser, files["z_positioning"]) as opened:
+        opened.settled()
+        with opened.page.expect_download() as waiting:
+            opened.page.locator("#csv").click()
+        waiting.value.save_as(tmp_path / "page.csv")
+        assert (tmp_path / "page.csv").read_text() == opened.csv()
+        assert opened.csv().startswith("time,")
+
+
 def test_tiles_say_what_is_and_what_was(browser: Any, files: dict[str, Path]) -> None:
     with Opened(browser, files["z_positioning"]) as opened:
         opened.settled()

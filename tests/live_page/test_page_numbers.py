@@ -172,7 +172,7 @@ def test_random_states_in_a_browser(browser: Any, name: str, tmp_path: Path) -> 
                     assert number_of(text) == pytest.approx(value, rel=5.01e-4, abs=1e-7), (key, each.changes)
             shown = opened.page.locator("#warnings li").all_inner_texts()
             assert sorted(shown) == sorted(typeset(warning) for warning in each.warnings)
-            for column, mine in opened.trace(tmp_path, [*each.positions]).items():
+            for column, mine in opened.trace([*each.positions]).items():
                 assert np.abs(mine - each.positions[column]).max() <= SAME, (column, each.changes)
         assert opened.said == []
         assert [url.partition("#")[0] for url in opened.asked if not url.startswith("blob:")] == [file.as_uri()]

@@ -20,27 +20,9 @@ from feedsim.report.picture import Picture
 from feedsim.report.style import PALETTE
 from report_helpers import FakeRun, circle_run, positioning_run
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (requirements-dev.lock)")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)")
-FLAGS = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
-    "--disable-sync", "--no-first-run",
-]  # fmt: skip
 OPEN_WITHIN = 0.5  # s of a processor, so that a reader does not wait
 # Rows of the table that floats beside the cursor: first what stands at the top, then a curve each.
 TOLD = "#{} .told"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as api:
-        try:
-            found = api.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        except playwright.Error as error:
-            pytest.skip(f"Chromium does not start here: {str(error).splitlines()[0]}")
-        yield found
-        found.close()
 
 
 @pytest.fixture(scope="module")

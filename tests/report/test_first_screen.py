@@ -8,8 +8,6 @@ from __future__ import annotations
 import html as markup
 import os
 import re
-import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,10 +24,6 @@ from feedsim.report.page import html
 from report_helpers import circle_run, positioning_run
 from ssp_helpers import short_scenario
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (requirements-dev.lock)")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)")
-FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"]
 ROOT = Path(__file__).resolve().parents[2]
 MOST_WORDS = 120  # of two letters and more: numbers and units are none
 # Words within the window but those of charts, their buttons and titles of what is folded; where the parts end.
@@ -49,17 +43,6 @@ SEEN = """() => {
   return { words, answer: foot(".answer"), top: top(".lead svg, .lead img"), picture: foot(".lead svg, .lead img"),
            keys: foot(".screen .keys"), next: foot(".next"), wide: document.documentElement.scrollWidth };
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as api:
-        try:
-            found = api.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        except playwright.Error as error:
-            pytest.skip(f"Chromium does not start here: {str(error).splitlines()[0]}")
-        yield found
-        found.close()
 
 
 @pytest.fixture(scope="module")

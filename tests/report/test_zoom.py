@@ -5,8 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import re
-import shutil
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -24,25 +22,8 @@ from feedsim.report.page import html
 from feedsim.report.picture import Picture
 from report_helpers import circle_run, positioning_run
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (requirements-dev.lock)")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-needs_browser = pytest.mark.skipif(
-    CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)"
-)
-FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"]
 ZOOMS = 60
 POSITION = 1999.5  # [mm] where an axis of 2 m stops
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as api:
-        try:
-            found = api.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        except playwright.Error as error:
-            pytest.skip(f"Chromium does not start here: {str(error).splitlines()[0]}")
-        yield found
-        found.close()
 
 
 def opened(browser: Any, file: Path) -> Any:
@@ -156,7 +137,6 @@ ZOOMED = """async ([figure, zooms]) => {
 }"""
 
 
-@needs_browser
 @pytest.mark.parametrize("name", ["circle", "stop", "far"])
 def test_no_zoom_repeats_a_tick(name: str, browser: Any, tmp_path: Path) -> None:
     if name == "far":
@@ -189,7 +169,6 @@ def test_no_zoom_repeats_a_tick(name: str, browser: Any, tmp_path: Path) -> None
     page.close()
 
 
-@needs_browser
 def test_far_off_the_cursor_reads_what_was_written(browser: Any, tmp_path: Path) -> None:
     """No stairs: neighbouring rows 1 nm apart are drawn and read apart; an offset stands at the axis."""
     t, x = far_off()
@@ -214,7 +193,6 @@ def test_far_off_the_cursor_reads_what_was_written(browser: Any, tmp_path: Path)
     page.close()
 
 
-@needs_browser
 def test_saved_curves_have_all_digits(browser: Any, tmp_path: Path) -> None:
     t, x = far_off()
     page = opened(browser, far_page(tmp_path))
@@ -227,7 +205,6 @@ def test_saved_curves_have_all_digits(browser: Any, tmp_path: Path) -> None:
     page.close()
 
 
-@needs_browser
 def test_the_polar_picture_stays_one_at_its_largest_magnification(browser: Any, tmp_path: Path) -> None:
     run = circle_run()
     report.write(run, evaluate(run), tmp_path)

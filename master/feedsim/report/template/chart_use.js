@@ -391,7 +391,7 @@ class Live {
     const link = element("a", { href: URL.createObjectURL(blob), download: `${this.stem}.${kind}` }, this.room);
     link.click();
     link.remove();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    setTimeout(() => URL.revokeObjectURL(link.href), 60000);
   }
 }
 

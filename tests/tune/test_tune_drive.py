@@ -20,7 +20,7 @@ from feedsim.structure import Modes, checked_modes
 from feedsim.tune.changed import changed_values
 from feedsim.tune.circles import Pair
 from feedsim.tune.closed_forms import axis_lag, loop_lag
-from feedsim.tune.drive import Limits, tune_drive
+from feedsim.tune.drive import CHOSEN, HELD, SEARCHED, Limits, tune_drive
 from feedsim.tune.drive_program import DriveProgram, Stop, circles_of, partner_of, stops_of
 from feedsim.tune.knobs import Knobs, matched, with_drives
 from feedsim.tune.search import least
@@ -28,6 +28,7 @@ from feedsim.tune.search import least
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 Z = SCENARIOS / "z_positioning.yaml"
 ONE = SCENARIOS / "one_axis.yaml"
+DWELL = "[{kind: dwell, duration: 1 s}]"
 EMPS = SCENARIOS / "machines" / "emps"
 
 
@@ -272,6 +273,19 @@ def test_motions_stay_within_limits() -> None:
     (circle,) = circles_of(machine, "X", "", [(0.05, 5.0)])
     assert 2 * circle.radius < 0.022
     assert circle.acceleration <= machine.axes["X"].max_acceleration
+
+
+@pytest.mark.parametrize("axis", ["X", "Y"])
+def test_circles_are_slower_where_the_path_asks_too_much_of_an_axis(axis: str) -> None:
+    """The path of this machine may accelerate at 2.25 m/s2, its axis Y at 1.8 m/s2."""
+    scenario = load(Z, [f"machine={SCENARIOS / 'machines' / 'sinumerik_840d'}", f"motions={DWELL}", "evaluate=[]"])
+    partner = partner_of(scenario, axis)
+    for stops, circles in (SEARCHED, CHOSEN, HELD):
+        wanted = circles_of(scenario.machine, axis, partner, circles)
+        program = DriveProgram.of(scenario, axis, partner, stops_of(scenario.machine, axis, stops), wanted)
+        for asked, planned in zip(wanted, program.circles, strict=True):
+            assert planned.radius == asked.radius
+            assert planned.feed <= asked.feed
 
 
 # --- the whole -------------------------------------------------------------------------------------------------------

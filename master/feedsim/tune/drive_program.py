@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,6 +35,8 @@ SPEED = 0.9  # of the highest speed of an axis, at most
 ACCELERATION = 0.8  # of the highest acceleration, at most, on circles
 RESTS = 20.0  # rest behind a move, in 1/K_v
 LEAST_REST = 0.3  # [s]
+APPROACH = 0.5  # of the highest speed, to where a circle begins
+SLOWER = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1)  # of the feeds: a path may ask an axis for more acceleration than it has
 INTERVAL = 250e-6  # [s] between the rows that are looked at
 
 
@@ -89,8 +92,23 @@ class DriveProgram:
     def of(
         cls, scenario: Scenario, axis: str, partner: str, stops: Sequence[Stop], circles: Sequence[Pair]
     ) -> DriveProgram:
-        """Plan them about the machine's pose. InputError: limits of the axes forbid one."""
+        """Plan them about the machine's pose, slower where limits of the axes ask for it.
+
+        InputError: they cannot be driven at any of SLOWER.
+        """
+        for slower in SLOWER[:-1]:
+            with suppress(InputError):
+                return cls._planned(scenario, axis, partner, stops, circles, slower)
+        return cls._planned(scenario, axis, partner, stops, circles, SLOWER[-1])
+
+    @classmethod
+    def _planned(
+        cls, scenario: Scenario, axis: str, partner: str, stops: Sequence[Stop], circles: Sequence[Pair], slower: float
+    ) -> DriveProgram:
         machine = scenario.machine
+        stops = [Stop(each.distance, slower * each.feed) for each in stops]
+        circles = [Pair(each.radius, slower * each.feed) for each in circles]
+        approach = APPROACH * slower * machine.axes[axis].max_speed
         rest = max(LEAST_REST, RESTS / machine.shipped_drive(axis, "tuning").K_v)
         motions: list[Move | Arc | Sine | Dwell] = [Dwell(duration=REST)]
         stopping, turning = [], []
@@ -104,13 +122,13 @@ class DriveProgram:
             centre = tuple(_centre(machine, name, each.radius) for name in (axis, partner) if name)
             if partner:
                 start = {axis: centre[0] + each.radius, partner: centre[1]}
-                motions += [Move(to=start, feed=0.5 * machine.axes[axis].max_speed), Dwell(duration=REST)]
+                motions += [Move(to=start, feed=approach), Dwell(duration=REST)]
                 turning.append(len(motions))
                 motions.append(Arc(
                     plane=(axis, partner), feed=each.feed, centre_by={axis: -each.radius, partner: 0.0}, angle=SWEEP,
                 ))  # fmt: skip
             else:
-                motions += [Move(to={axis: centre[0]}, feed=0.5 * machine.axes[axis].max_speed), Dwell(duration=REST)]
+                motions += [Move(to={axis: centre[0]}, feed=approach), Dwell(duration=REST)]
                 turning.append(len(motions))
                 sine = SineMove(amplitude=each.radius, frequency=each.feed / (2 * math.pi * each.radius), periods=2)
                 motions.append(Sine(axis=axis, moves=(sine,)))

@@ -107,7 +107,7 @@ def findings(tuned: Tuned) -> list[str]:
             f"{limits.gain_margin:g} dB and {limits.phase_margin:g} deg ({before.gain_of}; {before.phase_of})"
         )
     if not tuned.elastic:
-        found.append(RIGID)
+        found.append(Wrong(RIGID) if tuned.changes else Note(RIGID))
     drive = tuned.machine.shipped_drive(tuned.axis, "a report")
     if tuned.changes and (getattr(drive, "friction_pulse", None) or getattr(drive, "friction_table", None)):
         found.append(f"{tuned.axis}: {COMPENSATED}")
@@ -363,7 +363,8 @@ def _errors(case: Case) -> Section:
         cells = []
         for key, scale in (("overshoot", 1e6), ("miss", 1e6), ("settling", 1e3)):
             for errors in (case.before, case.after):
-                cells.append(f"{scale * float(getattr(errors, key)[k]):.2f}")
+                value = scale * float(getattr(errors, key)[k])
+                cells.append(f"{value:.2f}" if math.isfinite(value) else "never")
         lines.append((stop.text, *cells))
     stops = Table(
         "lrrrrrr",

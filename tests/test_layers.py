@@ -32,6 +32,7 @@ ORDER = [
     "scenario",
     "examples",
     "motions",
+    "estimation",
     "trace",
     "files",
     "fields",

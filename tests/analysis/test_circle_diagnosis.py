@@ -12,7 +12,7 @@ from drawn_circles import Causes, driven
 from scipy import stats
 
 from feedsim.analysis.circle import CircleUnderTest, Diagnosis, TurnedPath, answer, diagnose, sentence, swinging
-from feedsim.analysis.circle.robust import student
+from feedsim.estimation.interval import student
 
 BALLBAR = CircleUnderTest(("X", "Z"), radius=0.1, speed=0.05, pitch={"X": 0.01, "Z": 0.02})
 SAMPLES = 3000

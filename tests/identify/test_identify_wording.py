@@ -40,10 +40,11 @@ class Solved:
 @pytest.mark.parametrize(
     ("solved", "reasons", "held"),
     [
-        (Solved({"sigma_1": 0.69}), {"sigma_1": "known to +-135 % only (95 %)"}, {"sigma_1": 0.0}),
-        (Solved({EXCESS: 1.43}), {"F_S": "F_S - F_C known to +-280 % only (95 %)", "v_s": f"{GOES_WITH} F_S"},
+        (Solved({"sigma_1": 0.69}), {"sigma_1": "its 95 % interval is +-135 % of the value"}, {"sigma_1": 0.0}),
+        (Solved({EXCESS: 1.43}),
+         {"F_S": "the 95 % interval of F_S - F_C is +-280 % of the value", "v_s": f"{GOES_WITH} F_S"},
          {"F_S": 1.6, "v_s": 0.6}),
-        (Solved({"gamma": 1.42}), {"gamma": "known to +-278 % only (95 %)", "W": f"{GOES_WITH} gamma"},
+        (Solved({"gamma": 1.42}), {"gamma": "its 95 % interval is +-278 % of the value", "W": f"{GOES_WITH} gamma"},
          {"gamma": 1.0, "W": 0.0}),
         (Solved({}, {"gamma": 0.999}),
          {"gamma": "no engaging zone shows, the full stiffness", "W": f"{GOES_WITH} gamma"}, {"gamma": 1.0, "W": 0.0}),
@@ -69,15 +70,15 @@ def test_all_that_is_told_is_let_alone() -> None:
 
 def test_each_reason_is_said_once() -> None:
     held: Any = {
-        "sigma_1": ("undetermined", "known to +-135 % only (95 %)"),
+        "sigma_1": ("undetermined", "its 95 % interval is +-135 % of the value"),
         "M_0": ("undetermined", "one direction only"),
         "asymmetry": ("undetermined", "one direction only"),
-        "gamma": ("undetermined", "known to +-278 % only (95 %)"),
+        "gamma": ("undetermined", "its 95 % interval is +-278 % of the value"),
         "W": ("undetermined", f"{GOES_WITH} gamma"),
         "beta": ("held", "usual value"),
     }
-    said = ("sigma_1: known to +-135 % only (95 %)", "M_0 and asymmetry: one direction only",
-            "gamma: known to +-278 % only (95 %)")  # fmt: skip
+    said = ("sigma_1: its 95 % interval is +-135 % of the value", "M_0 and asymmetry: one direction only",
+            "gamma: its 95 % interval is +-278 % of the value")  # fmt: skip
     assert _doubts(held, None) == said
     # What stage 1 hands on it has said itself.
     first = stationary(estimates())

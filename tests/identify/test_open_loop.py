@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError, SimulationError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.open_loop import NEEDED, balanced, first_deflection, first_speed, substeps
 from feedsim.identify.parameters import NO_EFFECT
 from feedsim.identify.record import Record
-from feedsim.identify.result import NORMAL_95, Balance, Estimate
+from feedsim.identify.result import Balance, Estimate
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Record, read_records
 from feedsim.identify.position_loop import setpoint_delay, speed_setpoint
-from feedsim.identify.result import NORMAL_95
 
 H = 2e-3
 

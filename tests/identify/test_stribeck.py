@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import drift, stribeck
 from feedsim.identify.parameters import curve, torque
-from feedsim.identify.result import NORMAL_95, Plateau, Stationary
+from feedsim.identify.result import Plateau, Stationary
 from identify_records import I_P, SPEEDS, TRUE, stationary
 
 

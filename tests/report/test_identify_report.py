@@ -219,12 +219,17 @@ def test_doubts_of_a_stage_1_that_was_not_used(tmp_path: Path) -> None:
 
 def test_warnings_that_the_table_holds_are_not_told_twice() -> None:
     found = identification()
-    vague = replace(found.estimates["F_S"], status="undetermined", reason="known to +-281 % only (95 %)")
+    vague = replace(found.estimates["F_S"], status="undetermined", reason="its 95 % interval is +-281 % of the value")
     also = replace(found.estimates["v_s"], status="undetermined", reason="no Stribeck effect shows")
     both = {**found.estimates, "F_S": vague, "v_s": also}
-    repeating = ("F_S: known to +-281 % only (95 %)", "v_s is not estimated but held at 2: no Stribeck effect shows",
-                 "F_S and W: known to +-281 % only (95 %)")  # fmt: skip
-    telling = ("sigma_1 is known to 6.7 % only", "W: known to +-281 % only (95 %)", "no Stribeck effect shows")
+    repeating = ("F_S: its 95 % interval is +-281 % of the value",
+                 "v_s is not estimated but held at 2: no Stribeck effect shows",
+                 "F_S and W: its 95 % interval is +-281 % of the value")  # fmt: skip
+    telling = (
+        "sigma_1 is known to 6.7 % only",
+        "W: its 95 % interval is +-281 % of the value",
+        "no Stribeck effect shows",
+    )
     whole = identified(found=replace(found, estimates=both, warnings=(*repeating, *telling)))
     assert terminal_warnings(whole) == list(telling)
     assert whole.warnings == [*repeating, *telling]

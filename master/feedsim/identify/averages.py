@@ -6,9 +6,8 @@ from math import hypot
 
 import numpy as np
 
+from feedsim.estimation.covariance import correlation_time
 from feedsim.identify.record import Array
-
-LAGS_PER_TIME = 5.0  # lags that are summed, in correlation times (Sokal's automatic window)
 
 
 def window(rows: int, taper: int) -> Array:
@@ -32,22 +31,6 @@ def derivative(weights: Array, signal: Array, interval: float, order: int) -> fl
     if order == 1:
         return float(-np.sum((padded[2:] - padded[:-2]) * centred) / (2 * interval))
     return float(np.sum((padded[2:] - 2 * padded[1:-1] + padded[:-2]) * centred) / interval**2)
-
-
-def correlation_time(residuals: Array) -> float:
-    """Rows that count as one, >= 1: 1 + twice the sum of the autocorrelation.
-
-    Summed up to the first lag that is LAGS_PER_TIME times the sum so far (A. Sokal's window). Sums below 1 (ring-down)
-    are not believed: they would promise a mean better than white noise of the same scatter gives.
-    """
-    size = len(residuals)
-    spectrum = np.abs(np.fft.rfft(residuals - np.mean(residuals), 2 * size)) ** 2
-    covariance = np.fft.irfft(spectrum)[: max(size // 2, 1)]
-    if not covariance[0] > 0:
-        return 1.0
-    sums = 2 * np.cumsum(covariance / covariance[0]) - 1
-    enough = np.flatnonzero(np.arange(len(sums)) >= LAGS_PER_TIME * np.maximum(sums, 1.0))
-    return max(float(sums[enough[0]] if len(enough) else np.max(sums)), 1.0)
 
 
 def resolution(signal: Array) -> float:

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.parameters import curve, torque
 from feedsim.identify.record import Array
-from feedsim.identify.result import NORMAL_95, Plateau
+from feedsim.identify.result import Plateau
 from feedsim.identify.stribeck_identifiability import SAME_SPEED
 
 SAME = 0.02  # relative difference up to which a speed counts as repeated

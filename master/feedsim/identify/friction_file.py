@@ -14,10 +14,11 @@ import yaml
 
 from feedsim import units
 from feedsim.errors import OutputError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.fields import Quantity
 from feedsim.identify.read import Provenance, distinct
 from feedsim.identify.record import Record
-from feedsim.identify.result import NORMAL_95, Balance, Estimate, Identification
+from feedsim.identify.result import Balance, Estimate, Identification
 from feedsim.scenario import Friction, Subject
 
 FRICTION = "friction.yaml"

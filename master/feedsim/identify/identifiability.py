@@ -7,15 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feedsim.estimation.interval import ANY_VALUE, determined, half_width, reason, shows
 from feedsim.identify.parameters import KINDS, NO_EFFECT, inner, outer
-from feedsim.identify.result import NORMAL_95
 from feedsim.identify.search import Solution
 from feedsim.identify.torque import RecordTorque, deflection
 
-# Of the value: a standard deviation above says that even the order of magnitude is open (95 % interval down to 0).
-VAGUE = 0.5
-# A Stribeck peak that is this vague is an artefact of what happens within a few rows of the reversals.
-VAGUE_STRIBECK = 0.25
 GOES_WITH = "goes with"  # begins the reason of a parameter that is only held because another is
 SIGNIFICANT = 2.0  # standard deviations that something must differ from what it would be without
 
@@ -46,7 +42,7 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
     found: list[tuple[float, Verdict]] = []
     for name in free:
         # Those without a scale of their own are told with any bound, large or small.
-        lenient = name in kept or name in ("M_0", "asymmetry", "delay")
+        lenient = name in kept or name in ANY_VALUE
         key = inner(name)
         if lenient and np.isfinite(solution.sigma(key)) and key not in solution.fit.at_bound:
             continue
@@ -71,20 +67,21 @@ def _judge(solution: Solution, name: str) -> tuple[float, Verdict] | None:
     value = solution.fit[key]
     sigma = solution.sigma(key)
     if name == "gamma" and value > 1 - SIGNIFICANT * min(sigma, 0.25):
-        reason = f"no engaging zone shows, the full stiffness acts at once after reversals (gamma {value:.3g})"
-        return np.inf, Verdict({"gamma": 1.0}, name, reason)
+        why = f"no engaging zone shows, the full stiffness acts at once after reversals (gamma {value:.3g})"
+        return np.inf, Verdict({"gamma": 1.0}, name, why)
     if name in ("sigma_1", "sigma_2", "F_log", "F_S") and value <= 1e-9 * max(abs(solution.values["F_C"]), 1e-300):
-        reason = "the record fits best without (0 is the least that is physical)"
-        return np.inf, Verdict({name: 0.0}, name, reason)
+        why = "the record fits best without (0 is the least that is physical)"
+        return np.inf, Verdict({name: 0.0}, name, why)
     if not np.isfinite(sigma):
         return np.inf, Verdict({name: value}, name, "the record does not answer to it")
     if key in solution.fit.at_bound:
-        reason = f"the fit ends at the end of its range ({value:.3g} {KINDS[outer(key)].unit})"
-        return np.inf, Verdict({name: value}, name, reason)
-    if sigma > (VAGUE_STRIBECK if name in ("F_S", "v_s") else VAGUE) * abs(value):
-        vague = sigma / max(abs(value), 1e-300)
-        of = "F_S - F_C " if name == "F_S" else ""
-        return vague, Verdict({name: value}, name, f"{of}known to +-{100 * NORMAL_95 * vague:.0f} % only (95 %)")
+        why = f"the fit ends at the end of its range ({value:.3g} {KINDS[outer(key)].unit})"
+        return np.inf, Verdict({name: value}, name, why)
+    half = half_width(sigma)
+    # A Stribeck peak that is not determined is an artefact of what happens within a few rows of the reversals.
+    if not (determined(value, half) if name in ("F_S", "v_s") else shows(value, half)):
+        why = reason(value, half, "F_S - F_C" if name == "F_S" else "")
+        return half / max(abs(value), 1e-300), Verdict({name: value}, name, why)
     return None
 
 
@@ -107,11 +104,11 @@ def no_delay(models: Sequence[RecordTorque], solution: Solution, free: Collectio
     if "delay" not in free:
         return None
     interval = max(model.record.interval for model in models)
-    delay, reach = solution.values["delay"], NORMAL_95 * solution.sigma("delay")
+    delay, reach = solution.values["delay"], half_width(solution.sigma("delay"))
     if delay + reach < -interval:
         why = f"the fit makes the torque {-1e3 * delay:.2g} ms earlier than the motion, which no control does"
     elif reach > interval:
-        why = f"known to +-{1e3 * reach:.2g} ms only (95 %), which is more than a row"
+        why = f"its 95 % interval is +-{1e3 * reach:.2g} ms, which is more than a row"
     else:
         return None
     return Verdict({"delay": 0.0}, "delay", f"{why}: give it by --delay")

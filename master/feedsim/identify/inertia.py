@@ -64,7 +64,7 @@ APART = 0.5  # of the friction, or of the inertia: by how much line and curve ma
 CERTAIN = 4.0  # standard deviations of the line
 SIMPLE = "a rigid axis with simple friction"
 LEAST_SHARE = 0.05  # of the torque (rms) that accelerates, below which the friction model's faults may pass for J
-VAGUE = 0.1  # relative standard deviation of J that is worth a warning
+J_WARNED = 0.1  # relative standard deviation of J that is worth a warning
 
 
 def inertia(records: Sequence[Record]) -> Inertia:
@@ -203,7 +203,7 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
             f"accelerating takes {100 * share:.1f} % of the torque only: the inertia may be what the simple friction "
             "model lacks; record moves that accelerate harder, or give it"
         )
-    if sigma[0] > VAGUE * values[0]:
+    if sigma[0] > J_WARNED * values[0]:
         said.append(
             f"the inertia is known to {100 * sigma[0] / values[0]:.0f} % only: record moves that accelerate harder, or "
             "give it"

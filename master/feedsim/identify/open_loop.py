@@ -27,10 +27,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feedsim.errors import InputError, SimulationError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.fit import Fit, Parameter, Residuals, fit
 from feedsim.identify.parameters import FRICTION, level
 from feedsim.identify.record import Array, Record
-from feedsim.identify.result import NORMAL_95, Balance, Drift, Estimate
+from feedsim.identify.result import Balance, Drift, Estimate
 from feedsim.identify.torque import RecordTorque, deflection
 
 if TYPE_CHECKING:

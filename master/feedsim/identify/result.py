@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 from typing import Literal
 
 import numpy as np
 
+from feedsim.estimation.interval import ANY_VALUE, determined, half_width, reason
 from feedsim.identify.record import Array
 
 Status = Literal["estimated", "held", "given", "undetermined"]
-NORMAL_95 = 1.959964  # standard deviations on either side that hold 95 % of a normal distribution
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,15 @@ class Estimate:
     @property
     def interval(self) -> tuple[float, float]:
         """Confidence interval of 95 %, from the linearised model."""
-        return self.value - NORMAL_95 * self.sigma, self.value + NORMAL_95 * self.sigma
+        half = half_width(self.sigma)
+        return self.value - half, self.value + half
+
+    def judged(self) -> Estimate:
+        """The same, undetermined where its interval is too wide; its value stays, as it fits together with the rest."""
+        half = half_width(self.sigma)
+        if self.status != "estimated" or self.name in ANY_VALUE or determined(self.value, half):
+            return self
+        return replace(self, status="undetermined", reason=reason(self.value, half))
 
 
 @dataclass(frozen=True, eq=False)

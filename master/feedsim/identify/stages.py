@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.clipping import without_clipped
 from feedsim.identify.inertia import Inertia, contradiction, inertia
 from feedsim.identify.magnitudes import check_found, check_inertia, check_size
@@ -23,7 +24,7 @@ from feedsim.identify.output_error import dynamic
 from feedsim.identify.parameters import CONSTANT_SPEED, FIXED, FRICTION, NO_EFFECT, PRE_SLIDING, USUAL, estimate
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
-from feedsim.identify.result import NORMAL_95, Correlation, Dynamic, Estimate, Identification, Plateau, Stationary
+from feedsim.identify.result import Correlation, Dynamic, Estimate, Identification, Plateau, Stationary
 from feedsim.identify.stribeck import stationary
 from feedsim.identify.stribeck_identifiability import FEW_SPEEDS, Points
 from feedsim.identify.structure_torque import with_structure
@@ -120,7 +121,7 @@ class _Run:
         return Identification(
             axis=options.axis,
             I_P=options.I_P,
-            estimates=estimates,
+            estimates={name: each.judged() for name, each in estimates.items()},
             correlation=merged_correlation(first if prior else None, second) if believed else NOTHING_TOLD,
             stationary=first,
             dynamic=second,

@@ -119,7 +119,7 @@ class _Problem:
         A fit makes one of noise alone: with none, the drop of chi^2 is that of as many random numbers.
         """
         parts = [name for name in (EXCESS, "v_s", "beta") if name in found.names]
-        if not {EXCESS, "v_s"} <= set(parts) or found.sigma["v_s"] <= identifiability.VAGUE * found["v_s"]:
+        if not {EXCESS, "v_s"} <= set(parts) or found.sigma["v_s"] <= identifiability.V_S_WARNED * found["v_s"]:
             return {}
         reason = (
             f"the torque at the speeds from {self.points.speeds[0]:.3g} rad/s on is met as well without a Stribeck "

@@ -15,7 +15,8 @@ from feedsim.identify.result import Plateau
 SAME_SPEED = 0.05  # relative difference up to which plateaus count as one speed
 FEW_SPEEDS = 8
 SLOW_ENOUGH = 50e-3 / 60  # m/s: a lowest speed above leaves the Stribeck range open at its lower end
-VAGUE = 0.3  # relative standard deviation of v_s that asks whether there is a Stribeck effect at all, and for a warning
+# Relative standard deviation of v_s that asks whether there is a Stribeck effect at all, and for a warning.
+V_S_WARNED = 0.3
 CLEAR = 2.0  # standard deviations that a fall of torque over speed must have
 LIKE = 0.99  # correlation above which two parameters are one
 VARIED = 0.05  # range of the level over its mean that tells an asymmetry from a constant load
@@ -154,7 +155,7 @@ def warnings(points: Points, found: Fit, matrix: Array, names: Sequence[str], I_
             "both directions"
         )
     sigma = found.sigma
-    if "v_s" in sigma and sigma["v_s"] > VAGUE * found["v_s"]:
+    if "v_s" in sigma and sigma["v_s"] > V_S_WARNED * found["v_s"]:
         said.append(
             f"v_s is known to {100 * sigma['v_s'] / found['v_s']:.0f} % only: add plateaus about "
             f"{_speed(found['v_s'], I_P)}, or make them longer"

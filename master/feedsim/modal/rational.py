@@ -37,7 +37,6 @@ GRID = 80  # frequencies at which a further mode is tried
 TRIED_DAMPING = (0.01, 0.04)
 LOW_D, HIGH_D = 1e-4, 0.7
 LONGEST = 5e-3  # [s] of a delay
-NORMAL_95 = 1.959964
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.analysis.circle.robust import student
 from feedsim.cosim import fmus_directory
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.one_unit import parameters
@@ -29,6 +28,7 @@ from feedsim.cosim.system import plant_parameters
 from feedsim.cosim.trust import control, exchange_stability
 from feedsim.cosim.whole import open_whole
 from feedsim.errors import InputError
+from feedsim.estimation.interval import student
 from feedsim.linear.judgement import SHOWS, judge, locked_modes
 from feedsim.motions.circular import Circle, Circular
 from feedsim.motions.dwell import Dwell

@@ -14,15 +14,16 @@ import numpy as np
 
 from feedsim import variables
 from feedsim.errors import InputError
+from feedsim.estimation.covariance import Covariance, correlation_length, stretched
+from feedsim.estimation.interval import half_width
 from feedsim.identify.parameters import estimate
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms
-from feedsim.identify.result import NORMAL_95, Estimate
+from feedsim.identify.result import Estimate
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.elastic import KEYS, ElasticMode, modes_of
-from feedsim.replay.tuning import Problem, Tuned, correlation_length
+from feedsim.replay.tuning import Problem, Tuned
 from feedsim.trace.trace import Array
 
-VAGUE = 0.5  # relative half width of an interval beyond which a value is not determined
 POOR = 0.3  # share of the torque, or of the lag, that a fit may leave
 EXACT = 1e-5  # of the travel: a position that a fit leaves within it is met, however small the lag
 ONE_WAY = 0.15  # share of the mean torque to which the constant load has to be known where the axis moves one way
@@ -112,7 +113,7 @@ def one_way(each: AxisRecord, estimates: Mapping[str, Estimate], only: str) -> d
         for name, one in estimates.items()
     }
     torque = each.record.torque[each.moving]
-    mean, half = abs(float(np.mean(torque))), NORMAL_95 * estimates["M_0"].sigma
+    mean, half = abs(float(np.mean(torque))), half_width(estimates["M_0"].sigma)
     if mean > float(np.std(torque)) and half > ONE_WAY * mean:
         raise InputError(
             f"{each.record.name}, axis {each.axis}: {only}; M_0 by itself is known to +-{half:.2g} N.m only, and at "
@@ -143,14 +144,7 @@ def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:
         found = estimate(name, value, sigma)
     if left > HIDDEN:
         return replace(found, status="undetermined", reason="the record hardly depends on it")
-    relative = name not in ("k_ffw", "T_sym", "T_dyn", "M_0", "asymmetry", "delay")
-    if relative and NORMAL_95 * sigma > VAGUE * abs(value):
-        return replace(
-            found,
-            status="undetermined",
-            reason=f"its interval is +-{100 * NORMAL_95 * sigma / abs(value):.0f} % of the value",
-        )
-    return found
+    return found.judged()
 
 
 def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> Array:
@@ -164,10 +158,9 @@ def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> 
     J, r, count = found.jacobian, found.residuals, len(problem.rows)
     channels = slice(0, count), slice(count, 2 * count)
     prior = J[2 * count :].T @ J[2 * count :]
-    parts = [
-        (J[rows].T @ J[rows], correlation_length(r[rows]), max(float(np.mean(r[rows] ** 2)), left**2))
-        for rows, left in zip(channels, unseen, strict=True)
-    ]
-    whole = np.linalg.pinv(sum((part for part, _, _ in parts), prior), hermitian=True)
-    middle = sum((part * longer * variance for part, longer, variance in parts), prior)
-    return np.asarray(whole @ middle @ whole * np.outer(scale, scale))
+    normal = sum((J[rows].T @ J[rows] for rows in channels), prior)
+    middle = sum(
+        (stretched(J[rows], r[rows], rms, correlation_length) for rows, rms in zip(channels, unseen, strict=True)),
+        prior,
+    )
+    return np.asarray(Covariance.of(normal, hermitian=True).by(middle) * np.outer(scale, scale))

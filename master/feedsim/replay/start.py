@@ -9,8 +9,8 @@ from math import inf, pi
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.inertia import inertia
-from feedsim.identify.result import NORMAL_95
 from feedsim.replay.closed_loop import AxisRecord
 
 BANDWIDTH = 50.0  # [Hz] of a speed loop to begin with: K_p = 2 pi f J

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import FeedsimError, InputError
+from feedsim.estimation.covariance import correlation_length
 from feedsim.identify.position_loop import rms
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
 from feedsim.replay.elastic import modes_of, with_modes
@@ -260,15 +261,3 @@ class Problem:
     def _told(self, names: tuple[str, ...], least: Least, point: Point) -> Tuned:
         values = {name: self.at(name, float(away)) for name, away in zip(names, point.x, strict=True)}
         return Tuned(names, values, point, least.residuals(point), least.jacobian(point))
-
-
-def correlation_length(residuals: Array) -> float:
-    """How many neighbouring residuals say the same: the sum of their autocorrelation to where it ends, 1 at least."""
-    centred = residuals - np.mean(residuals)
-    spectrum = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
-    correlation = np.fft.irfft(spectrum)[: len(centred) // 2]
-    if not correlation[0] > 0:
-        return 1.0
-    correlation = correlation / correlation[0]
-    end = np.flatnonzero(correlation <= 0)
-    return max(1.0, 1.0 + 2.0 * float(np.sum(correlation[1 : end[0] if len(end) else None])))

@@ -16,6 +16,7 @@ from feedsim.analysis.circle.model import Fit, fit
 from feedsim.analysis.circle.setup import Offset
 from feedsim.analysis.circle.vibration import Vibration, averaged, vibrations
 from feedsim.analysis.figures import Array
+from feedsim.estimation.interval import shows
 
 # A peak is seen where its mean over this angle [deg], or over half of it again and again down to the least count of
 # samples, exceeds this multiple of what noise makes of such means and of the fitted rest below them, and that multiple
@@ -58,7 +59,7 @@ class Term:
     def told(self) -> bool:
         """Whether it is told from zero, and not by rounding alone."""
         size = abs(self.value) if self.key == "radius" else self.size
-        return size > FLOOR and (math.isnan(self.half) or abs(self.value) > self.half)
+        return size > FLOOR and shows(self.value, self.half)
 
 
 @dataclass(frozen=True)

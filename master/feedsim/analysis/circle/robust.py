@@ -2,7 +2,7 @@
 
 Samples count less the worse they fit (Tukey's biweight). Intervals hold what neighbouring samples share, what rounding
 of a record may have added, and what is not known of values that are only known to within a spread. May use
-analysis.figures. Start reading at robust_fit().
+analysis.figures and estimation. Start reading at robust_fit().
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.figures import Array
+from feedsim.estimation.covariance import Covariance
+from feedsim.estimation.interval import student
 
 BIWEIGHT = 4.685  # 95 % as efficient as least squares where the noise is normal
 PASSES = 6
@@ -113,39 +115,15 @@ def covariance_of(
     rounding adds, and what is not known of the tails.
     """
     known = robust.shared**2 * _known(matrix, spread)
-    inverse = np.linalg.pinv(matrix.T @ (robust.slopes[:, None] * matrix) + known)
+    covariance = Covariance.of(matrix.T @ (robust.slopes[:, None] * matrix) + known)
     influence = robust.weights * residual
     _, block = np.unique(blocks, return_inverse=True)
-    count, terms = int(block.max()) + 1, matrix.shape[1]
-    sums = np.zeros((count, terms))
-    np.add.at(sums, block, influence[:, None] * matrix)
-    free = max(count - terms + len(spread), 2)
-    single = inverse @ (matrix.T @ ((influence**2)[:, None] * matrix)) @ inverse
-    blockwise = inverse @ (sums.T @ sums) @ inverse * (count / free)
+    free = max(int(block.max()) + 1 - matrix.shape[1] + len(spread), 2)
+    single = covariance.of_samples(matrix, influence)
+    blockwise = covariance.of_blocks(matrix, influence, block, free)
     scale = np.sqrt(np.maximum(np.diag(single) / np.maximum(np.diag(blockwise), 1e-300), 1.0))
-    besides = robust.shared**2 * inverse @ known @ inverse
+    besides = robust.shared**2 * covariance.inverse @ known @ covariance.inverse
     if rounded.shape[1]:
-        moved = inverse @ (matrix.T @ (robust.weights[:, None] * rounded))
+        moved = covariance.inverse @ (matrix.T @ (robust.weights[:, None] * rounded))
         besides += (moved @ moved.conj().T).real
     return scale[:, None] * blockwise * scale + besides, student(free)
-
-
-def student(free: int) -> float:
-    """Quantile 0.975 of Student's distribution of so many degrees of freedom, to 2e-7 of its value.
-
-    Many: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 1964, 26.7.5. Few: SciPy, whose special
-    functions take a fiftieth of a run to load.
-    """
-    if free < 20:
-        from scipy.special import stdtrit
-
-        return float(stdtrit(free, 0.975))
-    z = 1.959963984540054  # of the normal distribution
-    series = (
-        z,
-        (z**3 + z) / 4,
-        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
-        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
-        (79 * z**9 + 776 * z**7 + 1482 * z**5 - 1920 * z**3 - 945 * z) / 92160,
-    )
-    return math.fsum(term / free**k for k, term in enumerate(series))

@@ -8,8 +8,9 @@ from typing import Literal
 
 import numpy as np
 
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Identified
-from feedsim.identify.result import NORMAL_95, Balance, Correlation, Dynamic, Identification, Stretch
+from feedsim.identify.result import Balance, Correlation, Dynamic, Identification, Stretch
 from feedsim.report.chart import Axis, Chart, Curve, Grid, Level, Panel
 from feedsim.report.formatting import counted
 from feedsim.report.identify.stribeck_plots import FRICTION, SPEED, TIME, ZERO, plateaus_picture, stribeck_picture

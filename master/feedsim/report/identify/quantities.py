@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Identified
-from feedsim.identify.result import NORMAL_95, Estimate, Stationary
+from feedsim.identify.result import Estimate, Stationary
 from feedsim.report.provenance import InputFile, hashed
 
 MM_PER_MIN = 60e3  # per m/s

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Identified, friction_file
 from feedsim.identify.friction_file import FRICTION
-from feedsim.identify.result import NORMAL_95, Estimate, Identification
+from feedsim.identify.result import Estimate, Identification
 from feedsim.report.content import Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import counted, display_unit, minus, powers, typeset
 from feedsim.report.identify import quantities

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.parameters import torque as motor_torque
 from feedsim.identify.record import Record
-from feedsim.identify.result import NORMAL_95, Identification, Plateau, Stationary
+from feedsim.identify.result import Identification, Plateau, Stationary
 from feedsim.report.chart import Axis, Band, Chart, Curve, Dash, Level, Panel
 from feedsim.report.formatting import counted, powers
 from feedsim.report.identify.quantities import MM_PER_MIN, curve_error, is_curve, speeds_of

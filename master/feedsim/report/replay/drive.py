@@ -9,10 +9,10 @@ from typing import Any
 
 from feedsim.analysis import Figure
 from feedsim.arguments import spelt
+from feedsim.estimation.interval import NORMAL_95
 from feedsim.findings import Note
 from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
-from feedsim.identify.result import NORMAL_95
 from feedsim.replay.compare import Comparison
 from feedsim.replay.drive import APART, DriveFound
 from feedsim.replay.identified import DrivesFound

@@ -92,12 +92,12 @@ def test_usage_errors_and_faults_of_our_own_are_unusable(
     with pytest.raises(SystemExit) as left:
         run(reference, reference, "--nonsense")
     assert left.value.code == 2
-    import feedsim.compare
+    import feedsim.jobs.compare
 
     def broken(*_: object, **__: object) -> None:
         raise RuntimeError("a fault of our own")
 
-    monkeypatch.setattr(feedsim.compare, "compare_series", broken)
+    monkeypatch.setattr(feedsim.jobs.compare, "compare_series", broken)
     assert run(reference, reference) == 2
     assert "a fault of our own" in capsys.readouterr().err
 

@@ -12,7 +12,8 @@ from feedsim.cli import COMMANDS
 from feedsim.cli.options import WRITES, Command, flat
 
 # What only a terminal needs: no progress bar and no summary, a text in place of the runs, a second run beside it.
-OF_THE_TERMINAL = {"quiet", "dry_run", "row", "try", "json"}
+OF_THE_TERMINAL = {"quiet", "dry_run", "row", "try", "all"}
+IN_PYTHON = {"--from": "start", "--to": "end"}  # "from" is a keyword
 OF_PYTHON = {"watch", "named"}  # who is told, and results under names of their own
 
 
@@ -28,7 +29,11 @@ def test_options_and_parameters_are_the_same(command: Command) -> None:
     job = fs
     for name in command.job.split("."):
         job = getattr(job, name)
-    typed = {option.typed.removeprefix("--").replace("-", "_") for option in flat(command.options)}
+    typed = {
+        IN_PYTHON.get(option.typed, option.typed).removeprefix("--").replace("-", "_")
+        for option in flat(command.options)
+        if not (option.typed == "--json" and "metavar" not in option.words)  # prints what Python has at hand
+    }
     if any(option.typed in WRITES for option in flat(command.options)):
         typed.add("force")
     parameters = inspect.signature(job).parameters

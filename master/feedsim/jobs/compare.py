@@ -1,48 +1,497 @@
-"""A result against a reference; it needs none of what runs need."""
+"""Results against references: of any simulator, and measured records."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from feedsim import units
+from feedsim.arguments import Value, amount, spelt
+from feedsim.compare.between import bounds_of
 from feedsim.compare.compare import compare as compared
-from feedsim.compare.files import compare_files, tolerances_of
-from feedsim.compare.options import Options
+from feedsim.compare.files import beside, compare_series, pairs_of, tolerances_of, unusable
+from feedsim.compare.options import Options, no_match
+from feedsim.compare.shift import estimated_shift
 from feedsim.compare.tolerance import Tolerances
-from feedsim.compare.verdict import Comparison
-from feedsim.trace import Trace, read_csv
+from feedsim.compare.verdict import Comparison, Variable, Verdict, seconds
+from feedsim.errors import InputError
+from feedsim.jobs.result import Result
+from feedsim.outputs import forced, replacing
+from feedsim.report.compare import report as page
+from feedsim.report.content import Report
+from feedsim.report.results import Content, check_place
+from feedsim.trace import Series, Trace, as_series, read_series
 
 if TYPE_CHECKING:
+    from feedsim.analysis import Figure
     from feedsim.cosim import Run
+    from feedsim.jobs.run import RunResult
+    from feedsim.trace import Array
 
 File = str | Path
+MOST_LINES = 10
+# What a record's signals are called here, and their units.
+RECORD_UNITS = {"x_a": "m", "x_s": "m", "n_a": "rad/s", "M_a": "N.m"}
+JSON, XML = "compare.json", "compare.xml"
+Pairs = Mapping[str, str] | Sequence[str]  # name -> text, or texts NAME=TEXT
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CompareResult(Result):
+    """Comparisons, one for each pair of files.
+
+    asked: files and folders that were given, in turn. tolerances: the tolerance file that was asked for.
+    durations: of the comparisons [s].
+    """
+
+    comparisons: Sequence[Comparison]
+    asked: Sequence[Path] = ()
+    tolerances: Path | None = None
+    durations: Sequence[float] = ()
+
+    kind = "compare"
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of all: "same", "different" or "unusable", whichever is worst."""
+        return max(self.comparisons, key=lambda pair: pair.exit_code).verdict
+
+    @property
+    def exit_code(self) -> int:
+        """0 same, 1 different, 2 unusable."""
+        return max(pair.exit_code for pair in self.comparisons)
+
+    @property
+    def same(self) -> bool:
+        """Whether all are the same."""
+        return self.exit_code == 0
+
+    @property
+    def worst(self) -> Variable | None:
+        """The compared variable of all pairs that is nearest to its limit, or farthest beyond it."""
+        found = [pair.worst for pair in self.comparisons if pair.worst is not None]
+        return max(found, key=lambda variable: (variable.ratio, variable.deviation), default=None)
+
+    @cached_property
+    def figures(self) -> Mapping[str, Figure]:
+        """Variable -> its largest deviation, in its unit; of several pairs "result: variable"."""
+        from feedsim.analysis import Figure, Named
+
+        alone = len(self.comparisons) == 1
+        return Named(
+            (
+                variable.name if alone else f"{pair.result}: {variable.name}",
+                Figure(variable.deviation, variable.unit, f"largest deviation; allowed {variable.allowed:.4g}"),
+            )
+            for pair in self.comparisons
+            for variable in pair.those("same", "different")
+        )
+
+    @property
+    def findings(self) -> Sequence[str]:
+        """What cannot be compared, and rows that were not compared."""
+        return self.report().warnings
+
+    @property
+    def answers(self) -> Sequence[str]:
+        """The verdict of every pair."""
+        return [f"{pair.result} against {pair.reference}: {pair.line}" for pair in self.comparisons]
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """What differs: of every pair its worst variables, and what is to be known."""
+        return self.listed(everything=False)
+
+    def listed(self, *, everything: bool) -> list[str]:
+        """As ``lines``; everything: every variable."""
+        # Of many pairs those that are the same take one line.
+        full = everything or len(self.comparisons) == 1
+        found = [line for pair in self.comparisons for line in _lines(pair, everything, full)]
+        return [*found, *_default(self.comparisons), *_unused(self), *_unreferenced(self), *_sum(self.comparisons)]
+
+    def report(self) -> Report:
+        """Content of report.html."""
+        return page.report_of(self.comparisons)
+
+    def files(self) -> Mapping[str, Content]:
+        """All figures as JSON, and JUnit XML for CI servers."""
+        return {JSON: page.to_json(self.comparisons), XML: page.junit(self.comparisons, self.durations)}
+
+    def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
+        """Content of summary.json."""
+        return {"verdict": self.verdict, "answer": list(self.answers), "files": list(names)}
+
+    def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
+        """Raise OutputError unless the result can be written to `folder`."""
+        check_place(folder, (JSON, XML, "report.html", "summary.json"), inputs, kind=self.kind)
+
+    @property
+    def inputs(self) -> Sequence[Path]:
+        """Files that were compared."""
+        return [Path(name) for pair in self.comparisons for name in (pair.result, pair.reference)]
+
+    def __repr__(self) -> str:
+        return f"Comparison: {self.comparisons[0].line}" if len(self.comparisons) == 1 else "; ".join(self.lines[-1:])
 
 
 def compare(
-    result: File | Trace | Run,
-    reference: File | Trace | Run,
-    tol: str | Sequence[str] | Tolerances = (),
-    options: Options | None = None,
-) -> Comparison:
-    """A result against a reference, within tolerances such as ``["1e-6", "*.x_a=2 nm"]``; files, traces or runs.
+    *files: File | Trace | Run | RunResult,
+    tol: str | Sequence[str] = (),
+    tolerances: File | None = None,
+    column: Pairs = (),
+    only: str | Sequence[str] = (),
+    ignore: str | Sequence[str] = (),
+    common: bool = False,
+    hold: str | Sequence[str] = (),
+    unit: Pairs = (),
+    time: str | None = None,
+    columns: File | None = None,
+    reference_unit: Pairs = (),
+    reference_time: str | None = None,
+    reference_columns: File | None = None,
+    axis: str | None = None,
+    machine: File | None = None,
+    start: Value | None = None,
+    end: Value | None = None,
+    shift: Value = 0.0,
+    max_shift: Value = "50 ms",
+    cover: Value = 0.0,
+    max_gap: Value | None = None,
+    at: Literal["auto", "result", "reference"] = "auto",
+    report: File | None = None,
+    junit: File | None = None,
+    json: File | None = None,
+    force: bool = False,
+) -> CompareResult:
+    """Compare results with references: every row must lie in a tube of value and time around the reference.
+
+    Args:
+        files: result and reference in turn: CSV files, folders, traces, runs.
+        tol: tolerances such as ``["1e-6", "*.x_a=2 nm"]``; later ones count more; none: 1e-3 of the range.
+        tolerances: tolerance file; None: the reference's own beside it.
+        column: result's name -> reference's name, where they differ; with * on both sides all such.
+        only, ignore: patterns of variables that are compared, and that are not.
+        common: columns that the result lacks are left out, not missing.
+        hold: patterns of variables that hold their values between rows.
+        unit, reference_unit: pattern -> unit of columns whose header has none.
+        time, reference_time: time column, "NAME" or "NAME:UNIT".
+        columns, reference_columns: mapping file, where one of both is a drive's record.
+        axis: of a drive's record. machine: gives its pitch and torque constant.
+        start, end: what is compared [s]; None: all.
+        shift: added to the result's time [s], or "estimate". max_shift: the largest estimated one [s].
+        cover: least share of the result's rows that must be compared.
+        max_gap: longest step between rows of the result [s]; None: any.
+        at: whose instants are looked at.
+        report, junit, json: files to write: report as HTML, JUnit XML, all figures as JSON.
+        force: they may be files that no comparison wrote.
+
+    Raises:
+        InputError: wrong arguments. What cannot be compared is "unusable" in what is returned.
+        OutputError: a file cannot be written.
 
     >>> import feedsim as fs
     >>> result = fs.run("z_positioning.yaml")
     >>> fs.compare(result, result).verdict
     'same'
     """
-    texts = [tol] if isinstance(tol, str) else tol
-    allowed = texts if isinstance(texts, Tolerances) else Tolerances.parse(texts)
-    if isinstance(result, str | Path) and isinstance(reference, str | Path):
-        beside = allowed if isinstance(texts, Tolerances) else tolerances_of(Path(reference), None, texts)
-        return compare_files(Path(result), Path(reference), beside, options)
-    return compared(_trace(result), _trace(reference), allowed, options)
+    texts = _texts(tol)
+    for option, given in (("axis", axis), ("machine", machine)):
+        if given is not None and columns is None and reference_columns is None:
+            raise InputError(
+                f"{spelt(option)} {given}: is for the record of a drive; {spelt('columns')} or "
+                f"{spelt('reference_columns')} says which"
+            )
+    choice = Options(
+        columns=_pairs("column", column, "RESULT=REFERENCE"),
+        only=_texts(only),
+        ignore=_texts(ignore),
+        units=_units("unit", unit),
+        reference_units=_units("reference_unit", reference_unit),
+        hold=_texts(hold),
+        start=_instant(start),
+        end=_instant(end),
+        shift=0.0 if shift == "estimate" else _instant(shift) or 0.0,
+        common=common,
+        max_gap=_instant(max_gap),
+        at=at,
+        cover=_share(cover),
+    )
+    asked = _Asked(
+        texts,
+        None if tolerances is None else Path(tolerances),
+        choice,
+        _Side(time, None if columns is None else Path(columns)),
+        _Side(reference_time, None if reference_columns is None else Path(reference_columns)),
+        axis,
+        None if machine is None else Path(machine),
+        amount(max_shift, "s") if shift == "estimate" else None,
+    )
+    Tolerances.parse(texts)  # a typing error is told before anything is read
+    paths = [Path(each) for each in files if isinstance(each, str | Path)]
+    outputs = {name: None if file is None else Path(file) for name, file in
+               (("html", report), ("xml", junit), ("json", json))}  # fmt: skip
+    with replacing(force or forced()):
+        if len(paths) < len(files):
+            found, durations = asked.in_memory(files)
+            page.check_writable(outputs, paths)
+        else:
+            pairs = pairs_of(paths)
+            own = [asked.tolerances, asked.ours.mapping, asked.theirs.mapping]
+            page.check_writable(outputs, [*(path for pair in pairs for path in pair), *filter(None, own)])
+            found, durations = asked.of_files(pairs)
+        result = CompareResult(found, paths, asked.tolerances, durations)
+        page.write(found, **outputs, durations=durations)
+    return result
 
 
-def _trace(given: File | Trace | Run) -> Trace:
-    if isinstance(given, Trace):
-        return given
-    if not isinstance(given, str | Path):
-        return given.trace
-    return read_csv(Path(given))
+@dataclass(frozen=True)
+class _Side:
+    """How a file of one side is read. time: NAME[:UNIT] of its time column; mapping: for a drive's record."""
+
+    time: str | None
+    mapping: Path | None
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """How pairs are compared. most: the largest shift that is estimated [s]; None: none is."""
+
+    tol: Sequence[str]
+    tolerances: Path | None
+    choice: Options
+    ours: _Side
+    theirs: _Side
+    axis: str | None
+    machine: Path | None
+    most: float | None
+
+    def of_files(self, pairs: Sequence[tuple[Path, Path]]) -> tuple[list[Comparison], list[float]]:
+        """Comparisons of pairs of files, and how long they took [s]."""
+        found, durations = [], []
+        for result, reference in pairs:
+            begin = perf_counter()
+            try:
+                comparison = self._pair(result, reference)
+            except InputError as error:
+                comparison = unusable(result, reference, "; ".join(str(error).splitlines()))
+            found.append(comparison)
+            durations.append(perf_counter() - begin)
+        if problem := _matched_nowhere(found, self.tol):
+            found = [unusable(each.result, each.reference, problem) if each.variables else each for each in found]
+        return found, durations
+
+    def in_memory(self, given: Sequence[Any]) -> tuple[list[Comparison], list[float]]:
+        """The same of traces and runs, and of CSV files beside them."""
+        if len(given) % 2:
+            raise InputError(f"{len(given)} results given; result and reference are needed in turn")
+        found, durations = [], []
+        for result, reference in zip(given[::2], given[1::2], strict=True):
+            begin = perf_counter()
+            ours, theirs = _series(result, self.ours), _series(reference, self.theirs)
+            names = tuple(str(each) if isinstance(each, str | Path) else what
+                          for each, what in ((result, "result"), (reference, "reference")))  # fmt: skip
+            limits = tolerances_of(Path("reference"), self.tolerances, self.tol)
+            choice, notes = self._shifted(ours, theirs, limits)
+            comparison = compared(ours, theirs, limits, choice, names=(names[0], names[1]))
+            found.append(replace(comparison, notes=(*notes, *comparison.notes)))
+            durations.append(perf_counter() - begin)
+        return found, durations
+
+    def _pair(self, result: Path, reference: Path) -> Comparison:
+        limits = tolerances_of(reference, self.tolerances, self.tol)
+        ours = self._read(result, self.ours)
+        theirs = self._read(reference, self.theirs)
+        choice, notes = self._shifted(ours, theirs, limits)
+        between = bounds_of(reference) if self.theirs.mapping is None else None
+        found = compare_series(ours, theirs, limits, choice, between=between, names=(str(result), str(reference)))
+        if result.exists() and result.samefile(reference):
+            notes.append("result and reference are the same file")
+        return replace(found, notes=(*notes, *found.notes))
+
+    def _shifted(self, ours: Series, theirs: Series, limits: Tolerances) -> tuple[Options, list[str]]:
+        """The choice with the shift that is estimated, and a note on it."""
+        if self.most is None:
+            return self.choice, []
+        shift = estimated_shift(ours, theirs, self.most, self.choice, limits)
+        return replace(self.choice, shift=shift.seconds), [shift.note]
+
+    def _read(self, path: Path, side: _Side) -> Series:
+        if side.mapping is not None:
+            return _read_record(path, side.mapping, self.axis, self.machine)
+        if path.suffix.lower() == ".mat":
+            raise InputError(
+                f"{path}: a MAT file needs a mapping of its columns: {spelt('columns')} or {spelt('reference_columns')}"
+            )
+        return read_series(path, time=side.time)
+
+
+def _series(given: Any, side: _Side) -> Series:
+    if isinstance(given, str | Path):
+        return read_series(Path(given), time=side.time)
+    return as_series(given if isinstance(given, Trace) else given.trace)
+
+
+def _texts(given: str | Sequence[str]) -> list[str]:
+    return [given] if isinstance(given, str) else list(given)
+
+
+def _pairs(option: str, given: Pairs, form: str) -> list[tuple[str, str]]:
+    """(name, text) of a mapping, or of texts NAME=TEXT. Raises InputError: no such form."""
+    if isinstance(given, Mapping):
+        return [*given.items()]
+    found = []
+    for text in given:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise InputError(f"{spelt(option)} {text}: {form} is needed")
+        found.append((name, value))
+    return found
+
+
+def _units(option: str, given: Pairs) -> dict[str, str]:
+    found = dict(_pairs(option, given, "PATTERN=UNIT"))
+    for unit in found.values():
+        units.unit(unit)
+    return found
+
+
+def _instant(value: Value | None) -> float | None:
+    return None if value is None else amount(value, "s", "0.1 s")
+
+
+def _share(value: Value) -> float:
+    """Of 0.9, "90 %" or "0.9". InputError."""
+    share = amount(value, "1", "90 %")
+    if not 0 <= share <= 1:
+        raise InputError(f"{spelt('cover')} {value}: is outside the allowed range: 0 to 100 %")
+    return share
+
+
+def _matched_nowhere(comparisons: Sequence[Comparison], texts: Sequence[str]) -> str:
+    """That a pattern of --tol matches in no reference, where it is so."""
+    compared = [each for each in comparisons if each.variables]
+    for pattern, _ in Tolerances.parse(texts).rules:
+        if compared and all(pattern in each.unused for each in compared):
+            names = dict.fromkeys(variable.name for each in compared for variable in each.variables)
+            return f"{spelt('tol')} given for {no_match(pattern, tuple(names))}"
+    return ""
+
+
+def _read_record(path: Path, mapping: Path, axis: str | None, machine: Path | None) -> Series:
+    """The record of an axis A as A.x_a, A.n_a, A.M_a and A.x_s, as far as it holds them.
+
+    Between the pieces of a record with gaps stands a row without numbers, so that nothing is compared there.
+    """
+    from feedsim.files.columns import load_columns
+    from feedsim.identify.read import read_records
+    from feedsim.scenario import load_subject
+
+    subject = load_subject(machine) if machine is not None else None
+    recorded = read_records(path, load_columns(mapping), axis, subject.machine if subject else None)
+    source = recorded.provenance
+    named = source.axis or axis
+    if not named:
+        raise InputError(
+            f"{path}: the record does not say which axis it is of; give {spelt('axis')}, for example {spelt('axis')} Z"
+        )
+    lead = None if source.pitch is None else source.pitch / (2 * np.pi)
+    pieces: dict[str, list[Array]] = {"time": []}
+    for i, record in enumerate(recorded.records):
+        columns = {"time": record.time, "n_a": record.speed, "M_a": record.torque}
+        if lead is not None:
+            columns["x_a"] = None if record.angle is None else record.angle * lead
+            columns["x_s"] = None if record.setpoint is None else record.setpoint * lead
+        for name, values in columns.items():
+            if values is None:
+                continue
+            parts = pieces.setdefault(name, [])
+            if i:
+                gap = 0.5 * (recorded.records[i - 1].time[-1] + record.time[0])
+                parts.append(np.array([gap if name == "time" else np.nan]))
+            parts.append(values)
+    joined = {name: np.concatenate(parts) for name, parts in pieces.items()}
+    time = joined.pop("time")
+    return Series(
+        time,
+        {f"{named}.{name}": values for name, values in joined.items()},
+        {f"{named}.{name}": RECORD_UNITS[name] for name in joined},
+    )
+
+
+def _lines(comparison: Comparison, everything: bool, notes: bool) -> list[str]:
+    """What the terminal shows of a pair; notes: although it is the same."""
+    found = [f"{comparison.result} against {comparison.reference}: {comparison.line}"]
+    if comparison.shift:
+        found.append(f"  shifted by {seconds(comparison.shift)}")
+    ranked = sorted(comparison.variables, key=lambda each: (-each.ratio, each.verdict == "same"))
+    shown = [each for each in ranked if everything or each.verdict != "same"]
+    cut = shown if everything else shown[:MOST_LINES]
+    width = max((len(each.name) for each in cut), default=0)
+    found += [f"  {each.name:<{width}}  {_variable_line(each)}" for each in cut]
+    if len(shown) > len(cut):
+        found.append(f"  and {len(shown) - len(cut)} more; --all lists them")
+    found += [f"  looks like: {each.text}" for each in comparison.looks_like]
+    return found + [f"  note: {note}" for note in comparison.notes if notes or not comparison.same]
+
+
+def _variable_line(variable: Variable) -> str:
+    outside = f"; outside in {variable.outside} of {variable.rows} rows" if variable.outside else ""
+    return f"{variable.verdict}: {variable.line}{outside}"
+
+
+def _default(comparisons: Sequence[Comparison]) -> list[str]:
+    """Of several pairs, whose notes are not shown where they are the same: that no tolerance is given for some."""
+    if len(comparisons) == 1:
+        return []
+    hidden = [
+        (each, note) for each in comparisons if each.same for note in each.notes if note.startswith("no tolerance")
+    ]
+    more = f" (as in {len(hidden) - 1} more)" if len(hidden) > 1 else ""
+    return [f"note: {hidden[0][0].result}: {hidden[0][1]}{more}"] if hidden else []
+
+
+def _unused(result: CompareResult) -> list[str]:
+    """Patterns of a tolerance file that match in no reference.
+
+    Of the file that was asked for, each; one that lies beside references serves those too that are not compared, so
+    that there a note is made only where none of its patterns matches.
+    """
+    by_file: dict[Path, list[set[str]]] = {}
+    for each in result.comparisons:
+        if (file := result.tolerances or beside(Path(each.reference))) is not None and each.variables:
+            by_file.setdefault(file, []).append(set(each.unused))
+    found = []
+    for file, unused in by_file.items():
+        own = [pattern for pattern, _ in tolerances_of(file, file, ()).rules if pattern != "*"]
+        nowhere = [pattern for pattern in own if all(pattern in each for each in unused)]
+        if nowhere and (result.tolerances is not None or nowhere == own):
+            found.append(f"note: {file}: matches no column: {', '.join(map(repr, nowhere))}")
+    return found
+
+
+def _unreferenced(result: CompareResult) -> list[str]:
+    """That files of a folder of results have no reference."""
+    compared = {Path(each.result) for each in result.comparisons}
+    found = []
+    for folder, reference in zip(result.asked[::2], result.asked[1::2], strict=False):
+        if folder.is_dir() and reference.is_dir():
+            more = sorted({path for path in folder.rglob("*.csv") if path.is_file()} - compared)
+            named = ", ".join(str(path.relative_to(folder)) for path in more[:3]) + (", ..." if len(more) > 3 else "")
+            found += [f"note: {folder}: {len(more)} CSV files have no reference: {named}"] if more else []
+    return found
+
+
+def _sum(comparisons: Sequence[Comparison]) -> list[str]:
+    if len(comparisons) == 1:
+        return []
+    counts = [(sum(each.verdict == kind for each in comparisons), kind) for kind in ("same", "different", "unusable")]
+    counted = ", ".join(f"{number} {kind}" for number, kind in counts if number)
+    partly = sum(each.coverage is not None and each.same and each.coverage.share < 1 for each in comparisons)
+    counted += f"; in {partly} of them not all rows are compared" if partly else ""
+    return [f"{len(comparisons)} comparisons: {counted}"]

@@ -8,9 +8,8 @@ from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from feedsim.analysis import Figure
 from feedsim.errors import InputError
 from feedsim.findings import severity
 from feedsim.outputs import forced, replacing
@@ -18,6 +17,9 @@ from feedsim.report.content import Report
 from feedsim.report.page import html
 from feedsim.report.picture import Picture
 from feedsim.report.results import Content, write_report
+
+if TYPE_CHECKING:
+    from feedsim.analysis import Figure
 
 HEIGHT = 900  # [px] of a report in a notebook; it scrolls
 

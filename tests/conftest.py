@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parent.parent
 UNITS = ("plant", "controller", "friction", "setpoint", "machine")
 
+# What a test computes, no earlier run has computed for it.
+os.environ["FEEDSIM_CACHE"] = ""
+
 # How long an example takes is no verdict.
 settings.register_profile("feedsim", deadline=None)
 settings.load_profile("feedsim")

@@ -43,6 +43,7 @@ ORDER = [
     "findings",
     "outputs",
     "owned",
+    "cache",
     "called",
     "extras",
     "errors",

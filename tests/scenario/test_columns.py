@@ -9,7 +9,8 @@ import pytest
 import yaml
 
 from feedsim.errors import InputError
-from feedsim.files.columns import Columns, Signal, is_rms, load_columns, spelled
+from feedsim.files.columns import Columns, Signal, load_columns
+from feedsim.files.spellings import is_rms, spelled
 from feedsim.scenario.schema import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,7 +9,7 @@ from typing import Literal
 
 from feedsim import units
 from feedsim.errors import InputError, few
-from feedsim.files.columns import spelled
+from feedsim.files.spellings import spelled
 from feedsim.trace import Series, matches
 from feedsim.trace.trace import suggest
 

@@ -9,16 +9,8 @@ from typing import Literal
 
 from feedsim import units
 from feedsim.errors import InputError, few
-from feedsim.files.columns import (
-    DIMENSIONS,
-    DRIVING,
-    Columns,
-    Signal,
-    is_rms,
-    known_unit,
-    resulting,
-    target_of,
-)
+from feedsim.files.columns import DIMENSIONS, DRIVING, Columns, Signal, resulting, target_of
+from feedsim.files.spellings import is_rms, known_unit
 from feedsim.findings import Note
 from feedsim.identify.signal_names import alias_of
 from feedsim.trace import Recording

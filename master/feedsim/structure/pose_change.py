@@ -9,21 +9,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.cache import cached
 from feedsim.errors import FeedsimError
 from feedsim.scenario import Machine
-from feedsim.structure.assembly import Assembly, Floats
-from feedsim.structure.geometry.assemble import State, assembler_of, state_of, structure_of
+from feedsim.structure.file import CODE, State, digest_of, state_of
 from feedsim.structure.modes import TOOL_PORTS
 
 if TYPE_CHECKING:
+    from feedsim.structure.assembly import Assembly, Floats
+    from feedsim.structure.geometry.assemble import Assembler
     from feedsim.structure.solve import Solution
 
 # Closer to the pose nothing is calculated [m]: modes change by 0.1 % and less per millimetre.
@@ -167,7 +169,7 @@ def over_axis(machine: Machine, axis: str, positions: Sequence[float]) -> ModesO
         return None
     try:
         pose = _Pose(machine.structure, state_of(machine.structure), tuple(machine.pose.items()))
-        if axis not in assembler_of(pose.structure, pose.state).structure.axes:
+        if axis not in _assembler(pose).structure.axes:
             return None
         solution, frequency = _middle(pose)[1], _middle(pose)[1].modes.frequency
         own = np.flatnonzero(_seen(solution) & (frequency > 0) & (frequency <= LOOKED_AT))
@@ -218,14 +220,34 @@ class _End:
     compliances: tuple[float, ...]
 
 
+# Most of the time of a short run: the answer of an earlier process counts, for the same file, code and ends.
+def _kept_between(
+    pose: _Pose, axis: str, low: float | None, high: float | None
+) -> tuple[tuple[ModeChange, ...], tuple[Compliance, ...]]:
+    """As _between; nothing of an axis that the structure does not know."""
+
+    def find() -> Any:
+        if axis not in _assembler(pose).structure.axes:
+            return [[], []]
+        modes, compliances = _between(pose, axis, low, high)
+        return [[astuple(mode) for mode in modes], [astuple(each) for each in compliances]]
+
+    follows_from = [digest_of(pose.structure, pose.state), pose.axes, axis, low, high]
+    modes, compliances = cached("modes-over-pose", follows_from, CODE, find)
+    return (
+        tuple(ModeChange(f, (ends[0], ends[1]), change, mac, moving) for f, ends, change, mac, moving in modes),
+        tuple(Compliance(name, unit, (at[0], at[1], at[2])) for name, unit, at in compliances),
+    )
+
+
 def _with_modes(pose: _Pose, axis: AxisChange) -> AxisChange:
     """The axis with its modes, where it goes far enough and the structure knows it."""
-    if axis.distance <= NEAR or axis.axis not in assembler_of(pose.structure, pose.state).structure.axes:
+    if axis.distance <= NEAR:
         return axis
     low, high = (
         None if abs(position - axis.pose) <= NEAR else round(position, DECIMALS) for position in (axis.low, axis.high)
     )
-    modes, compliances = _between(pose, axis.axis, low, high)
+    modes, compliances = _kept_between(pose, axis.axis, low, high)
     return replace(axis, modes=modes, compliances=compliances)
 
 
@@ -245,9 +267,15 @@ def _end(pose: _Pose, axis: str, position: float | None) -> _End:
     model = middle
     if position is not None:
         # Beyond the structure's travel (a following error, a recording) its end counts.
-        low, high = assembler_of(pose.structure, pose.state).structure.axes[axis].travel
+        low, high = _assembler(pose).structure.axes[axis].travel
         model = _model(pose, {axis: min(max(position, low), high)}, described=False)
     return _End(*_matched(*middle, model[1]), tuple(_static(axis, *model)))
+
+
+def _assembler(pose: _Pose) -> Assembler:
+    from feedsim.structure.geometry.assemble import assembler_of  # loaded where there is something to solve
+
+    return assembler_of(pose.structure, pose.state)
 
 
 @lru_cache(maxsize=4)  # matrices: large ones of large structures
@@ -258,10 +286,10 @@ def _middle(pose: _Pose) -> tuple[Assembly, Solution]:
 def _model(pose: _Pose, moved: Mapping[str, float], described: bool) -> tuple[Assembly, Solution]:
     from feedsim.structure.solve import solve  # loaded where there is something to solve
 
-    assembler = assembler_of(pose.structure, pose.state)
+    assembler = _assembler(pose)
     here = {axis: position for axis, position in pose.axes if axis in assembler.structure.axes}
     assembly = assembler.at({**here, **moved})
-    damping = structure_of(pose.structure, pose.state).damping
+    damping = assembler.structure.damping
     # The sparse way: a few modes of many.
     cutoff = 2 * math.pi * 2 * LOOKED_AT
     return assembly, solve(assembly, cutoff=cutoff, damping=damping, dense_limit=0, described=described)

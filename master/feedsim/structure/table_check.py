@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from feedsim import units
+from feedsim.cache import cached
 from feedsim.errors import FeedsimError
 from feedsim.scenario import Machine
-from feedsim.structure.geometry.assemble import State, assembler_of, state_of, structure_axes, structure_of
+from feedsim.structure.file import CODE, State, digest_of, state_of
 from feedsim.structure.modes import Modes, read_modes
 
 # A table and a structure that belong together agree to the eigensolver's error (1e-8); a changed structure is far off.
@@ -28,9 +29,15 @@ def table_mismatch(machine: Machine) -> str | None:
     """
     if machine.structure is None:
         return None
+    structure = machine.structure
+
+    def find() -> str:
+        built = _modes(structure, state_of(structure), tuple(machine.pose.items()))
+        return stale(read_modes(machine.modes, list(machine.axes)), built, SAME_FREQUENCY) if built else ""
+
     try:
-        built = _modes(machine.structure, state_of(machine.structure), tuple(machine.pose.items()))
-        how = stale(read_modes(machine.modes, list(machine.axes)), built, SAME_FREQUENCY) if built else ""
+        files = [digest_of(each, state_of(each)) for each in (structure, machine.modes)]
+        how = cached("table-of-modes", [files, [*machine.pose.items()], [*machine.axes]], CODE, find)
     except (OSError, FeedsimError):
         return None
     if not how:
@@ -50,13 +57,15 @@ def _shown(pose: Mapping[str, float], between: str) -> str:
 @lru_cache(maxsize=32)
 def _modes(structure: Path, state: State, pose: tuple[tuple[str, float], ...]) -> Modes | None:
     """Modes at the pose; `state` is that of the file, so that a changed one is read anew."""
+    # Loaded where there is something to solve.
+    from feedsim.structure.geometry.assemble import assembler_of, structure_axes, structure_of
+    from feedsim.structure.solve import solve
+
     description = structure_of(structure, state)
     axes = structure_axes(description)
     if not axes:
         return None
     assembly = assembler_of(structure, state).at({axis: position for axis, position in pose if axis in axes})
-    from feedsim.structure.solve import solve  # loaded where there is something to solve
-
     # The sparse way: of a model of some hundred degrees of freedom, in less than half the time of full matrices.
     return solve(assembly, cutoff=description.cutoff, damping=description.damping, dense_limit=0, described=False).modes
 

@@ -21,8 +21,8 @@ import numpy as np
 
 from feedsim import units
 from feedsim.errors import InputError, few
-from feedsim.files.columns import known_unit
 from feedsim.files.regular import content
+from feedsim.files.spellings import known_unit
 from feedsim.trace.trace import LARGEST, Array, check_name, check_unit, recorded, suggest
 
 _HEADER = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?")

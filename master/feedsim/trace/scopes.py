@@ -17,7 +17,7 @@ import numpy as np
 
 from feedsim.errors import InputError, few
 from feedsim.files import regular
-from feedsim.files.columns import known_unit, spelled
+from feedsim.files.spellings import known_unit, spelled
 from feedsim.trace.trace import Array
 
 HEAD = 65536  # bytes within which a file tells what it is

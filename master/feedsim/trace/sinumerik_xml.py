@@ -19,7 +19,7 @@ import numpy as np
 
 from feedsim.errors import InputError, few
 from feedsim.files import regular
-from feedsim.files.columns import known_unit, spelled
+from feedsim.files.spellings import known_unit, spelled
 from feedsim.trace.response import Complexes, FrequencyResponse
 from feedsim.trace.scopes import Signals, unique
 from feedsim.trace.trace import Array

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from feedsim import units
 from feedsim.errors import InputError
-from feedsim.files.columns import spelled
+from feedsim.files.spellings import spelled
 
 # Label, as it may stand in a line, and the unit of its kind.
 LABELS = {

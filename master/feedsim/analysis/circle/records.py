@@ -22,7 +22,7 @@ from feedsim.analysis.circle.header import Told, own_format
 from feedsim.analysis.circularity import EVEN, PARTS, fitted_circle
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
-from feedsim.files.columns import spelled
+from feedsim.files.spellings import spelled
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.trace import Recording, read_recording
 

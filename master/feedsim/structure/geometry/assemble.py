@@ -18,11 +18,9 @@ from feedsim.scenario.structure.checks import contradictions, pose_faults
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.assembly import Assembly, Geometry
+from feedsim.structure.file import State
 from feedsim.structure.geometry.mesh import Mesh, symmetric, weighted
 from feedsim.structure.geometry.springs import body_springs, drive_springs, ports
-
-# What tells a file from a later one of the same name.
-State = tuple[int, int, int]
 
 
 class Assembler:
@@ -92,12 +90,6 @@ def movable(structure: Structure) -> Assembler:
 def structure_axes(structure: Structure) -> tuple[str, ...]:
     """Axes of a structure of kind geometry; none of others."""
     return tuple(structure.axes) if isinstance(structure, GeometryStructure) else ()
-
-
-def state_of(file: Path) -> State:
-    """Time of the last change [ns], length [byte] and number of a file. Raises OSError."""
-    found = file.stat()
-    return found.st_mtime_ns, found.st_size, found.st_ino
 
 
 @lru_cache(maxsize=8)

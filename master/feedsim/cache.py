@@ -1,0 +1,99 @@
+"""Answers that are dear to find and short to write, kept on disk from one process to the next.
+
+An answer belongs to all that it follows from: the bytes of the user's files, the arguments, and the code that finds it.
+Where one of these changes it is found anew, so that a kept answer is the very one that would be found. What cannot be
+read or written is found as if nothing had been kept. May use: nothing. Start reading at cached().
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+FOLDER = "FEEDSIM_CACHE"  # environment variable: the folder; empty: nothing is kept
+KEPT = 256  # answers of one kind; the oldest go first
+LARGEST = 1 << 20  # bytes of an answer; a larger file is none of ours
+LIBRARIES = ("numpy", "scipy")
+
+
+def cached(kind: str, follows_from: Sequence[Any], code: Sequence[Path], find: Callable[[], Any]) -> Any:
+    """What `find` returns, numbers and texts as JSON has them; kept from an earlier process where nothing has changed.
+
+    kind: letters, the beginning of the file's name. follows_from: what the answer depends on, as JSON has it. code:
+    folders with the code that finds it.
+    """
+    place = folder()
+    if place is None:
+        return find()
+    asked = json.dumps([kind, _versions(tuple(code)), *follows_from], sort_keys=True)
+    file = place / f"{kind}-{hashlib.sha256(asked.encode()).hexdigest()[:40]}.json"
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+        if file.stat().st_size <= LARGEST:
+            kept = json.loads(file.read_text(encoding="utf-8"))
+            if kept["asked"] == asked:
+                return kept["answer"]
+    answer = find()
+    with suppress(OSError):
+        _keep(file, kind, json.dumps({"asked": asked, "answer": answer}))
+    return answer
+
+
+def folder() -> Path | None:
+    """Where answers are kept; None: nowhere."""
+    if (given := os.environ.get(FOLDER)) is not None:
+        return Path(given) if given else None
+    if sys.platform == "win32":
+        home = Path(os.environ.get("LOCALAPPDATA", ""))
+    else:
+        home = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.environ.get("HOME", "")) / ".cache")
+    return home / "feedsim" if home.is_absolute() else None
+
+
+def digest(file: Path) -> str:
+    """SHA-256 of a file's bytes. Raises OSError."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+@lru_cache(maxsize=8)
+def _versions(code: tuple[Path, ...]) -> list[str]:
+    """The code that finds an answer, the libraries that it computes with, and the processor."""
+    sources = hashlib.sha256()
+    for each in code:
+        for file in sorted(each.rglob("*.py")) if each.is_dir() else [each]:
+            sources.update(file.read_bytes())
+    libraries = []
+    for name in LIBRARIES:
+        with suppress(PackageNotFoundError):
+            libraries.append(f"{name} {version(name)}")
+    return [sources.hexdigest(), *libraries, platform.machine(), sys.byteorder]
+
+
+def _keep(file: Path, kind: str, text: str) -> None:
+    """Write it whole; others may read and write the same one meanwhile. Raises OSError."""
+    if len(text) > LARGEST:
+        return
+    file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", prefix=".", dir=file.parent, delete=False) as out:
+        fresh = Path(out.name)
+        try:
+            out.write(text)
+            out.close()
+            fresh.replace(file)
+        except BaseException:
+            with suppress(OSError):
+                fresh.unlink()
+            raise
+    others = sorted(file.parent.glob(f"{kind}-*.json"), key=lambda each: each.stat().st_mtime)
+    for old in others[:-KEPT]:
+        with suppress(OSError):
+            old.unlink()

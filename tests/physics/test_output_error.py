@@ -235,7 +235,7 @@ def test_what_small_sines_do_not_tell_is_said(law: FrictionLaw) -> None:
     )
     assert any(text.startswith("W needs") and "20 um" in text for text in found.advice)
     assert any(text.startswith("gamma needs") and "50 um" in text for text in found.advice)
-    assert any(text.startswith("sigma_1 is best told by") and "5 Hz" in text for text in found.advice)
+    assert any(text.startswith("sigma_1 is best determined by") and "5 Hz" in text for text in found.advice)
 
 
 def test_a_sliding_sine_parts_delay_and_damping(law: FrictionLaw) -> None:

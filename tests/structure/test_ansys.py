@@ -184,7 +184,7 @@ def test_what_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert "file.full: no mass matrix in it; the file of a modal analysis (ANTYPE,MODAL)" in fault([1, 2, 3], mass=None)
     assert "file.full: no stiffness matrix in it" in fault([1, 2, 3], stiffness=None)
     assert "degrees of freedom other than displacements and rotations (ANSYS numbers [20])" in fault([1, 2, 20])
-    assert "file.full: nodes with [3] of 4 degrees of freedom; which these are cannot be told" in fault([1, 2, 6, 5])
+    assert "file.full: nodes with [3] of 4 degrees of freedom; which ones is not known" in fault([1, 2, 6, 5])
 
     def lumped(*_: Any, **__: Any) -> Any:
         raise NotImplementedError("Unable to read a lumped mass matrix")

@@ -39,7 +39,7 @@ FELT = 1e-2
 DRIVING, MATTERS = 0.5, 0.05
 # A load that the recorded motor torque contradicts: the least change of its factor, and the least share of the motor's
 # work by which run and record differ while it acts. Below the last factor the record shows little of such a load.
-AMISS, APART, SHOWN = 0.5, 0.1, 0.3
+FACTOR_OFF, WORK_OFF, FACTOR_SEEN = 0.5, 0.1, 0.3
 # Of its travel: an axis that is off by more has left its setpoint; at rapid traverse without feedforward it is off by
 # 1 %.
 LEFT = 0.02
@@ -227,13 +227,13 @@ def _contradicted_loads(scenario: Scenario, loads: Sequence[Work]) -> list[str]:
     told = []
     for work in loads:
         drives = work.drives
-        if drives is None or (factor := drives.factor) is None or abs(factor - 1) < AMISS:
+        if drives is None or (factor := drives.factor) is None or abs(factor - 1) < FACTOR_OFF:
             continue
-        if abs(drives.run - drives.record) < APART * drives.turned:
+        if abs(drives.run - drives.record) < WORK_OFF * drives.turned:
             continue
         load = scenario.loads[work.load]
         column = load.motor_torque.column if load.motor_torque is not None else ""
-        if abs(factor) < SHOWN:
+        if abs(factor) < FACTOR_SEEN:
             wrong = "the record shows little or nothing of it: its size, kind or time is wrong"
         else:
             wrong = "its sign is wrong" if factor < 0 else "its size is wrong: unit, kind or factor"

@@ -84,12 +84,12 @@ def advice(
             continue
         if known <= good and relative > 1.5 * known:
             sentences.append(
-                f"{name} is told within {100 * relative:.1f} %, with a known delay within {100 * known:.1f} %: give "
+                f"{name} is known within {100 * relative:.1f} %, with a known delay within {100 * known:.1f} %: give "
                 "the delay, or add a sliding sine whose inertia marks it (500 um at 5 Hz)"
             )
         else:
             sentences.append(
-                f"{name} is told within {100 * relative:.1f} % only: more periods, or less noise (the deviation falls "
+                f"{name} is known within {100 * relative:.1f} % only: more periods, or less noise (the deviation falls "
                 "with the square root of the number of periods)"
             )
     return tuple(sentences)
@@ -102,7 +102,7 @@ def _wanted(estimate: Estimate) -> str:
     if estimate.status == "undetermined" or not np.isfinite(estimate.sigma):
         return "needs"
     good = GOOD[estimate.name] * abs(estimate.value)
-    return "needs" if estimate.sigma > good else "is best told by" if estimate.sigma > EXCELLENT * good else ""
+    return "needs" if estimate.sigma > good else "is best determined by" if estimate.sigma > EXCELLENT * good else ""
 
 
 def _length(angle: float, I_P: float | None) -> str:
@@ -111,5 +111,5 @@ def _length(angle: float, I_P: float | None) -> str:
 
 def _bound(estimate: Estimate) -> str:
     if estimate.status == "undetermined":
-        return " (it cannot be told from these records)"
-    return f" (told within {100 * estimate.sigma / abs(estimate.value):.0f} %)"
+        return " (these records do not determine it)"
+    return f" (known within {100 * estimate.sigma / abs(estimate.value):.0f} %)"

@@ -39,8 +39,9 @@ def hides(sigma: float, drifts: float, sigma_2: float) -> tuple[str, ...]:
         return ()
     whole, rest = (100 * NORMAL_95 * part / sigma_2 for part in (sigma, np.sqrt(max(sigma**2 - drifts**2, 0.0))))
     return (
-        "no fast speed is driven both early and late: viscous friction that falls as the axis warms up is not told "
-        f"from the shape of the curve; the interval of sigma_2 holds it (+-{whole:.2g} %, without +-{rest:.2g} %); "
+        "no fast speed is driven both early and late: viscous friction that falls as the axis warms up is not "
+        f"separated from the shape of the curve; the interval of sigma_2 holds it (+-{whole:.2g} %, without "
+        f"+-{rest:.2g} %); "
         "drive the fastest speed first and last, or warm the axis up before",
     )
 

@@ -60,7 +60,7 @@ class Inertia:
 
 LEAST_ROWS = 20
 USUAL = (0.05, 0.5, 0.95)  # quantiles of the speeds that count as usual
-APART = 0.5  # of the friction, or of the inertia: by how much line and curve may differ, besides
+CONTRADICTS = 0.5  # of the friction, or of the inertia: by how much line and curve may differ, besides
 CERTAIN = 4.0  # standard deviations of the line
 SIMPLE = "a rigid axis with simple friction"
 LEAST_SHARE = 0.05  # of the torque (rms) that accelerates, below which the friction model's faults may pass for J
@@ -234,12 +234,12 @@ def contradiction(found: Inertia, estimates: Mapping[str, Estimate]) -> str:
         friction = line["F_C"].value + line["sigma_2"].value * abs(n)
         straight = line["M_0"].value + side * friction
         row = np.array([{"J": 0.0, "sigma_2": n, "F_C": side, "M_0": 1.0}[name] for name in found.correlation.names])
-        margin = APART * friction + CERTAIN * float(np.sqrt(row @ found.covariance @ row))
+        margin = CONTRADICTS * friction + CERTAIN * float(np.sqrt(row @ found.covariance @ row))
         curved = float(torque(values, np.array([n]))[0])
         if abs(curved - straight) > margin:
             return f"{curved:.3g} N.m at {n:.3g} rad/s, where {SIMPLE} needs {straight:.3g} N.m"
     J = estimates.get("J")
-    margin = APART * line["J"].value + CERTAIN * line["J"].sigma
+    margin = CONTRADICTS * line["J"].value + CERTAIN * line["J"].sigma
     if J is not None and J.status == "estimated" and abs(J.value - line["J"].value) > margin:
         return f"an inertia of {J.value:.3g} kg.m2, where {SIMPLE} has {line['J'].value:.3g}"
     return ""

@@ -194,7 +194,7 @@ def _known(
         else:
             held["J"] = (J.status if J.status != "estimated" else "given"), J.reason or "no standard deviation is known"
     if prior is None and not _both_directions(fine):
-        reason = "the axis moves in one direction only: friction, constant load and asymmetry cannot be told apart"
+        reason = "the axis moves in one direction only: friction, constant load and asymmetry cannot be separated"
         held |= {name: ("undetermined", reason) for name in ("M_0", "asymmetry")}
         unknown.discard("M_0")
     if delay is not None:

@@ -129,7 +129,7 @@ def _usable(records: Sequence[Record], roles: Sequence[str]) -> list[Record]:
             raise InputError(f"{record.name}: no {' and no '.join(missing)}; the position loop needs it")
     moved = [each for each in records if np.ptp(np.asarray(each.setpoint)) > LEAST_TRAVEL]
     if not moved:
-        raise InputError(f"{records[0].name}: the setpoint does not move; the position loop cannot be told")
+        raise InputError(f"{records[0].name}: the setpoint does not move; the position loop cannot be identified")
     return moved
 
 

@@ -313,7 +313,7 @@ class _Run:
         if name in ("F_C", "F_S"):
             other = found.get("F_C" if name == "F_S" else "F_S")
             if other is None:
-                raise InputError(f"{name} cannot be told from the records: {reason}")
+                raise InputError(f"{name} is not determined by the records: {reason}")
             return held(other.value, f"as {other.name}")
         if name == "sigma_0":
             return held(found["F_S"].value / USUAL_DEFLECTION, "usual deflection")

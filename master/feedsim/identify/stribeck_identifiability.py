@@ -162,8 +162,8 @@ def warnings(points: Points, found: Fit, matrix: Array, names: Sequence[str], I_
         )
     if "F_log" in sigma and sigma["F_log"] > max(0.3 * found["F_log"], 0.02 * float(np.max(np.abs(points.torque)))):
         said.append(
-            f"F_log ({found['F_log']:.3g} -+ {sigma['F_log']:.2g} N.m) is hardly told from sigma_2 and F_C: add speeds "
-            "from well below to well above v_log; the curve itself may be good"
+            f"F_log ({found['F_log']:.3g} -+ {sigma['F_log']:.2g} N.m) is hardly separated from sigma_2 and F_C: add "
+            "speeds from well below to well above v_log; the curve itself may be good"
         )
     for name in found.at_bound:
         shown = "F_S - F_C" if name == EXCESS else name

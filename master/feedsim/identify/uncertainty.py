@@ -20,7 +20,7 @@ DRAWS = 8  # their mean square is known to within a half, their root to a quarte
 BY_CHANCE = 3.84  # variances that one stretch pulls by chance, 95 % (chi^2): a few stretches that agree tell no more
 # Of a row's interval: to better than that no cubic between rows tells when something happened. A delay that is too
 # short by it passes for damping, sigma_0 times as large.
-APART = 0.01
+INSTANT = 0.01
 SMOOTHER = 1.5  # times lower a cut-off: what it takes off more is about what the first one did
 AT_ODDS = 3.0  # times the deviation by noise that stretches which contradict each other make of it: worth a warning
 WORTH_A_WORD, LEAST_DELAY = 0.01, 2e-5  # of the value, and [s]: deviations that are worth it
@@ -70,7 +70,7 @@ def uncertainty(
 
 def _least(models: Sequence[RecordTorque], values: Mapping[str, float]) -> dict[str, float]:
     """Variances that no records tell a parameter better than, by inner name."""
-    apart = APART * max(model.record.interval for model in models)
+    apart = INSTANT * max(model.record.interval for model in models)
     least = {"delay": apart, "sigma_1": apart * values["sigma_0"]}
     return {name: sigma**2 for name, sigma in least.items()}
 

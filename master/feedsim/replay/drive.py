@@ -50,7 +50,7 @@ EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
 LEAST_ROWS = 50  # in which the axis moves
 MOST_TURNS = 8  # of fits and weights in turns; two or three do where the start is near
 SETTLED = 0.01  # change of a weight that moves no value by what its interval shows
-APART = 2.0  # of the logarithm of the likelihood: below it two cycles are as likely as one another
+DECISIVE = 2.0  # of the logarithm of the likelihood: below it two cycles are as likely as one another
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from feedsim.identify import Recorded
 from feedsim.owned import TemporaryFolder
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.compare import Comparison, replayed
-from feedsim.replay.drive import APART, DriveFound, identify_drive
+from feedsim.replay.drive import DECISIVE, DriveFound, identify_drive
 from feedsim.replay.machine_files import (
     RigidAxis,
     control_cycle,
@@ -92,7 +92,7 @@ def identify_drives(
     # A drive that closes the position loop itself (DSC) does so in its own cycle; a control, in that of its rows.
     cycle = position_cycle or control_cycle(interval)
     found = drives(cycle)
-    if position_cycle is None and sum(sum(one.other_cycles.values()) for one in found.values()) > APART:
+    if position_cycle is None and sum(sum(one.other_cycles.values()) for one in found.values()) > DECISIVE:
         cycle = _other(cycle, interval)
         found = drives(cycle)
     for axis, one in found.items():
@@ -120,7 +120,7 @@ def _begin(each: AxisRecord) -> Begin:
     if not each.record.driven:
         raise InputError(
             f"{each.record.name}, axis {each.axis}: no torque, current or force is recorded; without it neither "
-            "inertia nor friction is told: give a machine that has them (--machine)"
+            "inertia nor friction is known: give a machine that has them (--machine)"
         )
     return start_values(each)
 

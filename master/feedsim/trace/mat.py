@@ -107,7 +107,7 @@ class _Reader:
         else:
             end = start + size + (-size % 8 if kind != _COMPRESSED else 0)
         if start + size > len(view):
-            raise _Fault(f"it ends within {what}, which tells {size} bytes and has {len(view) - start}")
+            raise _Fault(f"it ends within {what}, which declares {size} bytes and has {len(view) - start}")
         return kind, view[start : start + size], end
 
     def inflated(self, data: memoryview) -> bytes:

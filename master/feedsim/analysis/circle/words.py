@@ -27,7 +27,7 @@ def answer(diagnosis: Diagnosis) -> str:
     if diagnosis.apart > CONTRADICT * diagnosis.G:
         return (
             f"{G}: turns that were read as one direction contradict each other by {_um(diagnosis.apart)}, so no cause "
-            "can be told. One may have been driven the other way: angles that rise from row to row are read as "
+            "is named. One may have been driven the other way: angles that rise from row to row are read as "
             "counterclockwise, angles that fall as clockwise. Reverse the rows of that turn, or give each by itself."
         )
     if not told:
@@ -58,7 +58,7 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
     value, axis = term.value, term.axis
     amount = abs(value)
     if not term.told and term.key not in ("rest", "peaks"):
-        return f"{name(term)}: cannot be told from zero"
+        return f"{name(term)}: cannot be distinguished from zero"
     match term.key:
         case "offset":
             return f"the centre lies {_um(amount)} off: set-up of the measurement, or drift since the centre was set"

@@ -32,7 +32,7 @@ function answer_of(diagnosis) {
 
 function sentence_of(diagnosis, term) {
   const [first, second] = diagnosis.circle.axes, { value, axis } = term, amount = Math.abs(value);
-  if (!term.certain && term.key !== "rest" && term.key !== "peaks") return `${name_of(term)}: cannot be told from zero`;
+  if (!term.certain && term.key !== "rest" && term.key !== "peaks") return `${name_of(term)}: cannot be distinguished from zero`;
   switch (term.key) {
     case "offset": return `the centre lies ${in_um(amount)} off: set-up of the measurement, or drift since the centre was set`;
     case "radius": return `the radius is ${in_um(amount)} too ${value > 0 ? "large" : "small"}: ${lag_words(diagnosis, value)}`;

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 CELL = 2.0  # points: how finely a panel is looked at
 NEAR, LED = 3.5, 9.0  # points between a point and its label; from which on a line leads to it
 FAR = 12.0  # points, of a label from its line
-APART = 2  # cells between words
+WORD_GAP = 2  # cells between words
 COVERED = 1e4  # what it costs to stand on a curve, against points of distance
 SMALL, LEAST, NOTE = 8.5, 6.5, 5.0  # points: of words, of those that need to be smaller, about a note
 
@@ -155,7 +155,7 @@ class Ground:
             + 50 * covered
         )
         a, b = np.unravel_index(int(np.argmin(cost)), cost.shape)
-        self.taken[max(0, a - APART) : a + across + APART, b : b + up] = True
+        self.taken[max(0, a - WORD_GAP) : a + across + WORD_GAP, b : b + up] = True
         x, y = float(left[a, 0]), float(low[0, b])
         label.set_transform(self.axes.transAxes)
         at = self.axes.transAxes.inverted().transform((x, y))

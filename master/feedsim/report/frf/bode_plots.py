@@ -44,7 +44,7 @@ KINDS = {
 }
 
 MOST_PAIRS = 3  # annotated per axis, besides the first one
-APART = 0.24  # of the logarithm of their frequencies: labels of two resonances do not touch
+LABEL_GAP = 0.24  # of the logarithm of their frequencies: labels of two resonances do not touch
 
 
 def speed_controlled_pictures(columns: Columns, span: Span) -> list[Picture]:
@@ -245,7 +245,7 @@ def curves_of(responses: Responses, name: str) -> list[Curve]:
 
 
 def most_marked(pairs: Sequence[linear.Pair], band: tuple[float, float]) -> list[linear.Pair]:
-    """The first pair within the band, and the MOST_PAIRS that rise most, each APART from the others."""
+    """The first pair within the band, and the MOST_PAIRS that rise most, each LABEL_GAP from the others."""
     inside = [pair for pair in pairs if band[0] <= pair.antiresonance.frequency and pair.resonance.frequency <= band[1]]
 
     def rise(pair: linear.Pair) -> float:
@@ -254,6 +254,6 @@ def most_marked(pairs: Sequence[linear.Pair], band: tuple[float, float]) -> list
     chosen = inside[:1]
     for pair in sorted(inside[1:], key=rise, reverse=True):
         peaks = (each.resonance.frequency for each in chosen)
-        if len(chosen) <= MOST_PAIRS and all(abs(math.log(pair.resonance.frequency / f)) > APART for f in peaks):
+        if len(chosen) <= MOST_PAIRS and all(abs(math.log(pair.resonance.frequency / f)) > LABEL_GAP for f in peaks):
             chosen.append(pair)
     return chosen

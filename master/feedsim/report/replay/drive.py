@@ -14,7 +14,7 @@ from feedsim.findings import Note
 from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
 from feedsim.replay.compare import Comparison
-from feedsim.replay.drive import APART, DriveFound
+from feedsim.replay.drive import DECISIVE, DriveFound
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
 from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
@@ -84,9 +84,9 @@ class DriveReport:
                 cycles = (
                     f"position cycles of {1e3 * own:g} ms (taken) and {1e3 * cycle:g} ms ({spelt('position_cycle')})"
                 )
-                if likelier > APART:
+                if likelier > DECISIVE:
                     told[f"axis {axis}: of {cycles} the record speaks for the latter"] = None
-                elif likelier > -APART:
+                elif likelier > -DECISIVE:
                     told[f"axis {axis}: {cycles} fit alike"] = None
                 else:
                     told[Note(f"axis {axis}: of {cycles} the record speaks for the former")] = None

@@ -13,9 +13,9 @@ MOST = 12  # signals in a picture
 
 
 def signals_picture(trace: Trace, title: str) -> Picture:
-    """All columns of a trace, those of one unit together. Raises InputError for more than can be told apart."""
+    """All columns of a trace, those of one unit together. Raises InputError for more than can be distinguished."""
     if not 0 < len(trace.names) <= MOST:
-        raise InputError(f"{len(trace.names)} signals in one picture; from 1 to {MOST} can be told apart")
+        raise InputError(f"{len(trace.names)} signals in one picture; from 1 to {MOST} can be distinguished")
     curves = {
         name: Curve(name, trace.time, trace[name], OF_AXES[k % len(OF_AXES)], "" if k < len(OF_AXES) else "dashed")
         for k, name in enumerate(trace.names)

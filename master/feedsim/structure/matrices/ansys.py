@@ -122,7 +122,7 @@ def _directions(file: Path, reference: np.ndarray, kinds: list[int]) -> np.ndarr
     # A node with fewer than all of them has the first three: a solid beside beams or shells.
     if not np.all((per_node == len(kinds)) | ((per_node == 3) & (kinds[:3] == [1, 2, 3]))):
         raise InputError(
-            f"{file}: nodes with {sorted(set(per_node.tolist()))} of {len(kinds)} degrees of freedom; which these are "
-            "cannot be told; nodes need all of them or UX, UY, UZ"
+            f"{file}: nodes with {sorted(set(per_node.tolist()))} of {len(kinds)} degrees of freedom; which ones is "
+            "not known; nodes need all of them or UX, UY, UZ"
         )
     return np.asarray(kinds, dtype=np.int64)[counts] - 1

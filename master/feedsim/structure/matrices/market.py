@@ -96,7 +96,7 @@ def _content(file: Path, what: str) -> tuple[int, str, str, Floats]:
         except DeprecationWarning:
             raise ValueError("it holds text that is no number") from None
     if numbers.size != told:
-        raise ValueError(f"it holds {numbers.size} numbers behind its size, which tells {told}")
+        raise ValueError(f"it holds {numbers.size} numbers behind its size, which declares {told}")
     if form == "coordinate":
         places = numbers.reshape(-1, 3)[:, :2]
         if not np.all((places == np.floor(places)) & (places >= 1) & (places <= rows)):

@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 from feedsim import cache
+from feedsim.report.content import Report
+from feedsim.report.page import html
 from feedsim.scenario import load_machine
 from feedsim.structure import pose_change as room
 from feedsim.structure import table_check
@@ -143,3 +145,35 @@ def test_a_run_whose_pose_is_known_loads_no_structure(place: Path) -> None:
         for _ in range(2)
     ]
     assert said == [["True", "True"], ["False", "False"]]
+
+
+def test_templates_of_reports_are_compiled_once(place: Path) -> None:
+    """The page is the same without kept templates, with new ones, with kept and with damaged ones."""
+    report = Report("Title", "subtitle", main=[], footer="")
+    pages = [html(report), html(report)]
+    (folder,) = place.iterdir()
+    kept = [*folder.iterdir()]
+    assert kept
+    for file in kept:
+        file.write_bytes(b"damaged")
+    pages.append(html(report))
+    assert pages == pages[:1] * 3
+
+
+def test_folders_of_other_code_are_few(place: Path, code: Path) -> None:
+    for k in range(8):
+        (code / "solver.py").write_text(f"x = {k}\n")
+        cache._versions.cache_clear()
+        own = cache.own_folder("compiled", [code])
+        assert own is not None
+        os.utime(own, (k, k))
+    assert len([*place.iterdir()]) == 5
+    assert own in place.iterdir()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="rights of POSIX")
+def test_a_folder_that_others_can_write_to_is_not_used(place: Path, code: Path) -> None:
+    own = cache.own_folder("compiled", [code])
+    assert own is not None
+    own.chmod(0o777)
+    assert cache.own_folder("compiled", [code]) is None

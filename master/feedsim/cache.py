@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import platform
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -23,7 +24,7 @@ from typing import Any
 FOLDER = "FEEDSIM_CACHE"  # environment variable: the folder; empty: nothing is kept
 KEPT = 256  # answers of one kind; the oldest go first
 LARGEST = 1 << 20  # bytes of an answer; a larger file is none of ours
-LIBRARIES = ("numpy", "scipy")
+LIBRARIES = ("numpy", "scipy", "jinja2")
 
 
 def cached(kind: str, follows_from: Sequence[Any], code: Sequence[Path], find: Callable[[], Any]) -> Any:
@@ -57,6 +58,35 @@ def folder() -> Path | None:
     else:
         home = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.environ.get("HOME", "")) / ".cache")
     return home / "feedsim" if home.is_absolute() else None
+
+
+def own_folder(kind: str, code: Sequence[Path]) -> Path | None:
+    """A folder for files of one kind that follow from this code and its libraries; None: none that is the user's own.
+
+    Folders of the kind for other code are removed but for the last four: programs of several versions may take turns.
+    """
+    place = folder()
+    if place is None:
+        return None
+    name = hashlib.sha256(json.dumps(_versions(tuple(code))).encode()).hexdigest()[:20]
+    own = place / f"{kind}-{name}"
+    try:
+        if not own.is_dir():
+            own.mkdir(mode=0o700, parents=True)
+            others = sorted(place.glob(f"{kind}-*/"), key=lambda each: each.stat().st_mtime)
+            for old in others[:-5]:
+                shutil.rmtree(old, ignore_errors=True)
+        return own if _private(own) else None
+    except OSError:
+        return None
+
+
+def _private(place: Path) -> bool:
+    """Whether nobody else can write there: what is compiled is executed. Raises OSError."""
+    if sys.platform == "win32":  # the folder is below the user's profile, where no other user writes
+        return True
+    found = place.stat()
+    return found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 
 def digest(file: Path) -> str:

@@ -93,6 +93,19 @@ def test_values_that_a_machine_cannot_have(place: Path) -> None:
     assert load_machine(place / "new").axes["X"].travel == pytest.approx((0.1, 1.5))
 
 
+@pytest.mark.parametrize("change", ["p1660[0]=450", "p1660[0]=455\np1659[0]=0,9"])
+def test_a_half_of_a_filter_is_not_taken(place: Path, change: str) -> None:
+    """The machine keeps its own filter, and a finding names the control's."""
+    (place / "f.tea").write_text(f"p1656[0]='H1'\np1657[0]=2\np1658[0]=455\np1659[0]=0.9\n{change}\np1661[0]=0.1\n")
+    result = fs.machine_import(place / "f.tea", "X", place / "centre")
+    result.save(place / "new")
+    assert (
+        load_machine(place / "new").axes["X"].drive.filter_1 == load_machine(place / "centre").axes["X"].drive.filter_1
+    )
+    assert [each.parameter for each in result.made.values] == [f"drive.filter_{k}.type" for k in (2, 3, 4)]
+    assert "values not taken: X p1657" in result.findings[0] or "X p1659" in result.findings[0]
+
+
 def test_a_draft(place: Path) -> None:
     done = feedsim("machine", "import", "nc.tea", "--axes", "X1", "--out", "new", cwd=place)
     assert done.returncode == 0

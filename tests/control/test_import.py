@@ -133,10 +133,10 @@ def test_parameters_of_a_drive() -> None:
 @pytest.mark.parametrize(
     ("change", "number", "reason"),
     [
-        (("p1660[0]=455", "p1660[0]=450"), "p1658", "it acts where p1657=1 or p1660=p1658"),
+        (("p1660[0]=455", "p1660[0]=450"), "p1658", "it can be taken where p1657=1 or p1660=p1658"),
         (("p1657[0]=2", "p1657[0]=5"), "p1657", "5 is none of 1 (low_pass), 2 (second_order)"),
-        (("p1521[0]=-80", "p1521[0]=-60"), "p1520", "it acts where p1521=-p1520"),
-        (("p115[1]=125", "p115[1]=250"), "p115", "it acts where p115[1]=p115"),
+        (("p1521[0]=-80", "p1521[0]=-60"), "p1520", "it can be taken where p1521=-p1520"),
+        (("p115[1]=125", "p115[1]=250"), "p115", "it can be taken where p115[1]=p115"),
         (("p1460[0]=7.5", "p1460[0]=7,5"), "p1460", "no number"),
         (("p1460[0]=7.5", 'p1460[0]="7.5"'), "p1460", "no number"),
         (("p1460[0]=7.5", "p1460[0]=7.5\np1460[0]=8"), "p1460", "the files have several values"),
@@ -147,8 +147,7 @@ def test_parameters_of_a_drive() -> None:
 def test_values_of_a_drive_that_are_refused(change: tuple[str, str], number: str, reason: str) -> None:
     found = read([opened("ps.tea", DRIVE.replace(*change).encode())], {"X": "X"})
     assert number not in {each.name.number for each in found.taken}
-    told = next(each.reason for each in found.refused if each.name.number == number)
-    assert reason in told
+    assert reason in reasons(found)[number]
 
 
 @pytest.mark.parametrize(
@@ -157,10 +156,10 @@ def test_values_of_a_drive_that_are_refused(change: tuple[str, str], number: str
         (("N10240 $MN_SCALING_SYSTEM_IS_METRIC=1", "N10240 $MN_SCALING_SYSTEM_IS_METRIC=0"), "MD31030", "is inch"),
         (("CHANDATA(2)", "N10220 $MN_SCALING_USER_DEF_MASK='H0'"), "MD32200", "MD10220 is 0"),
         (("CHANDATA(2)", "N10230 $MN_SCALING_FACTORS_USER_DEF[9]=1"), "MD32200", "another unit than 1000/min"),
-        (("[AX1]=FALSE", "[AX1]=TRUE"), "MD31030", "it acts where IS_ROT_AX=0"),
+        (("[AX1]=FALSE", "[AX1]=TRUE"), "MD31030", "it can be taken where IS_ROT_AX=0"),
         (("N31050 $MA_DRIVE_AX_RATIO_DENOM[0,AX1]=1\n", ""), "MD31030", "and the file has no MD31050"),
         (("RATIO_DENOM[0,AX1]=1", "RATIO_DENOM[0,AX1]=0"), "MD31030", "MD31050 is 0"),
-        (("N32620 $MA_FFW_MODE[AX1]=3", "N32620 $MA_FFW_MODE[AX1]=4"), "MD32610", "it acts where FFW_MODE=1|3"),
+        (("N32620 $MA_FFW_MODE[AX1]=3", "N32620 $MA_FFW_MODE[AX1]=4"), "MD32610", "it can be taken where FFW_MODE=1|3"),
         (("N32620 $MA_FFW_MODE[AX1]=3\n", ""), "MD32610", "and the file has no FFW_MODE"),
         (("N32450 $MA_BACKLASH", "N32451 $MA_BACKLASH"), "MD32450", "the file has MD32451 BACKLASH"),
         (("BACKLASH[0,AX1]=0.012", "BACKLASH[0,AX1]=R5"), "MD32450", "no number"),
@@ -172,7 +171,7 @@ def test_machine_data_that_are_refused(change: tuple[str, str], number: str, rea
     assert change[0] in NC
     found = read([opened("nc.tea", NC.replace(*change).encode())], {"X": "X1"})
     assert number not in {each.name.number for each in found.taken}
-    assert reason in next(each.reason for each in found.refused if each.name.number == number)
+    assert reason in reasons(found)[number]
 
 
 PULSE = """N32490 $MA_FRICT_COMP_MODE[0,AX1]=1
@@ -199,7 +198,7 @@ def test_a_friction_pulse() -> None:
     neural = opened("p.tea", PULSE.replace("MODE[0,AX1]=1", "MODE[0,AX1]=2").encode())
     found = read([neural], {"X": "AX1"}, checked=["all"])
     assert values(found, "X") == {}
-    assert found.refused[0].reason == "it acts where FRICT_COMP_MODE=1; FRICT_COMP_MODE is 2"
+    assert reasons(found)["MD32520"] == "it can be taken where FRICT_COMP_MODE=1; FRICT_COMP_MODE is 2"
 
 
 def test_what_the_files_do_not_have_is_assumed() -> None:
@@ -240,6 +239,27 @@ def test_a_container_with_drives() -> None:
         read([archive], {"X": "Q"})
     named = opened("all.arc", data.replace(b"p199[0]=83", b"p199[0]=89").replace(b"p199[1]=69", b"p199[1]=0"))
     assert named.places["PS000004"] == "YRVO_Y"
+
+
+def test_drives_of_two_units_with_the_same_numbers() -> None:
+    """Each unit of drives, a slave on the bus, counts its drive objects from the start."""
+    head = "\x00\\_N_PS000003_TEAPS000003.TEA/_N_BUS3_DIR/_N_SLAVE{0}_DIR/\\BUS3.DIR\\SLAVE{0}.DIR\\"
+    other = DRIVE.replace("p1460[0]=7.5", "p1460[0]=3")
+    data = (NC + head.format(3) + DRIVE + head.format(11) + other).encode("latin-1")
+    archive = opened("all.arc", data)
+    assert [*archive.places] == ["SLAVE3.PS000003", "SLAVE11.PS000003"]
+    for place, gain in (("SLAVE3.PS000003", 7.5), ("SLAVE11.PS000003", 3.0)):
+        assert values(read([archive], {"X": "X1"}, places={"X": [place]}), "X")["drive.K_p"] == gain
+    with pytest.raises(InputError, match="no drive object or list 'PS000003'; the files have SLAVE3"):
+        read([archive], {"X": "X1"}, places={"X": ["PS000003"]})
+    one = opened("one.arc", (NC + head.format(3) + DRIVE).encode("latin-1"))
+    assert values(read([one], {"X": "X1"}, places={"X": ["PS000003"]}), "X")["drive.K_p"] == 7.5
+
+
+def test_much_that_is_not_understood_is_counted() -> None:
+    archive = opened("nc.tea", (NC + "what is this\n" * 5000).encode())
+    assert archive.odd_count == 5000
+    assert len(archive.odd) == 1000
 
 
 TABLE = """Parameter;Name;Value;Unit

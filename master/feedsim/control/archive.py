@@ -15,6 +15,7 @@ from pathlib import PurePath
 from feedsim.errors import InputError
 
 LARGEST = 256_000_000  # bytes of a file
+MOST_ODD = 1000  # lines that were not understood and are kept
 LONGEST = 4000  # characters of a line; longer ones hold no single value
 _BINARY = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _MACHINE_DATUM = re.compile(
@@ -23,6 +24,7 @@ _MACHINE_DATUM = re.compile(
 )
 _DRIVE = re.compile(r"^[ \t]*(?P<name>[pPrR]0*(?P<number>\d{1,5}))[ \t]*(?:\[(?P<index>\d+)\])?[ \t]*=(?P<value>.*)$")
 _DRIVE_OBJECT = re.compile(r"PS0*(\d{1,6})[._](?:TEA|ACX)", re.IGNORECASE)
+_SLAVE = re.compile(r"SLAVE(\d{1,4})[._]DIR", re.IGNORECASE)
 _CHECKSUM = re.compile(r"[ \t]+'[0-9A-Fa-f]{4}'?[ \t]*$")
 _ISG = re.compile(
     r"^[ \t]*(?P<name>[A-Za-z_]\w*(?:\[\d+\])?(?:\.\w+(?:\[\d+\])?)+)[ \t]+(?P<value>[^#\n]*?)[ \t]*(?:#.*)?$"
@@ -85,7 +87,8 @@ class Archive:
     Attributes:
         name: of the file. control: one of CONTROLS. form: what kind of file it is, in words.
         text, encoding: as decoded; encoding it again gives the bytes. container: binary records lie between the texts.
-        entries: in the order of the file. odd: lines that were not understood. comments: how many lines say nothing.
+        entries: in the order of the file. odd: the first of `odd_count` lines that were not
+        understood. comments: how many lines say nothing.
         axis_names: axis -> name, "AX1" -> "X1". places: drive object or list -> name, "PS000003" -> "SERVO_X".
     """
 
@@ -98,11 +101,15 @@ class Archive:
     entries: list[Entry] = field(default_factory=list)
     odd: list[Odd] = field(default_factory=list)
     comments: int = 0
+    odd_count: int = 0
     axis_names: dict[str, str] = field(default_factory=dict)
     places: dict[str, str] = field(default_factory=dict)
 
     def add_odd(self, line: int, text: str, reason: str) -> None:
         """Note a line that was not understood."""
+        self.odd_count += 1
+        if len(self.odd) >= MOST_ODD:
+            return
         shown = "".join(c if c.isprintable() else "." for c in text.strip())
         self.odd.append(Odd(line, shown[:77] + "..." if len(shown) > 80 else shown, reason))
 
@@ -182,12 +189,17 @@ def _sinumerik(archive: Archive) -> None:
     place, branches = "", 0
     for number, start, line, ended in _lines(archive.text):
         if found := _DRIVE_OBJECT.findall(line):
-            place = f"PS{int(found[-1]):06d}"
+            slaves = _SLAVE.findall(line)
+            own = f"PS{int(found[-1]):06d}"
+            if slaves:
+                place = f"SLAVE{int(slaves[-1])}.{own}"
+            elif not place.endswith(f".{own}"):  # the header names the file again, without its unit
+                place = own
         elif "%_N_" in line:
             place = ""
         if "_N_" in line or _END.match(line):
             branches = 0
-        if not line.strip() or line.lstrip().startswith((";", "%", "[", "#")):
+        if not line.strip() or line.lstrip().startswith((";", "%", "[", "#", "\\SYSTEM.DRV")):
             archive.comments += 1
             continue
         if len(line) > LONGEST:

@@ -5,6 +5,7 @@ Clauses stand between semicolons:
     FFW_MODE=1|3            it acts where FFW_MODE is 1 or 3
     p1657=1 or p1660=p1658  one of the two is enough
     BACKLASH_FACTOR=1?      as the first one, and where the file has no such parameter as well
+    !FFW_MODE=1|3           as the first one, but else it may act in a way that we have not: that is a doubt
     FFW_MODE=0: 0           there our value is 0; "off": the group of parameters is switched off
     ~p1461=100              else there is a doubt: what is taken holds for a part alone
 
@@ -55,6 +56,7 @@ def judged(acts: str, look: Look) -> Judged:
             if holds is False:
                 doubts.append(f"{name} is {shown(look(name))}, not {clause[1:].partition('=')[2]}")
             continue
+        unfit, clause = clause.startswith("!"), clause.removeprefix("!")
         found = [_holds(term.strip(), look) for term in clause.split(" or ")]
         if any(holds for holds, _ in found):
             continue
@@ -63,7 +65,10 @@ def judged(acts: str, look: Look) -> Judged:
             reason = f"it acts where {clause.removesuffix('?')}, and the file has no {unknown[0]} (--assume)"
             return Judged("unknown", reason=reason)
         name = found[0][1]
-        return Judged("inactive", reason=f"it acts where {clause.removesuffix('?')}; {name} is {shown(look(name))}")
+        reason = f"it acts where {clause.removesuffix('?')}; {name} is {shown(look(name))}"
+        if unfit:
+            reason = f"it can be taken where {clause.removesuffix('?')}; {name} is {shown(look(name))}"
+        return Judged("unknown" if unfit else "inactive", reason=reason)
     return Judged("acts", doubts=tuple(doubts))
 
 
@@ -71,7 +76,7 @@ def tied(acts: str) -> list[tuple[str, str, float]]:
     """Pairs of parameters that are to be equal: name, other, and the sign of the other."""
     found = []
     for clause in re.split(r";| or ", acts):
-        term = _TERM.match(clause.strip().lstrip("~"))
+        term = _TERM.match(clause.strip().lstrip("~!"))
         if term and re.match(r"^-?[pA-Z]\w*$", term["right"].strip()) and not term["right"].strip().isupper():
             right = term["right"].strip()
             found.append((term["name"] + (term["element"] or ""), right.lstrip("-"), -1.0 if right[0] == "-" else 1.0))

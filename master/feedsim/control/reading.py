@@ -126,8 +126,8 @@ class View:
         self.axis, self.archives, self.assume = axis, archives, assume
         self.notes: list[str] = []
         self.known = _identified(archives, theirs)
-        self.places = tuple(places) if places else self._own_places(theirs, axes)
         known = [place for archive in archives for place in archive.places]
+        self.places = tuple(_whole(place, known) for place in places) if places else self._own_places(theirs, axes)
         for place in self.places:
             if place not in known:
                 raise InputError(f"no drive object or list {place!r}; the files have {', '.join(known) or 'none'}")
@@ -197,6 +197,12 @@ class View:
         if bit:
             return None if isinstance(value, str) else float((int(value) >> int(bit)) & 1)
         return float(value) if isinstance(value, bool) else value
+
+
+def _whole(place: str, known: Sequence[str]) -> str:
+    """A drive object by the end of its name, where that is enough: PS000003 of SLAVE3.PS000003."""
+    found = [each for each in known if each == place or each.endswith(f".{place}")]
+    return found[0] if len(found) == 1 else place
 
 
 def _holds_parameters(archive: Archive, place: str) -> bool:

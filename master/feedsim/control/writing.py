@@ -266,7 +266,7 @@ def _check(
         made = opened(archive.name, found.contents[archive.name]) if archive.name in found.contents else archive
         changed_ones = {id(edit.entry): edit.text for edit in edits if edit.archive is archive}
         wanted = [changed_ones.get(id(entry), entry.text) for entry in archive.entries]
-        if [entry.text for entry in made.entries] != wanted or len(made.odd) != len(archive.odd):
+        if [entry.text for entry in made.entries] != wanted or made.odd_count != archive.odd_count:
             raise InputError(f"{archive.name}: writing the values would change others; nothing was written")
         again.append(made)
     now = {(each.axis, each.parameter): each.value for each in read(again, axes, **how).taken}  # type: ignore[arg-type]

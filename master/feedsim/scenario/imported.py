@@ -24,6 +24,8 @@ from feedsim.scenario.machine import Axis, Drive, Filter, Machine
 
 # Switches of the machine file follow from what was taken.
 SWITCHES = {"omega_0": "reference_model", "D": "reference_model"}
+# Groups that are taken whole or not at all.
+WHOLE = ("drive.filter_", "drive.friction_pulse")
 # Files that a machine file names and that stay where they are; the modes go with it.
 _NAMED = ("structure", "plant")
 MODES = "modes.csv"
@@ -80,10 +82,15 @@ def imported(reading: Reading, machine: Path | None, name: str) -> Imported:
     source, base = _base(machine, name, reading)
     found = Imported(source.data, base, [], [], [])
     before = _faults(source)
+    halved = {(each.axis, _group(each.name.parameter)) for each in reading.refused if each.weight == "doubt"}
     for group in _groups(reading.taken):
         trial = source.copy()
         for each in group:
             _put(trial, each)
+        if (group[0].axis, whole := _group(group[0].parameter)) in halved and whole.startswith(WHOLE):
+            reason = "a value that belongs to it was not taken; a half of a filter or of a pulse would be another one"
+            found.refused += [_not(each, reason) for each in group]
+            continue
         if [each.parameter for each in group] in (["travel.0"], ["travel.1"]):
             found.refused.append(_not(group[0], "a machine file takes both ends of the travel or none"))
             continue
@@ -158,13 +165,17 @@ def _lacking(fault: str) -> bool:
     return ": missing" in fault
 
 
+def _group(parameter: str) -> str:
+    """What a value belongs to: its filter, the pulse, the reference model, the travel, or itself."""
+    way, _, last = parameter.rpartition(".")
+    return way if way not in ("", "drive", "cycles") else SWITCHES.get(last, last)
+
+
 def _groups(taken: Sequence[Taken]) -> Iterator[list[Taken]]:
     """Values that can only go together: those of a filter, of the pulse, of the reference model, both ends of a way."""
     found: dict[tuple[str, str], list[Taken]] = {}
     for each in taken:
-        way, _, last = each.parameter.rpartition(".")
-        group = way if way not in ("", "drive", "cycles") else SWITCHES.get(last, last)
-        found.setdefault((each.axis, group), []).append(each)
+        found.setdefault((each.axis, _group(each.parameter)), []).append(each)
     yield from found.values()
 
 

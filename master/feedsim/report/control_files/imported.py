@@ -38,7 +38,7 @@ def doubtful(reading: Reading, made: Imported) -> list[Refused]:
 def figures_of(archives: Sequence[Archive], reading: Reading, made: Imported) -> dict[str, Figure]:
     """How much of the files was understood."""
     read = sum(len(each.entries) for each in archives)
-    odd = sum(len(each.odd) for each in archives)
+    odd = sum(each.odd_count for each in archives)
     return {
         "values.taken": Figure(
             float(len(made.values)), "1", "values that the machine file has from the control's files"
@@ -70,7 +70,7 @@ def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> l
             first = archive.odd[0]
             found.append(
                 Note(
-                    f"{archive.name}: {counted(len(archive.odd), 'line')} not understood, the first in line "
+                    f"{archive.name}: {counted(archive.odd_count, 'line')} not understood, the first in line "
                     f"{first.line}: {first.reason}"
                 )
             )
@@ -181,7 +181,7 @@ def _missing(made: Imported) -> Section | None:
 
 def _odd(archives: Sequence[Archive]) -> Section | None:
     rows = [(f"{archive.name}:{each.line}", each.reason, code(each.text)) for archive, each in _examples(archives)]
-    total = sum(len(archive.odd) for archive in archives)
+    total = sum(archive.odd_count for archive in archives)
     note = f"The first {len(rows)} of {total}, of each file by turns." if total > len(rows) else ""
     table = Table("lpl", ("Line", "Why", "Text"), rows, note)
     return Section("Lines that were not understood", [table], "odd") if rows else None

@@ -25,7 +25,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("typed") / "scenarios"
     shutil.copytree(ROOT / "scenarios", place)
     (place / "results").mkdir()
-    (place / "results" / "summary.json").write_text('{"scenario": {}}')
+    (place / "results" / "result.csv").write_text("time [s],x [mm]\n0,0\n")
+    (place / "tuned").mkdir()
+    (place / "tuned" / "summary.json").write_text('{"scenario": {}}')
+    (place / "values.yaml").write_text("set:\n  machine.axes.Z.drive.K_v: 60 1/s\n")
     (place / "model.fmu").write_bytes(b"PK")
     return place
 
@@ -74,6 +77,9 @@ def test_nearest_names(typed: str, said: str, fmus: Path, folder: Path) -> None:
         ("run machines/test_centre/machine.yaml", "machine.yaml is a machine file, which feedsim machine info takes"),
         ("frf machines/test_centre/structure.yaml", "structure.yaml is a structure file, which"),
         ("run machines/test_centre/modes.csv", "modes.csv is a table of modes, which a machine file names; feedsim"),
+        ("show tuned", "tuned is a folder of results without a record (result.csv); feedsim show takes results of"),
+        ("frf tuned", "tuned is a folder of results without a record (result.csv); feedsim frf takes a scenario"),
+        ("run values.yaml", "values.yaml is a file of values for the option --set; feedsim run takes a scenario"),
         ("compensate results", "results is a folder of results, which feedsim show takes; feedsim compensate takes"),
         ("run model.fmu", "model.fmu is a unit for simulators (FMU); feedsim run takes a scenario or an SSP file"),
         ("run recordings/z_setpoint.csv", "z_setpoint.csv is a record, which feedsim identify takes"),

@@ -1,5 +1,6 @@
 """Changes from outside: --set KEY=VALUE and the scenario's own `set` group."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -160,3 +161,33 @@ def test_all_faulty_overrides_are_listed() -> None:
     message = refusal("motions.0.fed=1 m/s", "coupling.scheme=jacoby", "nonsense")
     assert "3 problems" in message
     assert "did you mean 'jacobi'?" in message
+
+
+def test_a_file_of_values_counts_like_its_entries(tmp_path: Path) -> None:
+    values = tmp_path / "values.yaml"
+    values.write_text(
+        "set:\n  machine.axes.Z.drive.K_v: 60 1/s\n"
+        "  machine.axes.Z.drive.filter_1: {type: low_pass, f: 500 Hz, D_den: 0.7}\n"
+    )
+    singly = [
+        "machine.axes.Z.drive.K_v=60 1/s", "machine.axes.Z.drive.filter_1={type: low_pass, f: 500 Hz, D_den: 0.7}",
+    ]  # fmt: skip
+    by_file, by_hand = load(Z, [str(values)]), load(Z, singly)
+    assert by_file.machine == by_hand.machine
+    assert load(Z, by_file.overrides).machine == by_hand.machine, "what a run writes down can be typed"
+    assert load(Z, [str(values), "machine.axes.Z.drive.K_v=70 1/s"]).machine.axes["Z"].drive.K_v == 70
+    assert any(file == values for _, file in by_file.files)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("set: {a: 1}\nname: x\n", "has to hold the group `set` with KEY: VALUE, and nothing else"),
+        ("set: 3\n", "nothing else"), ("- 1\n", "nothing else"), ("", "the file is empty"),
+        ("set:\n  machine.axes.Z.drive.K_vv: 3 1/s\n", "values.yaml:2: unknown key 'K_vv' in machine.axes.Z.drive"),
+    ],
+)  # fmt: skip
+def test_files_of_values_that_are_none(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "values.yaml").write_text(text)
+    with pytest.raises(InputError, match=re.escape(words)):
+        load(Z, [str(tmp_path / "values.yaml")])

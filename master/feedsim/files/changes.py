@@ -2,23 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from feedsim.errors import InputError
 from feedsim.fields import brief, did_you_mean
 from feedsim.files import shape
-from feedsim.files.source import Mark, Place, Source, at, copied, parse
+from feedsim.files.source import Mark, Place, Source, at, copied, parse, read
 
 
-def option(text: str, folder: Path) -> tuple[str, Source]:
-    """Split "KEY=VALUE" and read VALUE as YAML. InputError: no '=', no key, bad YAML."""
+def options(text: str, folder: Path) -> list[tuple[str, Source]]:
+    """Split "KEY=VALUE" and read VALUE as YAML; the name of a YAML file stands for the entries of its `set` group.
+
+    Such files are what tuning leaves. InputError: no '=', no key, bad YAML; a file without such a group or with more.
+    """
     key, equals, value = text.partition("=")
     where = f"--set {text}"
-    if not equals or not key.strip():
-        raise InputError(f"{where}: KEY=VALUE is needed, for example machine.axes.Z.friction.W='0 rad'")
-    return key.strip(), parse(value, where, folder, lines=False)
+    if equals and key.strip():
+        return [(key.strip(), parse(value, where, folder, lines=False))]
+    if equals or not text.endswith((".yaml", ".yml")):
+        example = "machine.axes.Z.friction.W='0 rad'"
+        raise InputError(f"{where}: KEY=VALUE is needed, for example {example}, or a YAML file with a group `set`")
+    source = read(folder / text)
+    if not isinstance(source.data, dict) or [*source.data] != ["set"] or not isinstance(source.data["set"], dict):
+        raise InputError(f"{where}: the file has to hold the group `set` with KEY: VALUE, and nothing else")
+    return [*entries(source, "set")]
+
+
+def spread(texts: Iterable[str]) -> list[str]:
+    """KEY=VALUE each: entries in place of the files that `options` takes. InputError as there."""
+    found = []
+    for text in texts:
+        many = [] if "=" in text else options(text, Path())
+        found += [f"{key}={as_text(value.data)}" for key, value in many] or [text]
+    return found
+
+
+def entries(source: Source, group: str) -> Iterator[tuple[str, Source]]:
+    """Keys and values of a group of settings, each with its place in the file."""
+    for key, value in source.data[group].items():
+        inner = {at[2:]: mark for at, mark in source.marks.items() if at[:2] == (group, key)}
+        yield key, Source(value, inner)
+
+
+def as_text(value: Any) -> str:
+    """A value of the `set` group as it stands behind KEY= on the command line."""
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 
 def apply(source: Source, model: Any, key: str, value: Source) -> Iterator[Place]:

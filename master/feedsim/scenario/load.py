@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from feedsim.errors import InputError
 from feedsim.fields import brief
@@ -25,8 +23,9 @@ Setting = tuple[str, Source]  # dotted key, value
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     """Read and check a scenario file.
 
-    `overrides` are KEY=VALUE texts as behind `--set`: dotted keys, values as in the file; they count after the
-    scenario's own `set` group. File names in them are relative to the working folder, those in a file relative to it.
+    `overrides` are KEY=VALUE texts as behind `--set`: dotted keys, values as in the file; or names of files with a
+    group `set`. They count after the scenario's own `set` group. File names in them are relative to the working folder,
+    those in a file relative to it.
 
     Raises InputError that lists every problem with file and line.
 
@@ -93,7 +92,7 @@ class Draft:
         scenario._overrides = self.overrides
         scenario._origins = {place: mark.where for place, mark in source.marks.items()}
         scenario._changes = tuple(self.changed)
-        scenario._settings = tuple(f"{key}={_text(value.data)}" for key, value in self.own)
+        scenario._settings = tuple(f"{key}={changes.as_text(value.data)}" for key, value in self.own)
         scenario._files = tuple(_files(source, self.path))
         scenario.machine._directory = source.mark(("machine",)).folder
         return scenario
@@ -107,9 +106,11 @@ def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Settin
     source = read_group(path)
     faults: list[str] = []
     outside = [*settings]
+    given: list[str] = []
     for text in overrides:
         with _collecting(faults):
-            outside.append(changes.option(text, Path()))
+            given += changes.spread([text])
+            outside += changes.options(text, Path())
     # A machine chosen from outside comes first: the scenario's own settings then meet that machine.
     for key, value in outside:
         if key == "machine":
@@ -118,7 +119,7 @@ def drafted(path: Path, overrides: Sequence[str] = (), settings: Sequence[Settin
     fetch(source, Scenario, (), faults)
     translate(source, ("machine", "axes"), faults)
     others = tuple((key, value) for key, value in outside if key != "machine")
-    texts = (*(f"{key}={_text(value.data)}" for key, value in settings), *overrides)
+    texts = (*(f"{key}={changes.as_text(value.data)}" for key, value in settings), *given)
     return Draft(path, source, own, others, texts, faults)
 
 
@@ -140,9 +141,10 @@ def load_machine(path: str | Path, overrides: Sequence[str] = ()) -> Machine:
     translate(source, ("axes",), faults)
     for text in overrides:
         with _collecting(faults):
-            key, value = translated(*changes.option(text, Path()))
-            for place in changes.apply(source, Machine, key.removeprefix("machine."), value):
-                fetch(source, Machine, place, faults)
+            for given in changes.options(text, Path()):
+                key, value = translated(*given)
+                for place in changes.apply(source, Machine, key.removeprefix("machine."), value):
+                    fetch(source, Machine, place, faults)
     machine = check(source, Machine, faults)
     if faults or machine is None:
         raise InputError.of(str(path), in_order(faults))
@@ -202,17 +204,12 @@ def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
         name, kind, notes, settings = scenario.name, "scenario", [machine.note, scenario.note], scenario.settings
     kept = tuple(note for note in notes if note)
     files = (*files, ("modes", machine.modes))
-    return Subject(machine, kind, name, file, kept, settings, tuple(overrides), files, scenario)
+    return Subject(machine, kind, name, file, kept, settings, tuple(changes.spread(overrides)), files, scenario)
 
 
 def _is_machine(path: Path) -> bool:
     data = read(path).data
     return isinstance(data, dict) and "axes" in data and "machine" not in data
-
-
-def _text(value: Any) -> str:
-    """A value of the `set` group as it stands behind KEY= on the command line."""
-    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 
 def _files(source: Source, path: Path) -> Iterator[tuple[str, Path]]:
@@ -228,14 +225,13 @@ def _files(source: Source, path: Path) -> Iterator[tuple[str, Path]]:
 
 def _own_settings(source: Source, faults: list[str]) -> Iterator[tuple[str, Source]]:
     """Take the `set` group out of the tree."""
-    settings = source.data.pop("set", None)
+    settings = source.data.get("set")
     place: Place = ("set",)
     if settings is not None and not isinstance(settings, dict):
         faults.append(describe(source, place, f"a group of KEY: VALUE is expected, not {brief(settings)}"))
     elif settings:
-        for key, value in settings.items():
-            inner = {at[2:]: mark for at, mark in source.marks.items() if at[:2] == ("set", key)}
-            yield key, Source(value, inner)
+        yield from changes.entries(source, "set")
+    source.data.pop("set", None)
     source.forget(place)
 
 

@@ -329,9 +329,7 @@ def report_of(tuned: Tuned, control: str = "") -> Report:
 
 def command(tuned: Tuned, folder: str) -> str:
     """The command line that runs the scenario with the new values."""
-    changed = dict.fromkeys(change.axis for change in tuned.changes)
-    sets = "".join(f" --set machine.axes.{axis}.drive={folder}/{drive_file(axis)}" for axis in changed)
-    return f"feedsim run {tuned.scenario.file.name}{sets}"
+    return f"feedsim run {tuned.scenario.file.name} --set {folder}/{SETTINGS}"
 
 
 def values(tuned: Tuned, control: str = "") -> Iterator[Part]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from feedsim.errors import InputError
 from feedsim.fields import did_you_mean
+from feedsim.files import changes
 from feedsim.files.checked import check, fetch, read_group
 from feedsim.files.problems import describe, dotted, in_order
 from feedsim.files.source import Source, at
@@ -74,7 +75,7 @@ def load_study(path: str | Path, overrides: Sequence[str] = (), *, runs: int | N
         goal=_goal(entry),
         explain=entry.explain or "",
         files=tuple(dict.fromkeys(files)),
-        overrides=tuple(overrides),
+        overrides=tuple(changes.spread(overrides)),
         warnings=tuple(warnings),
         written=written,
     )
@@ -93,14 +94,7 @@ def _base(source: Source, overrides: Sequence[str], faults: list[str]) -> Base |
 
 def _settings(source: Source) -> list[Setting]:
     """The study's `set` group."""
-    settings = source.data.get("set")
-    if not isinstance(settings, dict):
-        return []
-    found = []
-    for key, value in settings.items():
-        inner = {at[2:]: mark for at, mark in source.marks.items() if at[:2] == ("set", key)}
-        found.append((key, Source(value, inner)))
-    return found
+    return [*changes.entries(source, "set")] if isinstance(source.data.get("set"), dict) else []
 
 
 def _meant(base: Base, settings: Sequence[Setting]) -> list[str]:

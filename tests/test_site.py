@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -24,6 +25,9 @@ SEARCHED = {
     "notebook": "user-guide", "study": "sweeps", "finite-element": "fe-import",
     "log machine": "tutorials/log-to-machine", "not believe": "how-to/warnings", "warning": "how-to/warnings",
 }  # fmt: skip
+# Pages that axe-core looks at, one of each part.
+AXED = ("index", "search", "tutorials/first-circle", "how-to/why-not-round", "figures", "glossary", "theory",
+        "reference/commands", "reference/python", "reference/gallery", "units/plant")  # fmt: skip
 LARGEST = 10e6  # bytes of all pages: what a wheel can carry
 
 
@@ -89,6 +93,35 @@ def test_links_lead_somewhere(pages: dict[Path, Page]) -> None:
     assert not lost
 
 
+def test_terms_lead_to_the_glossary(pages: dict[Path, Page], site: Path) -> None:
+    """Every term has its row, and a page links to it once."""
+    home = (site / "glossary.html").resolve()
+    rows = {name for name in pages[home].names if name.startswith("term-")}
+    assert len(rows) > 22
+    linked = [
+        [link.partition("#")[2] for link in page.links if "glossary.html#term-" in link] for page in pages.values()
+    ]
+    assert all(len(set(each)) == len(each) for each in linked)
+    assert {name for each in linked for name in each} <= rows
+    assert sum(bool(each) for each in linked) > 20
+    assert len({name for each in linked for name in each}) > 0.7 * len(rows)
+
+
+def test_terms_are_linked_in_prose_alone() -> None:
+    sys.path.insert(0, str(ROOT / "docs" / "site"))
+    from stage import with_terms
+
+    text = (
+        "# Backlash\n\n| backlash | row |\n\n`jerk` and $jerk$, [jerk](a.md).\n\n```\njerk\n```\n\n"
+        "A Jerk, less jerk; backlashes, the quadrant glitches. **jerk**\n"
+    )
+    linked = with_terms(text, "how-to/a.md")
+    assert linked.count("glossary.html#") == 3
+    assert 'A <a class="term" href="../glossary.html#term-jerk">Jerk</a>, less jerk' in linked
+    assert 'href="../glossary.html#term-quadrant-glitch">quadrant glitches</a>' in linked
+    assert with_terms("| jerk | Ruck |\n", "glossary.md") == '| <a id="term-jerk"></a>jerk | Ruck |\n'
+
+
 def test_pages_ask_nobody_and_are_not_too_large(pages: dict[Path, Page], site: Path) -> None:
     assert not [source for page in pages.values() for source in page.loaded if "://" in source or source[:2] == "//"]
     assert sum(path.stat().st_size for path in site.rglob("*") if path.is_file()) < LARGEST
@@ -118,3 +151,26 @@ def test_the_search_finds_pages_from_disk(browser: Any, site: Path) -> None:
         )  # fmt: skip
     page.close()
     assert not [url for url in asked if not url.startswith(("file:", "data:"))]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)")
+@pytest.mark.skipif(
+    "FEEDSIM_AXE" not in os.environ, reason="FEEDSIM_AXE names axe.min.js of axe-core (npm pack axe-core)"
+)
+def test_axe_core_finds_nothing(site: Path) -> None:
+    """Pages of every part, on light and dark screens, wide and narrow."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    script = Path(os.environ["FEEDSIM_AXE"]).read_text(encoding="utf-8")
+    found = []
+    with playwright.sync_playwright() as api:
+        browser = api.chromium.launch(executable_path=CHROMIUM, args=["--headless", "--no-sandbox", "--disable-gpu"])
+        for name in AXED:
+            for scheme, width in (("light", 1400), ("dark", 390)):
+                page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+                page.goto((site / f"{name}.html").as_uri())
+                page.evaluate(script)
+                violations = page.evaluate("axe.run(document)")["violations"]
+                found += [(name, scheme, each["id"], each["nodes"][0]["html"][:160]) for each in violations]
+                page.close()
+        browser.close()
+    assert not found

@@ -3,7 +3,8 @@
     python docs/site/stage.py build/site-source
 
 May use feedsim. Start reading at main(): a page is a Markdown text by its place on the site. A link that leads to a
-file of the repository that is no page becomes the file's name.
+file of the repository that is no page becomes the file's name. The first mention of a glossary term on a page is a
+link to its row.
 """
 
 from __future__ import annotations
@@ -64,6 +65,57 @@ def relinked(text: str, document: Path) -> str:
     return "".join(shown).replace("```csv\n", "```text\n")  # Pygments knows no tables
 
 
+_ROW = re.compile(r"^\| ([A-Za-z][A-Za-z -]+?) \|", re.MULTILINE)
+# What is no prose: blocks and rows, headings, code, formulas, links, tags.
+_NO_PROSE = re.compile(
+    r"(^ *(`{3,}|:{3,}).*?^ *\2|^\$\$.*?\$\$|^(?:\||#|    |!\[).*?$|<!--.*?-->|`[^`]*`|\$[^$]*\$"
+    r"|!?\[[^\]]*\](?:\([^)]*\))?|<[^>]*>|\*\*[^*]*\*\*)",
+    re.DOTALL | re.MULTILINE,
+)
+_UNLINKED = ("glossary.md", "changelog.md", "contributing.md", "style.md", "index.md")
+
+
+def terms() -> list[str]:
+    """Terms of the glossary, the longest first."""
+    text = (DOCS / "glossary.md").read_text(encoding="utf-8")
+    return sorted((term for term in _ROW.findall(text) if term != "term"), key=len, reverse=True)
+
+
+def anchor_of(term: str) -> str:
+    """Where the row of a term is on the glossary's page."""
+    return "term-" + term.replace(" ", "-")
+
+
+def with_terms(text: str, page: str) -> str:
+    """The text of a page with the first mention of every glossary term as a link; the glossary with its anchors."""
+    if page == "glossary.md":
+        return _ROW.sub(
+            lambda row: f'| <a id="{anchor_of(row[1])}"></a>{row[1]} |' if row[1] != "term" else row[0], text
+        )
+    if page in _UNLINKED:
+        return text
+    up = "../" * page.count("/")
+    left = terms()
+    parts = []
+    at = 0
+    for skipped in [*_NO_PROSE.finditer(text), None]:
+        parts += [text[at : skipped.start() if skipped else len(text)], skipped[0] if skipped else ""]
+        at = skipped.end() if skipped else at
+    for number in range(0, len(parts), 2):
+        found = []  # place, words and term, of this stretch of prose
+        for term in list(left):
+            if (seen := re.search(rf"(?<![\w-]){term}(?:s|es)?(?![\w-])", parts[number], re.IGNORECASE)) and not any(
+                begin < seen.end() and seen.start() < end for begin, end, _ in found
+            ):
+                found.append((seen.start(), seen.end(), term))
+                left.remove(term)
+        for begin, end, term in sorted(found, reverse=True):
+            words = parts[number][begin:end]
+            link = f'<a class="term" href="{up}glossary.html#{anchor_of(term)}">{words}</a>'
+            parts[number] = parts[number][:begin] + link + parts[number][end:]
+    return "".join(parts)
+
+
 def main(folder: Path) -> None:
     """Write the sources of the site into `folder`, which is made anew."""
     shutil.rmtree(folder, ignore_errors=True)
@@ -74,7 +126,8 @@ def main(folder: Path) -> None:
                      *(path for path in ELSEWHERE if path.parent.parent.name == "src" and path.is_file())]:  # fmt: skip
         target = folder / str(place(document))
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(relinked(document.read_text(encoding="utf-8"), document), encoding="utf-8")
+        text = with_terms(relinked(document.read_text(encoding="utf-8"), document), str(place(document)))
+        target.write_text(text, encoding="utf-8")
     for name, text in reference.pages().items():
         (folder / "reference").mkdir(exist_ok=True)
         (folder / "reference" / f"{name}.md").write_text(text, encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -76,4 +77,6 @@ def test_every_cell_runs(
             names |= REDUCED[name]
         if isinstance(last, ast.Expr):
             said.append(shown(eval(compile(ast.Expression(last.value), name, "eval"), names)))
-    assert SHOWN[name] in "\n".join([*said, capfd.readouterr().out])
+    output = "\n".join([*said, capfd.readouterr().out])
+    assert SHOWN[name] in output
+    assert not re.search(r"\bnan\b", output), "a value that was not found"

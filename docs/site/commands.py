@@ -3,14 +3,15 @@
     python docs/site/commands.py                          # all pages, also slow commands: `make docs-test`
     python docs/site/commands.py docs/tutorials/*.md      # these
 
-May use numpy. Start reading at execute(). A page is executed in a folder of its own, with the examples in `scenarios`,
-the units in `fmus` and the inputs of inputs(). Comments in a page steer it:
+May use numpy and yaml. Start reading at execute(). A page is executed in a folder of its own, with the examples in
+`scenarios`, the units in `fmus` and the inputs of inputs(). Comments in a page steer it:
 
     <!-- first: COMMAND -->    done ahead of the next block, not shown to readers
     <!-- slow -->              the next block is executed by `make docs-test` alone
     <!-- not run: REASON -->   the next block is not executed
 
-A text block straight behind commands is what they print; `...` stands for anything.
+A YAML block that begins with `# FILE` is that file, where the folder has none of that name. A text block straight
+behind commands is what they print; `...` stands for anything.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 600.0  # s, of one command
@@ -87,6 +89,13 @@ def _blocks(text: str) -> Iterator[tuple[int, int, str, str]]:
     yield from sorted(fenced + plain)
 
 
+def written(page: Path) -> Iterator[tuple[str, str]]:
+    """Files that the page shows whole, with their names in the first line."""
+    for *_, kind, content in _blocks(page.read_text(encoding="utf-8")):
+        if kind == "yaml" and (found := re.match(r"# (\S+\.yaml)\n", content)):
+            yield found[1], content
+
+
 def _commands(content: str) -> Iterator[str]:
     """Lines that call feedsim; a line that ends with a backslash goes on in the next."""
     for line in re.sub(r"\\\n\s*", "", content).splitlines():
@@ -111,6 +120,9 @@ def inputs(folder: Path) -> None:
         for name in names:
             axes = "X [mm],Z [mm]" if name == "scales.csv" else "X [mm],Y [mm]"
             np.savetxt(folder / name, rows, fmt="%.6f", delimiter=",", header=f"time [s],{axes}", comments="")
+    machine = yaml.safe_load((folder / "scenarios/machines/test_centre/machine.yaml").read_text(encoding="utf-8"))
+    for name, axis in (("friction.yaml", "Z"), ("friction_x.yaml", "X"), ("friction_z.yaml", "Z")):
+        (folder / name).write_text(yaml.safe_dump(machine["axes"][axis]["friction"]), encoding="utf-8")
     for name, variable in MEASURED.items():
         if place := os.environ.get(variable):
             shutil.copyfile(place, folder / name)
@@ -134,6 +146,9 @@ def execute(page: Path, folder: Path, *, slow: bool = True) -> list[str]:
 
     folder: from prepared(). slow: also blocks marked so. Commands on measured data are left out where it is missing.
     """
+    for name, content in written(page):
+        if not (folder / name).exists() and (folder / name).parent.is_dir():
+            (folder / name).write_text(content, encoding="utf-8")
     wrong: list[str] = []
     lost: set[str] = set()  # files that commands left out would have written
     shell = f'feedsim() {{ "{sys.executable}" -m feedsim "$@"; }}; '
@@ -149,10 +164,14 @@ def execute(page: Path, folder: Path, *, slow: bool = True) -> list[str]:
                 continue
             python = step.python and command == step.commands[-1]
             call = [sys.executable, "-c", command] if python else ["bash", "-c", shell + command]
-            done = subprocess.run(
-                call, cwd=folder, capture_output=True, text=True, timeout=LIMIT,
-                env=os.environ | {"MPLBACKEND": "agg", "BROWSER": "true"},
-            )  # fmt: skip
+            try:
+                done = subprocess.run(
+                    call, cwd=folder, capture_output=True, text=True, timeout=LIMIT,
+                    env=os.environ | {"MPLBACKEND": "agg", "BROWSER": "true"},
+                )  # fmt: skip
+            except subprocess.TimeoutExpired:
+                wrong.append(f"{here}: not done after {LIMIT:g} s: {command}")
+                continue
             output += done.stdout + done.stderr
             if done.returncode:
                 wrong.append(

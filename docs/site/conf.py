@@ -30,7 +30,6 @@ myst_heading_anchors = 4
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 python_use_unqualified_type_names = True
-python_maximum_signature_line_length = 90
 add_module_names = False
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
@@ -60,7 +59,30 @@ def _mathml(self: SphinxTranslator, node: nodes.Element) -> None:
     raise nodes.SkipNode
 
 
+# What the theme and docutils leave out for keyboards and screen readers: what scrolls can be reached, parts have names.
+ACCESSIBLE = (
+    ('<p class="caption" role="heading">', '<p class="caption" role="heading" aria-level="2">'),
+    ('<aside class="sidebar-drawer">', '<aside class="sidebar-drawer" aria-label="All pages">'),
+    ('<aside class="toc-drawer', '<aside aria-label="This page" class="toc-drawer'),
+    ("<pre", '<pre tabindex="0"'),
+    ('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper'),
+    ('<div class="math">', '<div class="math" tabindex="0">'),
+    ('<th class="head"><p></p></th>', "<td></td>"),
+    ('<div id="search-results"></div>', '<h1>Search</h1><div id="search-results"></div>'),
+)
+
+
+def _accessible(app: Sphinx, exception: Exception | None) -> None:
+    """Complete the pages as they were written; the theme has no setting for this."""
+    for path in Path(app.outdir).rglob("*.html") if exception is None else ():
+        text = path.read_text(encoding="utf-8")
+        for before, after in ACCESSIBLE:
+            text = text if after in text and after != "<td></td>" else text.replace(before, after)  # written before
+        path.write_text(text, encoding="utf-8")
+
+
 def setup(app: Sphinx) -> None:
     """Register the writer of equations in place of MathJax, which would be a script of a megabyte."""
+    app.connect("build-finished", _accessible)
     app.add_node(nodes.math, override=True, html=(_mathml, None))
     app.add_node(nodes.math_block, override=True, html=(_mathml, None))

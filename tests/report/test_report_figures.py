@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -15,8 +17,10 @@ from feedsim.analysis import Figure, PositioningTask, evaluate, tasks
 from feedsim.motions import Circle, Dwell, Move
 from feedsim.report import chart
 from feedsim.report.chart import Band, Chart, Curve, Grid, Level, Mark, Panel, Polar
+from feedsim.report.chart.embedded import embedded
 from feedsim.report.chart.placing import Ground
 from feedsim.report.chart.scales import bent, ranges, ticks, unbent
+from feedsim.report.chart.still import still
 from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import ring_step
@@ -344,3 +348,15 @@ def test_long_recordings_stay_small_enough_for_a_page() -> None:
     (picture,) = draw(run, {})
     assert len(picture.svg) < 3 * LARGEST_SVG
     assert len(picture.png) < 1_000_000
+
+
+def test_the_cell_that_is_looked_for_has_a_frame_and_a_map_its_room() -> None:
+    grid = Grid("a map", ["1", "2"], ["b", "a"], np.array([[1.0, 2.0], [0.5, 3.0]]), (0.5, 3.0), best=(1, 0))
+    plain = replace(grid, best=None)
+    for each, frames in ((grid, 1), (plain, 0)):
+        svg = still(Chart([each]), "m", "t")
+        assert svg.count('stroke="var(--ink)" stroke-width="2.2"') == frames
+        (panel,) = json.loads(embedded({"m": Chart([each])}))["charts"]["m"]["panels"]
+        assert panel.get("best") == (None if each.best is None else [1, 0])
+    assert 'width="150.0"' in still(Chart([grid]), "m", "t")
+    assert Picture("m", "t", "", Chart([grid])).png != Picture("m", "t", "", Chart([plain])).png

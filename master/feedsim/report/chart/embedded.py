@@ -87,6 +87,7 @@ def _part(part: Part, pool: _Pool) -> dict[str, Any]:
             "kind": "grid", "title": part.title, "columns": list(part.columns), "rows": list(part.rows),
             "values": pool(part.values.ravel(), cells=True), "span": list(part.span), "decimals": part.decimals,
             **({} if part.bold is None else {"bold": np.flatnonzero(part.bold).tolist()}),
+            **({} if part.best is None else {"best": list(part.best)}),
         }  # fmt: skip
     return {
         "kind": "xy", "title": part.title, "x": _axis(part.x), "y": _axis(part.y),

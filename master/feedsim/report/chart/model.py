@@ -171,7 +171,8 @@ class Grid:
     """Numbers in cells, coloured by their size; a number that is not finite leaves its cell empty.
 
     span: the values of the palest and the deepest colour; about zero, signs have colours of their own. decimals: of the
-    numbers; None: three digits that count. bold: cells that stand out.
+    numbers; None: three digits that count. bold: cells that stand out. best: row and column of the cell that is looked
+    for, which has a frame.
     """
 
     title: str
@@ -181,6 +182,7 @@ class Grid:
     span: tuple[float, float]
     decimals: int | None = None
     bold: NDArray[np.bool_] | None = None
+    best: tuple[int, int] | None = None
 
 
 Part = Panel | Polar | Grid

@@ -405,6 +405,9 @@ def _grid(axes: Axes, grid: Grid) -> None:
     axes.pcolormesh(np.arange(columns + 1), np.arange(rows + 1), cells, **lines)
     axes.invert_yaxis()
     axes.grid(visible=False)
+    if grid.best is not None:
+        i, j = grid.best
+        axes.plot([j, j + 1, j + 1, j, j], [i, i, i + 1, i + 1, i], color=INK, linewidth=1.8, zorder=6, clip_on=False)
     axes.xaxis.tick_top()
     wide = (_width(Chart([grid])) - 1.0) / columns
     axes.tick_params(length=0)

@@ -203,9 +203,12 @@ def _polar(panel: Polar, width: float, height: float) -> str:
     return "".join(parts)
 
 
+WIDEST = 150.0  # of a cell
+
+
 def _grid(grid: Grid, width: float) -> str:
     left, top = min(260.0, 16 + 6.4 * max(map(len, grid.rows))), _over(grid)
-    cell = min(64.0, (width - left - 8 - SLANTED * len(grid.columns[-1])) / (len(grid.columns) - 0.5))
+    cell = min(WIDEST, (width - left - 8 - SLANTED * len(grid.columns[-1])) / (len(grid.columns) - 0.5))
     parts = [_text(4, 15, grid.title, "font-weight='600'")]
     for j, name in enumerate(grid.columns):
         parts.append(
@@ -230,6 +233,10 @@ def _grid(grid: Grid, width: float) -> str:
                 weight = " font-weight='700'" if grid.bold is not None and grid.bold[i, j] else ""
                 parts.append(_text(left + (j + 0.5) * cell, top + 24 * i + 16, cell_text(value, grid),
                                    f"font-size='11' text-anchor='middle'{weight}"))  # fmt: skip
+    if grid.best is not None:
+        i, j = grid.best
+        box = f'x="{left + j * cell:.1f}" y="{top + 24 * i:g}" width="{cell:.1f}" height="24"'
+        parts.append(f'<rect {box} fill="none" stroke="var(--ink)" stroke-width="2.2"/>')
     return "".join(parts)
 
 

@@ -107,11 +107,11 @@ def _errors(compensation: Compensation) -> Section:
         numbers = [*quality.peak.values(), *quality.dip.values(), quality.G]
         amount = minus(f"{change:+.3g} {unit}") if unit else ""
         rows.append((what, amount, *(minus(f"{1e6 * number:.3f}") for number in numbers)))
-    each = [f"{kind}, {axis} reverses [µm]" for kind in ("peak", "dip") for axis in compensation.turn.axes]
+    each = [f"{kind}, {axis} reverses [µm]" for kind in ("glitch", "dip") for axis in compensation.turn.axes]
     note = (
-        "An error of the delay or of a parameter, of all axes at once. Peak and dip: largest and smallest radius "
+        "An error of the delay or of a parameter, of all axes at once. Glitch and dip: largest and smallest radius "
         "deviation within ±45° of the reversals of an axis, less the median of the turn. Too little compensation "
-        "leaves peaks, too much leaves dips."
+        "leaves glitches, too much leaves dips."
     )
     table = Table("lrr" + "r" * len(each), ("Compensation", "Error", *each, "G [µm]"), rows, note)
     return Section("What errors cost", [table], "errors")

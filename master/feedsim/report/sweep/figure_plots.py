@@ -239,7 +239,9 @@ def grid_picture(account: Account, output: Output, stem: str) -> Picture | None:
         return Picture(f"grid-{stem}", title, f"A line for each {lines.name}.", chart, worded=True)
     cells = "A cell per run, its colour the deeper the larger the figure."
     empty = "" if np.isfinite(output.values).all() else " Empty: the run failed, or the figure could not be determined."
-    return Picture(f"grid-{stem}", title, cells + empty, _map(output, first, second), worded=True)
+    best = _best_row(account, output)
+    cells += " The frame is the run that is looked for." if best is not None else ""
+    return Picture(f"grid-{stem}", title, cells + empty, _map(output, first, second, best), worded=True)
 
 
 def _lines(output: Output, along: Input, lines: Sequence[tuple[str, Array, Array, str]]) -> Chart:
@@ -254,13 +256,14 @@ def _lines(output: Output, along: Input, lines: Sequence[tuple[str, Array, Array
     return Chart([Panel("", axis, Axis(output.name, output.scale.shown_unit), curves, height=1.3)])
 
 
-def _map(output: Output, first: Input, second: Input) -> Chart:
-    """A figure over a grid of two parameters."""
+def _map(output: Output, first: Input, second: Input, best: int | None = None) -> Chart:
+    """A figure over a grid of two parameters. best: the row that is looked for."""
     across, i = np.unique(first.values, return_inverse=True)
     up, j = np.unique(second.values, return_inverse=True)
     cells = np.full((len(up), len(across)), np.nan)
     cells[j, i] = output.values
     low, high = float(np.nanmin(cells)), float(np.nanmax(cells))
     title = f"{output.label} over {first.label} and, upwards, {second.label}"
+    framed = None if best is None else (len(up) - 1 - int(j[best]), int(i[best]))
     return Chart([Grid(title, [first.text(value) for value in across], [second.text(value) for value in up[::-1]],
-                       cells[::-1], (low, high))])  # fmt: skip
+                       cells[::-1], (low, high), best=framed)])  # fmt: skip

@@ -442,7 +442,7 @@ function draw_grid(panel, box, parent, values) {
   headed(panel.title, 4, box.width - 4, part);
   const left = grid_left(panel), top = grid_top(panel), columns = panel.columns.length;
   const slanted = 4.8 * panel.columns[columns - 1].length; // the last name leans over the edge
-  const width = Math.min(64, (box.width - left - 8 - slanted) / (columns - 0.5)), height = 24, numbers = width >= 30;
+  const width = Math.min(150, (box.width - left - 8 - slanted) / (columns - 0.5)), height = 24, numbers = width >= 30;
   const [low, high] = panel.span, about_zero = low < 0 && high > 0;
   panel.columns.forEach((name, j) => make("text", { transform: `translate(${left + (j + 0.5) * width} ${top - 6}) rotate(-40)`, fill: colour("ink"), "font-size": 11 }, part, name));
   panel.rows.forEach((name, i) => make("text", { x: left - 8, y: top + (i + 0.5) * height + 4, "text-anchor": "end", fill: colour("ink"), "font-size": 11 }, part, name));
@@ -456,6 +456,7 @@ function draw_grid(panel, box, parent, values) {
     make("title", {}, cell, `${row}, ${column}: ${number(value)}`);
     if (numbers) make("text", { x: box.x + width / 2, y: box.y + height / 2 + 4, "text-anchor": "middle", fill: colour("ink"), "font-size": 11, "font-weight": bold.has(i * columns + j) ? 700 : 400 }, part, panel.decimals === null ? three(value) : fixed(value, panel.decimals));
   }));
+  if (panel.best) make("rect", { x: left + panel.best[1] * width, y: top + panel.best[0] * height, width, height, fill: "none", stroke: colour("ink"), "stroke-width": 2.2 }, part);
   return { panel, part };
 }
 const grid_left = panel => Math.min(260, 16 + 6.4 * panel.rows.reduce((most, each) => Math.max(most, each.length), 0));

@@ -5,6 +5,7 @@ May use: the package. Start reading at main(). `make causes` runs it; every figu
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,20 +23,27 @@ from feedsim.report.style import BLUE, VERMILLION
 
 HERE = Path(__file__).resolve().parent
 CIRCLE = HERE.parent / "scenarios" / "xz_circle.yaml"
-FEEDS, RADII = (1000, 3000, 10000), (30, 60, 100)  # mm/min, mm
+FEEDS, FAST, RADII = (1000, 3000, 10000), (3000, 10000), (30, 60, 100)  # mm/min, mm
 BEGIN, END = "<!-- causes: begin -->", "<!-- causes: end -->"
-SHOWN = (3000, 60)  # of the picture
+SHOWN, ACROSS, POINTS = (3000, 60), 4, 800  # of the picture; circles beside each other; points of a turn, or more
 INDIRECT = tuple(f"machine.axes.{axis}.drive.measuring.indirect=true" for axis in "XZ")
 
 
 @dataclass(frozen=True)
 class Cause:
-    """What it is called, the settings that put it in, the term that is expected; whether the tool is looked at."""
+    """What it is called, the settings that put it in, the term that is expected; whether the tool is looked at, as an
+    instrument does; feeds [mm/min].
+
+    Settings may have {bend}, the bend of a guide [1/m] that is 8 um at the circle's edges, and {slope}, what that is in
+    the middle [um/m]: errors are zero where an axis starts, here at an edge.
+    """
 
     title: str
     settings: tuple[str, ...]
     term: str = ""
     at_tool: bool = False
+    recorded: bool = False
+    feeds: tuple[float, ...] = FEEDS
 
 
 CAUSES = (
@@ -50,6 +58,23 @@ CAUSES = (
         "machine.axes.X.drive.k_ffw=0", "machine.axes.Z.drive.k_ffw=0",
         "machine.axes.X.drive.K_v=3.96 (m/min)/mm", "machine.axes.Z.drive.K_v=4 (m/min)/mm",
     ), "servo"),
+    Cause("both scales 50 um/m too long (temperature)",
+          tuple(f"machine.axes.{axis}.drive.measuring.linear=50 um/m" for axis in "XZ"), "radius", feeds=FAST),
+    Cause("error of X with its pitch, 2 um", tuple(
+        f"machine.axes.X.drive.periodic_error_1.{each}" for each in ("period=20 mm", "amplitude=2 um")
+    ), "pitch X", feeds=FAST),
+    Cause("eccentric motor encoder of X, 0.6 mrad: 1.91 um with its pitch",
+          ("machine.axes.X.drive.encoder.eccentricity=0.6 mrad", *INDIRECT), "pitch X", feeds=FAST),
+    Cause("guide of X bent by 8 um at the edges (at the tool)",
+          ("machine.geometry.E_ZX_second={bend} 1/m", "machine.geometry.squareness_XZ={slope} um/m"),
+          "straightness X", True, True, FAST),
+    Cause("elastic hysteresis of X, 4 um",
+          ("machine.axes.X.hysteresis.value=4 um", "machine.axes.X.hysteresis.way=50 um", *INDIRECT), "lost_motion X",
+          feeds=FAST),
+    Cause("cogging of X, 0.4 N.m, six per turn", tuple(
+        f"machine.axes.X.drive.cogging_1.{each}" for each in ("order=6", "amplitude=0.4 N.m")
+    ), feeds=FAST),
+    Cause("60 % of the friction of X at its guide", ("machine.axes.X.guide.share=60 %",), "peaks X", feeds=FAST),
 )  # fmt: skip
 
 
@@ -57,7 +82,7 @@ def main() -> None:
     """Write table and picture anew."""
     rows, shown = [], {}
     for cause in CAUSES:
-        for feed in FEEDS:
+        for feed in cause.feeds:
             cells = []
             for radius in RADII:
                 found, paths = diagnosis(cause, feed, radius)
@@ -65,7 +90,12 @@ def main() -> None:
                 if (feed, radius) == SHOWN:
                     shown[cause.title] = paths
                 print(cause.title, feed, radius, cells[-1], flush=True)
-            rows.append((cause.title if feed == FEEDS[0] else "", feed, cells))
+            rows.append((cause.title if feed == cause.feeds[0] else "", feed, cells))
+    write(rows, shown)
+
+
+def write(rows: Sequence[tuple[str, float, list[str]]], shown: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> None:
+    """Table into the page, and the picture."""
     picture(shown, HERE / "images" / "causes.svg")
     page = HERE / "causes.md"
     text = page.read_text(encoding="utf-8")
@@ -75,25 +105,34 @@ def main() -> None:
 
 def diagnosis(cause: Cause, feed: float, radius: float) -> tuple[Diagnosis, list[tuple[np.ndarray, np.ndarray]]]:
     """What is found, and angle [rad] and deviation [m] of the turns."""
-    settings = (f"motions.0.radius={radius} mm", f"motions.0.feed={feed} mm/min", *cause.settings)
+    R = radius / 1e3
+    own = [each.format(bend=8e-6 / R**2, slope=2 * 8 / R) for each in cause.settings]
+    settings = (f"motions.0.radius={radius} mm", f"motions.0.feed={feed} mm/min", *own)
     run = cosim.run(scenario.load(CIRCLE, list(settings)), fmus=HERE.parent / "fmus")
     (task,) = (each for each in tasks(run.scenario, run.program) if isinstance(each, CircleTask))
     columns = ("tcp.x_X", "tcp.x_Z") if cause.at_tool else None
-    found = diagnosed(run.trace, task.turns, task.pitch, task.gain, task.drag, columns)
+    found = diagnosed(run.trace, task.turns, task.pitch, task.gain, task.drag, columns, cause.recorded)
     assert found is not None
     turns = [contour(run.trace, turn, columns) for turn in task.turns]
     return found, [(turn.angle, turn.deviation) for turn in turns]
 
 
 def words(found: Diagnosis, cause: Cause) -> str:
-    """The causes that a report names, the first first, without friction's peaks, which this machine always has."""
+    """The causes that a report names, the first first; friction's peaks, which this machine always has, and the mean
+    radius only where they are asked for. Of unlike amplitudes what the response of the axes makes of them."""
     named = []
-    for term in worth_telling(found):
-        if term.key in ("peaks", "offset"):
+    asked = [term for term in found.terms if term.key == "radius" and cause.term == "radius" and term.told]
+    for term in [*worth_telling(found), *asked]:
+        if term.key == "offset" or (term.key == "peaks" and not cause.term.startswith("peaks")):
             continue
         factor, unit = UNITS[term.unit]
         text = f"{name(term)} {factor * term.value:.3g} +- {factor * term.half:.2g} {unit}"
+        if term.key == "scale" and found.unlike is not None and abs(found.unlike) > term.half:
+            text += f" (by the response of the axes {1e6 * found.unlike:.3g})"
         named.append(f"**{text}**" if f"{term.key} {term.axis}".strip() == cause.term else text)
+    for each in found.vibrations:
+        text = f"vibration of {each.axis} {1e6 * each.amplitude:.2g} um at {each.frequency:.3g} Hz"
+        named.append(f"**{text}**" if cause.term == f"vibration {each.axis}" else text)
     return "; ".join(named) or "none"
 
 
@@ -110,18 +149,20 @@ def picture(shown: dict[str, list[tuple[np.ndarray, np.ndarray]]], file: Path) -
     matplotlib.rcParams.update({"svg.hashsalt": "causes", "svg.fonttype": "path", "font.size": 8})
     from matplotlib import pyplot
 
-    figure, places = pyplot.subplots(2, 3, figsize=(9, 6.2))
-    for place, (title, turns) in zip(places.flat, shown.items(), strict=True):
+    rows = -(-len(shown) // ACROSS)
+    figure, places = pyplot.subplots(rows, ACROSS, figsize=(3 * ACROSS, 3.1 * rows))
+    for place in places.flat:
+        place.axis("off")
+    for place, (title, turns) in zip(places.flat, shown.items(), strict=False):
         largest = max(float(np.abs(deviation).max()) for _, deviation in turns)
         circle = np.linspace(0, 2 * np.pi, 400)
         place.plot(np.cos(circle), np.sin(circle), color="#b0b0b0", linewidth=0.7)
         for (angle, deviation), colour in zip(turns, (BLUE, VERMILLION), strict=True):
             r = 1 + 0.35 * deviation / largest
-            order = np.argsort(angle)
+            order = np.argsort(angle)[:: max(1, len(angle) // POINTS)]
             place.plot((r * np.cos(angle))[order], (r * np.sin(angle))[order], color=colour, linewidth=1)
-        place.set_title(f"{title}\nlargest deviation {1e6 * largest:.3g} um")
+        place.set_title(f"{textwrap.fill(title, 34)}\nlargest deviation {1e6 * largest:.3g} um")
         place.set_aspect("equal")
-        place.axis("off")
     figure.tight_layout()
     figure.savefig(file, metadata={"Date": None, "Creator": None})
 

@@ -245,6 +245,39 @@ def test_path_lag_is_told_from_the_radius_where_the_drives_are_known() -> None:
     assert "one feed cannot tell which" in sentence(unknown, unknown["radius"])
 
 
+def test_unlike_amplitudes_are_told_with_what_the_response_makes_of_them() -> None:
+    """A slide behind a motor encoder travels 100 um/m further by its compliance; a scale of 40 um/m is the rest."""
+    known = replace(SMALL, gain={"X": 1 + 100e-6, "Z": 1.0})
+    found = both(known, Causes(scale=(140e-6, 0.0)))
+    assert found.unlike == pytest.approx(100e-6, rel=1e-9)
+    words = sentence(found, found["scale"])
+    assert "X travels 140 um/m more than Z: the response of the axes makes 100" in words
+    assert "scale, temperature or pitch compensation 40" in words
+    unknown = both(SMALL, Causes(scale=(140e-6, 0.0)))
+    assert "or an unlike decrease of the amplitude by path lag" in sentence(unknown, unknown["scale"])
+    other = both(replace(SMALL, gain={"X": 1.0, "Z": 1 + 100e-6}), Causes(scale=(0.0, 140e-6)))
+    assert "Z travels 140 um/m more than X: the response of the axes makes 100" in sentence(other, other["scale"])
+
+
+# Coulomb friction through loops of first order, 30 um/(N.m) where they are slow: of odd multiples of the turn's rate.
+DRAG = 30e-6 / (1 + 1j * (2 * np.arange(40) + 1) * 5.0 / 60)
+
+
+@pytest.mark.parametrize("sizes", [(2e-6, 0.0), (0.0, 2e-6), (1e-6, 3e-6)])
+def test_a_pitch_error_of_a_known_machine_is_no_lost_motion(sizes: tuple[float, float]) -> None:
+    """Three pitches in the circle: it does not repeat between two windows, and yet makes all clearer."""
+    circle = CircleUnderTest(("X", "Z"), 0.03, 0.05, {"X": 0.02, "Z": 0.02}, drag={"X": DRAG, "Z": DRAG})
+    for seed in range(5):
+        found = both(circle, Causes(pitch_error=sizes, phase=(1.0 + seed, 2.0), noise=0.02e-6), seed)
+        for i, axis in enumerate("XZ"):
+            assert found[f"pitch {axis}"].value == pytest.approx(sizes[i], abs=0.1e-6)
+            assert abs(found[f"lost_motion {axis}"].value) <= max(found[f"lost_motion {axis}"].half, 0.1e-6)
+    quiet = both(circle, Causes(lost=(2e-6, 0.0), noise=0.02e-6))
+    assert abs(quiet["lost_motion X"].value - 2e-6) <= quiet["lost_motion X"].half
+    with pytest.raises(KeyError):
+        quiet["pitch X"]
+
+
 DRAWS = 500
 # A cause that is not there is below this [m].
 INVENTED = 0.3e-6

@@ -35,11 +35,13 @@ def diagnosed(
     gain: Mapping[str, complex] | None = None,
     drag: Mapping[str, NDArray[np.complex128]] | None = None,
     columns: tuple[str, str] | None = None,
+    recorded: bool = False,
 ) -> Diagnosis | None:
     """Turns of one circle taken apart; None where they have too few samples for that.
 
     pitch: axis -> [m]. gain: axis -> x_a/x_s at the circle's frequency [1]. drag: axis -> x_a over a torque at the
     motor at the odd multiples of that frequency [m/(N.m)]. columns: of the positions; default: those of the scales.
+    recorded: they are looked at as those of an instrument are.
     """
     turn = turns[0]
     paths = []
@@ -50,7 +52,7 @@ def diagnosed(
         phase = (measured.time - measured.time[0]) * (2 * math.pi / (each.end - each.begin))
         paths.append(TurnedPath(measured.angle, measured.deviation, each.sense, phase))
     speed = 2 * math.pi * turn.radius / (turn.end - turn.begin)
-    return diagnose(CircleUnderTest(turn.axes, turn.radius, speed, pitch, gain or {}, drag or {}), paths)
+    return diagnose(CircleUnderTest(turn.axes, turn.radius, speed, pitch, gain or {}, drag or {}, recorded), paths)
 
 
 def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:

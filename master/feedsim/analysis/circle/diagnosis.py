@@ -91,6 +91,7 @@ class Diagnosis:
         peaks: of all reversals, in the order of the turns.
         vibrations: the strongest of each axis that stands out, of the radius where only that is known.
         lag: the part of the mean radius that the loops' response makes [m]; None where the drives are not known.
+        unlike: how much further the first axis travels than the second by that response [1]; None as ``lag``.
         form: order -> amplitude of it in what remains [m].
         noise: standard deviation of what remains outside the windows behind the reversals [m].
         centre: fitted, from the programmed one [m].
@@ -108,6 +109,7 @@ class Diagnosis:
     peaks: tuple[Peak, ...]
     vibrations: tuple[Vibration, ...]
     lag: float | None
+    unlike: float | None
     form: dict[int, float]
     noise: float
     left_out: tuple[str, ...]
@@ -173,6 +175,7 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         peaks=peaks,
         vibrations=vibrations(circle, found, whole),
         lag=_lag(circle),
+        unlike=_unlike(circle),
         form=_form(found),
         noise=found.noise,
         left_out=found.left_out,
@@ -191,6 +194,13 @@ def _lag(circle: CircleUnderTest) -> float | None:
     if any(axis not in circle.gain for axis in circle.axes):
         return None
     return circle.radius * (abs(sum(circle.gain[axis] for axis in circle.axes)) / 2 - 1)
+
+
+def _unlike(circle: CircleUnderTest) -> float | None:
+    """Compliance behind a motor encoder makes an axis travel further; without feedforward the slower one falls back."""
+    if any(axis not in circle.gain for axis in circle.axes):
+        return None
+    return float(abs(circle.gain[circle.axes[0]]) - abs(circle.gain[circle.axes[1]]))
 
 
 def _curves(found: Fit, paths: Sequence[TurnedPath], circle: CircleUnderTest) -> dict[str, list[Array]]:

@@ -60,10 +60,14 @@ HIDDEN = 0.45
 # Neighbouring samples share what disturbs them. Blocks of this angle [deg] do not, as far as intervals are concerned.
 BLOCK = 6.0
 # Friction is no clean step: the response to it outside the windows is known to this share.
-KNOWN = 0.2
+KNOWN = 0.3
+# Before it slides, friction is elastic, and no step at all: of a peak this share may look like lost motion.
+WOUND = 0.02
 # Time in which a control that nobody knows lets a peak of friction fall to 1/e, or sooner [s].
 SETTLES = 0.05
 PASSES = 6
+# Left out, they must leave this share of the noise to be taken in after all.
+CLEARER = 0.5
 REPEATS = 2.0  # and pitches that must lie between two windows, where the drives are known
 # The angle that is programmed and the one where the machine is differ by more than rounding from this deviation [m] on.
 UNSEEN = 5e-9
@@ -84,6 +88,7 @@ class Fit:
         window: how far behind a reversal is left out [rad].
         noise: standard deviation of a sample outside the windows [m].
         left_out: pitch errors that the circle is too small for. senses: of the paths.
+        wound: lost motion that friction at rest may make by itself, of "lost_0" and "lost_1" [m].
         unsure: what a term may be off by as the loops' response is not known better [m].
         offset: of the written angles; None where they are those of the machine's own scales.
     """
@@ -102,6 +107,7 @@ class Fit:
     noise: float
     left_out: tuple[str, ...]
     senses: tuple[int, ...]
+    wound: Mapping[str, float]
     unsure: float = 0.0
     offset: Offset | None = None
 
@@ -124,7 +130,8 @@ class Fit:
         length = float(np.hypot(*part)) if len(rows) == 2 else 0.0
         along = part / length if length > 0 else np.full(len(rows), 1 / math.sqrt(len(rows)))
         own = self.quantile * math.sqrt(max(float(along @ self.covariance[np.ix_(rows, rows)] @ along), 0.0))
-        return math.hypot(own, self.unsure, self.hidden if "squareness" in names else 0.0)
+        besides = self.hidden if "squareness" in names else self.wound.get(names[0], 0.0)
+        return math.hypot(own, self.unsure, besides)
 
     @property
     def hidden(self) -> float:
@@ -157,12 +164,12 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
 
 def _told(circle: CircleUnderTest, paths: Sequence[TurnedPath], angle: float) -> Fit:
     """With angles that are larger than those of the machine by ``angle`` [rad]."""
-    found = _shaped(circle, paths, Shape(angle=angle))
+    found = _pitched(circle, paths, Shape(angle=angle))
     moved = sum(math.hypot(found[a], found[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))
     moved += abs(found["squareness"])
     if all(path.phase is not None for path in paths) or moved**2 < circle.radius * UNSEEN:
         return found
-    other = _shaped(circle, paths, Shape(by_program=True, angle=angle))
+    other = _pitched(circle, paths, Shape(by_program=True, angle=angle))
     return other if other.noise < found.noise else found
 
 
@@ -174,12 +181,30 @@ class Left(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """by_program: the angles are the programmed ones. play: lost motion is used up first. angle: by which the angles
-    are larger than those of the machine [rad]."""
+    """by_program: the angles are the programmed ones. play: lost motion is used up first. pitches: errors that repeat
+    with a pitch are fitted even if they do not repeat between two windows. angle: by which the angles are larger than
+    those of the machine [rad]."""
 
     by_program: bool = False
     play: bool = False
+    pitches: bool = False
     angle: float = 0.0
+
+
+def _pitched(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
+    """Without errors that hardly repeat between two windows, unless they make all of it much clearer.
+
+    Where they do not, friction's response may look like them, or they like other terms: what they would move these is
+    part of the intervals.
+    """
+    found = _shaped(circle, paths, shape)
+    if not any(enough_pitches(circle, axis) for axis in found.left_out):
+        return found
+    other = _shaped(circle, paths, shape._replace(pitches=True))
+    if other.noise < CLEARER * found.noise:
+        return other
+    moved = np.array([found[name] - other[name] for name in found.names])
+    return replace(found, covariance=found.covariance + np.outer(moved, moved))
 
 
 def _shaped(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
@@ -209,7 +234,9 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
     both = len({path.sense for path in paths}) == 2
     asked = [axis for axis in circle.axes if axis in circle.pitch]
     # Where friction's response reaches far, an error must be seen to repeat between two windows.
-    free = circle.radius * (math.pi / 2 - window - math.radians(AHEAD)) if circle.drag else math.inf
+    free = math.inf
+    if circle.drag and not shape.pitches:
+        free = circle.radius * (math.pi / 2 - window - math.radians(AHEAD))
     circle = replace(circle, pitch={axis: p for axis, p in circle.pitch.items() if REPEATS * p <= free})
     values: dict[str, float] = {"angle": shape.angle} | ({PLAYED: 1.0} if shape.play else {})
     moves = centre_moves(paths) if circle.recorded else [{} for _ in paths]
@@ -260,6 +287,11 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
         noise=robust.noise,
         left_out=tuple(axis for axis in asked if not enough_pitches(circle, axis)),
         senses=tuple(path.sense for path in paths),
+        wound={
+            f"lost_{i}": WOUND * float(np.abs(residual[(which >= 0) & (which % 2 == i)]).max(initial=0.0))
+            for i in (0, 1)
+            if len(circle.drag) == 2
+        },
         unsure=_unsure(circle, tail[kept], residual[~kept], window),
     )
 

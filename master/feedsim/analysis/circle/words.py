@@ -66,10 +66,7 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
             return f"the radius is {_um(amount)} too {'large' if value > 0 else 'small'}: {_lag(diagnosis, value)}"
         case "scale":
             more, less = (first, second) if value > 0 else (second, first)
-            return (
-                f"{more} travels {_digits(amount * 1e6)} um/m more than {less}: scale, temperature or pitch "
-                "compensation, or an unlike decrease of the amplitude by path lag"
-            )
+            return f"{more} travels {_digits(amount * 1e6)} um/m more than {less}: {_unlike(diagnosis, value)}"
         case "squareness":
             return (
                 f"the angle between {first}+ and {second}+ is {_digits(amount * 1e6)} um/m "
@@ -172,6 +169,17 @@ def _lag(diagnosis: Diagnosis, change: float) -> str:
     return (
         f"path lag makes {_um(diagnosis.lag)} by the response of the position loops (K_v, speed feedforward, T_sym), "
         f"friction or a scale {_um(rest)}"
+    )
+
+
+def _unlike(diagnosis: Diagnosis, value: float) -> str:
+    """What unlike amplitudes are made of, as far as it can be told."""
+    if diagnosis.unlike is None:
+        return "scale, temperature or pitch compensation, or an unlike decrease of the amplitude by path lag"
+    response = math.copysign(1.0, value) * diagnosis.unlike
+    return (
+        f"the response of the axes makes {_digits(response * 1e6)} um/m (K_v, speed feedforward, compliance behind a "
+        f"motor encoder), scale, temperature or pitch compensation {_digits((abs(value) - response) * 1e6)} um/m"
     )
 
 

@@ -28,7 +28,7 @@ function diagnose(circle, whole, students) {
   });
   const last = term => Number(!term.certain || term.key === "rest"), order = term => -Math.round(term.gain / PEAK.FLOOR);
   terms.sort((a, b) => last(a) - last(b) || order(a) - order(b) || b.size - a.size);
-  return { circle, senses: paths.map(path => path.sense), G, terms, peaks, vibrations: vibrations_of(circle, found, whole), lag: lag_of(circle), form: form_of(found), noise: found.noise, left_out: found.left_out };
+  return { circle, senses: paths.map(path => path.sense), G, terms, peaks, vibrations: vibrations_of(circle, found, whole), lag: lag_of(circle), unlike: unlike_of(circle), form: form_of(found), noise: found.noise, left_out: found.left_out };
 }
 
 function thinned_path(path) {
@@ -39,6 +39,11 @@ function thinned_path(path) {
 function lag_of({ axes, radius, gain }) {
   if (axes.some(axis => !(axis in gain))) return null;
   return radius * (Math.hypot(...[0, 1].map(i => gain[axes[0]][i] + gain[axes[1]][i])) / 2 - 1);
+}
+
+function unlike_of({ axes, gain }) {
+  if (axes.some(axis => !(axis in gain))) return null;
+  return Math.hypot(...gain[axes[0]]) - Math.hypot(...gain[axes[1]]);
 }
 
 // "term axis" -> radial deviation that it makes, of all paths.

@@ -3,7 +3,7 @@
 const RADIANS = Math.PI / 180;
 const MODEL = {
   AHEAD: 2, BEHIND: [30, 45, 60], CALM: 0.05, NEXT: 4, TAIL: 2, TAIL_FLOOR: 10e-9, DECAYS: [2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 21, 25, 30], FALLEN: 2, BLOCK: 6, PASSES: 6, PITCHES: 2, REPEATS: 2,
-  KNOWN: 0.2, PLAY: 0.2e-6, TURNS: 10, PERIOD: 2048,
+  KNOWN: 0.3, WOUND: 0.02, CLEARER: 0.5, PLAY: 0.2e-6, TURNS: 10, PERIOD: 2048,
   MOST: 8000, BIWEIGHT: 4.685, SETTLED: 1e-13, UNUSUAL: 0.6745,
 };
 
@@ -14,26 +14,35 @@ const enough_pitches = (circle, axis) => axis in circle.pitch && 2 * circle.radi
 
 // circle: {axes, radius, speed, pitch, gain, drag}; paths: {angle, deviation, sense, phase}.
 function fit_circle(circle, paths, students) {
-  const found = fit_calm(circle, paths, students, false);
+  const found = fit_lost(circle, paths, students, false);
+  if (!found.left_out.some(axis => enough_pitches(circle, axis))) return found;
+  const other = fit_lost(circle, paths, students, true);
+  if (other.noise < MODEL.CLEARER * found.noise) return other;
+  const moved = found.names.map(name => found.of(name) - other.of(name));
+  return { ...found, covariance: found.covariance.map((row, i) => row.map((each, j) => each + moved[i] * moved[j])) };
+}
+
+function fit_lost(circle, paths, students, pitches) {
+  const found = fit_calm(circle, paths, students, false, pitches);
   if (Math.max(found.of("lost_0"), found.of("lost_1")) < MODEL.PLAY) return found;
-  const other = fit_calm(circle, paths, students, true);
+  const other = fit_calm(circle, paths, students, true, pitches);
   return behind(other) < behind(found) ? other : found;
 }
 
 // What is left behind the reversals, in squares.
 const behind = found => found.residual.reduce((sum, off, p) => off.reduce((own, each, k) => own + (found.reversal[p][k] >= 0 ? each * each : 0), sum), 0);
 
-function fit_calm(circle, paths, students, play) {
+function fit_calm(circle, paths, students, play, pitches) {
   let found = null;
   for (const degrees of MODEL.BEHIND) {
-    found = fit_windowed(circle, paths, degrees * RADIANS, students, play);
+    found = fit_windowed(circle, paths, degrees * RADIANS, students, play, pitches);
     if (calm(found)) break;
   }
   return found;
 }
 
-function fit_windowed(whole, paths, window, students, play) {
-  const known = whole.axes.every(axis => axis in whole.drag), asked = whole.axes.filter(axis => axis in whole.pitch), free = known ? whole.radius * (Math.PI / 2 - window - MODEL.AHEAD * RADIANS) : Infinity;
+function fit_windowed(whole, paths, window, students, play, pitches) {
+  const known = whole.axes.every(axis => axis in whole.drag), asked = whole.axes.filter(axis => axis in whole.pitch), free = known && !pitches ? whole.radius * (Math.PI / 2 - window - MODEL.AHEAD * RADIANS) : Infinity;
   const circle = { ...whole, pitch: Object.fromEntries(Object.entries(whole.pitch).filter(([, pitch]) => MODEL.REPEATS * pitch <= free)) };
   const both = new Set(paths.map(path => path.sense)).size === 2, count = paths.reduce((sum, path) => sum + path.angle.length, 0);
   let values = play ? { play: 1 } : {}, tails = { columns: [], spread: [] }, residual = null, undone, parts, windows, names, matrix, robust, kept, blocks;
@@ -62,8 +71,10 @@ function fit_windowed(whole, paths, window, students, play) {
   const tail = combined(tails.columns, robust.values.slice(names.length), count);
   // Positions of a run are not rounded: what rounding of a record adds is no part of it here.
   const { covariance, quantile: student } = covariance_of(kept, Float64Array.from(robust.rows, k => residual[k] - tail[k]), robust, tails.spread, blocks, students);
+  const reversal = concatenated(windows.map(each => each.which)), peak = i => residual.reduce((most, each, k) => reversal[k] >= 0 && reversal[k] % 2 === i ? Math.max(most, Math.abs(each)) : most, 0);
+  const wound = known ? { lost_0: MODEL.WOUND * peak(0), lost_1: MODEL.WOUND * peak(1) } : {};
   return {
-    names, values: names.map(name => values[name]), covariance, student, angle: undone.map(each => each.angle), residual: split_like(residual, paths.map(path => path.angle)), window, noise: robust.noise,
+    wound, names, values: names.map(name => values[name]), covariance, student, angle: undone.map(each => each.angle), residual: split_like(residual, paths.map(path => path.angle)), window, noise: robust.noise,
     reversal: windows.map(each => each.which), since: windows.map(each => each.since), tail: split_like(tail, paths.map(path => path.angle)), columns: parts,
     left_out: asked.filter(axis => !enough_pitches(circle, axis)), unsure: known ? MODEL.KNOWN * largest([0, ...Array.from(robust.rows, k => Math.abs(tail[k]))]) : 0, of: name => names.includes(name) ? values[name] : 0,
   };
@@ -77,7 +88,7 @@ function half_of(found, ...names) {
   const along = length > 0 ? part.map(each => each / length) : rows.map(() => 1 / Math.sqrt(rows.length));
   let sum = 0;
   rows.forEach((i, a) => rows.forEach((j, b) => { sum += along[a] * found.covariance[i][j] * along[b]; }));
-  return Math.hypot(found.student * Math.sqrt(Math.max(sum, 0)), found.unsure);
+  return Math.hypot(found.student * Math.sqrt(Math.max(sum, 0)), found.unsure, found.wound[names[0]] || 0);
 }
 
 // Standard deviation of the model's own deviation where it is known least well, behind the reversals.

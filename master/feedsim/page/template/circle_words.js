@@ -38,7 +38,7 @@ function sentence_of(diagnosis, term) {
     case "radius": return `the radius is ${in_um(amount)} too ${value > 0 ? "large" : "small"}: ${lag_words(diagnosis, value)}`;
     case "scale": {
       const [more, less] = value > 0 ? [first, second] : [second, first];
-      return `${more} travels ${three(amount * 1e6)} um/m more than ${less}: scale, temperature or pitch compensation, or an unlike decrease of the amplitude by path lag`;
+      return `${more} travels ${three(amount * 1e6)} um/m more than ${less}: ${unlike_words(diagnosis, value)}`;
     }
     case "squareness": return `the angle between ${first}+ and ${second}+ is ${three(amount * 1e6)} um/m ${value > 0 ? "less" : "more"} than 90 deg: squareness of the guideways, or its compensation`;
     case "servo": {
@@ -55,6 +55,12 @@ function sentence_of(diagnosis, term) {
     case "pitch": return `${axis} errs by ${in_um(amount)} (amplitude) with every pitch of its drive: screw, or motor encoder`;
   }
   return `what no cause explains: ${in_um(term.size)} from peak to valley (${diagnosis.form.map(([n, size]) => `order ${n}: ${in_um(size)}`).join(", ")})`;
+}
+
+function unlike_words({ unlike }, value) {
+  if (unlike === null) return "scale, temperature or pitch compensation, or an unlike decrease of the amplitude by path lag";
+  const response = Math.sign(value) * unlike;
+  return `the response of the axes makes ${three(response * 1e6)} um/m (K_v, speed feedforward, compliance behind a motor encoder), scale, temperature or pitch compensation ${three((Math.abs(value) - response) * 1e6)} um/m`;
 }
 
 function lag_words({ lag }, change) {

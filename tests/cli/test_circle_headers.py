@@ -45,6 +45,8 @@ def diagnosed(
         ['"Nominal radius","150.000","mm"', '"Feedrate","1000.0","mm/min"'],
         ["ballbar length\t150 mm", "path_speed\t16.6666666666667 mm/s"],
         ["Radius (in): 5.905511811", "Feed 39.37007874 in/min"],
+        ["Circle diameter: 300 mm", "Feed: 1000 mm/min"],
+        ["Solldurchmesser [mm];300,0", "Prüfradius [mm];150,0", "Vorschub [mm/min];1000"],
     ],
 )
 def test_radius_and_feed_of_the_header(lines: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

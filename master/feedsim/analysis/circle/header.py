@@ -17,8 +17,11 @@ from feedsim.files.spellings import spelled
 # Label, as it may stand in a line, and the unit of its kind.
 LABELS = {
     "radius": ("m", ("radius", "nominal radius", "programmed radius", "test radius", "circle radius", "ballbar length",
-                     "nominal length", "sollradius", "nennradius", "kreisradius", "programmierter radius", "rayon",
-                     "rayon nominal")),
+                     "nominal length", "path radius", "measuring radius", "sollradius", "nennradius", "kreisradius",
+                     "programmierter radius", "bahnradius", "prüfradius", "messradius", "rayon", "rayon nominal")),
+    "diameter": ("m", ("diameter", "nominal diameter", "programmed diameter", "test diameter", "circle diameter",
+                       "durchmesser", "solldurchmesser", "nenndurchmesser", "kreisdurchmesser", "diamètre",
+                       "diamètre nominal")),
     "feed": ("m/s", ("feed", "feed rate", "feedrate", "path feed", "path speed", "programmed feed", "feed speed",
                      "vorschub", "bahnvorschub", "bahngeschwindigkeit", "vorschubgeschwindigkeit", "avance",
                      "vitesse d'avance")),
@@ -62,6 +65,8 @@ def told_ahead(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
                 size = value * float(units.factor(spelled(unit), kind)) if unit else None
             except InputError:
                 size = None
+            if what == "diameter":
+                what, size = "radius", None if size is None else size / 2
             if size is None or not size > 0:
                 notes.append(f"{line.strip()!r} may be the {what}, and is not read: its unit is not known")
             elif what in found and abs(found[what] / size - 1) > 1e-9:

@@ -75,6 +75,8 @@ def test_into_a_machine(place: Path) -> None:
     assert "outside the allowed range" in rows["MD32450"]["reason"]
     page = (place / "new" / "report.html").read_text()
     assert "Values that were not taken" in page
+    assert "Where names and units come from" in page
+    assert "SINUMERIK 808D ADVANCED parameter manual 6FC5397-8EP40-0BA0, p. 228" in page
     again = feedsim("machine", "info", "new", cwd=place)
     assert again.returncode == 0, again.stderr
 

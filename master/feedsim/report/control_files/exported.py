@@ -13,6 +13,7 @@ from feedsim.control import Archive
 from feedsim.control.writing import Written
 from feedsim.findings import Note
 from feedsim.report.content import Report, Section, Table, Text, Tile, code
+from feedsim.report.control_files.sources import sources_section
 from feedsim.report.formatting import counted, minus
 from feedsim.report.provenance import figures_part, hashed, inputs_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
@@ -117,6 +118,7 @@ def report_of(
         main=[
             _changes(written, True, "Values that were changed", TOUCHED),
             _changes(written, False, "Values to type", "They are not in the files; the last column says why."),
+            sources_section(each.name for each in written.changes),
         ],
         provenance=provenance_section(
             [("Machine", machine.name), ("Control", archives[0].control)], hashed([("file", path) for path in inputs])

@@ -12,6 +12,7 @@ from feedsim.analysis import Figure
 from feedsim.control import Archive, Reading, Refused, Taken
 from feedsim.findings import Note
 from feedsim.report.content import Bullets, Report, Section, Table, Text, Tile, code
+from feedsim.report.control_files.sources import sources_section
 from feedsim.report.formatting import counted, minus
 from feedsim.report.provenance import figures_part, hashed, inputs_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
@@ -137,12 +138,17 @@ def report_of(archives: Sequence[Archive], reading: Reading, made: Imported, inp
             )
         ],
         next_step=("Look at the machine, then simulate with it:\n", code("feedsim machine info FOLDER")),
-        main=[_taken(made), _refused(reading, made), _missing(made), _odd(archives)],
+        main=[_taken(made), _refused(reading, made), _missing(made), _odd(archives), _sources(reading, made)],
         provenance=provenance_section(
             [("Control", reading.control)], hashed([("file", path) for path in inputs])
         ),
         footer="Every value with its place: sheet.csv and the remarks in machine.yaml. Names: docs/control_names.md.",
     )  # fmt: skip
+
+
+def _sources(reading: Reading, made: Imported) -> Section | None:
+    refused = (*reading.refused, *made.refused)
+    return sources_section([*(each.name for each in made.values), *(each.name for each in refused)])
 
 
 def _taken(made: Imported) -> Section | None:

@@ -59,6 +59,7 @@ NEEDED = {
     "circle": ["--feed", "1000 mm/min"],
     "sweep": ["--workers", "1"],
     "machine import": ["--axes", "Z"],
+    "tune drive": ["--axis", "Z", "--evaluations", "10"],
     "machine export": ["--like", "mill.tea", "--axes", "Z"],
 }
 # One file serves for both sides of what takes two.

@@ -348,7 +348,7 @@ def test_a_margin_that_nothing_has_keeps_the_drive(fmus: Path) -> None:
         (("--axis", "Z", "--gain-margin", "-1"), "--gain-margin -1: more than zero is needed"),
         (("--axis", "Z", "--gain-margin", "much"), "--gain-margin much: a number of dB is needed"),
         (("--axis", "Z", "--phase-margin", "3 mm"), "--phase-margin"),
-        (("--axis", "Z", "--evaluations", "3"), "--evaluations 3: at least 20 are needed"),
+        (("--axis", "Z", "--evaluations", "3"), "--evaluations 3: at least 10 are needed"),
         (("--axis", "Z", "--at", "Z=9m"), "--at Z=9m: Z is outside of its travel"),
         (("--axis", "Z", "--at", "Q=1mm"), "--at Q=1mm: AXIS=POSITION is needed"),
     ],

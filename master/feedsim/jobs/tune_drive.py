@@ -29,7 +29,7 @@ from feedsim.tune.drive import tune_drive as tune
 from feedsim.tune.drive_program import check_axis
 from feedsim.units import parse
 
-LEAST_EVALUATIONS = 20
+LEAST_EVALUATIONS = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -123,7 +123,7 @@ def tune_drive(
         encoder_noise: standard deviation of the motor encoder's angle per control cycle [rad]; the torque that it makes
             stays below 2 % of the torque limit, or below what it is with the present drive.
         at: further poses at which the margins hold, such as "X=100mm,Z=600mm"; the machine names its structure.
-        evaluations: candidates per start of the search, of which there are two.
+        evaluations: candidates per start of the search, of which there are three.
         set: changes of the scenario, as behind ``--set``.
         fmus: folder of the archives.
         out: folder that the result is written to; None: :meth:`Result.save` does it.

@@ -47,7 +47,7 @@ WEIGHT = 4.0  # exponent of the mean of ratios: large ones count more
 NEAR = 0.75  # of the margins asked for: candidates from there on run, for the picture
 TORQUE = 0.95  # of the torque limit
 NOISE = 0.02  # of the torque limit: torque that encoder noise may make [1]
-STARTS, STEP, EVALUATIONS = 2, 0.12, 130  # of the search; evaluations per start
+STEPS, EVALUATIONS = (0.12, 0.12, 0.05), 130  # of the search's starts; evaluations per start
 BACK = (1.0, 0.8, 0.6, 0.4, 0.2)  # ways back to the present drive that are tried
 FINALISTS = 4
 FASTER = {"K_p": 4.0, "T_n": 0.15, "K_v": 2.0, "omega_0": 3.0}  # direction of the closed-form start
@@ -285,7 +285,7 @@ class _Search:
 
     def searched(self) -> list[Array]:
         """Places of the best candidates within the limits, the best first."""
-        done, total = 0, STARTS * self.evaluations
+        done, total = 0, len(STEPS) * self.evaluations
 
         def counted(x: Array) -> Rank:
             nonlocal done
@@ -293,11 +293,20 @@ class _Search:
             done += 1
             return self.rank(x)
 
-        for seed, start in enumerate((self.fast_start(), self.knobs.present), start=1):
-            least(counted, start, step=STEP, evaluations=self.evaluations, seed=seed)
+        starts: tuple[Callable[[], Array], ...] = (self.fast_start, self.as_present, self.best_yet)
+        for seed, (start, step) in enumerate(zip(starts, STEPS, strict=True), start=1):
+            least(counted, start(), step=step, evaluations=self.evaluations, seed=seed)
         self.progress("candidates", total, total)
         allowed = sorted((each for each in self.tried if each[0][0] == 0), key=lambda each: each[0])
         return [x for _, x in allowed[:FINALISTS]]
+
+    def as_present(self) -> Array:
+        """Places of the drive as it is."""
+        return self.knobs.present
+
+    def best_yet(self) -> Array:
+        """Places of the best candidate that was tried."""
+        return min(self.tried, key=lambda each: each[0])[1]
 
     def fast_start(self) -> Array:
         """All gains higher together, as far as the margins allow: by closed forms alone."""

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError, SimulationError
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify.open_loop import NEEDED, balanced, first_deflection, first_speed, substeps
+from feedsim.identify.friction_file import drift_texts
+from feedsim.identify.open_loop import NEEDED, balanced, first_deflection, first_speed, reached, substeps
 from feedsim.identify.parameters import NO_EFFECT
 from feedsim.identify.record import Record
 from feedsim.identify.result import Balance, Estimate
@@ -210,6 +211,23 @@ def test_a_load_that_drifts(general: Record, law: FrictionLaw) -> None:
     assert rate.unit == "N.m/s"
     with_the_load_held = found(drifting(general, change), law, estimates({"F_C": OFF["F_C"]}), hold={"M_0"})
     assert not with_the_load_held.load_rates
+
+
+def test_a_drift_that_the_record_does_not_determine_is_not_used(general: Record, law: FrictionLaw) -> None:
+    """Noise alone: the rate's interval includes 0. F_C and M_0 are those of a constant load, and the position shows
+    what that leaves, as with the load held still."""
+    record = drifting(general, 0.0, 0.12, 3)
+    balance = found(record, law, estimates({**OFF, "sigma_2": 1.05 * TRUE["sigma_2"]}))
+    (rate,) = balance.load_rates.values()
+    low, high = rate.interval
+    assert low < 0 < high
+    assert (rate.status, rate.reason) == ("undetermined", "its interval includes 0: the load is taken as constant")
+    (text,) = drift_texts(balance)
+    assert text.startswith("a drift of M_0 is not determined, and not used: ")
+    values = {name: each.value for name, each in balance.estimates.items()} | {"delay": HELD}
+    assert record.angle is not None
+    left = float(np.sqrt(np.mean((record.angle - reached(record, law, values)) ** 2)))
+    assert balance.position[1] == pytest.approx(left, rel=1e-6)
 
 
 def test_the_interval_of_a_drift_holds_it(general: Record, law: FrictionLaw) -> None:

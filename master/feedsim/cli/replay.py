@@ -14,6 +14,7 @@ REPLAY_EPILOG = """examples:
   feedsim example sinumerik_840d test_centre
   feedsim replay capture.json --machine machines/sinumerik_840d --axes X,Y
   feedsim replay log.csv --machine machines/test_centre --axes Z --window "0.5 s..2 s"
+  feedsim replay log.csv --machine machines/test_centre --axes Z --open-loop
   feedsim replay log.csv --machine my_machine --axes Z --set axes.Z.drive.K_v="2 (m/min)/mm" --out results/other
 """
 DRIVE_DESCRIPTION = """The drive of axes from a record of their control: delay of the setpoint, gain and feedforward of
@@ -39,6 +40,7 @@ def replay(options: Namespace) -> None:
             options.axes,
             columns=options.columns,
             window=options.window,
+            open_loop=options.open_loop,
             set=options.overrides,
             fmus=options.fmus,
             out=out,
@@ -97,7 +99,10 @@ REPLAY = Command(
     (
         _RECORD,
         Option("--machine", "MACHINE-or-SCENARIO", "the machine that follows the record", type=Path, required=True),
-        _AXES, _COLUMNS, _WINDOW, out("replay_<name of the record>"), FIGURES, CONTROL,
+        _AXES, _COLUMNS, _WINDOW,
+        Option("--open-loop", "",
+               "the recorded torque drives the rigid axis, from the recorded position and speed on, without its drive"),
+        out("replay_<name of the record>"), FIGURES, CONTROL,
         settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,
     ),
     REPLAY_DESCRIPTION,

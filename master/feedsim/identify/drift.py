@@ -30,19 +30,18 @@ def warming(age: Array) -> Array:
     return np.asarray((np.outer(later, later) + np.outer(age, age) + np.minimum(age[:, None], age[None, :])) / 3)
 
 
-def hides(sigma: float, drifts: float, sigma_2: float) -> tuple[str, ...]:
+def hides(drifts: float, sigma_2: float) -> tuple[str, ...]:
     """A warning where warming that the speeds do not show leaves sigma_2 open.
 
-    sigma: its standard deviation [N.m.s/rad]; drifts: the part of it by warming.
+    drifts: the part of its standard deviation [N.m.s/rad] by warming. The interval itself is that of all records
+    together, which is printed with the value.
     """
     if not drifts > WORTH_A_WORD * sigma_2:
         return ()
-    whole, rest = (100 * NORMAL_95 * part / sigma_2 for part in (sigma, np.sqrt(max(sigma**2 - drifts**2, 0.0))))
     return (
         "no fast speed is driven both early and late: viscous friction that falls as the axis warms up is not "
-        f"separated from the shape of the curve; the interval of sigma_2 holds it (+-{whole:.2g} %, without "
-        f"+-{rest:.2g} %); "
-        "drive the fastest speed first and last, or warm the axis up before",
+        f"separated from the shape of the curve; the plateaus alone leave +-{100 * NORMAL_95 * drifts / sigma_2:.2g} "
+        "% of sigma_2 open by that; drive the fastest speed first and last, or warm the axis up before",
     )
 
 

@@ -127,7 +127,12 @@ def drift_texts(balance: Balance) -> list[str]:
         record: "{:.2g} N.m/s (95 %: {:.2g} to {:.2g})".format(rate.value, *rate.interval)
         for record, rate in rates.items()
     }
-    return [f"M_0 drifts by {text}" + (f" in {record}" if len(said) > 1 else "") for record, text in said.items()]
+    words = "a drift of M_0 is not determined, and not used:" if any(map(_open, rates.values())) else "M_0 drifts by"
+    return [f"{words} {text}" + (f" in {record}" if len(said) > 1 else "") for record, text in said.items()]
+
+
+def _open(rate: Estimate) -> bool:
+    return rate.status == "undetermined"
 
 
 def change_text(before: float, after: float) -> str:
@@ -210,11 +215,14 @@ def _origin(identified: Identified, software: Mapping[str, str]) -> dict[str, An
     for name, key in named.items():
         if (estimate := found.estimates.get(name)) is not None:
             content[key] = {"value": _quantity(estimate.value, estimate.unit), **_interval(estimate)}
-    if found.balance is not None and found.balance.applied and found.balance.load_rates:
-        content["constant_load"]["drift"] = [
+    if found.balance is not None and found.balance.applied:
+        drifts = [
             {"record": record, "value": _quantity(rate.value, rate.unit), **_interval(rate)}
             for record, rate in found.balance.load_rates.items()
+            if not _open(rate)
         ]
+        if drifts:
+            content["constant_load"]["drift"] = drifts
     if line := open_loop_line(found):
         content["open_loop"] = line
     content["parameters"] = {name: _interval(each) for name, each in found.estimates.items() if name not in named}

@@ -14,7 +14,8 @@ F_S moves by as much as F_C, and all else is held. The step refuses itself where
 A load is never quite constant: an amplifier's offset moves as it warms, grease leaves the rail. A change by 1 % of the
 friction over the record takes the position as far away as all else. With M_0, which is that in the middle of the
 record, goes its rate dM_0/dt, one for each record. The residual of the torque tells the rate, too, by a regression on
-time; as the two criteria weigh the record differently, the interval holds both.
+time; as the two criteria weigh the record differently, the interval holds both. Where the intervals of all rates
+include 0, the records determine no drift: F_C and M_0 are then estimated with a constant load.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ OUTLIER = 5.0  # standard deviations from that cubic that no sample of it may li
 BLOCKS, DRAWS = 10, 24  # stretches of a record whose torque residual may be turned, and how often they are drawn
 CHANGE = "change of M_0 over record"  # with its number, among the values
 SINES = "sines; the open loop needs general motion"
+NO_DRIFT = "its interval includes 0: the load is taken as constant"
 NEEDED = (*FRICTION, "M_0", "J")
 
 
@@ -126,6 +128,13 @@ def balanced(
             values |= _Solver(residuals, values).best(drifting, tolerance=1e-4).mapping()
         start = [axis.residual(values) for axis in axes]
         found = _Solver(residuals, values, "F_S" in hold).solve([*free, *drifting])
+        loads = _load_rates(residuals, axes, values, moved(found), [*free, *drifting]) if drifting else {}
+        if drifting and not any(map(_determined, loads.values())):
+            # What a record does not determine predicts nothing: the load is constant then.
+            values |= dict.fromkeys(drifting, 0.0)
+            start = [axis.residual(values) for axis in axes]
+            found = _Solver(residuals, values, "F_S" in hold).solve(free)
+            loads = {name: replace(rate, status="undetermined", reason=NO_DRIFT) for name, rate in loads.items()}
     except (SimulationError, InputError) as error:
         return refused(f"no least squares in open loop: {error}")
     new = moved(found)
@@ -134,13 +143,55 @@ def balanced(
     torque = _torque_rms(axes, values), _torque_rms(axes, new)
     changes = {name: (values[name], new[name]) for name in ("F_C", "F_S", "M_0")}
     drifts = tuple(axis.drift(*both) for axis, *both in zip(axes, start, end, strict=True))
-    loads = _load_rates(residuals, axes, values, new, [*free, *drifting]) if drifting else {}
     why = _doubt(values, new, position, torque)
     if why:
         return refused(why, position=position, torque=torque, changes=changes, drifts=drifts, load_rates=loads)
     changed = {name: _changed(estimates[name], after) for name, (before, after) in changes.items() if after != before}
     names = tuple(axis.record.name for axis in axes)
     return Balance({**estimates, **changed}, True, "", names, position, torque, changes, drifts, loads)
+
+
+def _determined(rate: Estimate) -> bool:
+    """Whether the interval of a drift leaves out 0."""
+    low, high = rate.interval
+    return low > 0 or high < 0
+
+
+def reached(record: Record, law: FrictionLaw, values: Mapping[str, float]) -> Array:
+    """(N,) angle [rad] that a rigid axis reaches under the record's torque, from the recorded angle and speed on.
+
+    J dn/dt = M_a(t + delay) - M_0 - M_fr - load; the axis goes on by itself, whatever was recorded.
+
+    Args:
+        values: every friction parameter, J, M_0, and the delay of the torque [s].
+
+    Raises:
+        InputError: a record without a position, parameters that the law refuses, friction that is too stiff for it.
+        SimulationError: the motion would be no finite number.
+    """
+    if record.angle is None:
+        raise InputError(f"{record.name}: no position; in open loop it is what is compared")
+    steps = substeps(values, record.interval)
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"{record.name}: {steps} steps between rows are needed for this friction in open loop; allowed: up to "
+            f"{MOST_STEPS}. sigma_0 or sigma_1 is too large for rows {1e3 * record.interval:.3g} ms apart"
+        )
+    first, n = first_speed(record.angle, record.interval)
+    torque = middle_torque(record, values["delay"])
+    z = first_deflection(values, n, float(torque[0]) - values["M_0"])
+    parameters = {name: values[name] for name in FRICTION}
+    angle, _ = law.free_axis(parameters, values["J"], values["M_0"], torque, record.interval, n=n, z=z, substeps=steps)
+    return np.asarray(first + angle, dtype=np.float64)
+
+
+def middle_torque(record: Record, delay: float) -> Array:
+    """(N - 1,) motor torque less known load [N.m] in the middle of every interval."""
+    middle = record.time[:-1] + record.interval / 2
+    torque = np.interp(middle + delay, record.time, record.torque)
+    if record.load is not None:
+        torque = torque - np.interp(middle, record.time, record.load)
+    return np.asarray(torque, dtype=np.float64)
 
 
 class _OpenLoop:
@@ -203,12 +254,7 @@ class _OpenLoop:
     def torque(self, delay: float) -> Array:
         """(N - 1,) motor torque less known load [N.m] in the middle of every interval."""
         if self._torque is None or self._torque[0] != delay:
-            time, h = self.record.time, self.record.interval
-            middle = time[:-1] + h / 2
-            torque = np.interp(middle + delay, time, self.record.torque)
-            if self.record.load is not None:
-                torque = torque - np.interp(middle, time, self.record.load)
-            self._torque = delay, np.asarray(torque, dtype=np.float64)
+            self._torque = delay, middle_torque(self.record, delay)
         return self._torque[1]
 
 

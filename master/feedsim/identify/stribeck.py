@@ -310,7 +310,7 @@ def _conclude(
     said += drifts
     if "sigma_2" in sigma:
         at = names.index("sigma_2")
-        said += drift.hides(sigma["sigma_2"], float(np.sqrt(max(warmed[at, at], 0.0))), values["sigma_2"])
+        said += drift.hides(float(np.sqrt(max(warmed[at, at], 0.0))), values["sigma_2"])
     if extra > 0:
         said.append(
             f"plateaus scatter about the curve by {100 * extra:.2g} % of their torque beyond their own noise (friction "

@@ -15,6 +15,7 @@ from feedsim.jobs.records import Asked
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import SILENT, Watch, announce
 from feedsim.replay.compare import replayed
+from feedsim.replay.open_loop import driven
 from feedsim.report.content import Report
 from feedsim.report.replay import report as page
 from feedsim.report.replay.report import Replayed
@@ -92,6 +93,7 @@ def replay(
     *,
     columns: File | None = None,
     window: str | None = None,
+    open_loop: bool = False,
     set: Changes = None,
     fmus: File | None = None,
     out: File | None = None,
@@ -102,12 +104,15 @@ def replay(
 ) -> ReplayResult:
     """Run the position setpoints of a record through the simulated axes, in closed loop, and compare.
 
+    In open loop the recorded torque drives the axes instead, from the recorded position and speed on.
+
     Args:
         record: CSV or MAT file, or a control's capture.
         machine: machine or scenario that follows the record.
         axes: of the record; None: all of the machine.
         columns: mapping file, which columns of the record are what.
         window: the part that counts, by times or by blocks of the record's program: "0.5 s..2 s", "N7..N20", "N7".
+        open_loop: the recorded torque drives the rigid axis, in place of its drive.
         set: changes of the machine, as behind ``--set``.
         fmus: folder of the archives.
         out: folder that the result is written to; None: :meth:`Result.save` does it.
@@ -115,7 +120,8 @@ def replay(
         watch: who hears how far the job is.
 
     Raises:
-        InputError: a faulty file, no such axis, no such window, no setpoint or no position in the record.
+        InputError: a faulty file, no such axis, no such window, no setpoint or no position in the record; in open loop
+            no torque.
         SimulationError: a unit failed.
         OutputError: `out` cannot be written.
 
@@ -130,18 +136,21 @@ def replay(
     own = asked.subject.machine
     archives = None if fmus is None else Path(fmus)
     inputs = [*asked.inputs, own.modes]
-    with kept(out, page.check_writable, watch, inputs, asked.asked_for, force=force):
+    asked_for = [*asked.asked_for, *(["open_loop=yes"] if open_loop else [])]
+    with kept(out, page.check_writable, watch, inputs, asked_for, force=force):
         watch.progress("reading", 0, 3)
         records = asked.records
         announce(watch, own, archives)
         watch.progress("replay", 1, 3)
-        comparisons = list(replayed(own, records, archives).values())
+        beside = driven(own, records, asked.read, archives) if open_loop else replayed(own, records, archives)
+        comparisons = list(beside.values())
         watch.progress("report", 2, 3)
         sources = [each.provenance for each in asked.read.values()]
         found = [finding for each in comparisons for finding in each.findings]
+        settings = {**asked.settings, **({"open_loop": "yes"} if open_loop else {})}
         findings = dict.fromkeys([*found, *(text for source in sources for text in source.warnings)])
         done = Replayed(
-            comparisons, asked.subject, sources, asked.marks, asked.settings, [*findings], _proposals(own, asked.axes)
+            comparisons, asked.subject, sources, asked.marks, settings, [*findings], _proposals(own, asked.axes)
         )
         result = ReplayResult(done, inputs)
         if out is not None:

@@ -57,6 +57,7 @@ class Comparison:
         delay: by how much the torque of the record is later than the simulated one [s], which is taken out; None
             where there is none.
         limit: torque that the simulated drive cannot exceed [N.m]; limited: share of its rows at that limit.
+        open_loop: whether the recorded torque drives the axis, in place of a drive.
     """
 
     axis: str
@@ -68,6 +69,7 @@ class Comparison:
     delay: float | None = None
     limit: float = inf
     limited: float = 0.0
+    open_loop: bool = False
 
     @property
     def findings(self) -> list[str]:
@@ -82,7 +84,7 @@ class Comparison:
                 f"drive has (axes.{self.axis}.drive.M_max)"
             ))  # fmt: skip
         off = rms(self.channels["position"].error[self.each.moving])
-        if off > self.lag:
+        if off > self.lag and not self.open_loop:
             found.append(Wrong(
                 f"axis {self.axis}: the simulated position is off by more ({1e6 * off:.4g} um rms) than the recorded "
                 f"one is behind its setpoint ({1e6 * self.lag:.4g} um): this is not the machine of the record"
@@ -91,19 +93,21 @@ class Comparison:
 
     @property
     def figures(self) -> dict[str, Figure]:
-        """Figures over the rows in which the axis moves, by name."""
-        rows = self.each.moving
+        """Figures over the rows in which the axis moves (in open loop over all), by name."""
+        rows = self.each.rows if self.open_loop else self.each.moving
         found: dict[str, Figure] = {}
         for name, channel in self.channels.items():
             scale, unit = {"m": (1e6, "um"), "rad/s": (TO_RPM, "rpm")}.get(channel.unit, (1.0, channel.unit))
             error = scale * channel.error[rows]
             key = name.replace(" ", "_")
-            told = f"{channel.meaning}: simulated less recorded, while the axis moves"
+            told = f"{channel.meaning}: simulated less recorded{'' if self.open_loop else ', while the axis moves'}"
             found[f"{self.axis}.{key}_rms"] = Figure(rms(error), unit, f"{told}, root mean square")
             found[f"{self.axis}.{key}_largest"] = Figure(
                 float(np.max(np.abs(error), initial=0.0)) if len(error) else nan, unit, f"{told}, largest magnitude"
             )
         position = self.channels["position"].error[rows]
+        if self.open_loop:
+            return found
         found[f"{self.axis}.lag"] = Figure(
             1e3 * self.lag, "mm", "distance of the position behind the setpoint in the record, root mean square"
         )

@@ -35,13 +35,19 @@ def _over_time(found: Comparison, marks: Sequence[Mark]) -> Picture:
         lag = 1e6 * each.I_P * each.record.deviation[rows]
     within = [mark for mark in marks if time[0] <= mark.time <= time[-1]][:MOST_MARKS]
     title = f"Axis {found.axis}: the record and its replay"
-    caption = "The recorded setpoints through the simulated axis, in closed loop, beside what was recorded." + (
-        " Dotted: begin of a block of the program, with its name where there is room." if within else ""
+    what_drives = (
+        "The recorded torque on the simulated axis, in open loop, from the recorded position and speed on."
+        if found.open_loop
+        else "The recorded setpoints through the simulated axis, in closed loop, beside what was recorded."
     )
+    dotted = " Dotted: begin of a block of the program, with its name where there is room." if within else ""
+    caption = what_drives + dotted
     blocks = [Level(mark.time, upright=True, dash="dotted") for mark in within]
     titled = [replace(level, text=name) for level, name in zip(blocks, names_of(within, time), strict=True)]
-    panels = [_panel(what, ordinate, "µm", time,
-                     simulated=lag - 1e6 * channels["position"].error[rows], recorded=lag)]  # fmt: skip
+    panels = []
+    if not found.open_loop:
+        simulated = lag - 1e6 * channels["position"].error[rows]
+        panels.append(_panel(what, ordinate, "µm", time, simulated=simulated, recorded=lag))
     for name, channel in channels.items():
         factor, unit = SHOWN[channel.unit]
         curves = {"what is left": factor * channel.error[rows]}

@@ -152,6 +152,12 @@ def answers(replayed: Replayed) -> list[str]:
     lines = []
     for each in replayed.comparisons:
         own = {name.partition(".")[2]: figure for name, figure in each.figures.items()}
+        if each.open_loop:
+            lines.append(
+                f"{each.axis}: in open loop, under the recorded torque, the position is off by {own['position_rms']} "
+                f"rms, {own['position_largest']} at most"
+            )
+            continue
         text = f"{each.axis}: position off by {own['position_rms']} rms, {own['position_largest']} at most"
         text += f" ({own['share_of_lag']} of the lag)"
         text += f"; torque {own['torque_rms']} rms" if "torque_rms" in own else "; no torque is recorded"

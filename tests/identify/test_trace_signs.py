@@ -34,6 +34,8 @@ def test_a_torque_that_brakes(tmp_path: Path) -> None:
     message = refusal(path, mapped(tmp_path, rest + REST))
     assert message.startswith(f"{path}: the torque brakes the axis in both directions (mean power -")
     assert "turn the sign: in the mapping, torque: {column: ActTorque, sign: -1}" in message
+    named = refusal(path, mapped(tmp_path, "axis: Y\n" + rest + REST))
+    assert named.startswith(f"{path}, axis Y: the torque brakes the axis in both directions")
     turned = mapped(tmp_path, rest + "torque: {column: ActTorque, sign: -1}\n")
     assert read_records(path, turned).provenance.warnings == ()
 

@@ -125,8 +125,10 @@ def test_identified_set_follows_the_record(
 def test_identified_set_moves_under_the_recorded_force_as_the_axis(
     measured: Measured, identified: Parameters, fmus: Path, tmp_path: Path
 ) -> None:
-    """The published parameters run 5 mm off: position is the second integral of whatever force is wrong."""
-    assert open_loop(measured, identified, fmus, tmp_path) <= 1.4e-3
+    """The published parameters run 5 mm off: position is the second integral of whatever force is wrong. With a load
+    that drifts by 0.5 N over the record 1.2 mm were left; the record does not determine that drift."""
+    assert identified.rate == 0.0
+    assert open_loop(measured, identified, fmus, tmp_path) <= 2.9e-3
 
 
 @pytest.mark.usefixtures("published_record")

@@ -180,6 +180,10 @@ def test_the_cycle_of_the_position_loop_is_told(tmp_path: Path, capsys: pytest.C
     summary = json.loads((tmp_path / "own" / "summary.json").read_text())
     assert summary["figures"]["X.position_rms"]["value"] < 0.4  # um, of which 0.3 um are noise
     found = summary["axes"]["X"]["parameters"]
+    # The log has the torque at one phase of that cycle: J came out 25 % too small, as estimated.
+    for name in ("J", "K_p"):
+        assert found[name]["status"] == "undetermined", name
+        assert found[name]["reason"].startswith("the torque is recorded once a cycle of the position loop"), name
     assert found["T_sym"]["value"] == pytest.approx(true.T_sym, abs=0.05e-3)
     assert found["k_ffw"]["value"] == pytest.approx(true.k_ffw, abs=1e-4)
 

@@ -135,7 +135,7 @@ def read_records(
     signs: Iterable[str] = ()
     unread: Iterable[str] = ()
     if records[0].driven:
-        signs = checked(path, records)
+        signs = checked(path, records, chosen.axis)
         unread = _unread_load(recording, chosen, drive, records, [slice(piece.first, piece.last) for piece in pieces])
     warnings = (*recording.notes, *chosen.notes, *unread, *drive.warnings, *gaps, *signs)
     return Recorded(records, _provenance(path, mapping, chosen, columns, drive, warnings))

@@ -39,18 +39,22 @@ MOVING, DIRECTION = 0.05, 0.05
 SPAN = 10e-3  # [s] that the speed is averaged over where only a position was recorded
 
 
-def checked(path: Path, records: Sequence[Record]) -> Iterator[str]:
-    """What is worth a warning. Raises InputError where a sign or a unit is wrong beyond doubt."""
-    yield from _speed(path, records)
-    yield from _power(path, records)
+def checked(path: Path, records: Sequence[Record], axis: str = "") -> Iterator[str]:
+    """What is worth a warning. Raises InputError where a sign or a unit is wrong beyond doubt.
+
+    axis: its name; empty where nothing tells it.
+    """
+    where = f"{path}, axis {axis}" if axis else f"{path}"
+    yield from _speed(where, records)
+    yield from _power(where, records)
 
 
-def _speed(path: Path, records: Sequence[Record]) -> Iterator[str]:
+def _speed(where: str, records: Sequence[Record]) -> Iterator[str]:
     a, b, c = np.sum([_slope(record) for record in records if len(record) > 2] or [(0.0, 0.0, 0.0)], axis=0)
     if not b > 0:
         return
     ratio = float(a / b)
-    said = f"{path}: the recorded speed is {ratio:.4g} times the slope of the position"
+    said = f"{where}: the recorded speed is {ratio:.4g} times the slope of the position"
     wrong = not 1 / WRONG_SLOPE <= ratio <= WRONG_SLOPE
     if wrong and abs(a) >= ALIKE * np.sqrt(b * c):
         raise InputError(f"{said} (allowed: {1 / WRONG_SLOPE:.2g} to {WRONG_SLOPE:g}); {_likely(ratio)}")
@@ -87,7 +91,7 @@ def _slope(record: Record) -> tuple[float, float, float]:
     return float(np.dot(means, steps)), float(np.dot(steps, steps)), float(np.dot(means, means))
 
 
-def _power(path: Path, records: Sequence[Record]) -> Iterator[str]:
+def _power(where: str, records: Sequence[Record]) -> Iterator[str]:
     """By the mean power torque * speed of what moves, in all and in either direction."""
     parts = [part for record in records if (part := _moving(record)) is not None]
     if not parts:
@@ -101,13 +105,13 @@ def _power(path: Path, records: Sequence[Record]) -> Iterator[str]:
         role = next((role for role in ("torque", "current", "force") if role in records[0].columns), "torque")
         column = records[0].columns.get(role, "NAME")
         raise InputError(
-            f"{path}: the torque brakes the axis in both directions (mean power {forward:.3g} W in the positive, "
+            f"{where}: the torque brakes the axis in both directions (mean power {forward:.3g} W in the positive, "
             f"{backward:.3g} W in the negative one), which friction cannot be; turn the sign: in the mapping, {role}: "
             f"{{column: {column}, sign: -1}}, or that of the motion"
         )
     if _share(net, speed) < -AGAINST:
         yield (
-            f"{path}: the torque is against the motion on average (mean power {float(np.mean(net * speed)):.3g} W); "
+            f"{where}: the torque is against the motion on average (mean power {float(np.mean(net * speed)):.3g} W); "
             "its sign, or that of the motion, is not right, unless a constant load drives the axis"
         )
 

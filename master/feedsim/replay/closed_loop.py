@@ -34,6 +34,8 @@ Mask = NDArray[np.bool_]
 
 SETTLED = 0.6  # [s] at rest ahead of the record
 BEFORE = 2.0  # [s] of the record ahead of a window that are run, too
+# What drive and friction bring along is not known where a record begins in motion; it has died away after that.
+UNKNOWN = 0.1  # [s]
 BEHIND = 4  # position cycles that the program goes on behind the last row
 # The setpoint moves where its speed is more than a share of the top speed; the axis follows for a while behind.
 MOVES, FOLLOWS = 1e-4, 0.02  # share, [s]
@@ -107,6 +109,8 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
 
     window: begin and end [s]; an end of inf is that of the stretch.
 
+    Of a stretch that begins in motion the first UNKNOWN do not count.
+
     Raises InputError: no stretch without a gap holds the window, or less than ten rows of it.
     """
     pitch = read.provenance.pitch
@@ -136,9 +140,18 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
     record = record.between(first, last)
     slack = 0.5 * record.interval
     rows = np.asarray((record.time >= begin - slack) & (record.time <= end + slack))
+    if _begins_in_motion(record):
+        rows &= np.asarray(record.time >= record.time[0] + UNKNOWN)
     if np.count_nonzero(rows) < 10:
         raise InputError(f"{read.provenance.file}: {np.count_nonzero(rows)} rows in the window; at least 10 are needed")
     return AxisRecord(axis, record, pitch / (2 * np.pi), rows)
+
+
+def _begins_in_motion(record: Record) -> bool:
+    """Whether the setpoint moves at the first row."""
+    assert record.setpoint is not None
+    speed = np.abs(np.gradient(record.setpoint, record.interval))
+    return bool(speed[0] > MOVES * np.max(speed))
 
 
 class Replay:
@@ -169,7 +182,7 @@ class Replay:
         self.pose = dict(machine.pose)
         self._into = {}
         for axis, each in records.items():
-            speed = float(self._spline(each)(0.0, 1)) if each.moving[0] else 0.0
+            speed = float(self._spline(each)(0.0, 1)) if _begins_in_motion(each.record) else 0.0
             limits = machine.axes[axis].max_acceleration, machine.path.jerk
             self._into[axis] = speed_change(speed, *limits)
             self.pose[axis] = float(each.setpoint[0]) - self._into[axis].distance

@@ -24,6 +24,7 @@ TO_RPM = 30 / np.pi
 BINS = 60  # of the position
 LATEST = 5e-3  # [s]: no channel of a control is later than that against another
 NEAR = 0.98  # of a torque limit: what the record shows of it, behind its filters
+LEAST_STILL = 10  # rows at standstill that make a figure
 HELPS = 0.99  # of what is left without a delay
 
 
@@ -105,6 +106,12 @@ class Comparison:
             found[f"{self.axis}.{key}_largest"] = Figure(
                 float(np.max(np.abs(error), initial=0.0)) if len(error) else nan, unit, f"{told}, largest magnitude"
             )
+        still = self.each.rows & ~self.each.moving
+        if "torque" in self.channels and np.count_nonzero(still) >= LEAST_STILL:
+            found[f"{self.axis}.torque_standstill_rms"] = Figure(
+                rms(self.channels["torque"].error[still]), "N.m",
+                "motor torque: simulated less recorded, while the axis stands still, root mean square",
+            )  # fmt: skip
         position = self.channels["position"].error[rows]
         if self.open_loop:
             return found

@@ -28,7 +28,7 @@ from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
 from feedsim.replay.elastic import ElasticMode
-from feedsim.replay.estimates import elastic_modes, estimates_of, one_way, refuse_poor
+from feedsim.replay.estimates import elastic_modes, estimates_of, one_phase, one_way, refuse_poor, with_undecided
 from feedsim.replay.selection import (
     BLOCKS,
     FOLDS,
@@ -152,6 +152,7 @@ def identify_drive(
     free += ["omega_0", "D"] if drive.reference_model else []
     progress("first fit", 0, 2 + len(BLOCKS))
     parts: dict[str, float] = {}
+    undecided: list[Tuned] = []
     chosen: tuple[str, ...] = ()
     if structure_known:
         own = {name for name, block in BLOCKS.items() if driven and _has(problem.start, block)}
@@ -160,7 +161,8 @@ def identify_drive(
         found = _first(problem, free)
     else:
         found = _best_start(problem, free, candidates)
-        chosen, parts, found = friction_parts(problem, found, progress)
+        chosen, parts, found, undecided = friction_parts(problem, found, progress)
+        without = found
     elastic: Mapping[int, float] = {}
     if modes != 0 and not structure_known:
         progress("elastic modes", 1 + len(BLOCKS), 2 + len(BLOCKS))
@@ -181,8 +183,12 @@ def identify_drive(
     estimates = estimates_of(
         problem, found, unseen, taps if exact_delay else None, speed if exact_gain else None, structure_known
     )
+    if undecided:
+        estimates = with_undecided(estimates, without, undecided)
     if begin is not None and begin.one_way:
         estimates = one_way(each, estimates, begin.one_way)
+    if machine.cycles.T_pos > 0.5 * each.record.interval and not structure_known:
+        estimates = one_phase(estimates)
     likelier = {} if other_cycle is None else {other_cycle: _likelier(problem, found, other_cycle)}
     return DriveFound(
         each.axis, estimates, taps, speed, problem.machine_of(found.values), parts, chosen,

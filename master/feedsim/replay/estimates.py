@@ -6,7 +6,7 @@ estimates_of().
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import hypot, nan
 
@@ -15,7 +15,7 @@ import numpy as np
 from feedsim import variables
 from feedsim.errors import InputError
 from feedsim.estimation.covariance import Covariance, correlation_length, stretched
-from feedsim.estimation.interval import half_width
+from feedsim.estimation.interval import NORMAL_95, half_width, student
 from feedsim.identify.parameters import estimate
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms
 from feedsim.identify.result import Estimate
@@ -28,10 +28,15 @@ POOR = 0.3  # share of the torque, or of the lag, that a fit may leave
 EXACT = 1e-5  # of the travel: a position that a fit leaves within it is met, however small the lag
 ONE_WAY = 0.15  # share of the mean torque to which the constant load has to be known where the axis moves one way
 SHAPE = 0.25  # standard deviation of the friction, of itself, where only its usual shape separates it from the load
+STRETCHES = 8  # of the motion, each of which is left out once
 HIDDEN = 0.8  # share of the usual deviation that is left: the record does not determine the value
 _CONTROLLER = variables.parameters("controller")
 ON_THE_MODEL = (
     "without the control's own speed setpoint or following error it rests on an axis that is taken to be rigid"
+)
+ONE_PHASE = (
+    "the torque is recorded once a cycle of the position loop, at one phase of it: it may be a quarter too small; rows "
+    "of a shorter interval show it"
 )
 ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "J", "M_0", "F_C", "F_S", "v_s", "F_log",
          "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
@@ -124,6 +129,36 @@ def one_way(each: AxisRecord, estimates: Mapping[str, Estimate], only: str) -> d
     return {**estimates, **undetermined}
 
 
+def with_undecided(estimates: Mapping[str, Estimate], found: Tuned, undecided: Sequence[Tuned]) -> dict[str, Estimate]:
+    """Estimates whose intervals include what they would be with a part of the friction law that the record neither
+    asks for nor excludes: it is a part of what is not known.
+
+    found: the fit without such parts. undecided: a fit with each of them.
+    """
+    wider = dict(estimates)
+    for name, one in estimates.items():
+        moved = max(
+            (abs(each.values[name] - found.values[name]) for each in undecided if name in found.names), default=0
+        )
+        if moved > 0:
+            wider[name] = replace(one, sigma=hypot(one.sigma, moved / NORMAL_95)).judged()
+    return wider
+
+
+def one_phase(estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """Estimates of a record that has the torque once a cycle of the position loop.
+
+    A held speed setpoint makes the torque ripple within that cycle, and the record shows one phase of the ripple: the
+    torque that accelerates comes out too small, and with it inertia and gain of the speed controller.
+    """
+    return {
+        name: replace(one, status="undetermined", reason=ONE_PHASE)
+        if name in ("J", "K_p") and one.status in ("estimated", "undetermined")
+        else one
+        for name, one in estimates.items()
+    }
+
+
 def elastic_modes(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> tuple[ElasticMode, ...]:
     """The elastic modes of a fit, with standard deviations."""
     own = modes_of(found.values)
@@ -152,7 +187,7 @@ def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> 
 
     unseen: rms of position and torque that the others do not predict, in their weights. Where a model is not quite that
     of the axis, a fit to little motion leaves too little. What it leaves of motion that it has not seen is the better
-    measure.
+    measure. So is what its stretches say differently.
     """
     scale = np.array([problem.spread(name, found.values) for name in found.names])
     J, r, count = found.jacobian, found.residuals, len(problem.rows)
@@ -163,4 +198,25 @@ def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> 
         (stretched(J[rows], r[rows], rms, correlation_length) for rows, rms in zip(channels, unseen, strict=True)),
         prior,
     )
-    return np.asarray(Covariance.of(normal, hermitian=True).by(middle) * np.outer(scale, scale))
+    covariance = np.asarray(Covariance.of(normal, hermitian=True).by(middle))
+    own = np.diag(covariance)
+    wider = np.sqrt(np.maximum(between_stretches(J, r, count) / np.where(own > 0, own, 1.0), 1.0))
+    return np.asarray(covariance * np.outer(wider * scale, wider * scale))
+
+
+def between_stretches(J: Array, r: Array, count: int) -> Array:
+    """(P,) variance of the parameters by what the STRETCHES of a record say differently, in usual deviations.
+
+    Errors of a model are not drawn anew with every row, and a fit to other motion has others. Leaving out one stretch
+    after the other shows how far they move the values (grouped jackknife; R. G. Miller, Biometrika 61 (1974), 1-15).
+    So few stretches know their own scatter roughly only: it counts by Student's distribution.
+
+    Args:
+        J, r: (2 count + M, P) and (2 count + M,), of two channels over `count` rows of motion, and of what is usual.
+    """
+    moved = []
+    for fold in np.array_split(np.arange(count), STRETCHES):
+        others = np.delete(np.arange(len(r)), np.concatenate([fold, fold + count]))
+        moved.append(np.linalg.lstsq(J[others], -r[others], rcond=None)[0])
+    scatter = (STRETCHES - 1) / STRETCHES * np.sum((np.array(moved) - np.mean(moved, axis=0)) ** 2, axis=0)
+    return np.asarray(scatter * (student(STRETCHES - 1) / NORMAL_95) ** 2)

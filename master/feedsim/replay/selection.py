@@ -35,9 +35,11 @@ BLOCK = 0.05  # [s]: residuals further apart than that are taken to be independe
 
 def friction_parts(
     problem: Problem, found: Tuned, progress: Progress
-) -> tuple[tuple[str, ...], dict[str, float], Tuned]:
-    """Parts of the friction law that the record asks for: chosen, the gain of each, and a fit with them."""
+) -> tuple[tuple[str, ...], dict[str, float], Tuned, list[Tuned]]:
+    """Parts of the friction law that the record asks for: chosen, the gain of each, a fit with them, and the fits with
+    one part more that predict as well as that: the record decides for neither."""
     gains: dict[str, float] = {}
+    undecided: list[Tuned] = []
     chosen: list[str] = []
     while len(chosen) < len(BLOCKS):
         progress("cross-validation", 1 + len(chosen), 2 + len(BLOCKS))
@@ -59,11 +61,12 @@ def friction_parts(
             gains[part] = float(np.sum(by) if np.all(by > 0) else np.min(by))
         gain, part = max((gains[part], part) for part in tried)
         if not gain >= BETTER:
+            undecided = [each for part, each in tried.items() if gains[part] > -BETTER]
             break
         chosen.append(part)
         found = tried[part]
         problem.weigh(found)
-    return tuple(chosen), gains, found
+    return tuple(chosen), gains, found, undecided
 
 
 def with_elastic_modes(problem: Problem, found: Tuned, count: int | None) -> tuple[Tuned, Mapping[int, float]]:

@@ -77,8 +77,8 @@ class DriveReport:
         for axis, one in self.found.drives.items():
             open_ones = [name for name, each in one.estimates.items() if each.status == "undetermined"]
             if open_ones:
-                told[f"axis {axis}: the record does not determine {', '.join(open_ones)}; their values fit together "
-                     "with the rest, and may be others"] = None  # fmt: skip
+                told[Note(f"axis {axis}: the record does not determine {', '.join(open_ones)}; their values fit "
+                          "together with the rest, and may be others")] = None  # fmt: skip
             for cycle, likelier in one.other_cycles.items():
                 own = one.machine.cycles.T_pos
                 cycles = (
@@ -87,7 +87,7 @@ class DriveReport:
                 if likelier > DECISIVE:
                     told[f"axis {axis}: of {cycles} the record speaks for the latter"] = None
                 elif likelier > -DECISIVE:
-                    told[f"axis {axis}: {cycles} fit alike"] = None
+                    told[Note(f"axis {axis}: {cycles} fit alike")] = None
                 else:
                     told[Note(f"axis {axis}: of {cycles} the record speaks for the former")] = None
         return list(told)

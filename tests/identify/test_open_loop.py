@@ -435,9 +435,10 @@ def test_published_parameters_of_a_measured_axis(law: FrictionLaw) -> None:
     balance = found(record, law, estimates(published | rest | {"asymmetry": 0.0}))
     assert balance.applied
     before, after = (I_P * rms for rms in balance.position)
-    # The constant load of this record drifts: without that, Coulomb and viscous friction get no further than 3.3 mm.
+    # With a load that drifts it would be 2.2 mm; the interval of that drift includes 0.
+    assert balance.load_rates["EMPS"].status == "undetermined"
     assert 4e-3 < before < 6e-3
-    assert after < 2.2e-3
+    assert after < 3.4e-3
     assert abs(balance.estimates["F_C"].value / I_P - 20.39) < 1.0
     assert abs(balance.estimates["M_0"].value / I_P + 3.165) < 0.3
     assert 0 < torque_change(balance) / I_P < 0.1

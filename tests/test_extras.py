@@ -104,6 +104,9 @@ def test_without_any_extra_a_command_works_or_says_at_once_what_it_lacks(name: s
     arguments = {"identify": ["a.csv"], "circle": ["a.csv"], "frf": ["a"], "show": ["a"], "compensate": ["a"]}
     record = {
         "tune compensation": ["a"],
+        "tune drive": ["a", "--axis", "Z"],
+        "machine import": ["a"],
+        "machine export": ["a", "--like", "b"],
         "replay": ["a", "--machine", "a"],
         "identify-drive": ["a"],
         "identify-modes": ["a", "--machine", "a"],

@@ -12,13 +12,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
-from feedsim.analysis import Figure
 from feedsim.errors import InputError
 from feedsim.fields import Quantity
 from feedsim.files.regular import digest
 from feedsim.scenario import Axis, Drive, ForeignUnit, Friction, Machine, Scenario
+
+if TYPE_CHECKING:
+    from feedsim.analysis import Figure
 
 Parameter = float | int | bool | str
 

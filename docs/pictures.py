@@ -73,7 +73,7 @@ def tube(place: Path) -> None:
     reference = fs.run(SCENARIOS / "z_positioning.yaml").trace.select(["Z.M_a"])
     late = np.interp(reference.time - 1.25e-3, reference.time, reference["Z.M_a"])
     result = replace(reference, columns={"Z.M_a": late})
-    picture = picture_of(fs.compare(result, reference, ["Z.M_a=0.2 N.m,1 ms"]), 1)
+    picture = picture_of(fs.compare(result, reference, tol="Z.M_a=0.2 N.m,1 ms").comparisons[0], 1)
     if picture is None:
         sys.exit("nothing was compared")
     picture.save(IMAGES / "comparison.png")

@@ -1,6 +1,6 @@
 // Whether the loops of a machine are stable, with what margins, and at which gains they would be: feedsim.linear.judgement once more,
 // and what feedsim.cosim.trust says of it. Method and numbers stand there; a test holds both to the same words.
-const JUDGED = { GAIN_MARGIN: 10 ** (6 / 20), PHASE_MARGIN: 30, STEP: 0.05, ABOUT: [-5, -2.4, -1.3, -0.7, -0.3, 0, 0.3, 0.7, 1.3, 2.4, 5], SHOWS: 0.03, WITHIN: [1e-2, 1e2], IMAGES: 1, SECTOR: 1, COUNTS: 8, CHANGE: 0.2, TURN: 0.6, ROUNDS: 12, GROWTH: 1e-2, TINY: 2.2250738585072014e-308 };
+const JUDGED = { GAIN_MARGIN: 10 ** (6 / 20), PHASE_MARGIN: 30, STEP: 0.05, ABOUT: [-5, -2.4, -1.3, -0.7, -0.3, 0, 0.3, 0.7, 1.3, 2.4, 5], SHOWS: 0.03, WITHIN: [1e-2, 1e2], IMAGES: 1, SECTOR: 1, COUNTS: 8, CHANGE: 0.2, TURN: 0.6, ROUNDS: 12, GROWTH: 1e-2, REAL: 1e-3, TINY: 2.2250738585072014e-308 };
 const GAINS = Array.from({ length: 2401 }, (_, k) => 10 ** (-6 + k / 200)), STATES = ["moving", "at rest"];
 const far = factor => Math.abs(Math.log(factor));
 const geometric = (from, to, count, whole = true) => Array.from({ length: count }, (_, k) => from * (to / from) ** (k / (whole ? count - 1 : count)));
@@ -46,6 +46,9 @@ function limits_of(L, [low, high]) {
     const size = Math.log(Math.max(size_of(L[k]), JUDGED.TINY)), next = Math.log(Math.max(size_of(L[k + 1]), JUDGED.TINY)), factor = Math.exp(-(size - a / turn * (next - size)));
     if (factor > low && factor < high) found.push(factor);
   }
+  // Half the sampling rate: the mirror image of the contour meets it there.
+  const end = L[L.length - 1], last = 1 / Math.max(size_of(end), JUDGED.TINY);
+  if (Math.abs(angle_of(scaled(-1, end))) < JUDGED.REAL && last > low && last < high) found.push(last);
   return found.sort((a, b) => a - b);
 }
 

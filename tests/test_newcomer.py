@@ -37,8 +37,8 @@ def tasks() -> dict[str, list[str]]:
     return {task: re.findall(r"\]\(([^)]+)\)", links) for task, links in rows if "---" not in task}
 
 
-def test_there_are_sixteen() -> None:
-    assert len(tasks()) == 16
+def test_every_task_has_a_page() -> None:
+    assert len(tasks()) >= 16
     assert all(tasks().values())
 
 

@@ -12,6 +12,7 @@ IMPORT_DESCRIPTION = """Drive, limits, filters and compensations of a machine fi
 is taken where the file has it once, where it acts, and where a public source states its unit. All others are named with
 the reason, and so is what the machine file needs besides."""
 IMPORT_EPILOG = """examples:
+  feedsim example xz_circle
   feedsim machine import archive.arc --axes X1,Y1 --out my_machine
   feedsim machine import nc.tea ps000003.tea --axes X=X1 --machine machines/test_centre --out my_machine
   feedsim machine import mill.ini --axes X,Y,Z --out my_machine

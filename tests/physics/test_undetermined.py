@@ -53,7 +53,8 @@ def test_no_slow_speeds(law: FrictionLaw, noise: float) -> None:
     found = identify([strokes, told], law, Options("Z", I_P, J=estimate("J", J, status="given"), delay=0.0))
     for name in ("F_C", "F_S", "v_s", "F_log", "sigma_2", "sigma_0", "W", "gamma"):
         each = found.estimates[name]
-        assert each.status == "estimated", each.reason
+        # sigma_2 is small beside F_log: its interval is more than half of it to either side.
+        assert each.status == ("undetermined" if name == "sigma_2" else "estimated"), each.reason
         # 1 %: what the spline between the samples takes off; held at F_C, F_S put sigma_0 17 % and gamma 80 % off.
         assert each.value == pytest.approx(TRUE[name], abs=max(3.5 * each.sigma, 0.01 * TRUE[name])), name
     assert not any("is not estimated" in text for text in found.warnings)

@@ -20,7 +20,7 @@ from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
-from feedsim.report.style import BLUE, MUTED, ORANGE, VERMILLION
+from feedsim.report.style import AFTER, ALLOWED, BEFORE, LEFT, MUTED
 from feedsim.scenario import Drive
 from feedsim.tune.changed import Changed
 from feedsim.tune.drive import NOISE, TORQUE, Case, Margins, Point, Tuned
@@ -391,15 +391,15 @@ def picture(tuned: Tuned) -> Picture:
         curves = [
             Curve(name, *_xy(chosen, of), colour, dots=True, faint=faint)
             for name, chosen, colour, faint in (
-                ("within all limits", [p for p in points if p.allowed], BLUE, False),
-                ("outside of a limit, or worse somewhere", [p for p in points if not p.allowed], ORANGE, True),
+                ("within all limits", [p for p in points if p.allowed], ALLOWED, False),
+                ("outside of a limit, or worse somewhere", [p for p in points if not p.allowed], LEFT, True),
             )
             if chosen
         ]
         marks = []
         for name, margins, peak, colour in (
-            ("before", tuned.before, _largest(tuned, "before"), VERMILLION),
-            ("chosen", tuned.after, _largest(tuned, "after"), BLUE),
+            ("before", tuned.before, _largest(tuned, "before"), BEFORE),
+            ("chosen", tuned.after, _largest(tuned, "after"), AFTER),
         ):
             if math.isfinite(of(margins)) and not (tuned.kept and name == "chosen"):
                 marks.append(Mark(of(margins), peak, name, colour, hollow=True))

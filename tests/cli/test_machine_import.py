@@ -47,7 +47,7 @@ def test_into_a_machine(place: Path) -> None:
         "machine", "import", "nc.tea", "drive.tea", "--axes", "X=X1", "--machine", "centre", "--out", "new", cwd=place
     )
     assert done.returncode == 0, done.stderr
-    assert "X: 10 values of X1 and drive, MD32200 5 1000/min" in done.stdout
+    assert "X: 10 values of X1 and drive, MD32200 = 5 (1000/min)" in done.stdout
     assert {path: path.read_bytes() for path in before} == before
     old, new = load_machine(place / "centre"), load_machine(place / "new")
     axis = new.axes["X"]
@@ -124,13 +124,17 @@ def test_a_draft(place: Path) -> None:
         (["nc.tea"], "--axes: which axes? The files have AX1 (X1)"),
         (["nc.tea", "--axes", "Q"], "no axis 'Q'; the files have AX1 (X1)"),
         (["nc.tea", "--axes", "X=X1,X=X1"], "--axes X=X1: X is named twice"),
+        (["nc.tea", "--axes", "X=X1,Z=AX1"], "X=X1 and Z=AX1: the same axis of the control, given to two axes"),
+        (["nc.tea", "--axes", "X=X1", "--machine", "nope"], "--machine: no such file: nope"),
+        (["nc.tea", "--axes", "X1", "--assume", "FOO=1"], "FOO is nothing that a value of the control sinumerik"),
+        (["centre", "--axes", "X"], "centre is a folder; name the files in it"),
         (["nc.tea", "--axes", "X="], "--axes X=: AXIS or AXIS=NAME IN THE CONTROL is needed"),
         (["nc.tea", "--axes", "Q=X1", "--machine", "centre"], "has no axis 'Q'; it has X, Y, Z"),
         (["nc.tea", "--axes", "X1", "--assume", "FFW_MODE"], "--assume FFW_MODE: NAME=VALUE is needed"),
         (["nc.tea", "--axes", "X1", "--assume", "A=b c"], "--assume A=b c: a number, TRUE, FALSE or 'H..' is needed"),
         (["nc.tea", "--axes", "X1", "--checked", "MD1"], "MD1 is no number of the table of names"),
         (["nc.tea", "--axes", "X1", "--drives", "X1=PS9"], "no drive object or list 'PS9'; the files have none"),
-        (["centre/machine.yaml", "--axes", "X"], "holds no parameters of a control"),
+        (["centre/machine.yaml", "--axes", "X"], "centre/machine.yaml: holds no parameters of a control"),
         (["missing.tea", "--axes", "X"], "no such file"),
     ],
 )
@@ -184,6 +188,14 @@ def test_an_export_to_another_control(place: Path) -> None:
     assert done.returncode == 2
     assert "is of the control twincat, the files are of sinumerik" in done.stderr
     assert not (place / "load").exists()
+
+
+def test_a_scenario_is_no_machine(place: Path) -> None:
+    (place / "s.yaml").write_text("motions: []\n")
+    for words in (["import", "nc.tea", "--machine", "s.yaml"], ["export", "s.yaml", "--like", "nc.tea"]):
+        done = feedsim("machine", *words, "--axes", "X=X1", "--out", "new", cwd=place)
+        assert done.returncode == 2
+        assert "s.yaml is a scenario, which feedsim run takes" in done.stderr
 
 
 def test_an_export_never_replaces_its_input(place: Path) -> None:

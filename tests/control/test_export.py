@@ -122,7 +122,31 @@ def test_a_filter_that_is_off_in_the_control() -> None:
     text = DRIVE.replace("'H0001'", "'H0000'")
     found = changed([opened("ps.tea", text.encode())], {"X": "X"}, {"X": {"drive.filter_1.type": "second_order"}})
     assert found.contents == {}
-    assert "it does not act: p1656 is 'H0000'" in found.changes[0].reason
+    assert [each.name.number for each in found.changes] == ["p1656.0", "p1657"]
+    assert "it does not act: p1656 is 'H0000'" in found.changes[1].reason
+
+
+@pytest.mark.parametrize(("word", "old"), [("p1656[0]='H0000'\n", "0"), ("", "")])
+def test_the_bit_of_a_filter_that_is_to_be_typed(word: str, old: str) -> None:
+    """A filter that the files do not have is typed whole: its bit, its type, and both frequencies."""
+    text = f"p1460[0]=7.5\n{word}"
+    values: dict[str, Value] = {"drive.filter_1.type": "band_stop", "drive.filter_1.f": 455.0,
+                                "drive.filter_1.D_den": 0.9, "drive.filter_1.D_num": 0.1,
+                                "drive.filter_2.type": "off"}  # fmt: skip
+    found = changed([opened("ps.tea", text.encode())], {"X": "X"}, {"X": values})
+    assert found.contents == {}
+    typed = {each.name.number: each for each in found.changes}
+    assert {number: each.new for number, each in typed.items()} == {
+        "p1656.0": "1", "p1657": "2", "p1658": "455", "p1659": "0.9", "p1661": "0.1"
+    }  # fmt: skip
+    assert typed["p1656.0"].old == old
+    assert "p1660 is to be 455 as well" in typed["p1658"].reason
+
+
+def test_a_word_of_bits_keeps_its_form() -> None:
+    text = DRIVE.replace("'H8029'", "8029H")
+    found = changed([opened("ps.tea", text.encode())], {"X": "X"}, {"X": {"drive.reference_model": False}})
+    assert found.contents["ps.tea"].decode() == text.replace("8029H", "8021H")
 
 
 def test_checksums_and_containers_are_not_written() -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from pathlib import PurePath
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from feedsim.control import Reading, opened, read
+from feedsim.control import Reading, opened, read, table
 from feedsim.control.archive import scalar
+from feedsim.control.usual import usual_ranges
 from feedsim.errors import InputError
 
 NC = """; start-up data, written by hand
@@ -356,20 +358,111 @@ def test_linuxcnc() -> None:
     ("text", "value"),
     [
         ("5", 5.0), ("-.5", -0.5), ("5.", 5.0), ("1e-3", 1e-3), ("1.5EX-3", 1.5e-3), ("+2", 2.0), ("TRUE", True),
-        ("false", False), ("'H8029'", 0x8029), ("'B101'", 5.0), ('"X1"', "X1"), ("#x0000ffff", 65535.0),
+        ("false", False), ("'H8029'", 0x8029), ("1H", 1.0), ("fH", 15.0), ("8029H", 0x8029), ("'B101'", 5.0),
+        ('"X1"', "X1"), ("#x0000ffff", 65535.0),
     ],
 )  # fmt: skip
 def test_scalars(text: str, value: object) -> None:
     assert scalar(text) == value
 
 
-@pytest.mark.parametrize("text", ["", "5,0", "5 6", "(1,2)", "R5", "nan", "inf", "0x10", "'H'", "--5", "1e", "5'"])
+@pytest.mark.parametrize(
+    "text", ["", "5,0", "5 6", "(1,2)", "R5", "nan", "inf", "0x10", "'H'", "--5", "1e", "5'", "0101B", "GH", "H"]
+)
 def test_no_scalars(text: str) -> None:
-    with pytest.raises(ValueError, match=r"no number|hexadecimal|invalid literal"):
+    with pytest.raises(ValueError, match=r"no number|invalid literal"):
         scalar(text)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_is_of_no_line(encoding: str) -> None:
+    archive = opened("d.tea", "p1460[0]=5\np1462[0]=10\n".encode(encoding))
+    assert values(read([archive], {"X": "X"}), "X") == {"drive.K_p": 5.0, "drive.T_n": 0.01}
+    assert [archive.text[slice(*each.span)] for each in archive.entries] == ["5", "10"]
+    assert opened("d.tea", "; gain\np1460=5\n".encode(encoding)).odd == []
+
+
+def test_words_of_bits_in_hexadecimal() -> None:
+    found = read([opened("d.tea", DRIVE.replace("'H0003'", "FH").encode())], {"X": "X"})
+    assert values(found, "X")["drive.filter_1.f"] == 455.0
+    # Without heads a word in letters is none: the file says no more than that the cell may be one.
+    assert values(read([opened("d.csv", b"p1460;EACH;5\n")], {"X": "X"}), "X") == {"drive.K_p": 5.0}
+
+
+def test_a_condition_that_cannot_be_read_is_named() -> None:
+    found = read([opened("d.tea", DRIVE.replace("'H0003'", "0101B").encode())], {"X": "X"})
+    said = "p1656 is '0101B' in d.tea:16, which cannot be read; --assume p1656.0=1"
+    assert said in reasons(found)["p1658"]
+    found = read([opened("d.tea", DRIVE.replace("'H0003'", "0101B").encode())], {"X": "X"}, assume={"p1656.0": "1"})
+    assert values(found, "X")["drive.filter_1.f"] == 455.0
+
+
+def test_a_value_by_a_condition_names_the_condition() -> None:
+    text = NC.replace("N32900 $MA_DYN_MATCH_ENABLE[AX1]=1", "N32900 $MA_DYN_MATCH_ENABLE[AX1]=0")
+    (case,) = (each for each in read([opened("nc.tea", text.encode())], {"X": "X1"}).taken
+               if each.parameter == "drive.T_dyn")  # fmt: skip
+    line = text[: text.index("N32900")].count("\n") + 1
+    assert (case.number, case.text, case.unit, case.value) == ("MD32900", "0", "", 0.0)
+    assert case.source == f"MD32900 = 0 (nc.tea:{line}): MD32910 does not act"
+    assumed = read([opened("nc.tea", NC.encode())], {"X": "X1"}, assume={"DYN_MATCH_ENABLE": "0"})
+    (case,) = (each for each in assumed.taken if each.parameter == "drive.T_dyn")
+    assert case.source == "DYN_MATCH_ENABLE = 0 (assumed): MD32910 does not act"
+
+
+@pytest.mark.parametrize("name", ["FOO", "MD32200", "MD32620", "p1656.7", "p1460"])
+def test_what_no_value_depends_on_is_not_assumed(name: str) -> None:
+    with pytest.raises(InputError, match=rf"{name} is nothing that a value .* assumed of .*FFW_MODE, .*p1656\.0"):
+        read([opened("nc.tea", NC.encode())], {"X": "X1"}, assume={name: "1"})
+
+
+@pytest.mark.parametrize("name", ["MD10220", "SCALING_SYSTEM_IS_METRIC", "MD10230[9]", "p1656", "p115[1]", "p1521"])
+def test_what_values_depend_on_is_assumed(name: str) -> None:
+    read([opened("nc.tea", NC.encode())], {"X": "X1"}, assume={name: "1"})
+
+
+def test_an_axis_of_the_control_is_one_axis() -> None:
+    for theirs in ("X1", "x1", "AX1"):
+        with pytest.raises(InputError, match=f"X=X1 and Z={theirs}: the same axis of the control, given to two axes"):
+            read([opened("nc.tea", NC.encode())], {"X": "X1", "Z": theirs})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            ("GAIN[0,AX1]=5", "GAIN[0,AX1]=500000"),
+            "MD32200 POSCTRL_GAIN = 500000 (nc.tea:14) is 8.333e+06 1/s, usual is",
+        ),
+        (("ACCEL[0,AX1]=2.5", "ACCEL[0,AX1]=1e6"), "1e+06 m/s^2, usual is 0.01 to 100 m/s^2: check the unit"),
+    ],
+)
+def test_values_far_outside_of_what_is_usual(change: tuple[str, str], said: str) -> None:
+    assert read([opened("nc.tea", NC.encode())], {"X": "X1"}).doubts == []
+    assert change[0] in NC
+    (doubt,) = read([opened("nc.tea", NC.replace(*change).encode())], {"X": "X1"}).doubts
+    assert said in doubt
+
+
+def test_usual_ranges() -> None:
+    """Every number of the table of names has a range, in the unit that the table has."""
+    units = {name.parameter: name.si for name in table()}
+    for parameter, usual in usual_ranges().items():
+        assert usual.low < usual.high
+        assert usual.unit == {"1": ""}.get(units[parameter], units[parameter]), parameter
+    numbers = {name.parameter for name in table() if name.si and not name.codes}
+    assert numbers == {*usual_ranges()} - {"drive.p"}
+
+
+def test_no_torque_is_no_limit() -> None:
+    text = DRIVE.replace("p1520[0]=80", "p1520[0]=0").replace("p1521[0]=-80", "p1521[0]=0")
+    assert (
+        reasons(read([opened("d.tea", text.encode())], {"X": "X"}))["p1520"] == "a drive without torque moves nothing"
+    )
+
+
 def test_no_file_of_a_control() -> None:
+    with pytest.raises(InputError, match=r"archives/rnd\.arc: holds no parameters"):
+        opened("rnd.arc", b"a", PurePath("archives/rnd.arc"))
     for data in (b"", b"a,b\nc,d\n", bytes(range(256)) * 20, b"name: machine\n", b"<a></a>"):
         with pytest.raises(InputError, match="holds no parameters of a control"):
             opened("file", data)

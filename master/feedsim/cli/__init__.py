@@ -169,7 +169,8 @@ def _in_words_of(control: str) -> AbstractContextManager[None]:
 def _kind_meant(options: argparse.Namespace) -> str:
     """What is to be said in place of a refusal, where the file is of a kind that another command takes."""
     command = options.called.removeprefix("feedsim ")
-    return meant(command, (getattr(options, name) for name in options.arguments))
+    said = meant(command, (getattr(options, name) for name in options.arguments))
+    return said or meant(f"{command} --machine", [getattr(options, "machine", None)])
 
 
 def _say(sentence: str, error: object) -> None:

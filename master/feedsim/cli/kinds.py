@@ -87,6 +87,8 @@ def _summary(path: Path) -> bool:
 
 _RUN = ("run", "validate", "frf", "compensate", "pack", "page", "ssp", "machine info", "machine show", "machine build",
         "machine pack", "tune compensation", "tune drive")  # fmt: skip
+_MACHINES = ("machine info", "machine show", "machine build", "machine pack", "frf", "pack", "machine export",
+             "machine import --machine")  # fmt: skip
 _RECORDS = ("identify", "circle", "show", "compare", "convert", "identify-drive", "replay", "identify-modes")
 KINDS = (
     Kind("a study", ("sweep", "validate"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),
@@ -98,12 +100,12 @@ KINDS = (
     ),
     Kind(
         "a machine file",
-        ("machine info", "machine show", "machine build", "machine pack", "frf", "pack"),
+        _MACHINES,
         _keyed({"axes"}, none={"motions", "bodies", "sampling"}),
     ),
     Kind(
         "the folder of a machine",
-        ("machine info", "machine show", "machine build", "machine pack", "frf", "pack"),
+        _MACHINES,
         _holds("machine.yaml", "structure.yaml"),
     ),
     Kind("results of a study", ("show",), _holds("study.json")),
@@ -135,7 +137,8 @@ def taken(command: str) -> list[str]:
 def meant(command: str, values: Iterable[Any]) -> str:
     """A sentence for a command that was given a file of a kind that it does not take; "" where none was.
 
-    command: its name, such as "machine info". values: of its arguments, single ones and lists.
+    command: its name, such as "machine info"; with an option whose value is a file, "machine import --machine". values:
+    of its arguments, single ones and lists.
     """
     own = taken(command)
     for path in _paths(values) if own else ():

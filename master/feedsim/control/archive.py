@@ -39,6 +39,7 @@ _PARAMETER = re.compile(
 )
 _END = re.compile(r"\s*(?:N\d+\s+)?M(?:0?17|0?2|30)\b")
 _NUMBER = re.compile(r"^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE]X?[+-]?\d+)?$", re.IGNORECASE)
+_HEXADECIMAL = re.compile(r"^[0-9A-F]+H$", re.IGNORECASE)  # as commissioning tools list words of bits
 _VALUE_HEADS = ("value", "wert", "valeur", "setting", "actual", "offline", "online", "current value")
 _UNIT_HEADS = ("unit", "einheit", "unité")
 
@@ -114,8 +115,8 @@ class Archive:
         self.odd.append(Odd(line, shown[:77] + "..." if len(shown) > 80 else shown, reason))
 
 
-def opened(name: str, data: bytes) -> Archive:
-    """What a file holds, by its content. InputError: none of the formats."""
+def opened(name: str, data: bytes, path: PurePath | None = None) -> Archive:
+    """What a file holds, by its content. path: by which the user knows it. InputError: none of the formats."""
     text, encoding = _decoded(data)
     plain = text.lstrip("\ufeff")
     for control, form, is_one, parse in _FORMATS:
@@ -125,13 +126,14 @@ def opened(name: str, data: bytes) -> Archive:
             if archive.entries:
                 return archive
     raise InputError(
-        f"{name}: holds no parameters of a control that are known here; machine data ($MA_...=), lists of drive "
-        "parameters (p1460[0]=...), lists of TwinCAT CNC, .xti, tables of parameters and LinuxCNC's INI files are read"
+        f"{path or name}: holds no parameters of a control that are known here; machine data ($MA_...=), lists of "
+        "drive parameters (p1460[0]=...), lists of TwinCAT CNC, .xti, tables of parameters and LinuxCNC's INI files "
+        "are read"
     )
 
 
 def scalar(text: str) -> float | bool | str:
-    """The value of a text of a control: number, TRUE or FALSE, 'H..' or 'B..', "...". ValueError: none of them."""
+    """The value of a text of a control: number, TRUE or FALSE, 'H..', ..H, 'B..', "...". ValueError: none."""
     text = text.strip()
     upper = text.upper()
     if upper in ("TRUE", "FALSE"):
@@ -142,8 +144,8 @@ def scalar(text: str) -> float | bool | str:
         return float(int(upper[2:-1], 16 if upper[1] == "H" else 2))
     if upper.startswith("#X"):
         return float(int(upper[2:], 16))
-    if upper.endswith(("H", "B")) and len(upper) > 1 and re.fullmatch(r"[0-9A-F]+H|[01]{4,}B", upper):
-        raise ValueError("hexadecimal or binary, or not")
+    if _HEXADECIMAL.match(text):
+        return float(int(upper[:-1], 16))
     if _NUMBER.match(text):
         return float(upper.replace("EX", "E"))
     raise ValueError("no number")
@@ -163,8 +165,8 @@ def _decoded(data: bytes) -> tuple[str, str]:
 
 
 def _lines(text: str) -> Iterator[tuple[int, int, str, bool]]:
-    """Number, start, text without its line feed, and whether a line feed ends it."""
-    start, number = 0, 1
+    """Number, start, text without its line feed, and whether one ends it. A byte order mark is part of no line."""
+    start, number = int(text.startswith("\ufeff")), 1
     while start < len(text):
         end = text.find("\n", start)
         if end < 0:
@@ -418,7 +420,9 @@ def _value_cells(cells: Sequence[tuple[str, int]], heads: Sequence[str], named: 
     found = []
     for k, (text, _) in enumerate(cells):
         try:
-            if k != named and not isinstance(scalar(text.strip("\"' ")), str):
+            bare = text.strip("\"' ")
+            word = bare.isalpha() and _HEXADECIMAL.match(bare)  # EACH is a word ahead of a number
+            if k != named and not word and not isinstance(scalar(bare), str):
                 found.append(k)
         except ValueError:
             continue

@@ -21,7 +21,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-Look = Callable[[str], "float | bool | str | None"]  # name -> value; None: the file has none, or several
+Look = Callable[[str], "float | bool | str | None"]  # name -> value; None: the file has none, several, or no number
+Lack = Callable[[str], str]  # name -> why there is no value
 _TERM = re.compile(r"^(?P<name>[\w.@-]+?)(?P<element>\[\d+\])?=(?P<right>[^:?]+)(?P<free>\?)?$")
 CLOSE = 1e-9
 
@@ -40,8 +41,13 @@ class Judged:
     doubts: tuple[str, ...] = ()
 
 
-def judged(acts: str, look: Look) -> Judged:
-    """What the conditions say of a file; look: a parameter's value there."""
+def absent(name: str) -> str:
+    """Why a parameter has no value, of one that no file has."""
+    return f"the file has no {name} (--assume)"
+
+
+def judged(acts: str, look: Look, lack: Lack = absent) -> Judged:
+    """What the conditions say of a file; look: a parameter's value there; lack: why it has none."""
     doubts = []
     clauses = [clause.strip() for clause in acts.split(";") if clause.strip()]
     for clause in clauses:
@@ -62,7 +68,7 @@ def judged(acts: str, look: Look) -> Judged:
             continue
         unknown = [name for holds, name in found if holds is None]
         if unknown:
-            reason = f"it acts where {clause.removesuffix('?')}, and the file has no {unknown[0]} (--assume)"
+            reason = f"it acts where {clause.removesuffix('?')}, and {lack(unknown[0])}"
             return Judged("unknown", reason=reason)
         name = found[0][1]
         reason = f"it acts where {clause.removesuffix('?')}; {name} is {shown(look(name))}"
@@ -80,6 +86,18 @@ def tied(acts: str) -> list[tuple[str, str, float]]:
         if term and re.match(r"^-?[pA-Z]\w*$", term["right"].strip()) and not term["right"].strip().isupper():
             right = term["right"].strip()
             found.append((term["name"] + (term["element"] or ""), right.lstrip("-"), -1.0 if right[0] == "-" else 1.0))
+    return found
+
+
+def depends(acts: str) -> list[str]:
+    """Names that the conditions look up."""
+    found = []
+    for clause in acts.split(";"):
+        for part in clause.partition(": ")[0].split(" or "):
+            if term := _TERM.match(part.strip().lstrip("~!")):
+                found.append(term["name"] + (term["element"] or ""))
+                rights = (right.strip().lstrip("-") for right in term["right"].split("|"))
+                found += [right for right in rights if not re.match(r"^[+]?[\d.]", right)]
     return found
 
 

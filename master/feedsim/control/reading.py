@@ -11,27 +11,68 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from feedsim.control.archive import Archive, Entry, scalar
-from feedsim.control.conditions import Judged, judged, shown
+from feedsim.control.conditions import Judged, absent, depends, judged, shown
 from feedsim.control.names import Name, table
+from feedsim.control.usual import usual_ranges
 from feedsim.errors import InputError
 
 Value = float | bool | str
 ALL = "all"
 # What SINUMERIK's machine data are in, where MD10220 and MD10230 say nothing else: gains in 1000/min.
 USUAL_MASK, USUAL_GAIN = 0x200, 1000 / 60
+_OF_UNITS = ("SCALING_SYSTEM_IS_METRIC", "MD10240", "MD10220", "MD10230[9]")
 # Software limits beyond this are none [m].
 NO_LIMIT = 1e4
 
 
 @dataclass(frozen=True)
 class Taken:
-    """A value of ours. axis: ours; "" of the machine. value: SI. entry, archive: where it stands; None of a case."""
+    """A value of ours.
+
+    axis: ours; "" of the machine. value: SI. entry, archive: where it stands; None where it follows from what was
+    assumed. condition: by which the parameter does not act and the value is that of none, "FFW_MODE=0"; the entry is
+    then that of the condition.
+    """
 
     axis: str
     name: Name
     value: Value
     entry: Entry | None
     archive: Archive | None
+    condition: str = ""
+
+    @property
+    def number(self) -> str:
+        """Of the parameter that the value stands in, or follows from."""
+        if not self.condition:
+            return self.name.number
+        return (self.entry.number or self.entry.key) if self.entry else self.condition.partition("=")[0]
+
+    @property
+    def called(self) -> str:
+        """Name of that parameter; of a condition also what does not act."""
+        if not self.condition:
+            return self.name.name
+        own = f"{self.entry.key}: " if self.entry and self.entry.key != self.number else ""
+        return f"{own}{self.name.number} {self.name.name} does not act"
+
+    @property
+    def text(self) -> str:
+        """As the file has it."""
+        return self.entry.text if self.entry else f"{self.condition.partition('=')[2]} (assumed)"
+
+    @property
+    def unit(self) -> str:
+        """Of the text; "" of a condition."""
+        return "" if self.condition else self.name.unit
+
+    @property
+    def source(self) -> str:
+        """Which text of the file the value is of, and where that stands."""
+        where = f" ({self.where})" if self.where else ""
+        if self.condition:
+            return f"{self.number} = {self.text[:40]}{where}: {self.name.number} does not act"
+        return f"{self.number} {self.called} = {self.text[:40]}{where}"
 
     @property
     def parameter(self) -> str:
@@ -106,14 +147,44 @@ def read(
     if unknown := [each for each in checked if each != ALL and each not in numbers]:
         raise InputError(f"{unknown[0]} is no number of the table of names of the control {controls.pop()}")
     found = Reading(controls.pop(), dict(axes))
+    asked = _asked(rows)
+    if unknown := [each for each in assume if each not in asked and each not in {_parts(name)[0] for name in asked}]:
+        raise InputError(
+            f"{unknown[0]} is nothing that a value of the control {found.control} depends on; that can be assumed of "
+            f"{', '.join(asked) or 'no parameter'}"
+        )
+    seen: dict[object, str] = {}
     for axis, theirs in axes.items():
         view = View(archives, axis, theirs, places.get(axis, ()), axes, assume)
+        for one in (theirs.upper(), *sorted(view.known)):
+            if (other := seen.setdefault(one, axis)) != axis:
+                given = f"{other}={axes[other]} and {axis}={theirs}"
+                raise InputError(f"{given}: the same axis of the control, given to two axes")
         found.places[axis] = view.places
         found.notes += view.notes
         for name in rows:
             _read(found, view, name, checked)
     _of_machine(found)
+    found.doubts += [doubt for each in found.taken if (doubt := _unusual(each))]
     return found
+
+
+def _unusual(each: Taken) -> str:
+    """A sentence on a value far outside of what feed axes have; "" of any other."""
+    usual = usual_ranges().get(each.parameter)
+    if usual is None or each.condition or isinstance(each.value, bool | str) or usual.holds(each.value):
+        return ""
+    said = f"{each.name.number} {each.name.name} = {each.text[:40]} ({each.where}) is {each.value:.4g}"
+    axis = f"{each.axis}: " if each.axis else ""
+    return f"{axis}{said} {usual.unit}, usual is {usual.low:g} to {usual.high:g} {usual.unit}: check the unit"
+
+
+def _asked(rows: Sequence[Name]) -> list[str]:
+    """Parameters whose values decide about others: conditions, ratios, units of machine data."""
+    found = [name for row in rows for name in (*depends(row.acts), *row.times)]
+    if any(row.number.startswith("MD") for row in rows):
+        found += _OF_UNITS
+    return sorted(dict.fromkeys(found))
 
 
 class View:
@@ -182,8 +253,7 @@ class View:
         """Value of a parameter or of one of its bits or elements; None: none, several, or no value."""
         if name in self.assume:
             return scalar(self.assume[name])
-        key, _, element = name.removesuffix("]").partition("[")
-        key, _, bit = key.partition(".") if key[:1] == "p" else (key, "", "")
+        key, element, bit = _parts(name)
         if key in self.assume and not element:
             value: Value = scalar(self.assume[key])
         else:
@@ -197,6 +267,23 @@ class View:
         if bit:
             return None if isinstance(value, str) else float((int(value) >> int(bit)) & 1)
         return float(value) if isinstance(value, bool) else value
+
+    def lack(self, name: str) -> str:
+        """Why value() has none, for a sentence."""
+        key, element, bit = _parts(name)
+        found = self.sought(key, element=int(element or 0))
+        if found.chosen is None:
+            return found.problem or absent(name)
+        archive, entry = found.chosen
+        where = f"{archive.name}:{entry.line}"
+        return f"{key} is {entry.text[:24]!r} in {where}, which cannot be read; --assume {name}={1 if bit else 'VALUE'}"
+
+
+def _parts(name: str) -> tuple[str, str, str]:
+    """Key, element and bit of "p115[1]" or "p1656.0"; "" of what it has not."""
+    key, _, element = name.removesuffix("]").partition("[")
+    key, _, bit = key.partition(".") if key[:1] == "p" else (key, "", "")
+    return key, element, bit
 
 
 def _whole(place: str, known: Sequence[str]) -> str:
@@ -268,7 +355,7 @@ def _read(found: Reading, view: View, name: Name, checked: Collection[str]) -> N
     def refuse(reason: str, weight: str = "doubt") -> None:
         found.refused.append(Refused(view.axis, name, entry.text, reason, where, weight))
 
-    said = judged(name.acts, view.value)
+    said = judged(name.acts, view.value, view.lack)
     if said.state == "case":
         _of_case(found, view, name, said)
         return
@@ -315,7 +402,7 @@ def _read(found: Reading, view: View, name: Name, checked: Collection[str]) -> N
 def _case(found: Reading, view: View, name: Name) -> None:
     """A parameter that the files do not have may have a value by what switches it off."""
     if name.acts:
-        said = judged(name.acts, view.value)
+        said = judged(name.acts, view.value, view.lack)
         if said.state == "case":
             _of_case(found, view, name, said)
 
@@ -325,8 +412,11 @@ def _of_case(found: Reading, view: View, name: Name, said: Judged) -> None:
     if isinstance(value, str) and value != "off":
         value = float(value)
     condition = said.reason.partition("=")[0]
-    archive, entry = view.sought(condition.partition(".")[0]).chosen or (None, None)
-    found.taken.append(Taken(view.axis, name, value, entry, archive))
+    key, element, _ = _parts(condition)
+    archive, entry = view.sought(key, element=int(element or 0)).chosen or (None, None)
+    if {condition, key} & {*view.assume}:
+        archive, entry = None, None
+    found.taken.append(Taken(view.axis, name, value, entry, archive, said.reason))
 
 
 def _unit(view: View, name: Name, entry: Entry, checked: Collection[str]) -> str:
@@ -366,7 +456,7 @@ def _converted(view: View, name: Name, entry: Entry, raw: Value | None) -> tuple
     if name.codes:
         value = next((ours for code, ours in name.codes if float(raw) == code), None)
         return value, "" if value is not None else f"{shown(float(raw))} is none of " + ", ".join(
-            f"{code} ({ours})" for code, ours in name.codes
+            f"{code} ({str(ours).lower()})" for code, ours in name.codes
         )
     if not name.si and name.unit != "1":
         if raw not in (0.0, 1.0):
@@ -378,15 +468,16 @@ def _converted(view: View, name: Name, entry: Entry, raw: Value | None) -> tuple
     for k, other in enumerate(name.times):
         ratio = view.value(other)
         if ratio is None:
-            return (
-                None,
-                f"it is multiplied by {' / '.join(name.times)}, and the file has no {other} (--assume {other}=1)",
-            )
+            why = view.lack(other)
+            why = f"{why.removesuffix(')')} {other}=1)" if why == absent(other) else why
+            return None, f"it is multiplied by {' / '.join(name.times)}, and {why}"
         if isinstance(ratio, str) or ratio == 0:
             return None, f"{other} is {shown(ratio)}"
         number = number * float(ratio) if k == 0 else number / float(ratio)
     if name.parameter.startswith("travel") and abs(number) >= NO_LIMIT:
         return None, "so far out that it is no limit"
+    if name.parameter == "drive.M_max" and number <= 0:
+        return None, "a drive without torque moves nothing"
     if name.parameter == "drive.p":
         return (int(number), "") if number == int(number) else (None, "no whole number")
     return number, ""

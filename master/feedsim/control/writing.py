@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 
 from feedsim.control.archive import Archive, Entry, opened, scalar
-from feedsim.control.conditions import tied
+from feedsim.control.conditions import shown, tied
 from feedsim.control.names import Name, names_of
 from feedsim.control.reading import Reading, Taken, Value, View, read
 from feedsim.errors import InputError
@@ -21,6 +21,7 @@ from feedsim.errors import InputError
 # Values this close are the same [relative]: a text of ten digits and its value in SI.
 SAME = 1e-9
 # The same filter by two names.
+_BIT = re.compile(r"(p\d+\.\d+)=1(?:;|$)")  # a condition that begins with a bit
 SYNONYMS = {"band_stop": "second_order"}
 
 
@@ -85,6 +86,7 @@ def changed(
         if gone.weight == "doubt" and not _equal(gone.text, new):
             found.changes.append(Change(gone.axis, gone.name, gone.text, new, False, gone.reason, gone.where))
     _absent(found, archives, axes, values, reading)
+    _bits(found, archives, axes, values, places, assume)
     _apply(found, edits, archives)
     if found.contents:
         _check(found, archives, axes, values, edits, dict(places=places, assume=assume, checked=checked))
@@ -106,7 +108,7 @@ def _compare(found: Written, edits: list[_Edit], view: View, taken: Taken, value
     if _same(taken.value, ours):
         found.same.append(taken)
         return
-    if taken.entry is None or taken.entry.key not in (taken.name.key, taken.name.number):
+    if taken.entry is None or taken.condition:
         new, _ = _text(view, taken.name, None, ours)
         reason = f"it does not act: {_condition(taken)}; change that at the control, and then the value"
         found.changes.append(Change(taken.axis, taken.name, "", new, False, reason, taken.where))
@@ -196,6 +198,8 @@ def _switched(name: Name, old: str, on: bool) -> tuple[str, str]:
     value = int(before) | (1 << int(bit)) if on else int(before) & ~(1 << int(bit))
     if old[:2].upper() == "'H":
         return f"'{old[1]}{value:0{len(old) - 3}X}'", ""
+    if re.fullmatch(r"[0-9A-Fa-f]+[Hh]", old):
+        return f"{value:0{len(old) - 1}X}{old[-1]}", ""
     if old[:2].upper() == "'B":
         return f"'{old[1]}{value:0{len(old) - 3}b}'", ""
     return str(value), ""
@@ -231,11 +235,45 @@ def _absent(
             ours = own.get(parameter)
             if ours is None or (axis, parameter) in named or not name.parameter.startswith("drive."):
                 continue
-            if isinstance(ours, str) or ours is False:
+            if isinstance(ours, str):
+                ours = SYNONYMS.get(ours, ours)
+            if ours is False or (isinstance(ours, str) and ours not in {value for _, value in name.codes}):
                 continue
             view = View(archives, axis, axes[axis], (), axes, {})
             new, _ = _text(view, name, None, ours)
-            found.changes.append(Change(axis, name, "", new, False, "the files have no such parameter"))
+            reason = "the files have no such parameter"
+            for other, right, sign in tied(name.acts):
+                if right == name.key:
+                    reason += f"; {other} is to be {'-' if sign < 0 else ''}{new} as well"
+            found.changes.append(Change(axis, name, "", new, False, reason))
+
+
+def _bits(
+    found: Written, archives: Sequence[Archive], axes: Mapping[str, str], values: Mapping[str, Mapping[str, Value]],
+    places: Mapping[str, Sequence[str]], assume: Mapping[str, str],
+) -> None:  # fmt: skip
+    """Bits of the control that switch a filter on, whose values are to be typed: they are to be set with them."""
+    seen: set[tuple[str, str]] = set()
+    changes: list[Change] = []
+    for change in found.changes:
+        group = change.name.parameter.rpartition(".")[0]
+        bit = _BIT.match(change.name.acts)
+        on = bit is not None and values[change.axis].get(f"{group}.type", "off") != "off"
+        if bit is not None and on and not change.written and (change.axis, bit[1]) not in seen:
+            seen.add((change.axis, bit[1]))
+            view = View(archives, change.axis, axes[change.axis], places.get(change.axis, ()), axes, assume)
+            before = view.value(bit[1])
+            if before != 1.0:
+                chosen = view.sought(bit[1].partition(".")[0]).chosen
+                where = f"{chosen[0].name}:{chosen[1].line}" if chosen else ""
+                called = f"switches {group.rpartition('.')[2].replace('_', ' ')} on"
+                name = replace(change.name, parameter=f"{group}.type", number=bit[1], name=called, unit="", si="",
+                               key="", acts="", codes=())  # fmt: skip
+                old = "" if before is None else shown(before)
+                reason = "set it with the values of the filter"
+                changes.append(Change(change.axis, name, old, "1", False, reason, where))
+        changes.append(change)
+    found.changes = changes
 
 
 def _apply(found: Written, edits: Sequence[_Edit], archives: Sequence[Archive]) -> None:

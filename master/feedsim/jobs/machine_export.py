@@ -124,26 +124,27 @@ def machine_export(
     names = [path.name for path in paths]
     if twice := next((name for name in names if names.count(name) > 1), ""):
         raise InputError(f"{spelt('like')}: two files are called {twice}; their copies stand in one folder")
+    own = load_machine(base)
+    archives = read_files(paths, watch)
+    if own.control and own.control != archives[0].control:
+        raise InputError(f"{base}: is of the control {own.control}, the files are of {archives[0].control}")
+    chosen = axes_of(axes, base, archives)
+    for axis in chosen:
+        if axis not in own.axes:
+            raise InputError(f"{base}: has no axis {axis!r}; it has {', '.join(own.axes)}")
+        own.shipped_drive(axis, "an export to a control")
+    written = changed(
+        archives,
+        chosen,
+        {axis: values_of(own, archives[0].control, axis) for axis in chosen},
+        places={axis: tuple(text.split("+")) for axis, text in pairs("drives", drives).items()},
+        assume=assumed(assume),
+        checked=listed(checked),
+    )
+    result = MachineExportResult(archives, written, own, chosen, inputs_of(paths, base))
+    # All inputs have been read: what a folder held before is said to be replaced only where it will be.
     with kept(out, lambda folder, inputs: page.check_writable(page.kept_apart(names), folder, inputs), watch,
               inputs_of(paths, base), (), force=force):  # fmt: skip
-        own = load_machine(base)
-        archives = read_files(paths, watch)
-        if own.control and own.control != archives[0].control:
-            raise InputError(f"{base}: is of the control {own.control}, the files are of {archives[0].control}")
-        chosen = axes_of(axes, base, archives)
-        for axis in chosen:
-            if axis not in own.axes:
-                raise InputError(f"{base}: has no axis {axis!r}; it has {', '.join(own.axes)}")
-            own.shipped_drive(axis, "an export to a control")
-        written = changed(
-            archives,
-            chosen,
-            {axis: values_of(own, archives[0].control, axis) for axis in chosen},
-            places={axis: tuple(text.split("+")) for axis, text in pairs("drives", drives).items()},
-            assume=assumed(assume),
-            checked=listed(checked),
-        )
-        result = MachineExportResult(archives, written, own, chosen, inputs_of(paths, base))
         if out is not None:
             result.save(out, force=force)
     return result

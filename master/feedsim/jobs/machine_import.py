@@ -11,7 +11,7 @@ from feedsim.analysis import Figure, Named
 from feedsim.arguments import listed, spelt
 from feedsim.control import Archive, Reading, opened, read
 from feedsim.control.archive import LARGEST, scalar
-from feedsim.errors import InputError
+from feedsim.errors import InputError, no_such_file
 from feedsim.files.regular import content
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
@@ -133,17 +133,20 @@ def machine_import(
     """
     paths = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
     base = None if machine is None else Path(machine)
+    if base is not None and not base.exists():
+        raise InputError(f"{spelt('machine')}: {no_such_file(base)}")
+    archives = read_files(paths, watch)
+    reading = read(
+        archives,
+        axes_of(axes, base, archives),
+        places={axis: tuple(text.split("+")) for axis, text in pairs("drives", drives).items()},
+        assume=assumed(assume),
+        checked=listed(checked),
+    )
+    made = imported(reading, base, name or paths[0].stem)
+    result = MachineImportResult(archives, reading, made, inputs_of(paths, base))
+    # All inputs have been read: what a folder held before is said to be replaced only where it will be.
     with kept(out, page.check_writable, watch, inputs_of(paths, base), (), force=force):
-        archives = read_files(paths, watch)
-        reading = read(
-            archives,
-            axes_of(axes, base, archives),
-            places={axis: tuple(text.split("+")) for axis, text in pairs("drives", drives).items()},
-            assume=assumed(assume),
-            checked=listed(checked),
-        )
-        made = imported(reading, base, name or paths[0].stem)
-        result = MachineImportResult(archives, reading, made, inputs_of(paths, base))
         if out is not None:
             result.save(out, force=force)
     return result
@@ -154,7 +157,9 @@ def read_files(paths: Sequence[Path], watch: Watch) -> list[Archive]:
     archives = []
     for k, path in enumerate(paths):
         watch.progress("reading", k, len(paths))
-        archives.append(opened(path.name, content(path, LARGEST)))
+        if path.is_dir():
+            raise InputError(f"{path} is a folder; name the files in it")
+        archives.append(opened(path.name, content(path, LARGEST), path))
     return archives
 
 

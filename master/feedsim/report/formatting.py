@@ -50,6 +50,11 @@ def display_unit(unit: str) -> str:
     return typeset(raised)
 
 
+def plain_unit(unit: str) -> str:
+    """A unit as it is typed; nothing for a plain number."""
+    return "" if unit == "1" else unit
+
+
 def minus(text: str) -> str:
     """A number with a minus sign in place of the hyphen; a zero has none."""
     return re.sub(r"^-(?=0(\.0*)?$)", "", text).replace("-", "−")

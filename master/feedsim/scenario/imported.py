@@ -53,7 +53,7 @@ class Imported:
 
     def text(self) -> str:
         """The machine file."""
-        remarks = {place_of(each): _remark(each) for each in self.values}
+        remarks = {place_of(each): each.source for each in self.values}
         head = ["# Written by feedsim machine import; behind each value that a control's file holds stands its place."]
         if self.missing:
             head += ["# A draft: a machine file needs these keys besides:", *(f"#   {each}" for each in self.missing)]
@@ -221,12 +221,6 @@ def _at(data: Any, place: Place) -> Any:
         else:
             return None
     return copied(data)
-
-
-def _remark(each: Taken) -> str:
-    if each.entry is None:
-        return f"{each.name.number} {each.name.name}"
-    return f"{each.name.number} {each.name.name} = {each.entry.text[:40]} ({each.where})"
 
 
 def _lines(data: Mapping[str, Any], place: Place, remarks: Mapping[Place, str], depth: int) -> Iterator[str]:

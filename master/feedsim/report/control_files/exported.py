@@ -14,7 +14,7 @@ from feedsim.control.writing import Written
 from feedsim.findings import Note
 from feedsim.report.content import Report, Section, Table, Text, Tile, code
 from feedsim.report.control_files.sources import sources_section
-from feedsim.report.formatting import counted, minus
+from feedsim.report.formatting import counted, minus, plain_unit
 from feedsim.report.provenance import figures_part, hashed, inputs_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.sections import provenance_section
@@ -80,9 +80,10 @@ def answers(written: Written, axes: Mapping[str, str]) -> list[str]:
 def change_lines(written: Written) -> list[str]:
     """Every changed value, a line each."""
     return [
-        f"{each.axis} {each.name.number} {each.name.name}: {each.old} -> {each.new} {each.name.unit}".rstrip()
+        f"{each.axis} {name.number} {name.name}: {each.old} -> {each.new} {plain_unit(name.unit)}".rstrip()
         for each in written.changes
         if each.written
+        for name in (each.name,)
     ]
 
 

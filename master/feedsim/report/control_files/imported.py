@@ -8,12 +8,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from feedsim.analysis import Figure
 from feedsim.control import Archive, Reading, Refused, Taken
 from feedsim.findings import Note
 from feedsim.report.content import Bullets, Report, Section, Table, Text, Tile, code
 from feedsim.report.control_files.sources import sources_section
-from feedsim.report.formatting import counted, minus
+from feedsim.report.formatting import Scale, counted, minus, plain_unit, scale
 from feedsim.report.provenance import figures_part, hashed, inputs_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.sections import provenance_section
@@ -55,7 +57,11 @@ def figures_of(archives: Sequence[Archive], reading: Reading, made: Imported) ->
 
 def findings(archives: Sequence[Archive], reading: Reading, made: Imported) -> list[str]:
     """What is to be known before the machine file is used."""
-    found: list[str] = list(reading.doubts)
+    found: list[str] = []
+    if not made.values:
+        whose = "the draft is empty" if made.base is None else "the machine file is as it was"
+        found.append(f"no value was taken; {whose}")
+    found += reading.doubts
     open_ones = doubtful(reading, made)
     if open_ones:
         shown = "; ".join(_named(each) for each in open_ones[:MOST_NAMED])
@@ -99,7 +105,8 @@ def _theirs(reading: Reading, axis: str) -> str:
 def _leading(own: Sequence[Taken]) -> str:
     names = ("drive.K_v", "drive.K_p", "drive.T_n")
     shown = [each for name in names for each in own if each.parameter == name and each.entry is not None]
-    return ", ".join(f"{each.name.number} {each.entry.text} {each.name.unit}" for each in shown if each.entry)
+    return ", ".join(f"{each.number} = {each.text}{f' ({unit})' if (unit := plain_unit(each.unit)) else ''}"
+                     for each in shown)  # fmt: skip
 
 
 def _named(each: Refused) -> str:
@@ -114,8 +121,8 @@ def sheet(reading: Reading, made: Imported) -> str:
     rows.writerow(["axis", "number", "name", "value", "unit", "ours", "value in the machine file", "taken", "reason",
                    "where"])  # fmt: skip
     for each in made.values:
-        rows.writerow([each.axis, each.name.number, each.name.name, each.entry.text if each.entry else "",
-                       each.name.unit, each.parameter, written(each), "yes", "", each.where])  # fmt: skip
+        rows.writerow([each.axis, each.number, each.called, each.text, each.unit, each.parameter, _ours(each), "yes",
+                       "", each.where])  # fmt: skip
     for gone in (*reading.refused, *made.refused):
         rows.writerow([gone.axis, gone.name.number, gone.name.name, gone.text, gone.name.unit, gone.name.parameter, "",
                        "no", gone.reason, gone.where])  # fmt: skip
@@ -154,10 +161,10 @@ def _sources(reading: Reading, made: Imported) -> Section | None:
 def _taken(made: Imported) -> Section | None:
     rows: list[tuple[Text, ...]] = [
         (
-            each.axis or "machine", code(each.name.number), each.name.name,
-            minus(f"{each.entry.text} {each.name.unit}".strip()) if each.entry else "–", code(each.parameter),
-            minus(str(written(each))), _before(made, each), each.where or "–",
-            "confirmed" if each.name.confirmed else "not confirmed",
+            each.axis or "machine", code(each.number), each.called,
+            minus(f"{each.text} {each.unit}".strip()), code(each.parameter),
+            minus(_ours(each)), _before(made, each), each.where or "–",
+            "–" if each.condition else "confirmed" if each.name.confirmed else "not confirmed",
         )
         for each in made.values
     ]  # fmt: skip
@@ -165,9 +172,23 @@ def _taken(made: Imported) -> Section | None:
     return Section("Values that were taken", [Table("lllrlrrll", heads, rows)], "taken") if rows else None
 
 
+def _ours(each: Taken) -> str:
+    """A value as the machine file has it, rounded, and in a unit that reads well."""
+    value = written(each)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if not isinstance(each.value, float):
+        return str(value)
+    unit = value.partition(" ")[2] if isinstance(value, str) else ""
+    usual = scale(unit, np.array([each.value])) if each.value and unit != "1/s" else Scale(1.0, unit)
+    return f"{each.value * usual.factor:.6g} {usual.unit}".rstrip()
+
+
 def _before(made: Imported, each: Taken) -> str:
     value = made.before.get(place_of(each))
-    return "–" if value is None or isinstance(value, dict | list) else minus(str(value))
+    if value is None or isinstance(value, dict | list):
+        return "–"
+    return str(value).lower() if isinstance(value, bool) else minus(str(value))
 
 
 def _refused(reading: Reading, made: Imported) -> Section | None:
@@ -211,9 +232,9 @@ def summary(
         "axes": dict(reading.axes),
         "figures": figures_part(figures_of(archives, reading, made)),
         "taken": [
-            {"axis": each.axis, "parameter": each.parameter, "number": each.name.number, "value": each.value,
+            {"axis": each.axis, "parameter": each.parameter, "number": each.number, "value": each.value,
              "unit": each.name.si, "text": each.entry.text if each.entry else None, "where": each.where,
-             "confirmed": each.name.confirmed}
+             "confirmed": None if each.condition else each.name.confirmed, "condition": each.condition}
             for each in made.values
         ],
         "not_taken": [

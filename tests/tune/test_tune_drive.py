@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -335,10 +336,46 @@ def test_values_that_are_typed_have_the_margins(tuned: Path) -> None:
 
 
 def test_a_margin_that_nothing_has_keeps_the_drive(fmus: Path) -> None:
-    found = tune_drive(load(ONE), "X", Limits(30.0, 80.0, 1e-5), fmus=fmus, progress=lambda *_: None, evaluations=20)
-    assert found.kept
+    found = tune_drive(load(ONE), "X", Limits(300.0, 80.0, 1e-5), fmus=fmus, progress=lambda *_: None, evaluations=20)
+    assert found.evaluations[1] == 0
+    assert re.fullmatch(
+        rf"none of {found.evaluations[0]} candidates has 300 dB and 80 deg; the nearest has [0-9.]+ dB and [0-9.]+ "
+        "deg; ask for less or raise evaluations", found.kept,
+    )  # fmt: skip
     assert not found.changes
     assert found.machine is load(ONE).machine or not changed_values(load(ONE).machine, found.machine)
+
+
+def test_a_result_follows_another_in_its_folder(fmus: Path, tmp_path: Path) -> None:
+    """The drive changes, stays, stays: each time the files are of the present result, and what goes is named."""
+    command = ("tune", "drive", ONE, "--axis", "X", "--evaluations", "10", "--out", "r")
+    assert feedsim(*command, fmus=fmus, cwd=tmp_path).returncode == 0
+    folder = tmp_path / "r"
+    assert yaml.safe_load((folder / "settings.yaml").read_text())["set"]
+    page = (folder / "report.html").read_text()
+    assert "--set r/settings.yaml" in page
+    assert "Motions not used for tuning" in page
+    again = (*command, "--gain-margin", "300")
+    done = feedsim(*again, fmus=fmus, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "r: its result is of other parameters (axis=X, gain_margin=8 dB, phase_margin=40 deg," in done.stderr
+    assert re.search(
+        r"X: the gain margin of the present drive is [0-9.]+ dB; 300 dB are required \(--gain-margin\). [A-Z]",
+        done.stderr,
+    )
+    assert "the phase margin of the present drive" not in done.stderr
+    assert yaml.safe_load((folder / "settings.yaml").read_text())["set"] == {}
+    present = load(ONE).machine.axes["X"].drive
+    assert load(ONE, [f"machine.axes.X.drive={folder / 'drive_X.yaml'}"]).machine.axes["X"].drive == present
+    page = (folder / "report.html").read_text()
+    assert "Motions not used for tuning," not in page  # nothing has changed: no table of before and after
+    assert "less peak at reversals" not in page
+    done = feedsim(*again, "--set", "machine.axes.X.drive.k_ffw=1", fmus=fmus, cwd=tmp_path)
+    assert (done.returncode, "of other parameters (axis=X, gain_margin=300 dB," in done.stderr) == (0, True)
+    done = feedsim(*again, "--set", "machine.axes.X.drive.k_ffw=1", fmus=fmus, cwd=tmp_path)
+    assert (done.returncode, "of other parameters" in done.stderr) == (0, False), done.stderr
+    done = feedsim(*command, "--at", "foo", fmus=fmus, cwd=tmp_path)
+    assert (done.returncode, "structure" in done.stderr or "--at foo" in done.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(
@@ -351,6 +388,8 @@ def test_a_margin_that_nothing_has_keeps_the_drive(fmus: Path) -> None:
         (("--axis", "Z", "--evaluations", "3"), "--evaluations 3: at least 10 are needed"),
         (("--axis", "Z", "--at", "Z=9m"), "--at Z=9m: Z is outside of its travel"),
         (("--axis", "Z", "--at", "Q=1mm"), "--at Q=1mm: AXIS=POSITION is needed"),
+        (("--axis", "Z", "--at", "Z=5deg"), "--at Z=5deg: '5deg' is an angle"),
+        (("--axis", "Z", "--at", "X=1mm,Z=200mm,Z=300mm"), "--at X=1mm,Z=200mm,Z=300mm: Z is given twice"),
     ],
 )
 def test_bad_input(words: tuple[str, ...], message: str, fmus: Path, tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ class TuneCompensationResult(Result):
 
     @property
     def answers(self) -> Sequence[str]:
-        """What it takes off on circles that were held out."""
+        """What it takes off on circles that were not used for tuning."""
         return page.answers(self.judged)
 
     @property

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from feedsim import scenario as scenarios
 from feedsim.analysis import Figure
-from feedsim.arguments import Changes, Value, quantity, settings, spelt
+from feedsim.arguments import Changes, Value, amount, given, quantity, settings, spelt
 from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result, in_words_of
@@ -27,17 +27,22 @@ from feedsim.tune.changed import Changed
 from feedsim.tune.drive import EVALUATIONS, Limits, Tuned
 from feedsim.tune.drive import tune_drive as tune
 from feedsim.tune.drive_program import check_axis
-from feedsim.units import parse
 
 LEAST_EVALUATIONS = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TuneDriveResult(Result):
-    """A tuned drive. tuned: its values, margins and motions. control: in whose names values are shown, too."""
+    """A tuned drive.
+
+    tuned: its values, margins and motions. control: in whose names values are shown, too. asked: name -> text of what
+    was asked for. folder: that it was written to first, as the caller spelt it; "": none.
+    """
 
     tuned: Tuned
     control: str = ""
+    asked: Mapping[str, str] = field(default_factory=dict)
+    folder: str = ""
 
     kind = page.KIND
 
@@ -72,22 +77,17 @@ class TuneDriveResult(Result):
         return [*self.answers, *page.lines_of(self.tuned, self.control)]
 
     def files(self) -> Mapping[str, Content]:
-        """Values to load, values to type, and a drive file for every axis that changes."""
+        """Values to load, values to type, and a drive file for the tuned axis and for every other that changes."""
         found = {page.SETTINGS: page.settings(self.tuned), page.SHEET: page.sheet(self.tuned, self.control)}
         return {**found, **page.drives(self.tuned)}
 
-    @property
-    def keeps(self) -> Sequence[str]:
-        """Drive files, which machine files and scenarios may name."""
-        return tuple(page.drives(self.tuned))
-
     def report(self) -> Report:
         """Content of report.html."""
-        return page.report_of(self.tuned, self.control)
+        return page.report_of(self.tuned, self.control, self.folder)
 
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
-        return page.summary(self.tuned, names)
+        return page.summary(self.tuned, names, self.asked)
 
     def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
         """Raise OutputError unless the result can be written to `folder`."""
@@ -156,15 +156,20 @@ def tune_drive(
         raise InputError(f"{spelt('axis')} {axis}: {error}") from None
     archives = None if fmus is None else Path(fmus)
     axes = list(plan.machine.axes)
+    places = _places(plan.machine, at)
+    asked = _asked(axis, limits, at, evaluations)
 
     def check(folder: Path, inputs: Sequence[Path]) -> None:
         page.check_writable(folder, axes, inputs)
 
-    with in_words_of(control), kept(out, check, watch, input_paths(plan), changes, force=force):
+    with in_words_of(control), kept(
+        out, check, watch, input_paths(plan), [*changes, *(f"{name}={text}" for name, text in asked.items())],
+        force=force,
+    ):  # fmt: skip
         announce(watch, plan.machine, archives, plan.coupling)
-        poses = _poses(plan.machine, at, watch)
+        poses = _poses(plan.machine, places, watch)
         tuned = tune(plan, axis, limits, poses, fmus=archives, progress=watch.progress, evaluations=evaluations)
-        result = TuneDriveResult(tuned, control)
+        result = TuneDriveResult(tuned, control, asked, "" if out is None else str(out))
         if out is not None:
             result.save(out, figures=figures, force=force, control=control)
     return result
@@ -187,31 +192,55 @@ def _decibels(value: Value, name: str) -> float:
         raise InputError(f"{spelt(name)} {value}: a number of dB is needed, e.g. 8 dB") from None
 
 
-def _poses(machine: Machine, texts: Sequence[str], watch: Watch) -> dict[str, Modes]:
-    """Name -> modes of further poses, computed from the structure."""
-    found: dict[str, Modes] = {}
+def _asked(axis: str, limits: Limits, at: Sequence[str], evaluations: int) -> dict[str, str]:
+    """What was asked for besides changes of the scenario, the same text for the same value."""
+    found = {
+        "axis": axis,
+        "gain_margin": f"{limits.gain_margin:g} dB",
+        "phase_margin": f"{limits.phase_margin:g} deg",
+        "encoder_noise": f"{1e6 * limits.encoder_noise:g} urad",
+        "evaluations": str(evaluations),
+    }
+    return {**found, "at": "; ".join(at)} if at else found
+
+
+def _places(machine: Machine, texts: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Text of a further pose -> axis -> position [m]."""
     if texts and machine.structure is None:
         raise InputError(
             f"{machine.name}: has no structure to compute modes from at another pose; give it the key structure, or "
             f"leave {spelt('at')} out"
         )
-    for k, text in enumerate(texts):
-        pose = {axis: machine.pose[axis] for axis in machine.axes}
-        for part in text.split(","):
-            axis, equals, position = (each.strip() for each in part.partition("="))
-            if not equals or axis not in pose:
-                raise InputError(
-                    f"{spelt('at')} {text}: AXIS=POSITION is needed, e.g. Z=600mm; axes are {', '.join(pose)}"
-                )
-            pose[axis] = parse(position, "m", "600 mm")
-            low, high = machine.axes[axis].travel
-            if not low <= pose[axis] <= high:
-                raise InputError(
-                    f"{spelt('at')} {text}: {axis} is outside of its travel, {low * 1e3:.6g} to {high * 1e3:.6g} mm"
-                )
-        watch.progress("poses", k, len(texts))
+    return {text: _place(machine, text) for text in texts}
+
+
+def _place(machine: Machine, text: str) -> dict[str, float]:
+    pose: dict[str, float] = {}
+    for part in text.split(","):
+        axis, equals, position = (each.strip() for each in part.partition("="))
+        if not equals or axis not in machine.axes:
+            raise InputError(
+                f"{spelt('at')} {text}: AXIS=POSITION is needed, e.g. Z=600mm; axes are {', '.join(machine.axes)}"
+            )
+        if axis in pose:
+            raise InputError(f"{spelt('at')} {text}: {axis} is given twice")
+        with given("at", text):
+            pose[axis] = amount(position, "m", "600 mm")
+        low, high = machine.axes[axis].travel
+        if not low <= pose[axis] <= high:
+            raise InputError(
+                f"{spelt('at')} {text}: {axis} is outside of its travel, {low * 1e3:.6g} to {high * 1e3:.6g} mm"
+            )
+    return {axis: machine.pose[axis] for axis in machine.axes} | pose
+
+
+def _poses(machine: Machine, places: Mapping[str, Mapping[str, float]], watch: Watch) -> dict[str, Modes]:
+    """Name -> modes of further poses, computed from the structure."""
+    found: dict[str, Modes] = {}
+    for k, (text, pose) in enumerate(places.items()):
+        watch.progress("poses", k, len(places))
         assert machine.structure is not None
         found[text] = build(load_structure(machine.structure), pose).solution.modes
-    if texts:
-        watch.progress("poses", len(texts), len(texts))
+    if places:
+        watch.progress("poses", len(places), len(places))
     return found

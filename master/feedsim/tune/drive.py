@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from feedsim.analysis.figures import Array
+from feedsim.arguments import spelt
 from feedsim.cosim.plant import plant_modes
 from feedsim.linear.candidates import Candidates, Judged
 from feedsim.linear.judgement import Loop, judge
@@ -61,6 +62,10 @@ class Limits:
     gain_margin: float
     phase_margin: float
     encoder_noise: float
+
+    def missing(self, margins: Margins) -> float:
+        """Shares of the margins asked for that are missing; 0 where both are there, infinite without stability."""
+        return max(0.0, 1 - margins.gain / self.gain_margin) + max(0.0, 1 - margins.phase / self.phase_margin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +183,7 @@ class _Search:
     margins_before: Margins
     points: list[Point]
     tried: list[tuple[Rank, Array]]
+    seen: list[Margins]
     closed: int = 0
     runs: int = 0
 
@@ -205,7 +211,7 @@ class _Search:
             search = cls(
                 scenario, axis, partner, limits, fmus, progress, evaluations, knobs, judges,
                 ("pose of the machine file", *poses), scaled, (), (),
-                _margins(judges, knobs.drive), [], [],
+                _margins(judges, knobs.drive), [], [], [],
             )  # fmt: skip
             search.parts = search.of(SEARCHED)
             search.before = search.errors(search.parts, machine)
@@ -236,10 +242,15 @@ class _Search:
     def rank(self, x: Array) -> Rank:
         """Violation of the limits, and mean ratio of errors, of a candidate at places x."""
         drive = self.knobs.drive_at(x)
-        margins = _margins(self.judges, drive)
-        self.closed += 1
-        found = self._rank(drive, margins)
+        found = self._rank(drive, self.margins(drive))
         self.tried.append((found, x))
+        return found
+
+    def margins(self, drive: Drive) -> Margins:
+        """Of a candidate, which is counted."""
+        found = _margins(self.judges, drive)
+        self.closed += 1
+        self.seen.append(found)
         return found
 
     def _rank(self, drive: Drive, margins: Margins) -> Rank:
@@ -261,13 +272,13 @@ class _Search:
         """0 where the limits are kept: shares that are missing of the margins, and of the noise that is too much."""
         if not math.isfinite(margins.gain + margins.phase):
             return 10.0 if margins.gain < 0 else 0.0
-        sigma = self.limits.encoder_noise
-        most = max(NOISE * self.knobs.drive.M_max, self.margins_before.noise * sigma)
-        return (
-            max(0.0, 1 - margins.gain / self.limits.gain_margin)
-            + max(0.0, 1 - margins.phase / self.limits.phase_margin)
-            + max(0.0, margins.noise * sigma / most - 1)
-        )
+        noise = margins.noise * self.limits.encoder_noise
+        return self.limits.missing(margins) + max(0.0, noise / self.most_noise - 1)
+
+    @property
+    def most_noise(self) -> float:
+        """Standard deviation of the torque [N.m] that encoder noise may make."""
+        return max(NOISE * self.knobs.drive.M_max, self.margins_before.noise * self.limits.encoder_noise)
 
     # --- the search -------------------------------------------------------------------------------------------------
 
@@ -320,8 +331,7 @@ class _Search:
         low, high = 0.0, 1.0
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            self.closed += 1
-            if self.violation(_margins(self.judges, self.knobs.drive_at(present + middle * (fast - present)))) == 0:
+            if self.violation(self.margins(self.knobs.drive_at(present + middle * (fast - present)))) == 0:
                 low = middle
             else:
                 high = middle
@@ -334,7 +344,7 @@ class _Search:
         """
         present = self.knobs.drive
         if not finalists:
-            return present, "no candidate within the margins is better on every move"
+            return present, self.without()
         parts = self.of(CHOSEN)
         before = self.errors(parts, self.scenario.machine)
         total, done = len(BACK) * len(finalists), 0
@@ -344,8 +354,7 @@ class _Search:
                 self.progress("choosing", done, total)
                 done += 1
                 drive = self.knobs.drive_at(self.knobs.present + share * (x - self.knobs.present))
-                self.closed += 1
-                if self.violation(_margins(self.judges, drive)) > 0:
+                if self.violation(self.margins(drive)) > 0:
                     continue
                 ratios, ratio = _ratios(before, self.errors(parts, self.machine_with(drive)))
                 self.runs += 1
@@ -356,6 +365,27 @@ class _Search:
                 return best[1], ""
         self.progress("choosing", total, total)
         return present, "no candidate within the margins is better on further moves and circles"
+
+    def without(self) -> str:
+        """Why no candidate is left: its margins, its noise, or its errors."""
+        limits = self.limits
+        asked = f"{limits.gain_margin:g} dB and {limits.phase_margin:g} deg"
+        within = [each for each in self.seen if limits.missing(each) == 0]
+        if not within:
+            nearest = min(self.seen, key=limits.missing)
+            has = (
+                f"the nearest has {decibels(nearest.gain)} and {nearest.phase:.3g} deg"
+                if math.isfinite(limits.missing(nearest))
+                else "none is stable"
+            )
+            return f"none of {self.closed} candidates has {asked}; {has}; ask for less or raise {spelt('evaluations')}"
+        if all(self.violation(each) > 0 for each in within):
+            noise = min(each.noise for each in within) * limits.encoder_noise
+            return (
+                f"the {len(within)} candidates with {asked} turn the encoder's noise into {noise:.3g} N.m of torque or "
+                f"more, {self.most_noise:.3g} N.m are allowed; ask for less or correct {spelt('encoder_noise')}"
+            )
+        return "no candidate within the margins is better on every move"
 
     def judged(self, machine: Machine) -> Iterator[Case]:
         """Moves and circles that nothing was chosen by: as the machine is, modes changed, friction changed."""
@@ -441,7 +471,12 @@ def _scaled(modes: Modes, factor: float) -> Modes:
 
 
 def _percent(what: str, factor: float) -> str:
-    return f"{what} {100 * (factor - 1):+.0f} %"
+    return f"{what} {abs(100 * (factor - 1)):.0f} % {'higher' if factor > 1 else 'lower'}"
+
+
+def decibels(value: float) -> str:
+    """A gain margin [dB] in words."""
+    return f"{value:.3g} dB" if math.isfinite(value) else ("no limit of the gain" if value > 0 else "no stability")
 
 
 def _with_friction(machine: Machine, axis: str, factor: float) -> Machine:

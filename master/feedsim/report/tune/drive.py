@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Figure
+from feedsim.arguments import spelt
 from feedsim.control import Name, names_of
 from feedsim.findings import Note, Wrong
 from feedsim.report import sections
@@ -23,7 +25,7 @@ from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, ALLOWED, BEFORE, LEFT, MUTED
 from feedsim.scenario import Drive
 from feedsim.tune.changed import Changed
-from feedsim.tune.drive import NOISE, TORQUE, Case, Margins, Point, Tuned
+from feedsim.tune.drive import NOISE, TORQUE, WORSE, Case, Margins, Point, Tuned, decibels
 from feedsim.units import convert
 from feedsim.variables import parameters
 
@@ -58,15 +60,19 @@ def figures_of(tuned: Tuned) -> dict[str, Figure]:
     ):
         for when, errors in (("before", first.before), ("after", first.after)):
             value = scale * float(np.max(getattr(errors, key)))
-            figures[f"{axis}.{name}_{when}"] = Figure(value, unit, f"{words}, {when} tuning; motions held out")
+            figures[f"{axis}.{name}_{when}"] = Figure(
+                value, unit, f"{words}, {when} tuning; motions not used for tuning"
+            )
     for name, words in (("peak", "peak where the axis reverses"), ("overshoot", "overshoot")):
         nominal = _reductions(first, name)
         every = np.concatenate([_reductions(case, name) for case in tuned.judged])
         figures[f"{axis}.{name}_reduction"] = Figure(
-            float(np.median(nominal)), "%", f"median reduction of the {words}, motions held out"
+            float(np.median(nominal)), "%", f"median reduction of the {words}, motions not used for tuning"
         )
         figures[f"{axis}.{name}_reduction_least"] = Figure(
-            float(every.min()), "%", f"least reduction of the {words}, motions held out, modes and friction changed too"
+            float(every.min()),
+            "%",
+            f"least reduction of the {words}, motions not used for tuning, modes and friction changed too",
         )
     for when, margins in (("before", tuned.before), ("after", tuned.after)):
         where = "over all loops of the axis, poses and modes"
@@ -100,12 +106,7 @@ def findings(tuned: Tuned) -> list[str]:
     found: list[str] = []
     if bad := worse(tuned):
         found.append(Wrong(f"worse than before on motions that were not used for tuning: {'; '.join(bad)}"))
-    limits, before = tuned.limits, tuned.before
-    if before.gain < limits.gain_margin or before.phase < limits.phase_margin:
-        found.append(
-            f"{tuned.axis}: the drive as it is has {_decibels(before.gain)} and {before.phase:.3g} deg of "
-            f"{limits.gain_margin:g} dB and {limits.phase_margin:g} deg ({before.gain_of}; {before.phase_of})"
-        )
+    found += present_misses(tuned)
     if not tuned.elastic:
         found.append(Wrong(RIGID) if tuned.changes else Note(RIGID))
     drive = tuned.machine.shipped_drive(tuned.axis, "a report")
@@ -116,12 +117,32 @@ def findings(tuned: Tuned) -> list[str]:
     return found
 
 
+def present_misses(tuned: Tuned) -> list[str]:
+    """A sentence for each margin that the present drive lacks, with the loop that has it."""
+    limits, before, axis = tuned.limits, tuned.before, tuned.axis
+    if not math.isfinite(before.phase) and before.phase < 0:
+        return [f"{axis}: the present drive is {before.phase_of}."]
+    return [
+        f"{axis}: the {name} margin of the present drive is {shown}; {limit:g} {unit} are required "
+        f"({spelt(f'{name}_margin')}). {_capital(loop)}."
+        for name, value, shown, limit, unit, loop in (
+            ("gain", before.gain, decibels(before.gain), limits.gain_margin, "dB", before.gain_of),
+            ("phase", before.phase, f"{before.phase:.3g} deg", limits.phase_margin, "deg", before.phase_of),
+        )
+        if value < limit
+    ]
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
 def answers(tuned: Tuned) -> list[str]:
     """What the tuned drive does, or why there is none."""
     axis, after, figures = tuned.axis, tuned.after, figures_of(tuned)
-    margins = f"{_decibels(after.gain)} and {after.phase:.3g} deg"
+    margins = f"{decibels(after.gain)} and {after.phase:.3g} deg"
     if tuned.kept:
-        return [f"{axis}: the drive stays as it is, {tuned.kept}. Its margins are {margins}."]
+        return [f"{axis}: the drive stays as it is: {tuned.kept}. The present drive has {margins}."]
     changed = ", with elastic modes 10 % lower and higher" if tuned.elastic else ""
     found = [
         f"{axis}: peaks at reversals fall by {_percent(figures[f'{axis}.peak_reduction'])}, overshoot by "
@@ -138,17 +159,14 @@ def _percent(figure: Figure) -> str:
     return f"{figure.value:.0f} %"
 
 
-def _decibels(value: float) -> str:
-    return f"{value:.3g} dB" if math.isfinite(value) else ("no limit of the gain" if value > 0 else "no stability")
-
-
 def why(tuned: Tuned) -> list[str]:
     """Why this point: what it was chosen from, and which limits it touches."""
     limits, after = tuned.limits, tuned.after
     allowed = [point for point in tuned.points if point.allowed]
     found = [
-        f"{tuned.evaluations[0]} candidates were judged in closed form, {tuned.evaluations[1]} ran, "
-        f"{len(allowed)} of those kept to all limits and were worse nowhere."
+        f"{tuned.evaluations[0]} candidates were judged by their margins and noise, {tuned.evaluations[1]} of them "
+        f"were simulated. {len(allowed)} met all limits and made no error larger by more than "
+        f"{100 * (WORSE - 1):.0f} %."
     ]
     if tuned.kept:
         return found
@@ -161,14 +179,14 @@ def why(tuned: Tuned) -> list[str]:
     if after.noise * limits.encoder_noise > (1 - BINDS) * NOISE * drive.M_max:
         touched.append("the torque of encoder noise")
     found.append(
-        f"Limits that it touches: {' and '.join(touched)}."
+        f"What limits the values: {' and '.join(touched)}."
         if touched
-        else "It touches no limit: further gain does not make the errors smaller on every motion."
+        else "No limit is reached: higher gains do not make the errors smaller on every motion."
     )
     if further := _beyond(tuned):
         found.append(further)
     found.append(
-        f"Least gain margin: {_decibels(after.gain)}, {after.gain_of}. Least phase margin: {after.phase:.3g}°, "
+        f"Least gain margin: {decibels(after.gain)}, {after.gain_of}. Least phase margin: {after.phase:.3g}°, "
         f"{after.phase_of}."
     )
     return found
@@ -187,7 +205,7 @@ def _beyond(tuned: Tuned) -> str:
     if best.ratio > 0.97 * min(within):
         return "Candidates with less margin are no better."
     return (
-        f"With less margin, {_decibels(best.margins.gain)} and {best.margins.phase:.3g}°, the errors would be "
+        f"With less margin, {decibels(best.margins.gain)} and {best.margins.phase:.3g}°, the errors would be "
         f"{100 * (1 - best.ratio / min(within)):.0f} % smaller still."
     )
 
@@ -206,11 +224,15 @@ def settings(tuned: Tuned) -> str:
 
 
 def drives(tuned: Tuned) -> dict[str, str]:
-    """Name -> text of a drive file for every axis that has changed: what a machine file or --set takes."""
-    head = f"# Drive of axis {{}} of {tuned.scenario.machine.name}, written by feedsim tune drive.\n"
+    """Name -> text of a drive file for the tuned axis, changed or not, and for every other that has changed.
+
+    A machine file or --set takes them.
+    """
+    same = "; its values stay as they were" if tuned.kept else ""
+    head = f"# Drive of axis {{}} of {tuned.scenario.machine.name}, written by feedsim tune drive{same}.\n"
     return {
         drive_file(axis): head.format(axis) + _drive_text(tuned.machine.shipped_drive(axis, "a file"))
-        for axis in dict.fromkeys(change.axis for change in tuned.changes)
+        for axis in dict.fromkeys([tuned.axis, *(change.axis for change in tuned.changes)])
     }
 
 
@@ -284,8 +306,8 @@ def lines_of(tuned: Tuned, control: str = "") -> list[str]:
     return found
 
 
-def report_of(tuned: Tuned, control: str = "") -> Report:
-    """Content of the report."""
+def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
+    """Content of the report. folder: where it stands, for command lines; "": not known."""
     figures, machine, axis = figures_of(tuned), tuned.scenario.machine, tuned.axis
     tiles = [
         Tile(tile_value(figures[f"{axis}.{name}"]), label, typeset(figures[f"{axis}.{name}"].meaning))
@@ -293,7 +315,7 @@ def report_of(tuned: Tuned, control: str = "") -> Report:
             ("peak_reduction", "less peak at reversals"), ("overshoot_reduction", "less overshoot"),
             ("gain_margin_after", "gain margin"), ("phase_margin_after", "phase margin"),
         )
-        if math.isfinite(figures[f"{axis}.{name}"].value)
+        if math.isfinite(figures[f"{axis}.{name}"].value) and not (tuned.kept and name.endswith("reduction"))
     ]  # fmt: skip
     notes = [note for note in (machine.note, tuned.scenario.note) if note]
     limits = tuned.limits
@@ -316,14 +338,16 @@ def report_of(tuned: Tuned, control: str = "") -> Report:
         main=[
             picture(tuned),
             *values(tuned, control),
-            Section("Why this point", [Bullets(list(why(tuned)))]),
+            Section("Why these values", [Bullets(list(why(tuned)))]),
             _margins(tuned),
-            *(_errors(case) for case in tuned.judged),
+            *(_errors(case) for case in tuned.judged if not tuned.kept),
             sections.figures_section(figures),
         ],
         provenance=sections.provenance_section(facts, input_files(tuned.scenario)),
         footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
-        next_step=("Run with the new values:\n", code(command(tuned, "THIS_FOLDER"))) if tuned.changes else "",
+        next_step=("Run with the new values:\n", code(command(tuned, shlex.quote(folder) if folder else "THIS_FOLDER")))
+        if tuned.changes
+        else "",
     )
 
 
@@ -348,9 +372,11 @@ def values(tuned: Tuned, control: str = "") -> Iterator[Part]:
 
 def _margins(tuned: Tuned) -> Section:
     lines: list[tuple[Text, ...]] = []
-    for name, own in (("before", tuned.before), ("after", tuned.after)):
+    for name, own in (
+        (("before", tuned.before), ("after", tuned.after)) if not tuned.kept else (("present", tuned.before),)
+    ):
         torque = f"{own.noise * tuned.limits.encoder_noise:.3g}"
-        lines.append((name, minus(_decibels(own.gain)), own.gain_of, minus(f"{own.phase:.3g}°"), own.phase_of, torque))
+        lines.append((name, minus(decibels(own.gain)), own.gain_of, minus(f"{own.phase:.3g}°"), own.phase_of, torque))
     heads = ("", "Gain margin", "of", "Phase margin", "of", "Torque of noise [N·m]")
     return Section("Margins", [Table("lrtrtr", heads, lines)])
 
@@ -377,7 +403,7 @@ def _errors(case: Case) -> Section:
     ]
     what = "Circle" if case.program.partner else "Sine of the radius and feed of a circle"
     reversals = Table("lrr", (what, "Peak before [µm]", "after"), circles)
-    return Section(minus(f"Motions held out, {case.name}"), [stops, reversals])
+    return Section(minus(f"Motions not used for tuning, {case.name}"), [stops, reversals])
 
 
 def picture(tuned: Tuned) -> Picture:
@@ -431,8 +457,8 @@ def _largest(tuned: Tuned, when: str) -> float:
     return 1e6 * float(np.max(getattr(tuned.searched, when).peak))
 
 
-def summary(tuned: Tuned, names: Sequence[str]) -> Mapping[str, Any]:
-    """Content of summary.json."""
+def summary(tuned: Tuned, names: Sequence[str], asked: Mapping[str, str]) -> Mapping[str, Any]:
+    """Content of summary.json. asked: name -> text of what was asked for besides changes of the scenario."""
     limits = tuned.limits
     return {
         "answer": answers(tuned),
@@ -442,6 +468,10 @@ def summary(tuned: Tuned, names: Sequence[str]) -> Mapping[str, Any]:
             for each in tuned.changes
         ],
         "kept": tuned.kept,
+        "scenario": {
+            "name": tuned.scenario.name, "file": tuned.scenario.file.name, "overrides": list(tuned.scenario.overrides),
+        },
+        "settings": dict(asked),
         "limits": {
             "gain_margin": limits.gain_margin, "phase_margin": limits.phase_margin,
             "encoder_noise": limits.encoder_noise,

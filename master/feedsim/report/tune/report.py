@@ -52,9 +52,9 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
 
 def figures_of(judged: Judged) -> dict[str, Figure]:
-    """How much errors at the reversals fall, on the circles that were held out."""
+    """How much errors at the reversals fall, on the circles that were not used for tuning."""
     found = judged.reduction(judged.held_before, judged.held_after)
-    words = "reduction of the error at the reversals, of all circles and axes that were held out"
+    words = "reduction of the error at the reversals, of all axes and of the circles that were not used for tuning"
     figures = {
         "held_out.median": Figure(100 * float(np.median(found)), "%", f"median {words}"),
         "held_out.worst": Figure(100 * float(found.min()), "%", f"least {words}"),
@@ -174,7 +174,7 @@ def report_of(judged: Judged) -> Report:
         main=[
             *pictures_of(judged),
             _values(judged),
-            _errors("Circles held out", judged.held, judged.held_before, judged.held_after, judged),
+            _errors("Circles not used for tuning", judged.held, judged.held_before, judged.held_after, judged),
             _errors("Circles tuned on", judged.tuned, judged.tuned_before, judged.tuned_after, judged),
             sections.figures_section(figures),
         ],
@@ -225,7 +225,7 @@ def pictures_of(judged: Judged) -> list[Picture]:
     ]  # fmt: skip
     found = [
         Picture(
-            "tune-errors", "Errors at the reversals, circles held out",
+            "tune-errors", "Errors at the reversals, circles not used for tuning",
             "The larger of peak and dip of the radius, against the median of the turn.",
             Chart(panels, (1.0,) * len(panels)),
         )

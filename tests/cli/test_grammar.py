@@ -28,6 +28,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "results" / "result.csv").write_text("time [s],x [mm]\n0,0\n")
     (place / "tuned").mkdir()
     (place / "tuned" / "summary.json").write_text('{"scenario": {}}')
+    for name, of in (("drive", "tune-drive"), ("odd", "A; B"), ("modes", "identify-modes")):
+        (place / name).mkdir()
+        (place / name / "summary.json").write_text(f'{{"kind": "{of}", "files": []}}')
+    (place / "drive" / "report.html").write_text("<html>")
     (place / "values.yaml").write_text("set:\n  machine.axes.Z.drive.K_v: 60 1/s\n")
     (place / "model.fmu").write_bytes(b"PK")
     return place
@@ -79,6 +83,13 @@ def test_nearest_names(typed: str, said: str, fmus: Path, folder: Path) -> None:
         ("run machines/test_centre/modes.csv", "modes.csv is a table of modes, which a machine file names; feedsim"),
         ("show tuned", "tuned is a folder of results without a record (result.csv); feedsim show takes results of"),
         ("frf tuned", "tuned is a folder of results without a record (result.csv); feedsim frf takes a scenario"),
+        (
+            "show drive",
+            "drive has results of feedsim tune drive, without a record (result.csv), its page is drive/report"
+            ".html; feedsim show takes results of a study",
+        ),
+        ("show modes", "modes has results of feedsim identify-modes, without a record (result.csv); feedsim show"),
+        ("show odd", "odd is a folder of results without a record (result.csv); feedsim show takes results of"),
         ("run values.yaml", "values.yaml is a file of values for the option --set; feedsim run takes a scenario"),
         ("compensate results", "results is a folder of results, which feedsim show takes; feedsim compensate takes"),
         ("run model.fmu", "model.fmu is a unit for simulators (FMU); feedsim run takes a scenario or an SSP file"),

@@ -6,11 +6,14 @@ May use: errors, files. Start with meant(), which the command line asks about a 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+NO_RECORD = "a folder of results without a record (result.csv)"
+NAMED = {"tune": "tune compensation", "machine": "machine info"}  # kind of a summary -> command, where they differ
 HEAD = 4096  # bytes of a file that are read to see what it is
 
 
@@ -110,7 +113,7 @@ KINDS = (
     ),
     Kind("results of a study", ("show",), _holds("study.json")),
     Kind("a folder of results", ("show", "compare"), _holds("result.csv")),
-    Kind("a folder of results without a record (result.csv)", (), _holds("summary.json")),
+    Kind(NO_RECORD, (), _holds("summary.json")),
     Kind("a file of values for the option --set", (), lambda path: _keys(path) == {"set"}),
     Kind("an SSP file", ("run", "validate"), _ends(".ssp")),
     Kind("a unit for simulators (FMU)", (), _ends(".fmu")),
@@ -145,8 +148,29 @@ def meant(command: str, values: Iterable[Any]) -> str:
         found = kind(path)
         if found is not None and command not in found.commands:
             other = f", which feedsim {found.commands[0]} takes" if found.commands else ""
-            return f"{path} is {found.name}{other}; feedsim {command} takes {_either(own)}"
+            what = _result(path) if found.name == NO_RECORD else ""
+            return f"{path} {what or f'is {found.name}{other}'}; feedsim {command} takes {_either(own)}"
     return ""
+
+
+def _result(folder: Path) -> str:
+    """What a folder without a record holds, as its summary has it: the command, and the page; "" where it has none."""
+    try:
+        content: Any = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    of = content.get("kind") if isinstance(content, dict) else None
+    if not isinstance(of, str) or not re.fullmatch("[a-z]+([ -][a-z]+)?", of):
+        return ""
+    page = folder / "report.html"
+    shown = f", its page is {page}" if page.is_file() else ""
+    return f"has results of feedsim {NAMED.get(of) or _command(of)}, without a record (result.csv){shown}"
+
+
+def _command(of: str) -> str:
+    """The command that makes results of a kind: "tune-drive" is of tune drive, "identify-modes" has its own name."""
+    first, dash, second = of.partition("-")
+    return f"{first} {second}" if dash and first in ("machine", "tune") else of
 
 
 def _paths(values: Iterable[Any]) -> Iterator[Path]:

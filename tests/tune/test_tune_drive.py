@@ -370,6 +370,8 @@ def test_a_result_follows_another_in_its_folder(fmus: Path, tmp_path: Path) -> N
     page = (folder / "report.html").read_text()
     assert "Motions not used for tuning," not in page  # nothing has changed: no table of before and after
     assert "less peak at reversals" not in page
+    assert "X.peak_before" in page
+    assert "X.peak_reduction" not in page
     done = feedsim(*again, "--set", "machine.axes.X.drive.k_ffw=1", fmus=fmus, cwd=tmp_path)
     assert (done.returncode, "of other parameters (axis=X, gain_margin=300 dB," in done.stderr) == (0, True)
     done = feedsim(*again, "--set", "machine.axes.X.drive.k_ffw=1", fmus=fmus, cwd=tmp_path)

@@ -160,14 +160,15 @@ def _percent(figure: Figure) -> str:
 
 
 def why(tuned: Tuned) -> list[str]:
-    """Why this point: what it was chosen from, and which limits it touches."""
+    """Why these values: what they were chosen from, and what limits them."""
     limits, after = tuned.limits, tuned.after
     allowed = [point for point in tuned.points if point.allowed]
-    found = [
-        f"{tuned.evaluations[0]} candidates were judged by their margins and noise, {tuned.evaluations[1]} of them "
-        f"were simulated. {len(allowed)} met all limits and made no error larger by more than "
+    judged, ran = tuned.evaluations
+    met = (
+        f"{ran} of them were simulated. {len(allowed)} met all limits and made no error larger by more than "
         f"{100 * (WORSE - 1):.0f} %."
-    ]
+    )
+    found = [f"{judged} candidates were judged by their margins and noise, {met if ran else 'none was simulated.'}"]
     if tuned.kept:
         return found
     touched = []
@@ -319,6 +320,7 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
     ]  # fmt: skip
     notes = [note for note in (machine.note, tuned.scenario.note) if note]
     limits = tuned.limits
+    shown = {name: each for name, each in figures.items() if not tuned.kept or name.endswith("_before")}
     facts = [
         ("Scenario", f"{tuned.scenario.name} ({tuned.scenario.file.name})"),
         ("Machine", machine.name),
@@ -341,7 +343,7 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
             Section("Why these values", [Bullets(list(why(tuned)))]),
             _margins(tuned),
             *(_errors(case) for case in tuned.judged if not tuned.kept),
-            sections.figures_section(figures),
+            sections.figures_section(shown),
         ],
         provenance=sections.provenance_section(facts, input_files(tuned.scenario)),
         footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),

@@ -121,7 +121,7 @@ def words(found: Diagnosis, cause: Cause) -> str:
     """The causes that a report names, the first first; friction's peaks, which this machine always has, and the mean
     radius only where they are asked for. Of unlike amplitudes what the response of the axes makes of them."""
     named = []
-    asked = [term for term in found.terms if term.key == "radius" and cause.term == "radius" and term.told]
+    asked = [term for term in found.terms if term.key == "radius" and cause.term == "radius" and term.shows]
     for term in [*worth_telling(found), *asked]:
         if term.key == "offset" or (term.key == "peaks" and not cause.term.startswith("peaks")):
             continue

@@ -26,7 +26,7 @@ def both(circle: CircleUnderTest, causes: Causes, seed: int = 1, samples: int = 
 def test_nothing_is_made_of_a_round_circle() -> None:
     found = both(BALLBAR, Causes())
     assert found.G < 1e-12
-    assert not any(term.told for term in found.terms)
+    assert not any(term.shows for term in found.terms)
     assert all(peak.height == 0 for peak in found.peaks)
     assert "no single cause" in answer(found)
 
@@ -79,7 +79,7 @@ def test_shares_add_up_to_the_deviation() -> None:
     causes = Causes(offset=(2e-6, 1e-6), squareness=30e-6, delay=(5e-4, 0.0), peak=(4e-6, 6e-6), noise=1e-7)
     found = both(BALLBAR, causes)
     assert sum(term.share for term in found.terms) == pytest.approx(1.0, abs=1e-9)
-    told = [round(term.gain, 9) for term in found.terms if term.told and term.key != "rest"]
+    told = [round(term.gain, 9) for term in found.terms if term.shows and term.key != "rest"]
     assert told == sorted(told, reverse=True)
 
 
@@ -375,7 +375,7 @@ def test_the_slow_tail_of_a_peak_is_not_taken_for_lost_motion() -> None:
         found = diagnose(circle, [driven(circle, causes, sense, rng, SAMPLES) for sense in (1, -1)])
         within += recovered(found, causes).values()
         terms = [found[f"lost_motion {axis}"] for axis in "XZ"]
-        invented += [abs(term.value) for term, lost in zip(terms, causes.lost, strict=True) if lost == 0 and term.told]
+        invented += [abs(term.value) for term, lost in zip(terms, causes.lost, strict=True) if lost == 0 and term.shows]
     # 300 intervals of 95 %, of which those of one draw go together: three times sqrt(0.95 * 0.05 / 100)
     assert sum(within) / len(within) > 0.95 - 0.065
     assert max(invented, default=0.0) < 1e-6

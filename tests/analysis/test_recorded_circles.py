@@ -81,12 +81,12 @@ def test_terms_are_in_their_intervals_and_none_is_invented(group: str) -> None:
         for key, (value, radial) in true(circle, seen).items():
             term = found[key]
             within[key] += abs(term.value - value) <= term.half or (key == "squareness" and bent)
-            if value == 0 and term.told:
+            if value == 0 and term.shows:
                 invented.append((key, abs(term.value * radial)))
         for i, axis in enumerate(circle.axes):
             peak = found[f"peaks {axis}"]
-            assert not (seen.causes.peak[i] > 0 and peak.told and peak.value < 0), (seen, peak)
-            if seen.causes.peak[i] == 0 and peak.told:
+            assert not (seen.causes.peak[i] > 0 and peak.shows and peak.value < 0), (seen, peak)
+            if seen.causes.peak[i] == 0 and peak.shows:
                 invented.append((peak.key, abs(peak.value)))
     assert sum(within.values()) >= 0.9 * DRAWS * len(within)
     assert min(within.values()) >= (0.9 - 0.225) * DRAWS, within

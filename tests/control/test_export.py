@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feedsim.control import opened, read
-from feedsim.control.reading import Value
+from feedsim.control.view import Value
 from feedsim.control.writing import changed, number
 from feedsim.errors import InputError
 

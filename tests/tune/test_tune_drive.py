@@ -21,8 +21,9 @@ from feedsim.structure import Modes, checked_modes
 from feedsim.tune.changed import changed_values
 from feedsim.tune.circles import Pair
 from feedsim.tune.closed_forms import axis_lag, loop_lag
-from feedsim.tune.drive import CHOSEN, HELD, SEARCHED, Limits, tune_drive
+from feedsim.tune.drive import CHOSEN, HELD, SEARCHED, tune_drive
 from feedsim.tune.drive_program import DriveProgram, Stop, circles_of, partner_of, stops_of
+from feedsim.tune.drive_result import Limits
 from feedsim.tune.knobs import Knobs, matched, with_drives
 from feedsim.tune.search import least
 

@@ -147,8 +147,8 @@ def typed(text: str) -> str:
 
 def settings(example: str = "machine.axes.Z.friction.F_C='1.8 N.m'") -> Option:
     """--set, with an example of KEY=VALUE."""
-    told = f"override one entry, e.g. {example}, or those of a YAML file with a group set; may be given several times"
-    return Option("--set", "KEY=VALUE", told, dest="overrides", many=True, type=typed)
+    words = f"override one entry, e.g. {example}, or those of a YAML file with a group set; may be given several times"
+    return Option("--set", "KEY=VALUE", words, dest="overrides", many=True, type=typed)
 
 
 @contextmanager

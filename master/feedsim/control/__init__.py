@@ -6,7 +6,8 @@ Start with names.py; the table is names.csv. Files are read by archive.py, and r
 of what they hold.
 """
 
-from feedsim.control.archive import Archive, Entry, Odd, opened
+from feedsim.control.archive import Archive, Entry, Odd
+from feedsim.control.formats import opened
 from feedsim.control.names import CONTROLS, Name, known, names_of, table
 from feedsim.control.reading import Reading, Refused, Taken, read
 

@@ -7,16 +7,16 @@ source (or by who calls), and where nothing contradicts it. May use errors. Star
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from feedsim.control.archive import Archive, Entry, scalar
 from feedsim.control.conditions import Judged, absent, depends, judged, shown
 from feedsim.control.names import Name, table
 from feedsim.control.usual import usual_ranges
+from feedsim.control.view import Value, View, comparable, name_parts
 from feedsim.errors import InputError
 
-Value = float | bool | str
 ALL = "all"
 # What SINUMERIK's machine data are in, where MD10220 and MD10230 say nothing else: gains in 1000/min.
 USUAL_MASK, USUAL_GAIN = 0x200, 1000 / 60
@@ -110,15 +110,6 @@ class Reading:
     places: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Sought:
-    """A parameter in the files of an axis: its entries, of all elements, and whether one of them was taken."""
-
-    entries: Sequence[tuple[Archive, Entry]]
-    chosen: tuple[Archive, Entry] | None
-    problem: str = ""
-
-
 def read(
     archives: Sequence[Archive],
     axes: Mapping[str, str],
@@ -148,7 +139,9 @@ def read(
         raise InputError(f"{unknown[0]} is no number of the table of names of the control {controls.pop()}")
     found = Reading(controls.pop(), dict(axes))
     asked = _asked(rows)
-    if unknown := [each for each in assume if each not in asked and each not in {_parts(name)[0] for name in asked}]:
+    if unknown := [
+        each for each in assume if each not in asked and each not in {name_parts(name)[0] for name in asked}
+    ]:
         raise InputError(
             f"{unknown[0]} is nothing that a value of the control {found.control} depends on; that can be assumed of "
             f"{', '.join(asked) or 'no parameter'}"
@@ -185,159 +178,6 @@ def _asked(rows: Sequence[Name]) -> list[str]:
     if any(row.number.startswith("MD") for row in rows):
         found += _OF_UNITS
     return sorted(dict.fromkeys(found))
-
-
-class View:
-    """Files as one axis sees them."""
-
-    def __init__(
-        self, archives: Sequence[Archive], axis: str, theirs: str, places: Sequence[str], axes: Mapping[str, str],
-        assume: Mapping[str, str],
-    ) -> None:  # fmt: skip
-        self.axis, self.archives, self.assume = axis, archives, assume
-        self.notes: list[str] = []
-        self.known = _identified(archives, theirs)
-        known = [place for archive in archives for place in archive.places]
-        self.places = tuple(_whole(place, known) for place in places) if places else self._own_places(theirs, axes)
-        for place in self.places:
-            if place not in known:
-                raise InputError(f"no drive object or list {place!r}; the files have {', '.join(known) or 'none'}")
-        if not self.known and not self.places:
-            has = list(dict.fromkeys(each for archive in archives for each in _axes_of(archive)))
-            lists = [f"{place}{f' ({name})' if name else ''}" for archive in archives
-                     for place, name in archive.places.items()]  # fmt: skip
-            raise InputError(
-                f"no axis {theirs!r}; the files have {', '.join(has[:40]) or 'no axes'}"
-                + (f"; lists that drives can be chosen from: {', '.join(lists[:40])}" if lists else "")
-            )
-
-    def _own_places(self, theirs: str, axes: Mapping[str, str]) -> tuple[str, ...]:
-        """Drive object or list of the axis: that of its name, or the only one of the only axis."""
-        every = {place: name for archive in self.archives for place, name in archive.places.items()
-                 if _holds_parameters(archive, place)}  # fmt: skip
-        named = [place for place, name in every.items() if theirs.upper() in (name.upper(), place.upper())]
-        if len(named) == 1:
-            self.notes.append(f"{self.axis}: parameters of the drive are those of {named[0]}, which has its name")
-            return tuple(named)
-        if len(every) == 1 and len(axes) == 1:
-            return tuple(every)
-        if every:
-            shown_ = ", ".join(f"{place}{f' ({name})' if name else ''}" for place, name in every.items())
-            self.notes.append(
-                f"{self.axis}: which drive is that of the axis is not known, so no parameter of a drive is taken; the "
-                f"files have {shown_}: name it, --drives {self.axis}={next(iter(every))}"
-            )
-        return ()
-
-    def entries(self, *keys: str) -> list[tuple[Archive, Entry]]:
-        """Entries of a key, by name or number, that are of this axis, or of the whole machine."""
-        return [
-            (archive, entry)
-            for archive in self.archives
-            for entry in dict.fromkeys(entry for key in keys for entry in _by_key(archive).get(key, ()))
-            if (not entry.axis or entry.axis in self.known) and (not entry.place or entry.place in self.places)
-        ]
-
-    def sought(self, *keys: str, element: int = 0) -> Sought:
-        """The one entry of an element, index 0 or none; or why there is none."""
-        every = self.entries(*keys)
-        own = [each for each in every if (each[1].index or 0) == element]
-        if not own:
-            return Sought(every, None, "" if not every else f"the file has elements of it, but not [{element}]")
-        if len({_comparable(entry.text) for _, entry in own}) > 1:
-            lines = ", ".join(f"{archive.name}:{entry.line} ({entry.text[:20]})" for archive, entry in own[:4])
-            return Sought(every, None, f"the files have several values: {lines}")
-        return Sought(every, own[-1])
-
-    def value(self, name: str) -> Value | None:
-        """Value of a parameter or of one of its bits or elements; None: none, several, or no value."""
-        if name in self.assume:
-            return scalar(self.assume[name])
-        key, element, bit = _parts(name)
-        if key in self.assume and not element:
-            value: Value = scalar(self.assume[key])
-        else:
-            chosen = self.sought(key, element=int(element or 0)).chosen
-            if chosen is None:
-                return None
-            try:
-                value = scalar(chosen[1].text)
-            except ValueError:
-                return None
-        if bit:
-            return None if isinstance(value, str) else float((int(value) >> int(bit)) & 1)
-        return float(value) if isinstance(value, bool) else value
-
-    def lack(self, name: str) -> str:
-        """Why value() has none, for a sentence."""
-        key, element, bit = _parts(name)
-        found = self.sought(key, element=int(element or 0))
-        if found.chosen is None:
-            return found.problem or absent(name)
-        archive, entry = found.chosen
-        where = f"{archive.name}:{entry.line}"
-        return f"{key} is {entry.text[:24]!r} in {where}, which cannot be read; --assume {name}={1 if bit else 'VALUE'}"
-
-
-def _parts(name: str) -> tuple[str, str, str]:
-    """Key, element and bit of "p115[1]" or "p1656.0"; "" of what it has not."""
-    key, _, element = name.removesuffix("]").partition("[")
-    key, _, bit = key.partition(".") if key[:1] == "p" else (key, "", "")
-    return key, element, bit
-
-
-def _whole(place: str, known: Sequence[str]) -> str:
-    """A drive object by the end of its name, where that is enough: PS000003 of SLAVE3.PS000003."""
-    found = [each for each in known if each == place or each.endswith(f".{place}")]
-    return found[0] if len(found) == 1 else place
-
-
-def _holds_parameters(archive: Archive, place: str) -> bool:
-    """Whether a drive object has what an axis needs; control units and infeeds have not."""
-    names = [name for name in table() if name.control == archive.control and not name.parameter.startswith("cycles.")]
-    keys = {key for name in names for key in (name.key, name.number)}
-    return any(entry.place == place and entry.key in keys for entry in archive.entries)
-
-
-def _by_key(archive: Archive) -> Mapping[str, Sequence[Entry]]:
-    kept = archive.__dict__.get("_by_key")
-    if kept is None:
-        kept = {}
-        for entry in archive.entries:
-            for key in {entry.key, entry.number} - {""}:
-                kept.setdefault(key, []).append(entry)
-        archive.__dict__["_by_key"] = kept
-    found: Mapping[str, Sequence[Entry]] = kept
-    return found
-
-
-def _axes_of(archive: Archive) -> Iterator[str]:
-    for axis in dict.fromkeys(entry.axis for entry in archive.entries if entry.axis):
-        name = archive.axis_names.get(axis, "")
-        yield f"{axis} ({name})" if name and name != axis else axis
-
-
-def _identified(archives: Sequence[Archive], theirs: str) -> frozenset[str]:
-    """What the files call the axis: its name, and AX1 or JOINT_0 by the table of names."""
-    found = set()
-    for archive in archives:
-        used = {entry.axis for entry in archive.entries if entry.axis}
-        by_name = {name.upper(): axis for axis, name in archive.axis_names.items()}
-        for each in (
-            theirs.upper(),
-            by_name.get(theirs.upper(), ""),
-            archive.axis_names.get(theirs.upper(), "").upper(),
-        ):
-            if each in used:
-                found.add(each)
-    return frozenset(found)
-
-
-def _comparable(text: str) -> object:
-    try:
-        return scalar(text)
-    except ValueError:
-        return text
 
 
 def _read(found: Reading, view: View, name: Name, checked: Collection[str]) -> None:
@@ -387,13 +227,13 @@ def _read(found: Reading, view: View, name: Name, checked: Collection[str]) -> N
         f"{view.axis}: {name.number} {name.name} is taken, but {text}: it holds for a part of the range alone"
         for text in said.doubts
     ]
-    others = {_comparable(each.text) for _, each in sought.entries if (each.index or 0) != 0}
-    if name.number.startswith("MD") and others - {_comparable(entry.text)}:
+    others = {comparable(each.text) for _, each in sought.entries if (each.index or 0) != 0}
+    if name.number.startswith("MD") and others - {comparable(entry.text)}:
         found.notes.append(
             f"{view.axis}: {name.number} {name.name} has other values in other elements (parameter sets, encoders); "
             "element 0 is taken"
         )
-    elif others - {_comparable(entry.text)} and name.number != "p115":
+    elif others - {comparable(entry.text)} and name.number != "p115":
         found.doubts.append(
             f"{view.axis}: {name.number} {name.name} differs between data sets; that of index 0 is taken"
         )
@@ -412,7 +252,7 @@ def _of_case(found: Reading, view: View, name: Name, said: Judged) -> None:
     if isinstance(value, str) and value != "off":
         value = float(value)
     condition = said.reason.partition("=")[0]
-    key, element, _ = _parts(condition)
+    key, element, _ = name_parts(condition)
     archive, entry = view.sought(key, element=int(element or 0)).chosen or (None, None)
     if {condition, key} & {*view.assume}:
         archive, entry = None, None

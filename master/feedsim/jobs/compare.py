@@ -15,11 +15,12 @@ from feedsim import units
 from feedsim.arguments import Value, amount, spelt
 from feedsim.compare.between import bounds_of
 from feedsim.compare.compare import compare as compared
-from feedsim.compare.files import beside, compare_series, pairs_of, tolerances_of, unusable
+from feedsim.compare.files import compare_series, pairs_of, tolerances_of, unusable
+from feedsim.compare.lines import lines_of
 from feedsim.compare.options import Options, no_match
 from feedsim.compare.shift import estimated_shift
 from feedsim.compare.tolerance import Tolerances
-from feedsim.compare.verdict import Comparison, Variable, Verdict, seconds
+from feedsim.compare.verdict import Comparison, Variable, Verdict
 from feedsim.errors import InputError
 from feedsim.jobs.result import Result
 from feedsim.outputs import forced, replacing
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from feedsim.trace import Array
 
 File = str | Path
-MOST_LINES = 10
 # What a record's signals are called here, and their units.
 RECORD_UNITS = {"x_a": "m", "x_s": "m", "n_a": "rad/s", "M_a": "N.m"}
 JSON, XML = "compare.json", "compare.xml"
@@ -110,10 +110,7 @@ class CompareResult(Result):
 
     def listed(self, *, everything: bool) -> list[str]:
         """As ``lines``; everything: every variable."""
-        # Of many pairs those that are the same take one line.
-        full = everything or len(self.comparisons) == 1
-        found = [line for pair in self.comparisons for line in _lines(pair, everything, full)]
-        return [*found, *_default(self.comparisons), *_unused(self), *_unreferenced(self), *_sum(self.comparisons)]
+        return lines_of(self.comparisons, self.asked, self.tolerances, everything=everything)
 
     def report(self) -> Report:
         """Content of report.html."""
@@ -181,7 +178,7 @@ def compare(
         hold: patterns of variables that hold their values between rows.
         unit, reference_unit: pattern -> unit of columns whose header has none.
         time, reference_time: time column, "NAME" or "NAME:UNIT".
-        columns, reference_columns: mapping file, where one of both is a drive's record.
+        columns, reference_columns: mapping file, where the file of that side is a drive's record.
         axis: of a drive's record. machine: gives its pitch and torque constant.
         start, end: what is compared [s]; None: all.
         shift: added to the result's time [s], or "estimate". max_shift: the largest estimated one [s].
@@ -232,7 +229,7 @@ def compare(
         None if machine is None else Path(machine),
         amount(max_shift, "s") if shift == "estimate" else None,
     )
-    Tolerances.parse(texts)  # a typing error is told before anything is read
+    Tolerances.parse(texts)  # a typing error is reported before anything is read
     paths = [Path(each) for each in files if isinstance(each, str | Path)]
     outputs = {name: None if file is None else Path(file) for name, file in
                (("html", report), ("xml", junit), ("json", json))}  # fmt: skip
@@ -422,76 +419,3 @@ def _read_record(path: Path, mapping: Path, axis: str | None, machine: Path | No
         {f"{named}.{name}": values for name, values in joined.items()},
         {f"{named}.{name}": RECORD_UNITS[name] for name in joined},
     )
-
-
-def _lines(comparison: Comparison, everything: bool, notes: bool) -> list[str]:
-    """What the terminal shows of a pair; notes: although it is the same."""
-    found = [f"{comparison.result} against {comparison.reference}: {comparison.line}"]
-    if comparison.shift:
-        found.append(f"  shifted by {seconds(comparison.shift)}")
-    ranked = sorted(comparison.variables, key=lambda each: (-each.ratio, each.verdict == "same"))
-    shown = [each for each in ranked if everything or each.verdict != "same"]
-    cut = shown if everything else shown[:MOST_LINES]
-    width = max((len(each.name) for each in cut), default=0)
-    found += [f"  {each.name:<{width}}  {_variable_line(each)}" for each in cut]
-    if len(shown) > len(cut):
-        found.append(f"  and {len(shown) - len(cut)} more; --all lists them")
-    found += [f"  looks like: {each.text}" for each in comparison.looks_like]
-    return found + [f"  note: {note}" for note in comparison.notes if notes or not comparison.same]
-
-
-def _variable_line(variable: Variable) -> str:
-    outside = f"; outside in {variable.outside} of {variable.rows} rows" if variable.outside else ""
-    return f"{variable.verdict}: {variable.line}{outside}"
-
-
-def _default(comparisons: Sequence[Comparison]) -> list[str]:
-    """Of several pairs, whose notes are not shown where they are the same: that no tolerance is given for some."""
-    if len(comparisons) == 1:
-        return []
-    hidden = [
-        (each, note) for each in comparisons if each.same for note in each.notes if note.startswith("no tolerance")
-    ]
-    more = f" (as in {len(hidden) - 1} more)" if len(hidden) > 1 else ""
-    return [f"note: {hidden[0][0].result}: {hidden[0][1]}{more}"] if hidden else []
-
-
-def _unused(result: CompareResult) -> list[str]:
-    """Patterns of a tolerance file that match in no reference.
-
-    Of the file that was asked for, each; one that lies beside references serves those too that are not compared, so
-    that there a note is made only where none of its patterns matches.
-    """
-    by_file: dict[Path, list[set[str]]] = {}
-    for each in result.comparisons:
-        if (file := result.tolerances or beside(Path(each.reference))) is not None and each.variables:
-            by_file.setdefault(file, []).append(set(each.unused))
-    found = []
-    for file, unused in by_file.items():
-        own = [pattern for pattern, _ in tolerances_of(file, file, ()).rules if pattern != "*"]
-        nowhere = [pattern for pattern in own if all(pattern in each for each in unused)]
-        if nowhere and (result.tolerances is not None or nowhere == own):
-            found.append(f"note: {file}: matches no column: {', '.join(map(repr, nowhere))}")
-    return found
-
-
-def _unreferenced(result: CompareResult) -> list[str]:
-    """That files of a folder of results have no reference."""
-    compared = {Path(each.result) for each in result.comparisons}
-    found = []
-    for folder, reference in zip(result.asked[::2], result.asked[1::2], strict=False):
-        if folder.is_dir() and reference.is_dir():
-            more = sorted({path for path in folder.rglob("*.csv") if path.is_file()} - compared)
-            named = ", ".join(str(path.relative_to(folder)) for path in more[:3]) + (", ..." if len(more) > 3 else "")
-            found += [f"note: {folder}: {len(more)} CSV files have no reference: {named}"] if more else []
-    return found
-
-
-def _sum(comparisons: Sequence[Comparison]) -> list[str]:
-    if len(comparisons) == 1:
-        return []
-    counts = [(sum(each.verdict == kind for each in comparisons), kind) for kind in ("same", "different", "unusable")]
-    counted = ", ".join(f"{number} {kind}" for number, kind in counts if number)
-    partly = sum(each.coverage is not None and each.same and each.coverage.share < 1 for each in comparisons)
-    counted += f"; in {partly} of them not all rows are compared" if partly else ""
-    return [f"{len(comparisons)} comparisons: {counted}"]

@@ -11,7 +11,7 @@ from typing import Any
 from feedsim.analysis import Figure, Named
 from feedsim.arguments import listed, spelt
 from feedsim.control import Archive, names_of
-from feedsim.control.reading import Value
+from feedsim.control.view import Value
 from feedsim.control.writing import Written, changed
 from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept

@@ -19,14 +19,16 @@ from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
 from feedsim.report.tune import drive as page
+from feedsim.report.tune import drive_files
 from feedsim.scenario import Machine
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure import Modes
 from feedsim.structure.build import build
 from feedsim.tune.changed import Changed
-from feedsim.tune.drive import EVALUATIONS, Limits, Tuned
+from feedsim.tune.drive import EVALUATIONS
 from feedsim.tune.drive import tune_drive as tune
 from feedsim.tune.drive_program import check_axis
+from feedsim.tune.drive_result import Limits, Tuned
 
 LEAST_EVALUATIONS = 10
 
@@ -74,12 +76,15 @@ class TuneDriveResult(Result):
     @property
     def lines(self) -> Sequence[str]:
         """The answer, and the values to type."""
-        return [*self.answers, *page.lines_of(self.tuned, self.control)]
+        return [*self.answers, *drive_files.lines_of(self.tuned, self.control)]
 
     def files(self) -> Mapping[str, Content]:
         """Values to load, values to type, and a drive file for the tuned axis and for every other that changes."""
-        found = {page.SETTINGS: page.settings(self.tuned), page.SHEET: page.sheet(self.tuned, self.control)}
-        return {**found, **page.drives(self.tuned)}
+        found = {
+            drive_files.SETTINGS: drive_files.settings(self.tuned),
+            drive_files.SHEET: drive_files.sheet(self.tuned, self.control),
+        }
+        return {**found, **drive_files.drives(self.tuned)}
 
     def report(self) -> Report:
         """Content of report.html."""

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 INK, MUTED, GRID, PAPER = "#1b1f24", "#59636e", "#d4dae1", "#fefefe"
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#b0528a", "#b87a00", "#3d9bd0"
-# What a colour means, in every picture. Axes are told by panel or label, the second direction of a circle by dashes.
+# What a colour means, in every picture. Panel or label names the axis; dashes show the second direction of a circle.
 SIMULATED = AFTER = BLUE
 RECORDED = BEFORE = INK
 SETPOINT = MUTED

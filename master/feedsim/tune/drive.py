@@ -24,8 +24,8 @@ from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Drive, Machine, Scenario
 from feedsim.structure import Modes
 from feedsim.structure.modes import write_modes
-from feedsim.tune.changed import Changed, changed_values
 from feedsim.tune.drive_program import DriveProgram, Errors, circles_of, partner_of, stops_of
+from feedsim.tune.drive_result import FLOOR, WORSE, Case, Limits, Margins, Point, Tuned, decibels
 from feedsim.tune.knobs import Knobs, matched
 from feedsim.tune.search import Rank, least
 
@@ -41,9 +41,7 @@ CHOSEN = (((2 * _MM, 4 * _MPM), (20 * _MM, 8 * _MPM), (60 * _MM, 3 * _MPM)),
           ((8 * _MM, 2.5 * _MPM), (25 * _MM, 2 * _MPM), (40 * _MM, 8 * _MPM)))  # fmt: skip
 HELD = (((0.5 * _MM, 1 * _MPM), (5 * _MM, 3 * _MPM), (30 * _MM, 10 * _MPM), (100 * _MM, 5 * _MPM)),
         ((10 * _MM, 1.5 * _MPM), (15 * _MM, 3.5 * _MPM), (30 * _MM, 5 * _MPM)))  # fmt: skip
-WORSE = 1.05  # of an error, from where on it counts as worse
 GAINED = 0.95  # of the errors' mean ratio: what gains less is not worth a change
-FLOOR = 0.05e-6  # [m] of an error: below it nothing counts
 WEIGHT = 4.0  # exponent of the mean of ratios: large ones count more
 NEAR = 0.75  # of the margins asked for: candidates from there on run, for the picture
 TORQUE = 0.95  # of the torque limit
@@ -55,100 +53,12 @@ FASTER = {"K_p": 4.0, "T_n": 0.15, "K_v": 2.0, "omega_0": 3.0}  # direction of t
 HALVINGS = 5
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What a drive has to keep to: margins [dB], [deg], standard deviation of the encoder's angle [rad]."""
-
-    gain_margin: float
-    phase_margin: float
-    encoder_noise: float
-
-    def missing(self, margins: Margins) -> float:
-        """Shares of the margins asked for that are missing; 0 where both are there, infinite without stability."""
-        return max(0.0, 1 - margins.gain / self.gain_margin) + max(0.0, 1 - margins.phase / self.phase_margin)
-
-
-@dataclass(frozen=True, eq=False)
-class Margins:
-    """Of a drive, over all poses and modes: least margins [dB], [deg], the loops that have them, and torque noise
-    [N.m]."""
-
-    gain: float
-    phase: float
-    gain_of: str
-    phase_of: str
-    noise: float
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """A candidate that has run: margins, mean ratio of its errors to those of the present drive, largest peak [m]."""
-
-    margins: Margins
-    ratio: float
-    peak: float
-    allowed: bool
-
-
 @dataclass(frozen=True, eq=False)
 class Part:
     """A program, and the factor on the frequencies of elastic modes with which it is run."""
 
     program: DriveProgram
     factor: float
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """Moves and circles with errors before and after. name: under what."""
-
-    name: str
-    program: DriveProgram
-    before: Errors
-    after: Errors
-
-    @property
-    def rows(self) -> Iterator[tuple[str, str, float, float]]:
-        """Motion, figure, before and after [m]: the largest distance behind a stop, the peak of a reversal."""
-        for k, stop in enumerate(self.program.stops):
-            yield stop.text, "miss", float(self.before.miss[k]), float(self.after.miss[k])
-        for k, circle in enumerate(self.program.circles):
-            yield circle.text, "peak", float(self.before.peak[k]), float(self.after.peak[k])
-
-    @property
-    def worse(self) -> list[tuple[str, str, float, float]]:
-        """Those that got worse by more than 5 %."""
-        return [row for row in self.rows if row[3] > WORSE * row[2] + FLOOR]
-
-
-@dataclass(frozen=True, eq=False)
-class Tuned:
-    """A drive and what it does.
-
-    machine: with it. before, after: margins. searched: what it was searched on. judged: what it was judged on, as the
-    machine is first. points: of the search.
-    evaluations: closed forms, runs. kept: why the drive stays as it is; "" where it changes. poses: in words.
-    """
-
-    scenario: Scenario
-    axis: str
-    partner: str
-    limits: Limits
-    machine: Machine
-    before: Margins
-    after: Margins
-    searched: Case
-    judged: tuple[Case, ...]
-    points: tuple[Point, ...]
-    evaluations: tuple[int, int]
-    kept: str
-    poses: tuple[str, ...]
-    elastic: bool
-
-    @property
-    def changes(self) -> tuple[Changed, ...]:
-        """Parameters that differ."""
-        return changed_values(self.scenario.machine, self.machine)
 
 
 def tune_drive(
@@ -472,11 +382,6 @@ def _scaled(modes: Modes, factor: float) -> Modes:
 
 def _percent(what: str, factor: float) -> str:
     return f"{what} {abs(100 * (factor - 1)):.0f} % {'higher' if factor > 1 else 'lower'}"
-
-
-def decibels(value: float) -> str:
-    """A gain margin [dB] in words."""
-    return f"{value:.3g} dB" if math.isfinite(value) else ("no limit of the gain" if value > 0 else "no stability")
 
 
 def _with_friction(machine: Machine, axis: str, factor: float) -> Machine:

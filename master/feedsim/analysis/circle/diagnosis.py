@@ -56,8 +56,8 @@ class Term:
     gain: float = 0.0
 
     @property
-    def told(self) -> bool:
-        """Whether it is told from zero, and not by rounding alone."""
+    def shows(self) -> bool:
+        """Whether it differs from zero by more than its interval and rounding."""
         size = abs(self.value) if self.key == "radius" else self.size
         return size > FLOOR and shows(self.value, self.half)
 
@@ -170,7 +170,9 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         senses=tuple(path.sense for path in paths),
         G=G,
         terms=tuple(
-            sorted(terms, key=lambda term: (not term.told or term.key == "rest", -round(term.gain / FLOOR), -term.size))
+            sorted(
+                terms, key=lambda term: (not term.shows or term.key == "rest", -round(term.gain / FLOOR), -term.size)
+            )
         ),
         peaks=peaks,
         vibrations=vibrations(circle, found, whole),

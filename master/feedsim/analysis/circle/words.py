@@ -44,7 +44,7 @@ def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
 
 def worth_telling(diagnosis: Diagnosis) -> list[Term]:
     """Causes that somebody can act on, the largest first."""
-    able = [term for term in diagnosis.terms if term.told and term.key not in ("rest", "radius")]
+    able = [term for term in diagnosis.terms if term.shows and term.key not in ("rest", "radius")]
     found = [term for term in able if term.share >= WORTH and term.size >= WORTH * diagnosis.G]
     besides = [
         term for term in able if term not in found and term.key != "offset" and term.size >= BESIDES * diagnosis.G
@@ -57,7 +57,7 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
     first, second = diagnosis.circle.axes
     value, axis = term.value, term.axis
     amount = abs(value)
-    if not term.told and term.key not in ("rest", "peaks"):
+    if not term.shows and term.key not in ("rest", "peaks"):
         return f"{name(term)}: cannot be distinguished from zero"
     match term.key:
         case "offset":
@@ -132,7 +132,7 @@ def further(diagnosis: Diagnosis) -> list[str]:
         )
     if not diagnosis.both:
         found.append("squareness and servo mismatch are one: a circle in the other direction separates them")
-    if of["third"].told:
+    if of["third"].shows:
         found.append(
             "squareness and guides that are bent in third order are not fully separated: a circle of half the radius "
             f"does it ({circle.radius * 500:.3g} mm)"
@@ -150,7 +150,7 @@ def further(diagnosis: Diagnosis) -> list[str]:
             "the circle is fast: peaks of friction may take a quarter turn, and are then not separated from lost "
             f"motion, scale and servo mismatch: a feed of {slow * 6e4:.2g} mm/min separates them"
         )
-    if "centres" in of and of["centres"].told and of["centres"].size > UNCERTAIN:
+    if "centres" in of and of["centres"].shows and of["centres"].size > UNCERTAIN:
         found.append(
             "an eccentric pivot and a drift between the turns are one: a second turn in the same direction separates "
             "them"
@@ -159,7 +159,7 @@ def further(diagnosis: Diagnosis) -> list[str]:
 
 
 def _lag(diagnosis: Diagnosis, change: float) -> str:
-    """What the mean radius is made of, as far as it can be told."""
+    """What the mean radius is made of, as far as it can be known."""
     if diagnosis.lag is None:
         return (
             "path lag without speed feedforward, symmetry filter T_sym, or a scale of both axes; one feed cannot tell "
@@ -173,7 +173,7 @@ def _lag(diagnosis: Diagnosis, change: float) -> str:
 
 
 def _unlike(diagnosis: Diagnosis, value: float) -> str:
-    """What unlike amplitudes are made of, as far as it can be told."""
+    """What unlike amplitudes are made of, as far as it can be known."""
     if diagnosis.unlike is None:
         return "scale, temperature or pitch compensation, or an unlike decrease of the amplitude by path lag"
     response = math.copysign(1.0, value) * diagnosis.unlike

@@ -59,7 +59,7 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
                 "half_interval": finite(term.half),
                 "alone": quantity(term.size, "m"),
                 "share": term.share,
-                "told_from_zero": term.told,
+                "told_from_zero": term.shows,
                 "meaning": sentence(diagnosis, term),
             }
             for term in diagnosis.terms

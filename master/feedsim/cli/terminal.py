@@ -5,14 +5,13 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feedsim.findings import WRONG, Note, ranked, severity
 from feedsim.jobs.watch import Watch
-from feedsim.owned import claimed
 
 if TYPE_CHECKING:
     from feedsim.scenario import Coupling, Machine
@@ -126,24 +125,6 @@ def watching(quiet: bool, unit: str = "", *, shortened: bool = False) -> Iterato
 
     with tqdm(unit=unit, unit_scale=shortened, leave=False, disable=quiet or not sys.stderr.isatty()) as bar:
         yield TerminalWatch(bar, quiet)
-
-
-@contextmanager
-def results_in(
-    directory: Path, check: Callable[..., None], inputs: Sequence[Path] = (), asked: Sequence[str] = ()
-) -> Iterator[None]:
-    """Have the folder of results to ourselves while they are made; say ahead where one of other parameters goes.
-
-    check: of the report that will be written there. inputs, asked: what the results are of, files and settings.
-
-    OutputError: another process has it, or the results could not be written there.
-    """
-    from feedsim.report.results import replaced
-
-    with claimed(directory):
-        check(directory, inputs)
-        warn(Note(text) for text in [replaced(directory, inputs, asked)] if text)
-        yield
 
 
 COLOURS = {"red": 31, "yellow": 33}

@@ -11,9 +11,6 @@ from feedsim.report.provenance import InputFile, hashed
 
 MM_PER_MIN = 60e3  # per m/s
 LEAST_SPEEDS = 3  # that make a curve
-_GREEK = (
-    "alpha", "beta", "gamma", "delta", "zeta", "eta", "kappa", "lambda", "mu", "rho", "sigma", "tau", "psi", "omega",
-)  # fmt: skip
 SAME_SPEED = 1.05  # ratio up to which two speeds are one: that of a direction and of the other, or of a repetition
 
 

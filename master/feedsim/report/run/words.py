@@ -7,10 +7,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from feedsim.analysis import Diagnosis, Figures
+from feedsim.analysis import Diagnosis, Figures, PositioningTask, tasks
 from feedsim.analysis.circle import worth_telling
 from feedsim.cosim import Run
 from feedsim.report.content import Text, code
+from feedsim.scenario import Drive
 from feedsim.trace import Trace
 
 # Of A, what repeats is worth compensating from this share of it on.
@@ -59,6 +60,10 @@ def next_step(run: Run, causes: Mapping[str, Diagnosis], change: str = "") -> Te
         return "See what friction compensation takes away:\n", code(f"feedsim compensate {file}")
     if first_causes[:1] == ["servo"]:
         return "See how each axis answers:\n", code(f"feedsim frf {file}")
+    for task in tasks(run.scenario, run.program):
+        axis = task.approach.axis if isinstance(task, PositioningTask) else ""
+        if axis and isinstance(run.scenario.machine.axes[axis].drive, Drive):
+            return "Find drive values with which it stops better:\n", code(f"feedsim tune drive {file} --axis {axis}")
     return "Lay another run or a record over it:\n", code("feedsim show THIS_FOLDER OTHER_FOLDER")
 
 

@@ -18,6 +18,7 @@ from feedsim.errors import InputError
 _RUN = ("fmpy", "scipy", "ruckig")
 EXTRAS = {
     "run": _RUN, "figures": (*_RUN, "matplotlib"), "sweep": (*_RUN, "distributed"), "uff": (*_RUN, "pyuff"),
+    "xlsx": (*_RUN, "xlsxwriter"),
     "parquet": ("pyarrow",), "pandas": ("pandas",),
 }  # fmt: skip
 

@@ -9,10 +9,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 
+import feedsim as fs
 from command_helpers import feedsim, summary_of
+from feedsim import extras
 from feedsim.report.run.sheet import FAILS, NO_LIMIT, OPEN, PASSES, judged
+from feedsim.report.run.workbook import _name
 
 ROOT = Path(__file__).resolve().parents[2]
 CYCLE = """
@@ -128,7 +132,63 @@ def test_a_circle_in_the_letters_of_iso_230_4(fmus: Path, tmp_path: Path) -> Non
     assert float(figures["G_XZ"]["Value"]) == pytest.approx(np.ptp(values), rel=0.02)  # readings are a degree apart
     assert float(figures["F_XZ,max"]["Value"]) == pytest.approx(values.max(), rel=0.02)
     assert figures["G_XZ"]["Verdict"] == PASSES
+    page = (out / "sheet.html").read_text(encoding="utf-8")
+    assert "<td>G<sub>XZ</sub></td>" in page
+    assert "<td>F<sub>XZ,max</sub></td>" in page
     assert said.startswith("Circle XZ passes (ISO 230-4): G_XZ ")
+
+
+def test_the_workbook_has_the_numbers_of_the_table(fmus: Path, tmp_path: Path) -> None:
+    """Read by a second implementation, openpyxl: readings, figures, limits as numbers; texts as texts."""
+    out, _ = ran(tmp_path, CYCLE, SHEET.replace("conditions: {", "xlsx: true, conditions: {note: '=1+1', "), fmus)
+    page = openpyxl.load_workbook(out / "sheet.xlsx")["Positioning of Z"]
+    rows = [[cell for cell in row if cell is not None] for row in page.iter_rows(values_only=True)]
+    assert rows[0] == ["Positioning of Z"]
+    assert ["FAIL"] in rows
+    assert ["note", "=1+1"] in rows
+    assert ["instrument", "laser <1>"] in rows
+    figures = {row[0]: row for row in rows if len(row) >= 4 and isinstance(row[2], float)}
+    for row in rows_of(out, "figure"):
+        _, _, value, *judged_by, verdict = figures[row["Item"]]
+        assert value == pytest.approx(float(row["Value"]), abs=1e-6)
+        assert judged_by == ([float(row["Limit"]), 0.05] if row["Limit"] else [0.05])
+        assert verdict == (row["Verdict"] or NO_LIMIT)
+    head = next(k for k, row in enumerate(rows) if row and row[0] == "Target [mm]")
+    readings: dict[tuple[str, str], list[float]] = {}
+    for row in rows_of(out, "reading"):
+        readings.setdefault((row["Target [mm]"], row["Approach"]), []).append(float(row["Value"]))
+    for row in rows[head + 1 : head + 7]:
+        own = readings.pop((f"{row[0]:g}", row[1]))
+        assert row[2:5] == pytest.approx(own, abs=1e-6)
+        assert row[5] == pytest.approx(np.mean(own), abs=1e-6)
+        assert row[6] == pytest.approx(np.std(own, ddof=1), abs=1e-6)
+    assert not readings
+    assert "sheet.xlsx" in summary_of(out)["files"]
+    before = (out / "sheet.xlsx").read_bytes()
+    again, _ = ran(tmp_path, CYCLE, SHEET.replace("conditions: {", "xlsx: true, conditions: {note: '=1+1', "), fmus)
+    assert (again / "sheet.xlsx").read_bytes() == before
+    ran(tmp_path, CYCLE, SHEET, fmus)
+    assert not (out / "sheet.xlsx").exists()
+
+
+def test_a_workbook_without_its_package_is_refused_before_the_run(
+    fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(extras.EXTRAS, "xlsx", ("no_such_package",))
+    machine = ROOT / "scenarios" / "machines" / "test_centre"
+    (tmp_path / "s.yaml").write_text(CYCLE.format(machine=machine, sheet=", sheet: {xlsx: true}"), encoding="utf-8")
+    with pytest.raises(extras.MissingPackage, match=r'pip install "feedsim\[xlsx\]"'):
+        fs.run(tmp_path / "s.yaml", fmus=fmus, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_names_of_worksheets() -> None:
+    taken: set[str] = set()
+    names = [_name(title, taken) for title in ("Circle XZ#2", "circle xz#2", "[a]:*?/\\'", 40 * "x", 41 * "x")]
+    assert names[:2] == ["Circle XZ#2", "circle xz#2 (2)"]
+    assert names[2] == "a"
+    assert [len(name) for name in names[3:]] == [31, 31]
+    assert len({name.casefold() for name in names}) == 5
 
 
 @pytest.mark.parametrize(

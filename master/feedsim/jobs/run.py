@@ -224,6 +224,8 @@ def run(
     """
     with opened(scenario, set, fmus) as subject:
         analysis.check(subject.plan, subject.program)  # an evaluation that cannot be made is refused before the run
+        if report.in_workbook(subject.plan):
+            report.workbook_needed()
         if page:
             from feedsim.page.content import content
 

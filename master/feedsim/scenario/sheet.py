@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, StrictStr
+from pydantic import Field, StrictBool, StrictStr
 
 from feedsim.fields import Model, Quantity, did_you_mean, fault
 
@@ -15,7 +15,7 @@ Limit = Annotated[float, Quantity("m", above=0, example="10 um")]
 
 
 class Sheet(Model):
-    """An acceptance sheet: sheet.html for print and sheet.csv."""
+    """An acceptance sheet: sheet.html for print, sheet.csv and, where it is asked for, sheet.xlsx."""
 
     limits: dict[StrictStr, Limit] = Field(default={}, description="Figure -> largest magnitude that passes")
     uncertainty: Annotated[float, Quantity("m", minimum=0, example="0.5 um")] = Field(
@@ -24,6 +24,7 @@ class Sheet(Model):
     conditions: dict[StrictStr, StrictStr] = Field(
         default={}, description="Condition of the test -> what it was, such as instrument: laser interferometer"
     )
+    xlsx: StrictBool = Field(default=False, description="Write sheet.xlsx too, a workbook of all sheets of the run")
 
 
 def checked(sheet: Sheet | None, known: tuple[str, ...]) -> Sheet | None:

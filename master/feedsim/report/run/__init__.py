@@ -7,5 +7,17 @@ Start with files.py, then report.py, the page; pose.py has the plant's pose.
 from feedsim.report.provenance import input_paths
 from feedsim.report.run.files import check_writable, files_of, growing, write
 from feedsim.report.run.report import answers, summary_line
+from feedsim.report.run.sheet import in_workbook
+from feedsim.report.run.workbook import needed as workbook_needed
 
-__all__ = ["answers", "check_writable", "files_of", "growing", "input_paths", "summary_line", "write"]
+__all__ = [
+    "answers",
+    "check_writable",
+    "files_of",
+    "growing",
+    "in_workbook",
+    "input_paths",
+    "summary_line",
+    "workbook_needed",
+    "write",
+]

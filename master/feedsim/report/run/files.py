@@ -46,6 +46,7 @@ from feedsim.report.run.report import (
     report_of,
     signal_unit,
 )
+from feedsim.report.run.workbook import workbook
 from feedsim.scenario import Logging
 from feedsim.trace import Trace, write_csv
 from feedsim.tune import of_run
@@ -60,7 +61,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """
     check_place(
         directory,
-        (RESULT, REPORT, SUMMARY, LOG, PAGE, sheet.HTML, sheet.CSV, PARTIAL),
+        (RESULT, REPORT, SUMMARY, LOG, PAGE, sheet.HTML, sheet.CSV, sheet.XLSX, PARTIAL),
         inputs,
         kind="run",
         own=(PARTIAL,),
@@ -116,6 +117,8 @@ def files_of(run: Run, page: str = "", recorded: Partial | None = None) -> dict[
     if sheets := sheet.sheets_of(run):
         files[sheet.HTML] = sheet_html(run.scenario.name, sheets, sheet.RULE)
         files[sheet.CSV] = sheet.table(sheets)
+    if sheet.in_workbook(run.scenario):
+        files[sheet.XLSX] = workbook(sheets, sheet.RULE)
     return files
 
 

@@ -23,11 +23,11 @@ from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture
 from feedsim.report.run.accuracy import accuracy_picture
 from feedsim.report.run.circle_plots import contour_picture
-from feedsim.scenario import CircleTest, PositioningAccuracy
+from feedsim.scenario import CircleTest, PositioningAccuracy, Scenario
 from feedsim.scenario.sheet import OF_CIRCLES, OF_POSITIONING, Sheet
 from feedsim.trace import Trace
 
-HTML, CSV = "sheet.html", "sheet.csv"
+HTML, CSV, XLSX = "sheet.html", "sheet.csv", "sheet.xlsx"
 SIMULATED = "Simulated by feedsim. Nothing was measured on a machine."
 RULE = (
     "A figure passes where its magnitude and the uncertainty U (k = 2) together keep within the limit, and fails where "
@@ -40,7 +40,7 @@ SYMBOLS = {
 }  # fmt: skip
 PASSES, FAILS, OPEN, NO_LIMIT = "pass", "fail", "not decided", "–"
 HEADS = ("Sheet", "Part", "Item", "Target [mm]", "Angle [deg]", "Approach", "Run", "Value", "Unit", "Limit", "Verdict")
-EVERY = 1.0  # [deg] between the readings of a circle
+EVERY, PRINTED = 1.0, 15.0  # [deg] between the readings of a circle: in the files, in print
 
 
 @dataclass(frozen=True)
@@ -62,20 +62,35 @@ class Result:
 
 @dataclass(frozen=True, eq=False)
 class Filled:
-    """A sheet: title, standard, conditions, table of readings, figures, picture.
+    """A sheet: title, standard, conditions, uncertainty [um], table of readings, figures, picture.
 
     Attributes:
-        heads, rows: of the readings as they are printed. readings: rows of sheet.csv behind "Sheet" and "Part".
+        heads, numbers: the table of readings; NaN where a cell is empty. every: how many of its rows there are to one
+            that is printed.
+        readings: rows of sheet.csv behind "Sheet" and "Part".
     """
 
     title: str
     standard: str
     conditions: Sequence[tuple[str, str]]
+    uncertainty: float
     heads: Sequence[str]
-    rows: Sequence[Sequence[str]]
+    numbers: Sequence[Sequence[float | str]]
     results: Sequence[Result]
     picture: Picture
     readings: Sequence[Sequence[str]] = field(default=())
+    every: int = 1
+
+    @property
+    def rows(self) -> list[list[str]]:
+        """The table of readings as it is printed."""
+        return [
+            [
+                cell if isinstance(cell, str) else _printed(cell, ".3f" if column else ".6g")
+                for column, cell in enumerate(row)
+            ]
+            for row in self.numbers[:: self.every]
+        ]
 
     @property
     def verdict(self) -> str:
@@ -93,6 +108,12 @@ def sheets_of(run: Run) -> list[Filled]:
         elif isinstance(item, CircleTest) and item.sheet is not None and isinstance(task, CircleTask):
             found.append(_circle(run, task, item.sheet))
     return found
+
+
+def in_workbook(scenario: Scenario) -> bool:
+    """Whether a sheet asks for sheet.xlsx besides."""
+    sheets = [item.sheet for item in scenario.evaluate if isinstance(item, PositioningAccuracy | CircleTest)]
+    return any(sheet is not None and sheet.xlsx for sheet in sheets)
 
 
 def verdict_line(sheet: Filled) -> str:
@@ -146,18 +167,20 @@ def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
     ]
     readings = 1e6 * found.deviations
     heads = ("Target [mm]", "Approach", *(f"{k + 1}" for k in range(visits.runs)), "x\u0305 [µm]", "s [µm]", "B [µm]")
-    rows, csv_rows = [], []
+    numbers: list[Sequence[float | str]] = []
+    csv_rows = []
     for i, target in enumerate(visits.targets):
         for side, arrow in enumerate("↑↓"):
             own = readings[side, i]
-            last = minus(f"{1e6 * found.B[i]:.3f}") if side == 0 else ""
-            rows.append((f"{1e3 * target:.6g}", arrow, *(minus(f"{value:.3f}") for value in own),
-                         minus(f"{1e6 * found.mean[side, i]:.3f}"), f"{1e6 * found.s[side, i]:.3f}", last))  # fmt: skip
+            B = float(1e6 * found.B[i]) if side == 0 else math.nan
+            numbers.append((float(1e3 * target), arrow, *map(float, own), float(1e6 * found.mean[side, i]),
+                            float(1e6 * found.s[side, i]), B))  # fmt: skip
             csv_rows += [("deviation", f"{1e3 * target:.9g}", "", arrow, str(k + 1), f"{value:.6f}", "um")
                      for k, value in enumerate(own)]  # fmt: skip
     results = _results(found.figures, SYMBOLS, sheet, OF_POSITIONING)
     picture = accuracy_picture(prefix, found, f"sheet-{prefix.replace('#', '-')}")
-    return Filled(f"Positioning of {prefix}", "ISO 230-2", conditions, heads, rows, results, picture, csv_rows)
+    return Filled(f"Positioning of {prefix}", "ISO 230-2", conditions, 1e6 * sheet.uncertainty, heads, numbers, results,
+                  picture, csv_rows)  # fmt: skip
 
 
 def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
@@ -179,15 +202,15 @@ def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
     names = [DIRECTIONS[each.sense] for each in task.turns]
     grid = np.arange(0.0, 360.0, EVERY)
     curves = [_deviation(run.trace, each, grid) for each in task.turns]
-    rows = [(f"{angle:g}", *(minus(f"{curve[k]:.3f}") for curve in curves))
-            for k, angle in enumerate(grid) if angle % 15 == 0]  # fmt: skip
+    numbers = [(float(angle), *(float(curve[k]) for curve in curves)) for k, angle in enumerate(grid)]
     csv_rows = [("radial deviation", "", f"{angle:g}", name, "", f"{curve[k]:.6f}", "um")
             for name, curve in zip(names, curves, strict=True) for k, angle in enumerate(grid)]  # fmt: skip
     results = _results(figures, symbols, sheet, OF_CIRCLES)
     stem = f"sheet-{task.prefix.replace('#', '-')}"
     picture = contour_picture(run.trace, turn, stem, task.back, task.diagnosis(run.trace))
     heads = ("Angle [°]", *(f"{name} [µm]" for name in names))
-    return Filled(f"Circle {task.prefix}", "ISO 230-4", conditions, heads, rows, results, picture, csv_rows)
+    return Filled(f"Circle {task.prefix}", "ISO 230-4", conditions, 1e6 * sheet.uncertainty, heads, numbers, results,
+                  picture, csv_rows, every=round(PRINTED / EVERY))  # fmt: skip
 
 
 def _deviation(trace: Trace, turn: Turn, grid: np.ndarray) -> np.ndarray:
@@ -204,6 +227,10 @@ def _common(run: Run) -> list[tuple[str, str]]:
 
 def _given(sheet: Sheet) -> list[tuple[str, str]]:
     return [*sheet.conditions.items(), ("Uncertainty U (k = 2)", f"{1e6 * sheet.uncertainty:g} µm")]
+
+
+def _printed(value: float, digits: str) -> str:
+    return "" if math.isnan(value) else minus(f"{value:{digits}}")
 
 
 def table(sheets: Sequence[Filled]) -> str:

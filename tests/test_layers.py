@@ -21,6 +21,7 @@ ORDER = [
     "replay",
     "identify",
     "tune",
+    "uncertainty",
     "analysis",
     "modal",
     "compare",

@@ -176,8 +176,7 @@ def compensate(
         after = run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
         variations = _table(scenario, program, turn, used, applied, law, fmus=fmus, progress=tell) if table else ()
     left_before, left_after = (quality(result.trace, turn) for result in (before, after))
-    figures = _circle_figures(turn, "before", "without", before, left_before)
-    figures |= _circle_figures(turn, "after", "with", after, left_after)
+    figures = circle_figures(turn, before.trace, after.trace)
     T_c = machine.cycles.T_c
     feedforward = Trace(
         np.arange(len(next(iter(torque.values()))), dtype=np.float64) * T_c,
@@ -388,10 +387,15 @@ def _varied(friction: Friction, names: Sequence[str], factor: float) -> Friction
     return friction.model_copy(update=values)
 
 
-def _circle_figures(turn: Turn, name: str, words: str, result: Run, left: Quality) -> dict[str, Figure]:
+def circle_figures(turn: Turn, before: Trace, after: Trace) -> dict[str, Figure]:
+    """Figures of the turn without and with compensation, "before.G", "after.dip_X"."""
+    return _figures_of(turn, "before", "without", before) | _figures_of(turn, "after", "with", after)
+
+
+def _figures_of(turn: Turn, name: str, words: str, trace: Trace) -> dict[str, Figure]:
     """Figures of the turn of a run. name: ahead of the keys; words: "without" or "with", for the meanings."""
-    found = circularity(result.trace, turn)
-    for axis, dip in left.dip.items():
+    found = circularity(trace, turn)
+    for axis, dip in quality(trace, turn).dip.items():
         found[f"dip_{axis}"] = Figure(
             dip * 1e6,
             "um",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import BooleanOptionalAction, Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, out, pairs, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET, UNCERTAIN, Command, Option, out, pairs, settings
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Run a circle without and with friction compensation. A friction model, driven by the speed setpoint
@@ -31,6 +31,7 @@ def compensate(options: Namespace) -> None:
             friction=pairs("friction", options.frictions, "AXIS=FILE.yaml is needed, such as Z=friction_z.yaml"),
             delay=pairs("delay", options.delays, "[AXIS=]VALUE is needed, such as Z='4.2 ms'", common=True),
             table=options.table,
+            uncertain=options.uncertain,
             set=options.overrides,
             fmus=options.fmus,
             out=out,
@@ -57,7 +58,7 @@ COMMAND = Command(
         Option("--table", "",
                "with the runs that show what errors of the delay and of the parameters cost (default: yes)",
                action=BooleanOptionalAction, default=True),
-        settings(), FMUS, QUIET,
+        UNCERTAIN, settings(), FMUS, QUIET,
     ),
     DESCRIPTION,
     EPILOG,

@@ -137,6 +137,12 @@ CONTROL = Option(
 )  # fmt: skip
 
 
+UNCERTAIN = Option(
+    "--uncertain", "N", "repeat with N draws of the machine from the intervals of its identified values; figures get "
+    "intervals, curves bands (N: 19 or more, 39 hold 95 %%; default: none)", type=int, default=0,
+)  # fmt: skip
+
+
 def typed(text: str) -> str:
     """What was typed, also under a locale of few characters, such as C: it is taken for UTF-8 there."""
     try:

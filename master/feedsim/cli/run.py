@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET, Command, Option, out, settings
+from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET, UNCERTAIN, Command, Option, out, settings
 from feedsim.cli.terminal import finish, watching
 from feedsim.errors import InputError
 
@@ -33,6 +33,7 @@ def run(options: Namespace) -> None:
             options.scenario,
             set=options.overrides,
             page=options.page,
+            uncertain=options.uncertain,
             fmus=options.fmus,
             out=out,
             figures=options.figures,
@@ -114,7 +115,7 @@ RUN = Command(
     "run",
     "run a scenario or an SSP; write result.csv, summary.json, report.html and figures",
     run,
-    (*SUBJECT, out("<name of the scenario file>"), FIGURES, PAGE, CONTROL, TRY, QUIET),
+    (*SUBJECT, out("<name of the scenario file>"), FIGURES, PAGE, CONTROL, TRY, UNCERTAIN, QUIET),
     epilog=TRUST,
     job="run",
 )

@@ -18,11 +18,13 @@ from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import SILENT, Watch, announce
 from feedsim.report import compensate as page
+from feedsim.report import uncertainty as intervals
 from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
 from feedsim.scenario.load import read_friction
 from feedsim.trace import write_csv
+from feedsim.uncertainty import Cloud, Known, Uncertainty, check_count, cloud_of, known_of, of_compensation
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,11 +32,12 @@ class CompensateResult(Result):
     """A circle without and with compensation.
 
     compensation: both runs, the feedforward, what errors cost. frictions: axis -> file that the friction of its
-    compensation comes from.
+    compensation comes from. uncertainty: intervals by draws of identified values, where they were asked for.
     """
 
     compensation: Compensation
     frictions: Mapping[str, Path]
+    uncertainty: Uncertainty | None = None
 
     kind = "compensate"
 
@@ -61,11 +64,26 @@ class CompensateResult(Result):
     @property
     def lines(self) -> Sequence[str]:
         """G and glitches before and after."""
-        return [f"  {page.summary_line(self.compensation)}"]
+        return [f"  {page.summary_line(self.compensation)}", *(f"  {line}" for line in self._open)]
+
+    @property
+    def _open(self) -> list[str]:
+        """What identification leaves open, in a sentence."""
+        return [] if self.uncertainty is None else intervals.answers(self.uncertainty, self.figures, self._leading)
+
+    @property
+    def _leading(self) -> list[str]:
+        keys = ["G", *(f"glitch_{axis}" for axis in self.compensation.turn.axes)]
+        return [f"{which}.{key}" for which in ("before", "after") for key in keys]
 
     def report(self) -> Report:
         """Content of report.html."""
-        return page.report_of(self.compensation, self.frictions)
+        report = page.report_of(self.compensation, self.frictions)
+        return (
+            report
+            if self.uncertainty is None
+            else intervals.with_intervals(report, self.uncertainty, self.figures, self._leading)
+        )
 
     def files(self) -> Mapping[str, Content]:
         """The runs with (result.csv) and without compensation, the feedforward, the table where there is one."""
@@ -75,11 +93,16 @@ class CompensateResult(Result):
             page.UNCOMPENSATED: partial(write_csv, trace=done.before.trace),
             page.FEEDFORWARD: partial(write_csv, trace=done.feedforward),
         }
+        if self.uncertainty is not None:
+            curves[intervals.BANDS] = intervals.bands_csv(self.uncertainty)
         return curves | ({page.TABLE: page.table_csv(done)} if done.table else {})
 
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
-        return page.summary(self.compensation, self.frictions, names)
+        content = page.summary(self.compensation, self.frictions, names)
+        return content if self.uncertainty is None else content | {
+            "uncertain": intervals.summary_part(self.uncertainty, self.figures)
+        }  # fmt: skip
 
     def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
         """Raise OutputError unless the result can be written to `folder`."""
@@ -92,6 +115,7 @@ def compensate(
     friction: Mapping[str, File] | None = None,
     delay: Value | Mapping[str, Value] | None = None,
     table: bool = True,
+    uncertain: int = 0,
     set: Changes = None,
     fmus: File | None = None,
     out: File | None = None,
@@ -110,6 +134,8 @@ def compensate(
         delay: of the feedforward behind the speed setpoint [s], of all axes or axis -> delay; of the drive's parameters
             where it is not given. Values may be texts, "4.2 ms". In a mapping "" is all axes.
         table: with the runs that show what errors of the delay and of the parameters cost.
+        uncertain: draws of identified values, 19 or more, which give intervals of figures and bands of contours: of the
+            machine, and of the files of `friction`; 0: none.
         set: changes of the scenario, as behind ``--set``.
         fmus: folder of the archives.
         out: folder that the result is written to; None: :meth:`Result.save` does it.
@@ -117,7 +143,8 @@ def compensate(
         watch: who hears how far the job is.
 
     Raises:
-        InputError: a faulty file, no circle, an axis that rests, a drive whose lag is not known.
+        InputError: a faulty file, no circle, an axis that rests, a drive whose lag is not known, no identified values
+            to draw.
         SimulationError: a unit failed.
         OutputError: `out` cannot be written.
 
@@ -134,16 +161,37 @@ def compensate(
     sets = {axis: read_friction(file) for axis, file in files.items()}
     delays = _delays(delay, program)
     _check_lags(plan, [axis for axis in moving_axes(program) if axis not in delays])
+    known, cloud = _open_of(plan, sets, uncertain)
     archives = None if fmus is None else Path(fmus)
     with kept(out, page.check_writable, watch, [*input_paths(plan), *files.values()], changes, force=force):
         announce(watch, plan.machine, archives, plan.coupling)
         done = compensation.compensate(
             plan, program, frictions=sets, delays=delays, table=table, fmus=archives, progress=watch.progress
         )
-        result = CompensateResult(done, files)
+        uncertainty = None
+        if uncertain:
+            uncertainty = of_compensation(done, known, cloud, uncertain, fmus=archives, progress=watch.progress)
+        result = CompensateResult(done, files, uncertainty)
         if out is not None:
             result.save(out, figures=figures, force=force)
     return result
+
+
+def _open_of(
+    plan: scenarios.Scenario, sets: Mapping[str, scenarios.Friction], count: int
+) -> tuple[dict[str, Known], Cloud | None]:
+    """What is known of sets that compensate, by axis, and of the machine. InputError: of neither anything."""
+    if not count:
+        return {}, None
+    check_count(count)
+    found = {axis: known_of(friction, axis, friction.parameters()) for axis, friction in sets.items()}
+    known = {axis: each for axis, each in found.items() if each.names}
+    try:
+        return known, cloud_of(plan.machine)
+    except InputError:
+        if known:
+            return known, None
+        raise
 
 
 def _file(axis: str, file: File, program: nc.Program) -> Path:

@@ -28,10 +28,12 @@ from feedsim.report.partial import Partial
 from feedsim.report.picture import Picture
 from feedsim.report.results import Content
 from feedsim.report.run.files import summary
-from feedsim.report.run.report import HEADER, draw, is_leading, report_of
+from feedsim.report.run.report import HEADER, is_leading, leading
 from feedsim.report.run.signals import signals_picture
+from feedsim.report.uncertainty import answers
 from feedsim.scenario import Scenario
 from feedsim.trace import Array
+from feedsim.uncertainty import Cloud, Uncertainty, check_count, cloud_of, of_run
 
 if TYPE_CHECKING:
     import pandas
@@ -41,7 +43,8 @@ if TYPE_CHECKING:
 class RunResult(Run, Result):
     """What a run leaves behind, with its figures, pictures and files.
 
-    page: the machine as a page that computes, where the job was asked for it.
+    page: the machine as a page that computes, where the job was asked for it. uncertainty: intervals of the figures by
+    draws of identified values, where it was asked for them.
 
     >>> import feedsim as fs
     >>> result = fs.run("z_positioning.yaml")
@@ -52,13 +55,14 @@ class RunResult(Run, Result):
     """
 
     page: str = ""
+    uncertainty: Uncertainty | None = None
 
     kind = "run"
 
     @classmethod
-    def of(cls, run: Run, page: str = "") -> RunResult:
+    def of(cls, run: Run, page: str = "", uncertainty: Uncertainty | None = None) -> RunResult:
         """A run, as it is."""
-        return cls(**{each.name: getattr(run, each.name) for each in fields(Run)}, page=page)
+        return cls(**{each.name: getattr(run, each.name) for each in fields(Run)}, page=page, uncertainty=uncertainty)
 
     @cached_property
     def figures(self) -> Mapping[str, Figure]:
@@ -88,7 +92,8 @@ class RunResult(Run, Result):
     @property
     def lines(self) -> Sequence[str]:
         """The answers, and the leading figures."""
-        return [*self.answers, f"{self.scenario.name}: {report.summary_line(self, self.figures)}"]
+        said = answers(self.uncertainty, self.figures, leading(self.figures)) if self.uncertainty is not None else []
+        return [*self.answers, *said, f"{self.scenario.name}: {report.summary_line(self, self.figures)}"]
 
     @property
     def inputs(self) -> Sequence[Path]:
@@ -97,16 +102,15 @@ class RunResult(Run, Result):
 
     def report(self) -> Report:
         """Content of report.html."""
-        pictures = draw(self, self.figures, self.causes)
-        return report_of(self, self.figures, pictures, self.causes, page=bool(self.page))
+        return report.page_of(self, self.figures, self.causes, page=bool(self.page), uncertainty=self.uncertainty)
 
     def files(self) -> Mapping[str, Content]:
         """result.csv, log.csv where there is a log, machine.html where the page was asked for."""
-        return report.files_of(self, self.page)
+        return report.files_of(self, self.page, uncertainty=self.uncertainty)
 
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
-        return summary(self, self.figures, names, causes=self.causes)
+        return summary(self, self.figures, names, causes=self.causes, uncertainty=self.uncertainty)
 
     def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
         """Raise OutputError unless the result can be written to `folder`."""
@@ -144,7 +148,16 @@ class RunResult(Run, Result):
         """
         with replacing(force or forced()), in_words_of(control):
             report.check_writable(Path(folder), self.inputs)
-            return report.write(self, self.figures, folder, recorded, self.causes, drawn=figures, page=self.page)
+            return report.write(
+                self,
+                self.figures,
+                folder,
+                recorded,
+                self.causes,
+                drawn=figures,
+                page=self.page,
+                uncertainty=self.uncertainty,
+            )
 
     def __repr__(self) -> str:
         figures = [f"{name} {figure}" for name, figure in self._leading().items()][:4]
@@ -194,6 +207,7 @@ def run(
     *,
     set: Changes = None,
     page: bool = False,
+    uncertain: int = 0,
     fmus: File | None = None,
     out: File | None = None,
     figures: Sequence[str] = (),
@@ -207,13 +221,16 @@ def run(
         scenario: a file, an SSP file, or what :func:`load` has returned.
         set: changes, as behind ``--set``: a mapping, or texts "KEY=VALUE".
         page: with the machine as a page that computes, which the report links.
+        uncertain: draws of the machine from the intervals of its identified values, 19 or more, which give intervals of
+            figures and bands of curves; 0: none.
         fmus: folder of the archives.
         out: folder that the result is written to, row by row while it runs; None: :meth:`RunResult.save` does it.
         figures, force, control: as of :meth:`Result.save`.
         watch: who hears how far the job is.
 
     Raises:
-        InputError: a faulty file, a motion that violates a limit, an evaluation that cannot be made.
+        InputError: a faulty file, a motion that violates a limit, an evaluation that cannot be made, no identified
+            values to draw.
         SimulationError: a unit failed; where `out` is given the rows up to there are kept.
         OutputError: `out` cannot be written.
 
@@ -226,6 +243,10 @@ def run(
         analysis.check(subject.plan, subject.program)  # an evaluation that cannot be made is refused before the run
         if report.in_workbook(subject.plan):
             report.workbook_needed()
+        cloud = None
+        if uncertain:
+            check_count(uncertain)
+            cloud = cloud_of(subject.plan.machine)
         if page:
             from feedsim.page.content import content
 
@@ -235,9 +256,9 @@ def run(
             for sentence in cosim.executed(subject.plan.machine, subject.fmus, subject.plan.coupling):
                 watch.announce(subject.named(sentence))
             if out is None:
-                return _run(subject, None, page, watch)
+                return _with_draws(_run(subject, None, page, watch), subject, cloud, uncertain, watch)
             with _rows_kept(report.growing(out), watch) as recorded:
-                result = _run(subject, recorded, page, watch)
+                result = _with_draws(_run(subject, recorded, page, watch), subject, cloud, uncertain, watch)
                 result.save(out, figures=figures, force=force, control=control, recorded=recorded)
     return result
 
@@ -257,6 +278,13 @@ def _run(subject: Opened, recorded: Partial | None, page: bool, watch: Watch) ->
     from feedsim.page.html import html
 
     return RunResult.of(done, html(done, fmus=subject.fmus))
+
+
+def _with_draws(result: RunResult, subject: Opened, cloud: Cloud | None, count: int, watch: Watch) -> RunResult:
+    """The run with what identification leaves open, where that is asked for."""
+    if cloud is None:
+        return result
+    return replace(result, uncertainty=of_run(result, cloud, count, fmus=subject.fmus, progress=watch.progress))
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from feedsim.report.run.files import summary as summary_of_run
 from feedsim.report.run.report import motions_section, provenance
 from feedsim.report.sections import figures_footer, figures_section, files_table
 from feedsim.report.style import remarked
+from feedsim.report.uncertainty import BANDS
 
 RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE = "result.csv", "uncompensated.csv", "feedforward.csv", "compensation.csv"
 
@@ -30,7 +31,9 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, REPORT, SUMMARY), inputs, kind="compensate")
+    check_place(
+        directory, (RESULT, UNCOMPENSATED, FEEDFORWARD, TABLE, BANDS, REPORT, SUMMARY), inputs, kind="compensate"
+    )
 
 
 def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:

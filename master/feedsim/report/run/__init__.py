@@ -5,7 +5,7 @@ Start with files.py, then report.py, the page; pose.py has the plant's pose.
 """
 
 from feedsim.report.provenance import input_paths
-from feedsim.report.run.files import check_writable, files_of, growing, write
+from feedsim.report.run.files import check_writable, files_of, growing, page_of, write
 from feedsim.report.run.report import answers, summary_line
 from feedsim.report.run.sheet import in_workbook
 from feedsim.report.run.workbook import needed as workbook_needed
@@ -17,6 +17,7 @@ __all__ = [
     "growing",
     "in_workbook",
     "input_paths",
+    "page_of",
     "summary_line",
     "workbook_needed",
     "write",

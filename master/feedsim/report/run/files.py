@@ -21,6 +21,7 @@ from feedsim.analysis import (
 from feedsim.cosim import Run
 from feedsim.motions.circular import DIRECTIONS
 from feedsim.report.changes import changes_part
+from feedsim.report.content import Report
 from feedsim.report.page import sheet_html
 from feedsim.report.partial import PARTIAL, Partial
 from feedsim.report.provenance import (
@@ -42,14 +43,17 @@ from feedsim.report.run.report import (
     RESULT,
     answers,
     draw,
+    leading,
     real_time_factor,
     report_of,
     signal_unit,
 )
 from feedsim.report.run.workbook import workbook
+from feedsim.report.uncertainty import BANDS, bands_csv, summary_part, with_intervals
 from feedsim.scenario import Logging
 from feedsim.trace import Trace, write_csv
 from feedsim.tune import of_run
+from feedsim.uncertainty import Uncertainty
 
 FORMAT = 1
 
@@ -61,7 +65,7 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """
     check_place(
         directory,
-        (RESULT, REPORT, SUMMARY, LOG, PAGE, sheet.HTML, sheet.CSV, sheet.XLSX, PARTIAL),
+        (RESULT, REPORT, SUMMARY, LOG, PAGE, BANDS, sheet.HTML, sheet.CSV, sheet.XLSX, PARTIAL),
         inputs,
         kind="run",
         own=(PARTIAL,),
@@ -82,24 +86,39 @@ def write(
     *,
     drawn: Sequence[str] = (),
     page: str = "",
+    uncertainty: Uncertainty | None = None,
 ) -> tuple[Path, ...]:
     """Write result.csv, summary.json, report.html, log.csv, if there is one, and figures; returns their paths.
 
     figures: as from ``analysis.evaluate``. recorded: the run's rows where they have been written already, in the same
     directory; the file becomes result.csv, or stays as it is where the results cannot be written. Files of an earlier
     run are replaced. causes: as from ``analysis.diagnoses``, which is asked where they are not given. drawn: kinds of
-    files that figures/* are drawn as. page: the machine as a page that computes, which the report links. Raises
-    OutputError.
+    files that figures/* are drawn as. page: the machine as a page that computes, which the report links. uncertainty:
+    what identification leaves open. Raises OutputError.
     """
-    files = files_of(run, page, recorded)
+    files = files_of(run, page, recorded, uncertainty)
     causes = diagnoses(run) if causes is None else causes
-    report = report_of(run, figures, draw(run, figures, causes), causes, page=bool(page))
-    return write_report(
-        directory, report, partial(summary, run, figures, causes=causes), files, drawn, kind="run", own=(PARTIAL,)
-    )
+    report = page_of(run, figures, causes, page=bool(page), uncertainty=uncertainty)
+    content = partial(summary, run, figures, causes=causes, uncertainty=uncertainty)
+    return write_report(directory, report, content, files, drawn, kind="run", own=(PARTIAL,))
 
 
-def files_of(run: Run, page: str = "", recorded: Partial | None = None) -> dict[str, Content]:
+def page_of(
+    run: Run,
+    figures: Mapping[str, Figure],
+    causes: Mapping[str, Diagnosis],
+    *,
+    page: bool,
+    uncertainty: Uncertainty | None,
+) -> Report:
+    """Content of the report, with the intervals where there are some."""
+    report = report_of(run, figures, draw(run, figures, causes), causes, page=page)
+    return report if uncertainty is None else with_intervals(report, uncertainty, figures, leading(figures))
+
+
+def files_of(
+    run: Run, page: str = "", recorded: Partial | None = None, uncertainty: Uncertainty | None = None
+) -> dict[str, Content]:
     """Name -> content of all files besides the report; arguments as of :func:`write`."""
 
     def result(path: Path) -> Path | None:
@@ -112,6 +131,8 @@ def files_of(run: Run, page: str = "", recorded: Partial | None = None) -> dict[
     files: dict[str, Content] = {RESULT: result}
     if run.log is not None:
         files[LOG] = partial(write_csv, trace=run.log)
+    if uncertainty is not None:
+        files[BANDS] = bands_csv(uncertainty)
     if page:
         files[PAGE] = page
     if sheets := sheet.sheets_of(run):
@@ -123,7 +144,11 @@ def files_of(run: Run, page: str = "", recorded: Partial | None = None) -> dict[
 
 
 def summary(
-    run: Run, figures: Mapping[str, Figure], files: Sequence[str], causes: Mapping[str, Diagnosis] | None = None
+    run: Run,
+    figures: Mapping[str, Figure],
+    files: Sequence[str],
+    causes: Mapping[str, Diagnosis] | None = None,
+    uncertainty: Uncertainty | None = None,
 ) -> dict[str, Any]:
     """Content of summary.json; a figure that could not be determined has the value null."""
     causes = causes or {}
@@ -133,6 +158,7 @@ def summary(
         "answer": answers(run, figures, causes),
         "warnings": [*run.warnings, *doubts(figures, causes)],
         "figures": figures_part(figures),
+        **({"uncertain": summary_part(uncertainty, figures)} if uncertainty is not None else {}),
         "changes": changes_part(of_run(run, causes)),
         "circles": _circles(run, causes),
         "diagnosis": {prefix: diagnosis_part(diagnosis) for prefix, diagnosis in causes.items()},

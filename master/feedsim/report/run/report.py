@@ -285,15 +285,16 @@ def real_time_factor(run: Run) -> float | None:
 
 def summary_line(run: Run, figures: Mapping[str, Figure]) -> str:
     """The run in one line: its leading figures, and how fast it was."""
-    leading = [
-        f"{name} {figure}"
-        for name, figure in figures.items()
-        if is_leading(name, LINE) and not _has_peak(name, figures)
-    ]
+    found = [f"{name} {figures[name]}" for name in leading(figures)]
     factor = real_time_factor(run)
     digits = ".0f" if factor is not None and factor >= 10 else ".2g"
     speed = f" ({factor:{digits}} x real time)" if factor is not None else ""
-    return ", ".join([*leading, f"{run.program.duration:.4g} s simulated in {run.wall_time:.3g} s{speed}"])
+    return ", ".join([*found, f"{run.program.duration:.4g} s simulated in {run.wall_time:.3g} s{speed}"])
+
+
+def leading(figures: Mapping[str, Figure]) -> list[str]:
+    """Names of the figures that say most, a reversal by one height."""
+    return [name for name in figures if is_leading(name, LINE) and not _has_peak(name, figures)]
 
 
 def is_leading(name: str, among: Sequence[str]) -> bool:

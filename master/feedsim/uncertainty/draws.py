@@ -1,0 +1,233 @@
+"""Draws of a machine from the intervals and correlations that its identified values have.
+
+A friction file of feedsim identify or identify-drive holds, in its group `identified`, an interval of 95 % of every
+estimated parameter and their correlation matrix. Together they are the covariance of a normal distribution. A draw
+outside the range of a parameter, or with less static than Coulomb friction, is drawn anew: the normal distribution,
+truncated to what is possible.
+
+A value that the machine file has otherwise than its identification was set by somebody: it does not vary.
+
+Where the inertia was identified together with the drive, all torques of a draw are divided by its inertia over that of
+the machine. The equation of motion of an axis, its elastic modes included, has torques over inertia only. So the motion
+is the one of the drawn inertia, and the table of modes stays as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim import units
+from feedsim.errors import InputError
+from feedsim.estimation.interval import NORMAL_95
+from feedsim.fields import Quantity
+from feedsim.scenario import Drive, Friction, Machine
+
+Array = NDArray[np.float64]
+SAME = 1e-3  # of the standard deviation: a value that is nearer to that of its identification is that value
+ATTEMPTS = 10_000  # draws until one is possible
+LOAD, INERTIA = "constant_load", "inertia"
+# Symbol of the correlation matrix -> key of the group `identified`, of what is no parameter of the friction.
+BESIDE = {"M_0": LOAD, "J": INERTIA}
+UNITS = {LOAD: "N.m", INERTIA: "kg.m2"}
+TORQUES = ("sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "F_log")  # what friction multiplies a torque with
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """How well the values of an axis are known.
+
+    names: keys of friction, "drive.K_p" and the like of the drive, "constant_load", "inertia". mean (P,), covariance
+    (P, P): SI. fixed: names that have an interval and were set otherwise.
+    """
+
+    axis: str
+    names: tuple[str, ...]
+    mean: Array
+    covariance: Array
+    fixed: tuple[str, ...] = ()
+
+    @property
+    def sigma(self) -> Array:
+        """(P,) standard deviations."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    def draw(self, random: np.random.Generator) -> dict[str, float]:
+        """A draw of all values, whether possible or not."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        return dict(zip(self.names, map(float, self.mean + root @ random.normal(size=len(self.names))), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """A machine and what is known of its values, by axis."""
+
+    machine: Machine
+    known: Mapping[str, Known]
+
+    def draws(self, count: int, seed: int = 1) -> Iterator[Machine]:
+        """Machines, the same ones for the same seed. InputError: the intervals of an axis exclude what is possible."""
+        random = np.random.default_rng(seed)
+        for _ in range(count):
+            axes = dict(self.machine.axes)
+            for axis, known in self.known.items():
+                axes[axis] = _possible(axes[axis], known, random)
+            yield self.machine.model_copy(update={"axes": axes})
+
+
+def cloud_of(machine: Machine, axes: Sequence[str] | None = None) -> Cloud:
+    """What the files of a machine say of its values. axes: that may vary; None: all.
+
+    Raises InputError: no axis has identified values with intervals.
+    """
+    found = {}
+    for name in axes or machine.axes:
+        axis = machine.axes[name]
+        if not isinstance(axis.friction, Friction):
+            continue
+        present: dict[str, float] = {LOAD: axis.constant_load}
+        present |= {key: float(value) for key, value in axis.friction.parameters().items()}
+        if isinstance(axis.drive, Drive):
+            present |= {
+                f"drive.{key}": float(value)
+                for key, value in axis.drive.parameters().items()
+                if isinstance(value, int | float) and not isinstance(value, bool)
+            }
+        known = known_of(axis.friction, name, present)
+        if known.names:
+            found[name] = known
+    if not found:
+        raise InputError(
+            f"{machine.name}: no axis has identified values with intervals, which draws could be made from; give an "
+            "axis the friction file of feedsim identify or identify-drive"
+        )
+    return Cloud(machine, found)
+
+
+def known_of(friction: Friction, axis: str, present: Mapping[str, Any]) -> Known:
+    """What a friction file says of its values. present: key -> value [SI] that is in use.
+
+    Raises InputError: the group `identified` is not as feedsim writes it.
+    """
+    identified = friction.identified
+    try:
+        return _known(identified, axis, present)
+    except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
+        raise InputError(
+            f"axis {axis}: the group identified of its friction is not as feedsim identify writes it: {error}"
+        ) from None
+
+
+def _known(identified: Mapping[str, Any], axis: str, present: Mapping[str, Any]) -> Known:
+    ends: dict[str, tuple[float, float]] = {}
+    for name, one in (*identified.get("parameters", {}).items(), *((key, identified.get(key, {})) for key in UNITS)):
+        if "interval" in one:
+            low, high = (_si(end, name) for end in one["interval"])
+            ends[name] = low, high
+    names: list[str] = []
+    fixed: list[str] = []
+    for name, (low, high) in ends.items():
+        spread = (high - low) / (2 * NORMAL_95)
+        if not spread > 0:
+            continue
+        same = name == INERTIA or abs(present.get(name, np.inf) - (low + high) / 2) <= SAME * spread
+        (names if same else fixed).append(name)
+    sigma = np.array([(ends[name][1] - ends[name][0]) / (2 * NORMAL_95) for name in names])
+    mean = np.array([present.get(name, sum(ends[name]) / 2) for name in names], dtype=np.float64)
+    correlation = np.eye(len(names))
+    known = identified.get("correlation", {})
+    of = [BESIDE.get(name, name) for name in known.get("names", ())]
+    matrix = np.array(known.get("matrix", ()), dtype=np.float64).reshape(len(of), len(of))
+    shared = [(i, of.index(name)) for i, name in enumerate(names) if name in of]
+    for i, k in shared:
+        for j, m in shared:
+            correlation[i, j] = 1.0 if i == j else (matrix[k, m] + matrix[m, k]) / 2
+    return Known(axis, tuple(names), mean, correlation * np.outer(sigma, sigma), tuple(fixed))
+
+
+def _si(end: str | float, name: str) -> float:
+    """An end of an interval, as it was written: a number, or one with a unit."""
+    if not isinstance(end, str):
+        return float(end)
+    return units.parse(end, unit_of(name))
+
+
+def unit_of(name: str) -> str:
+    """SI unit of a value by its name. KeyError: no such value."""
+    if name in UNITS:
+        return UNITS[name]
+    model, key = (Drive, name.removeprefix("drive.")) if name.startswith("drive.") else (Friction, name)
+    quantity = Quantity.of(model.model_fields[key])
+    return quantity.unit if quantity is not None else units.DIMENSIONLESS
+
+
+def drawn_friction(friction: Friction, known: Known, random: np.random.Generator) -> Friction:
+    """A draw of a friction alone, as compensations use it. Raises InputError as :meth:`Cloud.draws`."""
+    for _ in range(ATTEMPTS):
+        drawn = known.draw(random)
+        if (made := _friction(friction, drawn, 1.0)) is not None:
+            return made
+    raise _impossible(known)
+
+
+def _possible(axis: Any, known: Known, random: np.random.Generator) -> Any:
+    """The axis with a draw that is possible."""
+    for _ in range(ATTEMPTS):
+        drawn = known.draw(random)
+        inertia = float(known.mean[known.names.index(INERTIA)]) if INERTIA in known.names else 0.0
+        if inertia and drawn[INERTIA] <= 0:
+            continue
+        factor = inertia / drawn[INERTIA] if inertia else 1.0
+        friction, drive = _friction(axis.friction, drawn, factor), _drive(axis.drive, drawn, factor)
+        if friction is not None and drive is not None:
+            load = factor * drawn.get(LOAD, axis.constant_load)
+            return axis.model_copy(update={"friction": friction, "drive": drive, "constant_load": load})
+    raise _impossible(known)
+
+
+def _impossible(known: Known) -> InputError:
+    return InputError(
+        f"axis {known.axis}: of {ATTEMPTS} draws from the intervals of its identified values none is possible; their "
+        "values lie outside of the ranges of the parameters"
+    )
+
+
+def _friction(friction: Friction, drawn: Mapping[str, float], factor: float) -> Friction | None:
+    """With the values drawn, its torques times `factor`; None where that is no friction."""
+    values = {name: value for name, value in drawn.items() if name in Friction.model_fields}
+    for name in TORQUES if factor != 1 else ():
+        values[name] = factor * values.get(name, float(getattr(friction, name)))
+    if not _within(Friction, values):
+        return None
+    made = friction.model_copy(update=values)
+    # Where the identification found no difference of both, F_S is no value of its own and follows F_C.
+    if "F_S" not in values and friction.F_S == friction.F_C:
+        made = made.model_copy(update={"F_S": made.F_C})
+    return made if made.F_S >= made.F_C else None
+
+
+def _drive(drive: Any, drawn: Mapping[str, float], factor: float) -> Any:
+    """With the values drawn, its torques times `factor`; None where that is no drive."""
+    if not isinstance(drive, Drive):
+        return drive
+    values = {name.removeprefix("drive."): value for name, value in drawn.items() if name.startswith("drive.")}
+    if factor != 1:
+        values["K_p"] = factor * values.get("K_p", drive.K_p)
+        values["M_max"] = factor * drive.M_max
+    return drive.model_copy(update=values) if _within(Drive, values) else None
+
+
+def _within(model: type[Friction | Drive], values: Mapping[str, float]) -> bool:
+    """Whether all values are in the ranges of their parameters."""
+    for name, value in values.items():
+        quantity = Quantity.of(model.model_fields[name])
+        if quantity is None:
+            continue
+        if not quantity.minimum <= value <= quantity.maximum or value <= quantity.above:
+            return False
+    return True

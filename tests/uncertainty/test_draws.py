@@ -1,0 +1,84 @@
+"""Draws of a machine: their moments, what they leave alone, what is refused; intervals by order."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from identified_sets import CIRCLE, write_set
+
+from feedsim.errors import InputError
+from feedsim.scenario import Friction, load
+from feedsim.uncertainty import cloud_of, interval, share_of
+
+
+def drawn(file: Path, count: int, *more: str) -> list[Friction]:
+    machine = load(CIRCLE, [f"machine.axes.Z.friction={file}", *more]).machine
+    return [each.shipped_friction("Z", "a test") for each in cloud_of(machine).draws(count)]
+
+
+def test_draws_have_the_covariance_of_the_file(tmp_path: Path) -> None:
+    """Half intervals of 1.96 standard deviations; 4000 draws: of a correlation to 0.02, of a spread to 2.3 %."""
+    draws = drawn(write_set(tmp_path, sigma=0.03, correlation=-0.6), 4000)
+    F_C, sigma_0, F_S = (np.array([getattr(each, name) for each in draws]) for name in ("F_C", "sigma_0", "F_S"))
+    assert F_C.mean() == pytest.approx(1.6, rel=0.0015)
+    assert F_C.std() == pytest.approx(0.03 * 1.6, rel=0.04)
+    assert np.corrcoef(F_C, sigma_0)[0, 1] == pytest.approx(-0.6, abs=0.03)
+    assert abs(np.corrcoef(F_S, sigma_0)[0, 1]) < 0.05
+
+
+def test_draws_are_possible(tmp_path: Path) -> None:
+    """Intervals that reach beyond what is possible are cut there: F_S at least F_C, gamma at most 1, sigma_1 from 0."""
+    draws = drawn(write_set(tmp_path, sigma=0.4), 500)
+    assert all(each.F_S >= each.F_C > 0 and each.sigma_1 >= 0 and 0 < each.gamma <= 1 for each in draws)
+    assert np.std([each.sigma_1 for each in draws]) > 0.2 * 0.8
+    for each in draws[:20]:
+        Friction.model_validate(dict(each))  # the check of machine files
+
+
+def test_draws_are_the_same_in_every_call(tmp_path: Path) -> None:
+    file = write_set(tmp_path)
+    assert drawn(file, 3) == drawn(file, 5)[:3]
+
+
+def test_a_value_that_was_set_does_not_vary(tmp_path: Path) -> None:
+    draws = drawn(write_set(tmp_path), 5, "machine.axes.Z.friction.F_C=1.7 N.m")
+    assert {each.F_C for each in draws} == {1.7}
+    assert len({each.sigma_0 for each in draws}) == 5
+
+
+def test_the_constant_load_varies_where_it_is_the_identified_one(tmp_path: Path) -> None:
+    file = write_set(tmp_path, load=0.5)
+
+    def loads(*more: str) -> set[float]:
+        machine = load(CIRCLE, [f"machine.axes.Z.friction={file}", *more]).machine
+        return {each.axes["Z"].constant_load for each in cloud_of(machine).draws(4)}
+
+    assert loads() == {0.0}
+    assert len(loads("machine.axes.Z.constant_load=0.5 N.m")) == 4
+
+
+def test_what_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no axis has identified values with intervals"):
+        cloud_of(load(CIRCLE).machine)
+    file = write_set(tmp_path)
+    content = yaml.safe_load(file.read_text())
+    content["identified"]["correlation"]["matrix"] = [[1.0]]
+    file.write_text(yaml.safe_dump(content))
+    with pytest.raises(InputError, match="axis Z: the group identified of its friction is not as feedsim identify"):
+        cloud_of(load(CIRCLE, [f"machine.axes.Z.friction={file}"]).machine)
+
+
+def test_intervals_hold_their_share_whatever_the_distribution() -> None:
+    """Of normal, uniform and very skew draws: the mean over 2000 sets is that of the order statistics, to 0.5 %."""
+    random = np.random.default_rng(5)
+    for make in (random.normal, random.uniform, random.exponential):
+        for count in (19, 39, 80):
+            low, high = interval(make(size=(count, 2000)))
+            further = make(size=(50, 2000))
+            assert np.mean((low < further) & (further < high)) == pytest.approx(share_of(count), abs=0.005)
+    assert share_of(19) == 0.9
+    low, high = interval(np.arange(1.0, 40.0))
+    assert (float(low), float(high)) == pytest.approx((1.0, 39.0), rel=1e-12)

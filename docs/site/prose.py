@@ -36,9 +36,12 @@ def blocks(text: str) -> Iterator[Block]:
     """The prose of a Markdown page."""
     fence, math, comment = "", False, False
     begun, lines = 0, list[str]()
+    inside = False  # an entry of a list, whose paragraphs are indented
     for number, line in enumerate([*text.splitlines(), ""], start=1):
         opening = _FENCE.match(line)
-        skipped = bool(fence) or math or comment
+        inside = bool(_ITEM.match(line)) or (inside and line[:1] in ("", " "))
+        code = line.startswith("    ") and not lines and not inside  # a block that is indented, without a fence
+        skipped = bool(fence) or math or comment or code
         if opening and not (math or comment):
             if not fence:
                 fence = opening[1][:3]

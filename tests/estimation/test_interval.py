@@ -10,7 +10,7 @@ import pytest
 from scipy import signal, stats
 
 from feedsim.estimation import covariance, interval
-from feedsim.estimation.covariance import Covariance, correlation_length, correlation_time, stretched
+from feedsim.estimation.covariance import Covariance, correlation_length, stretched
 from feedsim.identify.result import Estimate, Status
 
 ROWS, RUNS, POLE = 2000, 400, 0.9
@@ -49,14 +49,25 @@ def test_the_interval_is_that_of_a_normal_distribution() -> None:
     assert interval.half_width(2.0) == pytest.approx(2 * stats.norm.ppf(0.975), rel=1e-6)
 
 
-@pytest.mark.parametrize("length", [correlation_time, correlation_length])
-def test_rows_that_count_as_one(length: object) -> None:
+@pytest.mark.parametrize("of_mean", [True, False])
+def test_rows_that_count_as_one(of_mean: bool) -> None:
     """Of a process of first order with the pole a: (1 + a)/(1 - a) rows, and one of white noise."""
-    assert callable(length)
     noise = np.random.default_rng(5).standard_normal(400_000)
-    assert length(noise) == pytest.approx(1.0, abs=0.1)
+    assert correlation_length(noise, of_mean=of_mean) == pytest.approx(1.0, abs=0.1)
     # The estimate of a sum over some hundred lags scatters by a few percent on so many rows.
-    assert length(signal.lfilter([1.0], [1.0, -POLE], noise)) == pytest.approx((1 + POLE) / (1 - POLE), rel=0.12)
+    correlated = signal.lfilter([1.0], [1.0, -POLE], noise)
+    assert correlation_length(correlated, of_mean=of_mean) == pytest.approx((1 + POLE) / (1 - POLE), rel=0.12)
+
+
+def test_rows_that_count_as_one_where_errors_swing() -> None:
+    """A sine of P rows: its correlation is a cosine, whose sum up to the first zero is P/(2 pi); over all it is 0."""
+    wave = np.sin(2 * np.pi * np.arange(40_000) / 400)
+    assert correlation_length(wave) == pytest.approx(2 * 400 / (2 * np.pi), rel=0.01)
+    assert correlation_length(wave, of_mean=True) < 0.01 * len(wave)
+
+
+def test_an_offset_is_correlated_over_all_rows() -> None:
+    assert correlation_length(np.ones(1000)) == pytest.approx(1000, rel=0.3)
 
 
 def test_the_covariance_is_the_scatter_of_many_fits() -> None:

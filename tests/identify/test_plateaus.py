@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from feedsim.estimation.covariance import correlation_length
 from feedsim.identify import averages
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
@@ -178,7 +179,9 @@ def test_windows_and_derivatives() -> None:
     parabola = 1e3 + 2.0 * time + 3.0 * time**2
     assert averages.derivative(weights, parabola, 0.01, 1) == pytest.approx(2.0 + 6.0 * 0.5)
     assert averages.derivative(weights, parabola, 0.01, 2) == pytest.approx(6.0)
-    assert averages.correlation_time(np.random.default_rng(1).standard_normal(4000)) == pytest.approx(1.0, abs=0.15)
+    assert correlation_length(np.random.default_rng(1).standard_normal(4000), of_mean=True) == pytest.approx(
+        1.0, abs=0.15
+    )
     assert averages.resolution(np.array([0.1, 0.3, 0.1, 0.7])) == pytest.approx(0.2)
     noise = 0.02 * np.random.default_rng(2).standard_normal(4000)
     assert averages.white(np.sin(np.arange(4000) * 0.01) + noise) == pytest.approx(0.02, rel=0.05)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedsim.identify.fit import Parameter, Prior, fit
+from feedsim.estimation.fit import fit
+from feedsim.estimation.parameter import Parameter, Prior
 from feedsim.identify.uncertainty import drift_covariance
 
 Array = NDArray[np.float64]

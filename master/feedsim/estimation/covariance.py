@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-LAGS_PER_TIME = 5.0  # lags that are summed, in correlation times (Sokal's automatic window)
+LAGS_PER_LENGTH = 5.0  # lags that are summed, in correlation lengths (Sokal's automatic window)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,38 +50,33 @@ class Covariance:
 def stretched(matrix: Array, residuals: Array, least: float, length: Callable[[Array], float]) -> Array:
     """(P, P) middle of residuals (N,) that are correlated over a stretch of rows.
 
-    matrix (N, P): slopes. least: rms that the residuals have at least. length: how many neighbouring rows say the same.
+    matrix (N, P): slopes. least: rms that the residuals have at least. length: rows that count as one, of residuals
+    less their mean.
     """
     variance = max(float(np.mean(residuals**2)), least**2)
-    return np.asarray(matrix.T @ matrix * length(residuals) * variance)
+    return np.asarray(matrix.T @ matrix * length(residuals - np.mean(residuals)) * variance)
 
 
-def correlation_time(residuals: Array) -> float:
-    """Rows that count as one, >= 1: 1 + twice the sum of the autocorrelation.
+def correlation_length(residuals: Array, *, of_mean: bool = False) -> float:
+    """Rows (>= 1) that count as one of residuals (N,) about 0: 1 + twice the sum of their autocorrelation.
 
-    Summed up to the first lag that is LAGS_PER_TIME times the sum so far (A. Sokal's window). Sums below 1 (ring-down)
-    are not believed: they would promise a mean better than white noise of the same scatter gives.
+    Summed up to the first lag without correlation: errors of a model swing, what lies behind has both signs, and it
+    would shorten the length without a reason. An offset that is left is correlated over all rows.
+
+    of_mean: of noise whose mean is asked for. Swings cancel there, so that both signs count, up to the first lag that
+    is LAGS_PER_LENGTH times the sum so far (A. Sokal's window). Sums below 1 (ring-down) are not believed: they would
+    promise a mean better than white noise of the same scatter gives.
     """
-    size = len(residuals)
-    correlation = autocorrelation(residuals - np.mean(residuals))[: max(size // 2, 1)]
-    if not correlation[0] > 0:
-        return 1.0
-    sums = 2 * np.cumsum(correlation / correlation[0]) - 1
-    enough = np.flatnonzero(np.arange(len(sums)) >= LAGS_PER_TIME * np.maximum(sums, 1.0))
-    return max(float(sums[enough[0]] if len(enough) else np.max(sums)), 1.0)
-
-
-def correlation_length(residuals: Array) -> float:
-    """As :func:`correlation_time` for errors of a model, which swing: summed up to where the correlation ends.
-
-    What lies behind the first lag without correlation has both signs, and would shorten the length without a reason.
-    """
-    correlation = autocorrelation(residuals - np.mean(residuals))[: len(residuals) // 2]
+    correlation = autocorrelation(residuals)[: max(len(residuals) // 2, 1)]
     if not correlation[0] > 0:
         return 1.0
     correlation = correlation / correlation[0]
-    end = np.flatnonzero(correlation <= 0)
-    return max(1.0, 1.0 + 2.0 * float(np.sum(correlation[1 : end[0] if len(end) else None])))
+    if not of_mean:
+        ends = np.flatnonzero(correlation <= 0)
+        return max(1.0, 1.0 + 2.0 * float(np.sum(correlation[1 : ends[0] if len(ends) else None])))
+    sums = 2 * np.cumsum(correlation) - 1
+    ends = np.flatnonzero(np.arange(len(sums)) >= LAGS_PER_LENGTH * np.maximum(sums, 1.0))
+    return max(float(sums[ends[0]] if len(ends) else np.max(sums)), 1.0)
 
 
 def autocorrelation(residuals: Array) -> Array:

@@ -6,7 +6,7 @@ from math import hypot
 
 import numpy as np
 
-from feedsim.estimation.covariance import correlation_time
+from feedsim.estimation.covariance import correlation_length
 from feedsim.identify.record import Array
 
 
@@ -69,7 +69,7 @@ def mean(signal: Array, weights: Array, step: float, *, trend: bool = False) -> 
         along = np.arange(len(signal)) - 0.5 * (len(signal) - 1)
         residuals = residuals - np.mean(residuals) - along * np.sum(along * residuals) / np.sum(along**2)
     scatter = float(np.std(residuals))
-    variance = scatter**2 * correlation_time(residuals) * float(np.sum(weights**2))
+    variance = scatter**2 * correlation_length(residuals - np.mean(residuals), of_mean=True) * float(np.sum(weights**2))
     if step > 0:
         variance += step**2 / 12 * max(float(np.exp(-4 * np.pi**2 * (scatter / step) ** 2)), 0.1)
     return middle, float(np.sqrt(variance))

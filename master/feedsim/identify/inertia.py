@@ -17,8 +17,8 @@ from math import ceil
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.estimation.fit import correlation
 from feedsim.identify.averages import white
-from feedsim.identify.fit import correlation
 from feedsim.identify.parameters import RIGID, estimate, torque
 from feedsim.identify.record import Array, Record, runs
 from feedsim.identify.result import Correlation, Estimate

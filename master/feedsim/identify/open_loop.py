@@ -28,8 +28,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feedsim.errors import InputError, SimulationError
+from feedsim.estimation.fit import Fit, fit
 from feedsim.estimation.interval import NORMAL_95
-from feedsim.identify.fit import Fit, Parameter, Residuals, fit
+from feedsim.estimation.least_squares import Model
+from feedsim.estimation.parameter import Parameter
 from feedsim.identify.parameters import FRICTION, level
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Balance, Drift, Estimate
@@ -259,7 +261,7 @@ class _OpenLoop:
 
 
 def _load_rates(
-    residuals: Residuals,
+    residuals: Model,
     axes: Sequence[_OpenLoop],
     old: Mapping[str, float],
     new: Mapping[str, float],
@@ -366,7 +368,7 @@ def _directions(model: RecordTorque) -> set[float]:
 class _Solver:
     """The least squares from `values`; below: F_C stays below F_S, which is held."""
 
-    def __init__(self, residuals: Residuals, values: Mapping[str, float], below: bool = False) -> None:
+    def __init__(self, residuals: Model, values: Mapping[str, float], below: bool = False) -> None:
         self._residuals, self._values, self._below = residuals, dict(values), below
 
     def best(

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.estimation.fit import correlation
+from feedsim.estimation.parameter import Prior
 from feedsim.identify.advice import advice
-from feedsim.identify.fit import Prior, correlation
 from feedsim.identify.identifiability import (
     GOES_WITH,
     LEAST_EXPLAINED,
@@ -30,7 +31,7 @@ from feedsim.identify.motion import noise_of
 from feedsim.identify.parameters import FIXED, KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
-from feedsim.identify.search import FOLLOWED, Search, Solution, grid, joined, sliding, spread, with_excess
+from feedsim.identify.search import FOLLOWED, Search, Solution, grid, sliding, spread, with_excess
 from feedsim.identify.torque import RecordTorque, deflection, models
 from feedsim.identify.uncertainty import FLOOR, Uncertainty, limits, uncertainty
 
@@ -214,7 +215,7 @@ def _known(
             held["v_log"] = "held", "a third of the typical speed, so that the logarithm bends where the axis moves"
     values.setdefault("sigma_0", 0.0)
     told = tuple(name for one in priors for name in one.names)
-    return _Known(values, joined(priors), told, held, drift)
+    return _Known(values, Prior.joined(priors), told, held, drift)
 
 
 def _both_directions(fine: Sequence[RecordTorque]) -> bool:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feedsim.identify.fit import Fit, Parameter, Prior, fit
+from feedsim.estimation.covariance import correlation_length
+from feedsim.estimation.fit import Fit, fit
+from feedsim.estimation.parameter import Parameter, Prior
 from feedsim.identify.inertia import SLOW
 from feedsim.identify.parameters import EXCESS, inner, inner_to_outer, reversal_ranges
 from feedsim.identify.record import Array
@@ -27,18 +29,6 @@ def with_excess(prior: Prior) -> Prior:
     turn[prior.names.index("F_S"), prior.names.index("F_C")] = -1
     names = tuple(inner(name) for name in prior.names)
     return Prior(names, turn @ prior.values, turn @ prior.covariance @ turn.T)
-
-
-def joined(priors: Sequence[Prior]) -> Prior:
-    """Independent priors as one."""
-    names = tuple(name for prior in priors for name in prior.names)
-    covariance = np.zeros((len(names), len(names)))
-    at = 0
-    for prior in priors:
-        size = len(prior.names)
-        covariance[at : at + size, at : at + size] = prior.covariance
-        at += size
-    return Prior(names, np.concatenate([np.zeros(0), *(prior.values for prior in priors)]), covariance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,31 +115,26 @@ class Search:
             return np.concatenate(self.residuals(*full(moved)))
 
         found = fit(
-            residuals, parameters, prior=joined([self.prior, loose]), difference=1e-5, tolerance=tolerance, limit=limit
+            residuals,
+            parameters,
+            prior=Prior.joined([self.prior, loose]),
+            difference=1e-5,
+            tolerance=tolerance,
+            limit=limit,
         )
         point, shares = full(found.mapping())
         return Solution(point, shares, found)
 
 
 def spread(residual: Array) -> float:
-    """Standard deviation that residuals (N,) of a stretch are worth.
+    """Standard deviation of residuals (N,) of a stretch as if every row were independent, single outliers cut.
 
-    White ones: their RMS, single outliers cut. Those that hang together in time, which is the model's error and not
-    noise, tell less than their number says: their variance counts 1 + 2 sum(rho) times, rho being the autocorrelation
-    up to where it drowns.
+    Residuals that are correlated over time, which is the model's error and not noise, determine less than their number
+    says: their variance counts as often as rows count as one.
     """
     scale = 1.4826 * float(np.median(np.abs(residual)))
     cut = np.clip(residual, -4 * scale, 4 * scale) if scale > 0 else residual
-    variance = float(np.mean(cut**2))
-    if variance == 0:
-        return 0.0
-    count = len(cut)
-    power = np.abs(np.fft.rfft(cut, 2 * count)) ** 2
-    rho = np.fft.irfft(power)[: count // 4] / (count * variance)
-    drowned = 3 / np.sqrt(count)
-    silent = np.flatnonzero(rho < drowned)
-    last = int(silent[0]) if len(silent) else len(rho)
-    return float(np.sqrt(variance * (1 + 2 * np.sum(rho[1:last]))))
+    return float(np.sqrt(np.mean(cut**2) * correlation_length(cut)))
 
 
 SLIDING = 0.1  # of the highest speed: above, the friction is taken as Coulomb plus viscous

@@ -10,9 +10,10 @@ from scipy.linalg import solve_triangular
 from scipy.stats import chi2, f
 
 from feedsim.errors import InputError
+from feedsim.estimation.fit import Fit, correlation, fit, inverse
+from feedsim.estimation.parameter import Parameter
 from feedsim.identify import drift
 from feedsim.identify import stribeck_identifiability as identifiability
-from feedsim.identify.fit import Fit, Parameter, correlation, fit, inverse
 from feedsim.identify.parameters import (
     CONSTANT_SPEED,
     EXCESS,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feedsim.identify.fit import Fit
+from feedsim.estimation.fit import Fit
 from feedsim.identify.parameters import EXCESS, level
 from feedsim.identify.record import Array
 from feedsim.identify.result import Plateau

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from feedsim.identify.fit import Fit, Prior
+from feedsim.estimation.fit import Fit
+from feedsim.estimation.parameter import Prior
 from feedsim.identify.parameters import PRE_SLIDING, inner
 from feedsim.identify.record import Array
 from feedsim.identify.search import Search, Solution

@@ -23,12 +23,14 @@ from typing import TypeVar
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.identify.parameters import EXCESS
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
 from feedsim.identify.record import Record
 from feedsim.identify.result import Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
 from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.estimates import elastic_modes, estimates_of, one_phase, one_way, refuse_poor, with_undecided
+from feedsim.replay.parameters import TABLE
 from feedsim.replay.selection import (
     BLOCKS,
     FOLDS,
@@ -39,7 +41,7 @@ from feedsim.replay.selection import (
     with_elastic_modes,
 )
 from feedsim.replay.start import Begin
-from feedsim.replay.tuning import BOUNDS, FINAL, ROUGH, Problem, Tuned
+from feedsim.replay.tuning import FINAL, ROUGH, Problem, Tuned
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
 
@@ -219,8 +221,8 @@ def feedforward_of(records: Sequence[Record]) -> float | None:
     scale = np.linalg.norm(columns, axis=0) + 1e-300
     found, _, rank, _ = np.linalg.lstsq(columns / scale, n_s, rcond=1e-9)
     weight = float(found[1] / scale[1])
-    low, high = BOUNDS["k_ffw"]
-    return min(max(weight, low), high) if rank == columns.shape[1] else None
+    own = TABLE["k_ffw"]
+    return min(max(weight, own.lower), own.upper) if rank == columns.shape[1] else None
 
 
 def start_of(machine: Machine, axis: str) -> dict[str, float]:
@@ -231,7 +233,7 @@ def start_of(machine: Machine, axis: str) -> dict[str, float]:
               ("F_C", "sigma_0", "sigma_1", "sigma_2", "v_s", "F_log", "W", "gamma", "asymmetry")}  # fmt: skip
     T_n = drive.T_n if drive.T_n is not None else 1.0
     return values | {
-        "excess": float(friction.F_S) / values["F_C"] - 1.0, "M_0": machine.axes[axis].M_0,
+        EXCESS: float(friction.F_S) - values["F_C"], "M_0": machine.axes[axis].M_0,
         "K_v": drive.K_v, "k_ffw": drive.k_ffw, "T_sym": drive.T_sym, "T_dyn": drive.T_dyn, "delay": 0.0,
         "K_p": drive.K_p, "K_i": drive.K_p / T_n, "J": checked_modes(machine).J_tot(axis),
         "omega_0": drive.omega_0 or 1.0, "D": drive.D or 1.0,
@@ -261,7 +263,7 @@ def _likelier(problem: Problem, found: Tuned, T_pos: float) -> float:
 
 def _first(problem: Problem, free: Sequence[str]) -> Tuned:
     """A first fit, whose weights are those of what is left."""
-    found = problem.fitted(free, {}, promises=ROUGH)
+    found = problem.fitted(free, {}, tolerance=ROUGH)
     problem.weigh(found)
     found = problem.fitted(free, found.values, found)
     problem.weigh(found)

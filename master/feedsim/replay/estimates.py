@@ -16,7 +16,7 @@ from feedsim import variables
 from feedsim.errors import InputError
 from feedsim.estimation.covariance import Covariance, correlation_length, stretched
 from feedsim.estimation.interval import NORMAL_95, half_width, student
-from feedsim.identify.parameters import estimate
+from feedsim.identify.parameters import EXCESS, estimate, inner_to_outer
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms
 from feedsim.identify.result import Estimate
 from feedsim.replay.closed_loop import AxisRecord
@@ -76,10 +76,10 @@ def estimates_of(
     result: dict[str, Estimate] = {}
 
     def put(name: str, value: float, sigma: float, by: str) -> None:
-        result[name] = _judged(name, value, sigma, spread.get(by, nan) / problem.spread(by, values))
+        result[name] = _judged(name, value, sigma, spread.get(by, nan) / problem.deviation(by, values))
 
     for name in found.names:
-        if name not in ("K_i", "excess", "K_v", "T_dyn") and not name.startswith("mode_"):
+        if name not in ("K_i", EXCESS, "K_v", "T_dyn") and not name.startswith("mode_"):
             put(name, values[name], spread[name], name)
     ratio = np.array([(n == "K_p") / values["K_p"] - (n == "K_i") / values["K_i"] for n in found.names])
     T_n = values["K_p"] / values["K_i"]
@@ -96,9 +96,9 @@ def estimates_of(
         put("T_dyn", values["T_dyn"], spread["T_dyn"], "T_dyn")
         if not known:
             result["T_dyn"] = replace(result["T_dyn"], status="undetermined", reason=ON_THE_MODEL)
-    if "excess" in found.names:
-        rise = np.array([(n == "F_C") * (1 + values["excess"]) + (n == "excess") * values["F_C"] for n in found.names])
-        put("F_S", values["F_C"] * (1 + values["excess"]), float(np.sqrt(rise @ covariance @ rise)), "excess")
+    if EXCESS in found.names:
+        rise = inner_to_outer(found.names, ["F_S"])[0]
+        put("F_S", values["F_C"] + values[EXCESS], float(np.sqrt(rise @ covariance @ rise)), EXCESS)
     if known:
         result["J"] = replace(estimate("J", values["J"]), status="given", reason="of the machine's modes")
     return {name: result[name] for name in ORDER if name in result}
@@ -189,7 +189,7 @@ def _covariance(problem: Problem, found: Tuned, unseen: tuple[float, float]) -> 
     of the axis, a fit to little motion leaves too little. What it leaves of motion that it has not seen is the better
     measure. So is what its stretches say differently.
     """
-    scale = np.array([problem.spread(name, found.values) for name in found.names])
+    scale = np.array([problem.deviation(name, found.values) for name in found.names])
     J, r, count = found.jacobian, found.residuals, len(problem.rows)
     channels = slice(0, count), slice(count, 2 * count)
     prior = J[2 * count :].T @ J[2 * count :]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from feedsim.errors import InputError
 from feedsim.identify import Recorded
+from feedsim.identify.parameters import EXCESS
 from feedsim.owned import TemporaryFolder
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.compare import Comparison, replayed
@@ -152,7 +153,7 @@ def _begun(
 def rigid_axis(each: AxisRecord, begin: Mapping[str, float]) -> RigidAxis:
     """An axis to begin on. begin: as start_values gives them."""
     most = limits(each)
-    friction = {**begin, "F_S": begin["F_C"] * (1 + begin["excess"])}
+    friction = {**begin, "F_S": begin["F_C"] + begin[EXCESS]}
     pitch = 2 * pi * each.I_P
     return RigidAxis(pitch, float(each.setpoint[0]), most, simple_drive(begin, most["torque"]), friction, {})
 

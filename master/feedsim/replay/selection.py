@@ -13,6 +13,7 @@ from math import inf, log
 import numpy as np
 
 from feedsim.errors import InputError
+from feedsim.identify.parameters import EXCESS
 from feedsim.identify.position_loop import rms
 from feedsim.replay.elastic import MOST_MODES, begin_mode, resonance
 from feedsim.replay.tuning import Problem, Rows, Tuned
@@ -24,7 +25,7 @@ Progress = Callable[[str, int, int], None]
 BLOCKS: Mapping[str, tuple[str, ...]] = {
     "logarithmic rise": ("F_log",),
     "engaging zone": ("W", "gamma"),
-    "Stribeck effect": ("excess", "v_s"),
+    "Stribeck effect": (EXCESS, "v_s"),
     "asymmetry": ("asymmetry",),
 }
 FOLDS = 4
@@ -113,12 +114,12 @@ def with_elastic_modes(problem: Problem, found: Tuned, count: int | None) -> tup
 
 def _begin(problem: Problem, name: str) -> float:
     F_C = problem.start["F_C"]
-    return {"F_log": 0.1 * F_C, "gamma": 0.5, "excess": 0.1, "asymmetry": 0.0}.get(name, problem.start[name])
+    return {"F_log": 0.1 * F_C, "gamma": 0.5, EXCESS: 0.1 * F_C, "asymmetry": 0.0}.get(name, problem.start[name])
 
 
 def _at_end(problem: Problem, found: Tuned, block: Sequence[str]) -> bool:
     """Whether a part sits at a bound: the record does not determine it."""
-    return any(problem.at_end(name, found.values[name]) for name in block)
+    return any(problem.no_effect(name, found.values[name]) for name in block)
 
 
 def _predicted(problem: Problem, found: Tuned) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify.inertia import inertia
+from feedsim.identify.parameters import EXCESS
 from feedsim.replay.closed_loop import AxisRecord
 
 BANDWIDTH = 50.0  # [Hz] of a speed loop to begin with: K_p = 2 pi f J
@@ -94,7 +95,7 @@ def _values(
         "J": J, "J_sigma": J_sigma, "M_0": M_0, "F_C": F_C, "sigma_2": max(sigma_2, 0.1 * F_C / top),
         "K_p": 2 * pi * BANDWIDTH * J, "K_i": 2 * pi * BANDWIDTH * J / INTEGRAL,
         "sigma_0": F_C * each.I_P / PRESLIDING, "sigma_1": 1e-4 * F_C * each.I_P / PRESLIDING, "v_s": 1e-2 * top,
-        "W": ZONE, "gamma": 1.0, "excess": 0.0, "F_log": 0.0, "asymmetry": 0.0,
+        "W": ZONE, "gamma": 1.0, EXCESS: 0.0, "F_log": 0.0, "asymmetry": 0.0,
         "K_v": 30.0, "k_ffw": 1.0, "T_sym": 0.5e-3, "T_dyn": 2 * each.record.interval, "delay": 0.0,
     }  # fmt: skip
 

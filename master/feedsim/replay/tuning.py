@@ -1,62 +1,43 @@
-"""The units on one record, over the parameters of a drive: what they leave of position and torque, by least squares.
+"""The units on one record, over the parameters of a drive: residuals of position and torque, by least squares.
 
-The parameters are those of the drive and the friction, but for three: K_i = K_p/T_n, `excess` = F_S/F_C - 1, and
-`delay`, by how much the torque is logged later than the motion.
-
-A run of the units is what costs, and a Jacobian by differences is a run for every parameter. It is therefore taken
-over from one fit to the next (secant.py); what is left out of a fit, and intervals, are told from differences.
+The parameters are in parameters.py. A run of the units is what costs, and a Jacobian by differences is a run for every
+parameter. It is therefore taken over from one fit to the next (estimation/secant.py); cross-validation and intervals
+take differences anew.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, inf, log, nan, sqrt
+from math import log, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.errors import FeedsimError, InputError
 from feedsim.estimation.covariance import correlation_length
+from feedsim.estimation.least_squares import LeastSquares, Point
+from feedsim.estimation.secant import secant
+from feedsim.identify.parameters import EXCESS
 from feedsim.identify.position_loop import rms
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
 from feedsim.replay.elastic import modes_of, with_modes
-from feedsim.replay.secant import Least, Point
+from feedsim.replay.parameters import difference, no_effect, parameter
 from feedsim.scenario import Machine
 from feedsim.trace.trace import Array
 
 Rows = NDArray[np.int64]
 
-# Deviations of the logarithm (of the value itself where it is not in LOGARITHMIC) about the start: what is usual. The
-# inertia begins with the rigid line's, which accelerations tell well; where they do not, its deviation is that line's.
-# A mode's place is told by regression ahead of the fit.
-LOGARITHMIC = ("J", "K_p", "K_i", "K_v", "omega_0", "D", "F_C", "sigma_0", "sigma_1", "sigma_2", "v_s", "W")
-OF_MODES = {"mode_f": 0.1, "mode_D": 0.7, "mode_u": 0.7}  # of the logarithm
-USUAL = {
-    "J": 0.05, "K_p": 1.0, "K_i": 1.5, "K_v": 1.0, "omega_0": 0.7, "D": 0.5, "F_C": 0.7, "sigma_0": 1.5,
-    "sigma_1": 2.0, "sigma_2": 1.5, "v_s": 1.5, "W": 1.5, "gamma": 0.5, "excess": 0.5, "asymmetry": 0.2,
-    "T_sym": 3e-3, "T_dyn": 10e-3, "k_ffw": 0.5, "delay": 1e-3,
-}  # fmt: skip
-BOUNDS = {"gamma": (1e-3, 1.0), "excess": (0.0, 3.0), "asymmetry": (-0.6, 0.6), "F_log": (0.0, inf),
-          "T_sym": (0.0, 0.02), "T_dyn": (0.0, 0.1), "k_ffw": (0.0, 1.5), "delay": (-5e-3, 5e-3)}  # fmt: skip
-# Where a part of the friction law has no effect, or runs away.
-ENDS = {"gamma": (1.0,), "excess": (0.0, 3.0), "asymmetry": (-0.6, 0.6), "F_log": (0.0,)}
-# A tuned speed loop has this damping at least, give or take BARELY of the logarithm.
-DAMPED, BARELY = 0.7, 0.2
-SPAN = 4.0  # usual deviations that a logarithm may be off its start
-LEAST = {"position": 1e-9, "torque": 1e-3}  # [m], share of the torque: no channel is weighted as better than that
+# A tuned speed loop has this damping at least, give or take DAMPING_DEVIATION of the logarithm.
+LEAST_DAMPING, DAMPING_DEVIATION = 0.7, 0.2
+# [m], share of the torque: no channel is weighted as better than that.
+LEAST_WEIGHT = {"position": 1e-9, "torque": 1e-3}
 
-# Of the cost: what a step has to promise. The cost counts what rows say of their own, some hundred pieces. A fit that
-# ends COMPARED off its least is off by a few hundredths of the logarithm of the likelihood, or a fifth of a standard
-# deviation; FINAL is a tenth of that, and a third of the deviation. ROUGH is to begin with, where weights are guessed.
+# Share of the cost: predicted reduction of a step at which a fit ends. The cost counts independent rows, some hundred.
+# A fit that ends COMPARED off its least is off by a few hundredths of the logarithm of the likelihood, or a fifth of a
+# standard deviation; FINAL is a tenth of that, and a third of the deviation. ROUGH is to begin with, where weights are
+# guessed.
 ROUGH, COMPARED, FINAL = 3e-3, 2e-4, 3e-5
-LEAST_SHAPE = 1e-3  # of a mode at the scale, over the rigid motion's
-DIFFERENCE = 1e-3  # of the logarithm, or of a tenth of the usual deviation
-
-
-def logarithmic(name: str) -> bool:
-    """Whether a parameter is scaled by its logarithm."""
-    return name in LOGARITHMIC or name.rpartition("_")[0] in OF_MODES
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +105,7 @@ class Problem:
         torques = {name: values[name] / scale for name in ("F_C", "sigma_0", "sigma_1", "sigma_2", "F_log")}
         friction = self.machine.shipped_friction(self.each.axis, "the identification of a drive").model_copy(
             update={
-                **torques, "F_S": torques["F_C"] * (1 + values["excess"]),
+                **torques, "F_S": torques["F_C"] + values[EXCESS] / scale,
                 **{name: values[name] for name in ("v_s", "W", "gamma", "asymmetry")},
             }
         )  # fmt: skip
@@ -158,54 +139,19 @@ class Problem:
         off = torque - self.each.record.torque if self.each.record.driven else np.zeros(len(time))
         return found["x_a"][:: self.per_row] - self.each.position, off
 
-    def rings(self, values: Mapping[str, float]) -> float:
-        """How far the speed loop is less damped than anybody leaves it: J s^2 + K_p s + K_i."""
+    def damping_penalty(self, values: Mapping[str, float]) -> float:
+        """How far the speed loop J s^2 + K_p s + K_i is less damped than a tuned one, in standard deviations."""
         values = self.start | dict(values)
         damping = values["K_p"] / (2 * sqrt(values["J"] * values["K_i"]))
-        return max(0.0, log(DAMPED / damping)) / BARELY
+        return max(0.0, log(LEAST_DAMPING / damping)) / DAMPING_DEVIATION
 
-    def away(self, name: str, value: float) -> float:
-        start = self.start[name]
-        usual = self.usual(name)
-        return log(value / start) / usual if logarithmic(name) else (value - start) / usual
+    def no_effect(self, name: str, value: float) -> bool:
+        """Whether a value has no effect, or lies at the end of its range."""
+        return no_effect(name, value, self.start)
 
-    def at_end(self, name: str, value: float) -> bool:
-        """Whether a value has run to where it has no effect, or to where it ends."""
-        if logarithmic(name):
-            return abs(self.away(name, value)) > 0.95 * SPAN
-        return any(abs(value - end) < 0.01 * self.usual(name) for end in ENDS.get(name, ()))
-
-    def usual(self, name: str) -> float:
-        """Deviation from the start that is usual, of the logarithm or of the value."""
-        key = name.rpartition("_")[0]
-        if key in OF_MODES:
-            return OF_MODES[key]
-        if key == "mode_v":
-            return max(abs(self.start[name]), LEAST_SHAPE)
-        if name == "J":
-            return max(USUAL["J"], self.start.get("J_sigma", 0.0))
-        return USUAL[name] if name in USUAL else 2.0 * self.start["F_C"] if name == "F_log" else 5 * self.start["F_C"]
-
-    def at(self, name: str, away: float) -> float:
-        """The value that is so many usual deviations off the start."""
-        off = away * self.usual(name)
-        if logarithmic(name):
-            return self.start[name] * exp(off)
-        low, high = BOUNDS.get(name, (-inf, inf))  # the way there and back rounds
-        return min(max(self.start[name] + off, low), high)
-
-    def bounds(self, names: Sequence[str]) -> tuple[Array, Array]:
-        """(P,) and (P,), in usual deviations from the start."""
-        ends = [
-            (-SPAN, SPAN) if logarithmic(name) else tuple(self.away(name, end) for end in BOUNDS.get(name, (-inf, inf)))
-            for name in names
-        ]
-        low, high = zip(*ends, strict=True)
-        return np.array(low), np.array(high)
-
-    def spread(self, name: str, values: Mapping[str, float]) -> float:
-        """The usual deviation of a parameter, in its own unit."""
-        return self.usual(name) * (abs(values[name]) if logarithmic(name) else 1.0)
+    def deviation(self, name: str, values: Mapping[str, float]) -> float:
+        """Standard deviation of a parameter's prior, in its own unit, at values."""
+        return parameter(name, self.start).slope(abs(values[name]))
 
     def weigh(self, found: Tuned) -> None:
         """Take what is left with what was found as what a residual is worth.
@@ -214,50 +160,49 @@ class Problem:
         so the channels are weighed against each other, and against what is usual.
         """
         position, torque = found.position, found.torque
-        least = LEAST["torque"] * rms(self.each.record.torque[self.rows]) if self.each.record.driven else 1.0
+        least = LEAST_WEIGHT["torque"] * rms(self.each.record.torque[self.rows]) if self.each.record.driven else 1.0
         self.weights = {
-            "position": max(rms(position), LEAST["position"]) * sqrt(correlation_length(position)),
-            "torque": max(rms(torque), least) * sqrt(correlation_length(torque)),
+            "position": max(rms(position), LEAST_WEIGHT["position"])
+            * sqrt(correlation_length(position - np.mean(position))),
+            "torque": max(rms(torque), least) * sqrt(correlation_length(torque - np.mean(torque))),
         }
 
     def fitted(
-        self, free: Sequence[str], begin: Mapping[str, float], near: Tuned | None = None, promises: float = COMPARED
+        self, free: Sequence[str], begin: Mapping[str, float], near: Tuned | None = None, tolerance: float = COMPARED
     ) -> Tuned:
-        """From `begin`, with the weights as they are, to where no step promises more than a share of the cost.
+        """From `begin`, with the weights as they are, to where no step has a predicted reduction above that share.
 
         near: a fit nearby, whose Jacobian is taken over.
         """
         names = tuple(free)
-        least = self._least(names)
-        x = np.array([self.away(name, begin.get(name, self.start[name])) for name in names])
+        problem = self._least_squares(names)
         slopes = np.full((2 * len(self.rows), len(names)), nan)
         for k, name in enumerate(names):
             if near is not None and name in near.names:
                 slopes[:, k] = near.point.slopes[:, near.names.index(name)]
-        return self._told(names, least, least.found(np.clip(x, least.low, least.high), slopes, promises))
+        return _tuned(problem, secant(problem, problem.position(begin), slopes, tolerance))
 
-    def exact(self, found: Tuned, central: bool = False) -> Tuned:
-        """The same with its Jacobian by differences, which what is left out and intervals are told from."""
-        least = self._least(found.names)
-        return self._told(found.names, least, least.exact(found.point, central))
+    def exact(self, fit: Tuned, central: bool = False) -> Tuned:
+        """The same with its Jacobian by differences, which cross-validation and intervals are taken from."""
+        problem = self._least_squares(fit.names)
+        return _tuned(problem, problem.exact(fit.point, central))
 
-    def _least(self, names: tuple[str, ...]) -> Least:
+    def _least_squares(self, names: tuple[str, ...]) -> LeastSquares:
         """The sum of squares over both channels in their weights and over how far every parameter is off its start."""
+        parameters = [parameter(name, self.start) for name in names]
 
-        def values(x: Array) -> dict[str, float]:
-            return {name: self.at(name, float(away)) for name, away in zip(names, x, strict=True)}
-
-        def errors(x: Array) -> Array:
-            position, torque = self.errors(values(x))
+        def errors(values: Mapping[str, float]) -> Array:
+            position, torque = self.errors(values)
             return np.concatenate([position[self.rows], torque[self.rows]])
 
-        count = len(self.rows)
-        weights = np.repeat([self.weights["position"], self.weights["torque"]], count)
-        steps = np.array([DIFFERENCE / self.usual(name) if logarithmic(name) else 0.1 * DIFFERENCE for name in names])
-        return Least(
-            errors, lambda x: np.append(x, self.rings(values(x))), weights, *self.bounds(names), steps
-        )  # fmt: skip
+        def prior(x: Array) -> Array:
+            return np.append(x, self.damping_penalty(problem.values(x)))
 
-    def _told(self, names: tuple[str, ...], least: Least, point: Point) -> Tuned:
-        values = {name: self.at(name, float(away)) for name, away in zip(names, point.x, strict=True)}
-        return Tuned(names, values, point, least.residuals(point), least.jacobian(point))
+        weights = np.repeat([self.weights["position"], self.weights["torque"]], len(self.rows))
+        steps = np.array([difference(each) for each in parameters])
+        problem = LeastSquares(errors, parameters, steps, prior, weights)
+        return problem
+
+
+def _tuned(problem: LeastSquares, point: Point) -> Tuned:
+    return Tuned(problem.names, problem.values(point.x), point, problem.residuals(point), problem.jacobian(point))

@@ -1,7 +1,7 @@
 """Why a circle is not round: the radial deviation of one direction or of both taken apart into causes.
 
 May use analysis.figures, analysis.circularity, trace and units. Simulated circles and recorded ones are the same to it.
-Start with model.py, the terms and their fit, weighted by robust.py; diagnosis.py says what share of G each term has.
+Start with model.py, the terms and their fit (estimation/robust.py); diagnosis.py says what share of G each term has.
 """
 
 from feedsim.analysis.circle.diagnosis import Diagnosis, Peak, Term, diagnose

@@ -44,10 +44,10 @@ from feedsim.analysis.circle.geometry import (
     enough_pitches,
     undo,
 )
-from feedsim.analysis.circle.robust import SETTLED, covariance_of, robust_fit, rounding
 from feedsim.analysis.circle.setup import Offset, angle_offset, centre_moves
 from feedsim.analysis.circle.tails import NEXT, Tails, fading_tails, known_tails, what_is_left
 from feedsim.analysis.figures import Array
+from feedsim.estimation.robust import SETTLED, covariance_of, robust_fit, rounding
 
 # Angle ahead of a reversal and behind it that is left out [deg]; the second grows while the peak has not died away.
 AHEAD, BEHIND = 2.0, (30.0, 45.0, 60.0)

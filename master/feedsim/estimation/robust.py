@@ -1,8 +1,8 @@
 """Values of a linear model from samples that do not all fit, and how well they are known.
 
 Samples count less the worse they fit (Tukey's biweight). Intervals hold what neighbouring samples share, what rounding
-of a record may have added, and what is not known of values that are only known to within a spread. May use
-analysis.figures and estimation. Start reading at robust_fit().
+of a record may have added, and what is not known of values that are only known to within a spread.
+Start reading at robust_fit().
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feedsim.analysis.figures import Array
 from feedsim.estimation.covariance import Covariance
 from feedsim.estimation.interval import student
+from feedsim.estimation.parameter import Array
 
 BIWEIGHT = 4.685  # 95 % as efficient as least squares where the noise is normal
 PASSES = 6

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.identify.fit import Parameter, Prior, correlation, fit, inverse
+from feedsim.estimation.fit import correlation, fit, inverse
+from feedsim.estimation.parameter import Parameter, Prior
 
 TIME = np.linspace(0.0, 4.0, 41)
 
@@ -131,7 +132,7 @@ def test_refusals() -> None:
     line = Parameter("m", 1.0)
     with pytest.raises(InputError, match="twice"):
         fit(lambda v: TIME, [line, line])
-    with pytest.raises(InputError, match="1 residuals cannot tell 2 parameters"):
+    with pytest.raises(InputError, match="1 residuals cannot determine 2 parameters"):
         fit(lambda v: np.ones(1), [line, Parameter("c", 0.0)])
     with pytest.raises(InputError, match=r"not finite at m = 1"):
         fit(lambda v: np.full(3, np.nan), [line])

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
 from feedsim.errors import InputError
-from feedsim.replay.secant import Least
-from feedsim.trace.trace import Array
+from feedsim.estimation.least_squares import LeastSquares
+from feedsim.estimation.parameter import Array, Parameter
+from feedsim.estimation.secant import secant
 
 TIME = np.linspace(0.0, 3.0, 200)
 TRUE = np.array([1.2, 0.7, 0.4, -0.3])
@@ -33,9 +36,14 @@ class Counted:
         return course(x) - self.measured
 
 
-def least(errors: Counted, low: Array = FREE[0], high: Array = FREE[1]) -> Least:
+def least(errors: Callable[[Array], Array], low: Array = FREE[0], high: Array = FREE[1]) -> LeastSquares:
     """With the noise's own weight, and a weak prior at 0."""
-    return Least(errors, lambda x: 0.01 * x, np.full(len(TIME), 0.02), low, high, STEPS)
+    parameters = [Parameter(str(k), 0.0, *both, scale=1.0) for k, both in enumerate(zip(low, high, strict=True))]
+
+    def model(values: Mapping[str, float]) -> Array:
+        return errors(np.array([*values.values()]))
+
+    return LeastSquares(model, parameters, STEPS, lambda x: 0.01 * x, np.full(len(TIME), 0.02))
 
 
 def unknown(rows: int = len(TIME), columns: int = 4) -> Array:
@@ -46,7 +54,7 @@ def test_the_end_is_that_of_exact_jacobians() -> None:
     """To a small share of a standard deviation, as the promise of a step that is left says; in less calls."""
     begin = np.array([0.6, 0.2, 0.2, 0.2])
     errors, exact = Counted(), Counted()
-    found = least(errors).found(begin, unknown(), 1e-6)
+    found = secant(least(errors), begin, unknown(), 1e-6)
     other = least_squares(lambda x: np.concatenate([exact(x) / 0.02, 0.01 * x]), begin, xtol=1e-12)
     sigma = np.sqrt(np.diag(np.linalg.inv(other.jac.T @ other.jac)))
     assert np.all(np.abs(found.x - other.x) < 0.05 * sigma)
@@ -55,14 +63,14 @@ def test_the_end_is_that_of_exact_jacobians() -> None:
 
 def test_slopes_from_nearby_save_calls() -> None:
     """They are taken over, and what is not known is found by differences: three calls of four are saved."""
-    near = least(Counted()).exact(least(Counted()).found(TRUE, unknown(), 1e-4))
+    near = least(Counted()).exact(secant(least(Counted()), TRUE, unknown(), 1e-4))
     slopes = near.slopes.copy()
     slopes[:, 3] = np.nan
     begin = near.x + np.array([0.001, 0.0, 0.0, 0.002])
     calls = []
     for known in (slopes, unknown()):
         errors = Counted()
-        found = least(errors).found(begin, known, 1e-4)
+        found = secant(least(errors), begin, known, 1e-4)
         assert found.x == pytest.approx(near.x, abs=1e-3)
         calls.append(errors.calls)
     assert calls[1] - calls[0] == 3
@@ -72,7 +80,7 @@ def test_bounds_hold() -> None:
     """The end lies on a bound where the free one lies behind it, and is the least of those that are allowed."""
     low, high = np.array([0.0, 0.0, 0.0, -0.1]), np.array([2.0, 2.0, 2.0, 1.0])
     begin = np.array([1.0, 0.5, 0.5, 0.5])
-    found = least(Counted(), low, high).found(begin, unknown(), 1e-6)
+    found = secant(least(Counted(), low, high), begin, unknown(), 1e-6)
     errors = Counted()
     other = least_squares(lambda x: np.concatenate([errors(x) / 0.02, 0.01 * x]), begin, bounds=(low, high), xtol=1e-12)
     assert found.x[3] == -0.1
@@ -88,17 +96,17 @@ def test_steps_into_nothing_are_shortened() -> None:
             raise InputError("unstable")
         return errors(x)
 
-    problem = Least(guarded, lambda x: 0.01 * x, np.full(len(TIME), 0.02), *FREE, STEPS)
-    found = problem.found(np.array([0.6, 0.2, 0.2, 0.2]), unknown(), 1e-5)
+    problem = least(guarded)
+    found = secant(problem, np.array([0.6, 0.2, 0.2, 0.2]), unknown(), 1e-5)
     assert found.x == pytest.approx(TRUE, abs=0.03)
     with pytest.raises(InputError, match="unstable"):
-        problem.found(np.array([0.6, 0.8, 0.2, 0.2]), unknown(), 1e-5)
+        secant(problem, np.array([0.6, 0.8, 0.2, 0.2]), unknown(), 1e-5)
 
 
 def test_slopes_in_the_end() -> None:
     """Central differences are those of the closed form to the square of their step."""
     problem = least(Counted())
-    point = problem.exact(problem.found(TRUE, unknown(), 1e-4), central=True)
+    point = problem.exact(secant(problem, TRUE, unknown(), 1e-4), central=True)
     x = point.x
     decay, angle = np.exp(-x[1] * TIME), 4 * TIME + x[3]
     form = np.column_stack([decay, -x[0] * TIME * decay, np.sin(angle), x[2] * np.cos(angle)])

@@ -18,6 +18,7 @@
 #include "../plant_fmu/modes.c"
 #include "../plant_fmu/poses.c"
 #include "../plant_fmu/resources.c"
+#include "../plant_fmu/transmission.c"
 #include "csv.c"
 #include "hash.c"
 #include "numbers.c"

@@ -17,7 +17,7 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     const size_t ports = plant_ports(plant), size = modal_padded(modes);
     const size_t system = modal_memory(modes, ports);
     const size_t crossing = cells_scratch(plant->axes, size);
-    const size_t scratch = 4 * ports + plant->axes + crossing;
+    const size_t scratch = 4 * ports + plant->axes + 2 * size + crossing;
     Modal *modal = unit_alloc(unit, cells, sizeof *modal);
     double *systems = modal != NULL ? unit_alloc(unit, cells, system * sizeof *systems) : NULL;
     double *memory = systems != NULL ? unit_alloc(unit, scratch, sizeof *memory) : NULL;
@@ -29,7 +29,7 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     unit_free(unit, plant->modal);
     unit_free(unit, plant->systems);
     unit_free(unit, plant->memory);
-    plant->mobility = NULL;
+    plant->mobility = plant->transmitted = NULL;
     plant->modal = modal;
     plant->systems = systems;
     plant->memory = memory;
@@ -43,7 +43,9 @@ static bool plant_place(Unit *unit, Plant *plant, size_t cells, size_t modes) {
     plant->y = plant->du + ports;
     plant->y_before = plant->y + ports;
     plant->x = plant->y_before + ports;
-    plant->carried = plant->x + plant->axes;
+    plant->q_free = plant->x + plant->axes;
+    plant->v_free_step = plant->q_free + size;
+    plant->carried = plant->v_free_step + size;
     return true;
 }
 
@@ -182,17 +184,90 @@ static bool plant_derive_guides(Unit *unit, Plant *plant) {
     return true;
 }
 
+/* Transmissions between the motors and the structure. */
+static bool plant_derive_transmissions(Unit *unit, Plant *plant) {
+    const size_t axes = unit_axes(unit);
+    if (plant->transmissions == NULL) {
+        unit_free(unit, plant->motor_u);
+        double *numbers = plant->motor_u = unit_alloc(unit, 4 * axes + 2 * axes * axes, sizeof *numbers);
+        plant->transmissions = numbers != NULL ? unit_alloc(unit, axes, sizeof *plant->transmissions) : NULL;
+        if (plant->transmissions == NULL) {
+            return false;
+        }
+        plant->motor_du = numbers + axes;
+        plant->angle_free = plant->motor_du + axes;
+        plant->n_free = plant->angle_free + axes;
+        plant->by_angle = plant->n_free + axes;
+        plant->by_n = plant->by_angle + axes * axes;
+    }
+    plant->driven = false;
+    for (size_t i = 0; i < axes; i++) {
+        const AxisBlock *v = unit_axis(unit, i);
+        plant->transmissions[i] = (Transmission){.on = v->transmission_stiffness > 0, .J = v->transmission_inertia};
+        plant->driven = plant->driven || plant->transmissions[i].on;
+    }
+    return true;
+}
+
+/* Way of a slide per angle of its motor, by the rigid modes of a cell [m/rad]; 0: none moves it. */
+static double plant_lead(const Plant *plant, const Modal *modal, size_t axis) {
+    const double *n = modal->shape + axis * modal->size, *x = modal->shape + (plant_slides(plant) + axis) * modal->size;
+    double both = 0, own = 0;
+    for (size_t k = 0; k < modal->size; k++) {
+        if (!(modal->omega[k] > 0)) {
+            both += x[k] * n[k];
+            own += n[k] * n[k];
+        }
+    }
+    return own > 0 ? both / own : 0;
+}
+
+/* At the motors, by the modes: these hold the inertia on the motor's side, and have to hold more than that. */
+static bool plant_join_motors(Unit *unit, const Plant *plant) {
+    for (size_t i = 0; plant->driven && i < plant->axes; i++) {
+        const AxisBlock *v = unit_axis(unit, i);
+        Transmission *p = &plant->transmissions[i];
+        char text[2][NUMBER_TEXT_SIZE];
+        double most = 0;
+        for (size_t cell = 0; cell < plant->cells; cell++) {
+            const Modal *modal = &plant->modal[cell];
+            double sum = 0;
+            for (size_t k = 0; k < modal->size; k++) {
+                sum += modal->shape[i * modal->size + k] * modal->shape[i * modal->size + k];
+            }
+            most = fmax(most, sum);
+        }
+        if (p->on && !(p->J * most < 0.95)) {
+            return unit_fail(unit,
+                             "parameter '%s.transmission.inertia' is %s kg.m2; it must be below 0.95 of the inertia "
+                             "that answers a torque at once, %s kg.m2 by the modes, of which it is a part",
+                             unit_axis_name(unit, i), number_text(text[0], p->J), number_text(text[1], 1 / most));
+        }
+        p->lead = plant_lead(plant, &plant->modal[0], i);
+        if (p->on && !(fabs(p->lead) > 0)) {
+            return unit_fail(unit,
+                             "parameter '%s.transmission.stiffness' is %s N/m, and no rigid mode moves the axis: a "
+                             "transmission needs its lead",
+                             unit_axis_name(unit, i), number_text(text[0], v->transmission_stiffness));
+        }
+        p->c = v->transmission_stiffness * p->lead * p->lead;
+        p->d = v->transmission_damping * p->lead * p->lead;
+        p->half = p->on ? v->transmission_play / 2 / fabs(p->lead) : 0;
+    }
+    return true;
+}
+
 /* A file is read once for an instance as long as modes_file keeps its value: a state that is restored must find the
  * table it was made with, whatever has become of the file. */
 bool plant_derive(Unit *unit) {
     Plant *plant = unit_derived(unit);
     plant_derive_errors(unit, plant);
-    if (!plant_derive_guides(unit, plant)) {
+    if (!plant_derive_guides(unit, plant) || !plant_derive_transmissions(unit, plant)) {
         return false;
     }
     const char *path = unit_scalars(unit)->modes_file;
     if (plant->ready && strcmp(plant->table, path) == 0) {
-        return true;
+        return plant_join_motors(unit, plant);
     }
     uint64_t hash = plant->archive_hash;
     const bool good =
@@ -202,7 +277,7 @@ bool plant_derive(Unit *unit) {
         plant->table_hash = hash;
         snprintf(plant->table, sizeof plant->table, "%s", path);
     }
-    return good;
+    return good && plant_join_motors(unit, plant);
 }
 
 /* --- saved states ------------------------------------------------------------------------------------------------- */

@@ -120,6 +120,8 @@ bool plant_load(Unit *unit) {
 void plant_release(Unit *unit) {
     Plant *plant = unit_derived(unit);
     if (plant != NULL) {
+        unit_free(unit, plant->transmissions);
+        unit_free(unit, plant->motor_u);
         unit_free(unit, plant->guides);
         unit_free(unit, plant->v_free);
         unit_free(unit, plant->memory);

@@ -261,6 +261,17 @@ void modal_mobility(const Modal *modal, size_t at, size_t from, double *held, do
     }
 }
 
+double modal_moved(const Modal *modal, size_t at, size_t from) {
+    const size_t size = modal->size;
+    double moved = 0;
+    for (size_t k = 0; k < size; k++) {
+        const size_t lane = k % MODAL_LANES;
+        const double *c = modal->update + (k - lane) * COEFFICIENTS + lane;
+        moved += modal->shape[at * size + k] * modal->shape[from * size + k] * c[2 * MODAL_LANES];
+    }
+    return moved;
+}
+
 double modal_sum(const Modal *modal, size_t port, const double *UNALIASED q) {
     const size_t size = modal->size;
     const double *UNALIASED b = modal->shape + port * size;

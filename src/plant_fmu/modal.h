@@ -29,6 +29,7 @@
 #define modal_advance PREFIXED(modal_advance)
 #define modal_add PREFIXED(modal_add)
 #define modal_mobility PREFIXED(modal_mobility)
+#define modal_moved PREFIXED(modal_moved)
 #define modal_sum PREFIXED(modal_sum)
 #define modal_acceleration PREFIXED(modal_acceleration)
 #define modal_kinetic_energy PREFIXED(modal_kinetic_energy)
@@ -81,6 +82,9 @@ void modal_add(const Modal *modal, size_t port, double f, double df, double *q_e
 /* Speed at the port `at` at the end of a step by an input of 1 at the port `from`: *held, and *ramp by one that rises
  * from 0 to 1 over the step. */
 void modal_mobility(const Modal *modal, size_t at, size_t from, double *held, double *ramp);
+
+/* Displacement at the port `at` at the end of a step by an input of 1 at the port `from`. */
+double modal_moved(const Modal *modal, size_t at, size_t from);
 
 /* Displacement at a port from q; with v in place of q the speed there. */
 double modal_sum(const Modal *modal, size_t port, const double *q);

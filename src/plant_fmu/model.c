@@ -224,7 +224,7 @@ static bool plant_step_guides(Plant *plant, const Modal *modal, double *state, d
     for (size_t i = 0; i < axes; i++) {
         if (plant->guides[i].on) {
             modal_add(modal, slides + i, -start[i].F, start[i].F - guides[i].F, q_end, v_end);
-            end[slides + i] -= guides[i].F;
+            end[slides + i] = plant->u[slides + i] + plant->du[slides + i] - guides[i].F;
         }
     }
     return true;
@@ -249,6 +249,128 @@ static void plant_show_guides(Unit *unit, const Plant *plant, double *state) {
     }
 }
 
+/* --- transmissions between the motors and the structure
+ * ---------------------------------------------------------------
+ */
+
+/* Of each axis, behind the guides of a state. */
+static TransmissionState *plant_transmissions(const Plant *plant, double *state) {
+    return (TransmissionState *)(void *)(plant_guides(plant, state) + plant->axes);
+}
+
+/* The torques at the motors, taken off the structure, which keeps the constant load: a weight hangs behind the play. */
+static void plant_take_motors(Unit *unit, Plant *plant) {
+    for (size_t i = 0; i < plant->axes; i++) {
+        if (plant->transmissions[i].on) {
+            const double M_0 = unit_axis(unit, i)->M_0;
+            plant->motor_u[i] = plant->u[i] + M_0;
+            plant->motor_du[i] = plant->du[i];
+            plant->u[i] = -M_0;
+            plant->du[i] = 0;
+        }
+    }
+}
+
+/* What the structure gives way at the motors' ports to a torque over a step of h. */
+static void plant_prepare_transmissions(Plant *plant, const Modal *modal, double h) {
+    if (plant->transmitted == modal && plant->transmitted_h == h) {
+        return;
+    }
+    const size_t axes = plant->axes;
+    for (size_t i = 0; i < axes * axes; i++) {
+        double ramp;
+        modal_mobility(modal, i / axes, i % axes, &plant->by_n[i], &ramp);
+        plant->by_angle[i] = modal_moved(modal, i / axes, i % axes);
+    }
+    plant->transmitted = modal;
+    plant->transmitted_h = h;
+}
+
+/* Behind a step that the structure took without motors: its end with them, and with friction at the guides, which the
+ * torques of the motors change and which changes these: by turns, until they have settled. False where one is no finite
+ * number. */
+static bool plant_step_transmissions(Plant *plant, const Modal *modal, double *state, double *end, double h) {
+    const int most_passes = 20;
+    const double settled = 1e-10; /* of a torque */
+    const size_t axes = plant->axes, bytes = plant->size * sizeof(double);
+    double *q_end = end + plant_ports(plant), *v_end = q_end + plant->size;
+    const TransmissionState *start = plant_transmissions(plant, state);
+    TransmissionState *motors = plant_transmissions(plant, end);
+    plant_prepare_transmissions(plant, modal, h);
+    if (plant->guided) {
+        memcpy(plant->q_free, q_end, bytes);
+        memcpy(plant->v_free_step, v_end, bytes);
+    }
+    for (size_t i = 0; i < axes; i++) {
+        plant->angle_free[i] = plant->transmissions[i].on ? modal_sum(modal, i, q_end) : 0;
+        plant->n_free[i] = plant->transmissions[i].on ? modal_sum(modal, i, v_end) : 0;
+    }
+    bool other = true;
+    for (int pass = 0; other && pass < most_passes; pass++) {
+        double most = 0, change = 0;
+        for (size_t i = 0; i < axes; i++) {
+            plant->y[i] = motors[i].T;
+        }
+        if (!transmission_step(axes, plant->transmissions, plant->motor_u, plant->motor_du, plant->angle_free,
+                               plant->n_free, plant->by_angle, plant->by_n, start, motors, h)) {
+            return false;
+        }
+        for (size_t i = 0; i < axes; i++) {
+            most = fmax(most, fabs(motors[i].T));
+            change = fmax(change, fabs(motors[i].T - plant->y[i]));
+        }
+        other = plant->guided && (pass == 0 || change > settled * most);
+        if (pass > 0) {
+            memcpy(q_end, plant->q_free, bytes);
+            memcpy(v_end, plant->v_free_step, bytes);
+        }
+        for (size_t i = 0; i < axes; i++) {
+            if (plant->transmissions[i].on) {
+                modal_add(modal, i, motors[i].T, 0, q_end, v_end);
+                end[i] = plant->u[i] + motors[i].T;
+            }
+        }
+        if (plant->guided && !plant_step_guides(plant, modal, state, end, h)) {
+            return false;
+        }
+        for (size_t i = 0; other && i < axes; i++) {
+            if (plant->transmissions[i].on) { /* what the guides do at the motors' ports */
+                plant->angle_free[i] += modal_sum(modal, i, q_end) - motors[i].angle_s;
+                plant->n_free[i] += modal_sum(modal, i, v_end) - motors[i].n_s;
+            }
+        }
+    }
+    return true;
+}
+
+/* Behind the step, and a crossing from cell to cell: the structure as its modes have it, motors turned along with it.
+ */
+static void plant_follow_transmissions(const Plant *plant, const Modal *modal, double *end) {
+    const double *q_end = end + plant_ports(plant), *v_end = q_end + plant->size;
+    TransmissionState *motors = plant_transmissions(plant, end);
+    for (size_t i = 0; i < plant->axes; i++) {
+        if (plant->transmissions[i].on) {
+            const double angle = modal_sum(modal, i, q_end);
+            motors[i].angle += angle - motors[i].angle_s;
+            motors[i].angle_s = angle;
+            motors[i].n_s = modal_sum(modal, i, v_end);
+        }
+    }
+}
+
+static void plant_show_transmissions(Unit *unit, const Plant *plant, double *state) {
+    for (size_t i = 0; i < plant->axes; i++) {
+        const TransmissionState *motor = &plant_transmissions(plant, state)[i];
+        AxisBlock *axis = unit_axis(unit, i);
+        if (plant->transmissions[i].on) {
+            axis->n_a = axis->n_fr = motor->n;
+            axis->transmission_F = motor->C / plant->transmissions[i].lead;
+            axis->transmission_way = (motor->angle - motor->angle_s) * plant->transmissions[i].lead;
+            axis->transmission_heat = motor->heat;
+        }
+    }
+}
+
 /* --- start and step, with all of it ---------------------------------------------------------------------------------
  */
 
@@ -263,6 +385,11 @@ static void plant_start(Unit *unit) {
     plant_positions(unit, plant, plant->y + plant_slides(plant), plant->x);
     for (size_t i = 0; i < plant->axes; i++) {
         plant_guides(plant, plant_state(unit))[i].x = unit_axis(unit, i)->x_0;
+        if (plant->transmissions[i].on) {
+            const double M_0 = unit_axis(unit, i)->M_0;
+            plant_transmissions(plant, plant_state(unit))[i].u = u[i] + M_0;
+            u[i] = -M_0;
+        }
     }
     plant_show_guides(unit, plant, plant_state(unit));
     head->table_hash = plant->table_hash;
@@ -326,6 +453,9 @@ static bool plant_step(Unit *unit, double t, double h) {
     double *state = plant_state(unit), *end = plant_state_at(unit, plant, place);
     double *q_end = end + ports, *v_end = q_end + size;
     plant_gather(unit, h, plant->u, plant->du);
+    if (plant->driven) {
+        plant_take_motors(unit, plant);
+    }
     size_t active = plant->axes; /* mostly, no force is on tool and slides: nothing to add then */
     const double *u = plant->u, *du = plant->du;
     for (size_t i = 0; i < ports; i++) {
@@ -336,7 +466,10 @@ static bool plant_step(Unit *unit, double t, double h) {
     }
     modal_prepare(modal, h);
     modal_advance(modal, active, u, du, state + ports, state + ports + size, q_end, v_end);
-    if (plant->guided && !plant_step_guides(plant, modal, state, end, h)) {
+    if (plant->driven && !plant_step_transmissions(plant, modal, state, end, h)) {
+        return unit_fail(unit, "a force behind a motor would be no finite number at the end of the step");
+    }
+    if (plant->guided && !plant->driven && !plant_step_guides(plant, modal, state, end, h)) {
         return unit_fail(unit, "a friction force at a guide would be no finite number at the end of the step");
     }
     if (!plant_measure(plant, modal, q_end, v_end, plant->y) ||
@@ -360,8 +493,14 @@ static bool plant_step(Unit *unit, double t, double h) {
         }
         plant_show_guides(unit, plant, end);
     }
+    if (plant->driven) {
+        plant_follow_transmissions(plant, &plant->modal[plant_head(unit)->cell], end);
+    }
     plant_head(unit)->place = place;
     plant_show(unit, plant, plant->y);
+    if (plant->driven) {
+        plant_show_transmissions(unit, plant, end);
+    }
     if (plant->errors) {
         plant_show_play(unit, plant, plant_ways(plant, end));
     }
@@ -444,6 +583,10 @@ static double plant_output_derivative(Unit *unit, unsigned vr) {
     switch ((vr - SCALAR_ROWS) % AXIS_ROWS) {
     case AXIS_VR_n_a:
     case AXIS_VR_n_fr:
+        if (plant->transmissions[axis].on) {
+            const TransmissionState *motor = &plant_transmissions(plant, plant_state(unit))[axis];
+            return (motor->u - motor->C) / plant->transmissions[axis].J;
+        }
         return modal_acceleration(modal, axis, ports, u, q, v);
     case AXIS_VR_guide_F_fr:
         return plant_guides(plant, plant_state(unit))[axis].slope;

@@ -11,6 +11,7 @@
 #include "modal.h"
 #include "modes.h"
 #include "poses.h"
+#include "transmission.h"
 #include "unit.h"
 
 #define plant_load PREFIXED(plant_load)
@@ -55,19 +56,31 @@ typedef struct Plant {
     double *held, *ramp;   /* [axes][axes] mobilities of the slides, for */
     const Modal *mobility; /* this modal system */
     double mobility_h;     /* and this step */
+
+    bool driven; /* a motor with a transmission: what follows counts */
+    Transmission *transmissions;
+    double *motor_u, *motor_du;   /* [axes] torques on the motors */
+    double *angle_free, *n_free;  /* [axes] the structure at their ports without them */
+    double *by_angle, *by_n;      /* [axes][axes] what their torques add there, for */
+    const Modal *transmitted;     /* this modal system */
+    double transmitted_h;         /* and this step */
+    double *q_free, *v_free_step; /* [size] */
 } Plant;
 
 /* State block: this head, then two places by turns for inputs at the end of the last step [ports], q [size], v [size],
  * with play or geometry, ways of the slides since the start, what play takes off or adds, and the wind-up of the
- * hysteresis [axes] each, and a
- * GuideState per axis: a step leaves its result in the other one, which counts once it is known to be sound. */
+ * hysteresis [axes] each, and a GuideState and a TransmissionState per axis: a step leaves its result in the other one,
+ * which counts once it is known to be sound. */
 typedef struct StateHead {
     uint64_t table_hash; /* mode table that the state belongs to */
     uint64_t cell;       /* whose modes q and v belong to */
     uint64_t place;      /* that counts, 0 or 1 */
 } StateHead;
 
-enum { GUIDE_DOUBLES = sizeof(GuideState) / sizeof(double) };
+enum {
+    GUIDE_DOUBLES = sizeof(GuideState) / sizeof(double),
+    TRANSMISSION_DOUBLES = sizeof(TransmissionState) / sizeof(double)
+};
 
 /* The first of the ports at the slides. */
 static inline size_t plant_slides(const Plant *plant) {
@@ -79,7 +92,7 @@ static inline size_t plant_ports(const Plant *plant) {
 }
 
 static inline size_t plant_state_doubles(const Plant *plant) {
-    return plant_ports(plant) + 2 * plant->size + (3 + GUIDE_DOUBLES) * plant->axes;
+    return plant_ports(plant) + 2 * plant->size + (3 + GUIDE_DOUBLES + TRANSMISSION_DOUBLES) * plant->axes;
 }
 
 /* --- load.c: the archive */

@@ -17,7 +17,7 @@ from feedsim.errors import FeedsimError, InputError
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine
 from feedsim.structure.assembly import SAME_POSITION
-from feedsim.structure.modes import Modes, checked_modes
+from feedsim.structure.modes import Modes, checked_modes, with_transmissions
 from feedsim.structure.pack import AXES_IN_ARCHIVE, MODES_IN_ARCHIVE, POSES_IN_ARCHIVE, pack
 from feedsim.structure.poses_file import read_cell
 
@@ -151,7 +151,7 @@ def plant_modes(machine: Machine) -> tuple[Modes, list[str]]:
         with_grid = _of_cell(machine)
     except FeedsimError as error:  # who simulates meets it again; the closed form can do without the archive
         return table, [f"the closed form has the modes of {machine.modes.name}, not those of the plant: {error}"]
-    return with_grid or (table, [])
+    return (with_transmissions(machine, with_grid[0]), with_grid[1]) if with_grid else (table, [])
 
 
 def _of_cell(machine: Machine) -> tuple[Modes, list[str]] | None:

@@ -29,6 +29,7 @@ from feedsim.trace import Table, Trace, matching
 
 PLANT_SIGNALS = ("x_a", "n_a")
 GUIDE_SIGNAL = "guide.F_fr"  # of axes with friction there
+TRANSMISSION_SIGNALS = ("transmission.F", "transmission.way")  # of axes with one
 TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z", "tcp.x_X", "tcp.x_Y", "tcp.x_Z")
 # Of the coupling, not of a unit: recorded where it is asked for.
 RESIDUAL, RESIDUAL_UNIT = "residual", "J"
@@ -59,7 +60,13 @@ def columns_of(machine: Machine, loaded: Sequence[str] = (), *, residual: bool =
     for name, axis in machine.axes.items():
         shown = (*DRIVE.shown(axis.drive), *FRICTION.shown(axis.friction), *([RESIDUAL] if residual else []))
         found += (f"{name}.{signal}" for signal in (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *shown))
-    return [*found, *(f"{name}.{GUIDE_SIGNAL}" for name in machine.guided), *TOOL_SIGNALS, *loaded]
+    return [*found, *_effects(machine), *TOOL_SIGNALS, *loaded]
+
+
+def _effects(machine: Machine) -> list[str]:
+    """Columns of the plant that only axes with such an effect have."""
+    guides = [f"{name}.{GUIDE_SIGNAL}" for name in machine.guided]
+    return guides + [f"{name}.{signal}" for name in machine.transmitted for signal in TRANSMISSION_SIGNALS]
 
 
 def loaded_inputs(scenario: Scenario) -> list[str]:
@@ -117,8 +124,9 @@ class Recording:
                     self._setpoints[name] = values[axis]
                     self._units[name] = wiring.SETPOINT_UNITS[setpoint]
         plant = [f"{axis}.{signal}" for axis in system.axes for signal in PLANT_SIGNALS]
-        plant += [f"{axis}.{GUIDE_SIGNAL}" for axis in system.machine.guided]
-        self._log(wiring.PLANT, {name: name for name in (*plant, *TOOL_SIGNALS, *loaded)}, cycle)
+        self._log(
+            wiring.PLANT, {name: name for name in (*plant, *_effects(system.machine), *TOOL_SIGNALS, *loaded)}, cycle
+        )
         self.limited: dict[str, int] = {}
         for axis, described in system.machine.axes.items():
             drive, friction = DRIVE.shown(described.drive), FRICTION.shown(described.friction)

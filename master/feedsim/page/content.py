@@ -150,7 +150,8 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
         *reach.sentences(machine, program, resources),
     }  # fmt: skip
     ahead = [warning for warning in run_check(scenario, program, fmus=folder) if warning not in said]
-    tables = {} if machine.plant is None else {"table": _table(modes, machine), "pose": _table(here, machine)}
+    own = machine.plant is not None or machine.transmitted  # not the modes that the unit holds
+    tables = {} if not own else {"table": _table(modes, machine), "pose": _table(here, machine)}
     scheme = SCHEMES[coupling.scheme]
     # Judged is all friction of an axis, wherever it acts.
     friction = {f"{name}.friction.{key}": value for name, axis in machine.axes.items()

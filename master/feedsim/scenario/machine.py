@@ -233,8 +233,27 @@ else:
 
 if TYPE_CHECKING:
     Hysteresis = ParameterGroup
+
+    class _TransmissionParameters(ParameterGroup):
+        stiffness: float
+        damping: float
+        play: float
+        inertia: float
+
 else:
     Hysteresis = group("plant/axis", "hysteresis", "Elastic hysteresis between motor and slide")
+    _TransmissionParameters = group("plant/axis", "transmission", "Contact between motor and structure")
+
+
+class Transmission(_TransmissionParameters):
+    """A contact with stiffness, damping and play between a motor and what it drives."""
+
+    @field_validator("damping", "play", check_fields=False)
+    @classmethod
+    def _stiff(cls, value: float, info: ValidationInfo) -> float:
+        if value > 0 and not info.data.get("stiffness", True):
+            raise fault("stiffness is missing: without it the motor is joined rigidly, without play")
+        return value
 
 
 class Guide(_GuideParameters):
@@ -312,6 +331,9 @@ class Axis(Model):
     )
     hysteresis: Hysteresis | None = Field(
         default=None, description="Elastic hysteresis between motor and slide, without dynamics"
+    )
+    transmission: Transmission | None = Field(
+        default=None, description="Contact with stiffness, damping and play between motor and structure"
     )
     guide: Guide | None = Field(default=None, description="Friction between slide and rail, beside that at the motor")
     display_sign: Literal[1, -1] = Field(default=1, description="Sign of torque and current in figures, nowhere else")
@@ -476,11 +498,13 @@ class Machine(Model):
 
     @property
     def errors(self) -> dict[str, Parameter]:
-        """Parameters of the plant for play, hysteresis, friction at the guides and geometry, where there are any."""
+        """Parameters of the plant for play, hysteresis, transmissions, friction at the guides and geometry, if any."""
         play: dict[str, Parameter] = {f"{name}.play": axis.play for name, axis in self.axes.items() if axis.play}
         for name, axis in self.axes.items():
             wound = axis.hysteresis.parameters() if axis.hysteresis is not None else {}
             play |= {f"{name}.hysteresis.{key}": value for key, value in wound.items()}
+            joined = axis.transmission.parameters() if axis.transmission is not None else {}
+            play |= {f"{name}.transmission.{key}": value for key, value in joined.items()}
             play |= {f"{name}.guide.{key}": value for key, value in axis.friction_at_guide.items()}
         geometry = self.geometry.parameters() if self.geometry is not None else {}
         return play | {f"geometry.{name}": value for name, value in geometry.items()}
@@ -516,6 +540,11 @@ class Machine(Model):
     def guided(self) -> list[str]:
         """Axes with friction at the guide."""
         return [name for name, axis in self.axes.items() if axis.friction_at_guide.get("F_S")]
+
+    @property
+    def transmitted(self) -> list[str]:
+        """Axes whose motor is joined to the structure by a transmission."""
+        return [name for name, axis in self.axes.items() if axis.transmission and axis.transmission.stiffness > 0]
 
     @field_validator("axes")
     @classmethod

@@ -255,11 +255,12 @@ def _axis(parts: Parts, axis: str, told: Mapping[str, Any], folder: Path) -> dic
 
 
 def _effects(parts: Parts, axis: str) -> dict[str, Any]:
-    """Hysteresis and friction at the guide of an axis, where there is any."""
+    """Hysteresis, transmission and friction at the guide of an axis, where there is any."""
     if parts.roles.plant not in parts.archives:
         return {}
     given = parts.values[parts.roles.plant]
-    on = [name for name, value in (("hysteresis", "value"), ("guide", "F_S")) if given.get(f"{axis}.{name}.{value}")]
+    switches = {"hysteresis": "value", "transmission": "stiffness", "guide": "F_S"}
+    on = [name for name, value in switches.items() if given.get(f"{axis}.{name}.{value}")]
     return {name: _group(parts, parts.roles.plant)[axis][name] for name in on}
 
 

@@ -26,6 +26,7 @@ MODE, FREQUENCY, DAMPING = "mode", "frequency [Hz]", "damping ratio [1]"
 TOOL_PORTS = ("tcp_X", "tcp_Y", "tcp_Z")
 # A lead from mode shapes carries the eigensolver's error (1e-8 and less); a wrong pitch is off by per cents.
 LEAD_TOLERANCE = 1e-3
+MOST_INERTIA = 0.95  # of J_inf, on the motor's side of a transmission; as the unit plant has it
 MOST_PROBLEMS = 20
 
 
@@ -176,8 +177,51 @@ def _number(cell: str) -> float:
         return math.nan
 
 
+@lru_cache(maxsize=8)
+def joined(modes: Modes, contacts: tuple[tuple[str, float, float, float], ...]) -> Modes:
+    """Modes of a structure whose motors are joined to it by contacts, each closed: (axis, stiffness [N.m/rad], damping
+    [N.m.s/rad], inertia on the motor's side [kg.m2]).
+
+    The structure holds these inertias, so they are taken off it and set behind the springs: with q its coordinates, phi
+    the motors' angles and n the shapes at the rotors, M = diag(1 - sum J n n', J), K = diag(omega^2, 0) + sum c w w',
+    w = (-n, 1). Damping couples these modes; its diagonal is kept.
+
+    Raises:
+        InputError: an inertia is as large as what answers a torque at once.
+    """
+    from scipy.linalg import eigh  # few machines need it
+
+    axes = [axis for axis, *_ in contacts]
+    N, omega = len(modes.frequency), 2 * np.pi * modes.frequency
+    size = N + len(axes)
+    n = [np.concatenate([modes.ports[f"n_{axis}"], np.zeros(len(axes))]) for axis in axes]
+    M = np.eye(size)
+    K, D = (np.diag(np.concatenate([each, np.zeros(len(axes))])) for each in (omega**2, 2 * modes.damping * omega))
+    for i, (axis, c, d, J) in enumerate(contacts):
+        motor = np.zeros(size)
+        motor[N + i] = 1.0
+        M += J * np.outer(motor, motor) - np.outer(motor, motor) - J * np.outer(n[i], n[i])
+        K += c * np.outer(motor - n[i], motor - n[i])
+        D += d * np.outer(motor - n[i], motor - n[i])
+        if modes.J_inf(axis) * MOST_INERTIA <= J:
+            raise InputError(
+                f"axis {axis}: transmission.inertia is {J:.6g} kg.m2; it must be below {MOST_INERTIA:g} of the inertia "
+                f"that answers a torque at once, {modes.J_inf(axis):.6g} kg.m2 by {modes.file}, of which it is a part"
+            )
+    squares, shapes = eigh(K, M)
+    slow = int(np.count_nonzero(modes.rigid))
+    found = np.sqrt(np.maximum(squares, 0.0))
+    found[:slow] = 0.0
+    damping = np.zeros(size)
+    damping[slow:] = np.einsum("im,ij,jm->m", shapes, D, shapes)[slow:] / (2 * found[slow:])
+    ports = {name: shape @ shapes[:N] for name, shape in modes.ports.items()}
+    ports |= {f"n_{axis}": shapes[N + i] for i, axis in enumerate(axes)}
+    return Modes(modes.file, found / (2 * np.pi), damping, ports)
+
+
 def checked_modes(machine: Machine) -> Modes:
     """The machine's mode table, consistent with its axes: one rigid mode per axis, leads that agree with the pitches.
+    Transmissions of the machine are part of it, their contacts closed.
 
     Raises:
         InputError: the table is broken or contradicts the machine file.
@@ -193,4 +237,13 @@ def checked_modes(machine: Machine) -> Modes:
             )
     if problems:
         raise InputError.of(f"{machine.modes}: the modes contradict the machine", problems)
-    return modes
+    return with_transmissions(machine, modes)
+
+
+def with_transmissions(machine: Machine, modes: Modes) -> Modes:
+    """Modes of the structure with the contacts that join the machine's motors to it; `modes` itself without any."""
+    contacts = tuple(
+        (name, each.stiffness * axis.I_P**2, each.damping * axis.I_P**2, each.inertia)
+        for name, axis in machine.axes.items() if (each := axis.transmission) is not None and each.stiffness > 0
+    )  # fmt: skip
+    return joined(modes, contacts) if contacts else modes

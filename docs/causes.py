@@ -16,7 +16,7 @@ from feedsim import cosim, scenario
 from feedsim.analysis import Diagnosis
 from feedsim.analysis.circle import name
 from feedsim.analysis.circle.words import worth_telling
-from feedsim.analysis.circle_figures import UNITS, diagnosed
+from feedsim.analysis.circle_figures import FIGURE_UNITS, diagnosed
 from feedsim.analysis.circularity import contour
 from feedsim.analysis.evaluate import CircleTask, tasks
 from feedsim.report.style import BLUE, VERMILLION
@@ -125,7 +125,7 @@ def words(found: Diagnosis, cause: Cause) -> str:
     for term in [*worth_telling(found), *asked]:
         if term.key == "offset" or (term.key == "peaks" and not cause.term.startswith("peaks")):
             continue
-        factor, unit = UNITS[term.unit]
+        factor, unit = FIGURE_UNITS[term.unit]
         text = f"{name(term)} {factor * term.value:.3g} +- {factor * term.half:.2g} {unit}"
         if term.key == "scale" and found.unlike is not None and abs(found.unlike) > term.half:
             text += f" (by the response of the axes {1e6 * found.unlike:.3g})"

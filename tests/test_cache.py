@@ -104,7 +104,7 @@ def test_where_answers_are_kept(set_to: dict[str, str], expected: Path | None, m
 
 
 def test_the_oldest_answers_go(place: Path, code: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "KEPT", 3)
+    monkeypatch.setattr(cache, "MAX_ANSWERS", 3)
     for k in range(6):
         cache.cached("kind", [k], [code], Counted(k))
         for file in place.iterdir():  # a clock may be coarse

@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 FOLDER = "FEEDSIM_CACHE"  # environment variable: the folder; empty: nothing is kept
-KEPT = 256  # answers of one kind; the oldest go first
-LARGEST = 1 << 20  # bytes of an answer; a larger file is none of ours
+MAX_ANSWERS = 256  # answers of one kind; the oldest go first
+MAX_ANSWER_BYTES = 1 << 20  # bytes of an answer; a larger file is none of ours
 LIBRARIES = ("numpy", "scipy", "jinja2")
 
 
@@ -39,7 +39,7 @@ def cached(kind: str, follows_from: Sequence[Any], code: Sequence[Path], find: C
     asked = json.dumps([kind, _versions(tuple(code)), *follows_from], sort_keys=True)
     file = place / f"{kind}-{hashlib.sha256(asked.encode()).hexdigest()[:40]}.json"
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
-        if file.stat().st_size <= LARGEST:
+        if file.stat().st_size <= MAX_ANSWER_BYTES:
             kept = json.loads(file.read_text(encoding="utf-8"))
             if kept["asked"] == asked:
                 return kept["answer"]
@@ -110,7 +110,7 @@ def _versions(code: tuple[Path, ...]) -> list[str]:
 
 def _keep(file: Path, kind: str, text: str) -> None:
     """Write it whole; others may read and write the same one meanwhile. Raises OSError."""
-    if len(text) > LARGEST:
+    if len(text) > MAX_ANSWER_BYTES:
         return
     file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile("w", encoding="utf-8", prefix=".", dir=file.parent, delete=False) as out:
@@ -124,6 +124,6 @@ def _keep(file: Path, kind: str, text: str) -> None:
                 fresh.unlink()
             raise
     others = sorted(file.parent.glob(f"{kind}-*.json"), key=lambda each: each.stat().st_mtime)
-    for old in others[:-KEPT]:
+    for old in others[:-MAX_ANSWERS]:
         with suppress(OSError):
             old.unlink()

@@ -199,19 +199,19 @@ def parameter(variable: Variable, default: Any = ..., *, example: str = "", text
 @cache
 def _symbols() -> dict[str, str]:
     """Symbol as a pattern -> its dimension."""
-    return {symbol: units.unit(symbol).dimension for symbol in (*units.SYMBOLS, *units.ALIASES)}
+    return {symbol: units.unit(symbol).dimension for symbol in (*units.UNIT_SYMBOLS, *units.ALIASES)}
 
 
 def _axis(value: Any, info: ValidationInfo) -> str:
-    if not isinstance(value, str) or not re.fullmatch(_NAME, value) or value in RESERVED:
+    if not isinstance(value, str) or not re.fullmatch(_NAME_PATTERN, value) or value in RESERVED:
         raise fault(f"{brief(value)} is no axis name: a letter, then letters, digits and _ (not {', '.join(RESERVED)})")
     if isinstance(info.context, Reading) and info.context.axes is not None and value not in info.context.axes:
         raise fault(no_axis(value, info.context.axes))
     return value
 
 
-_NAME = "[A-Za-z][A-Za-z0-9_]*"
-_AXIS = {"type": "string", "pattern": f"^{_NAME}$", "description": "Axis of the machine."}
+_NAME_PATTERN = "[A-Za-z][A-Za-z0-9_]*"
+_AXIS = {"type": "string", "pattern": f"^{_NAME_PATTERN}$", "description": "Axis of the machine."}
 AxisName = Annotated[str, PlainValidator(_axis), WithJsonSchema(_AXIS)]
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from feedsim.errors import OutputError
 
-HEAD = 4096  # bytes of a file that are read to see what it is
+HEAD_BYTES = 4096  # bytes of a file that are read to see what it is
 _FORCED = ContextVar("forced", default=False)
 
 
@@ -71,7 +71,7 @@ def begins_with(*marks: bytes) -> Callable[[Path], bool]:
     def one(path: Path) -> bool:
         try:
             with path.open("rb") as file:
-                head = file.read(HEAD)
+                head = file.read(HEAD_BYTES)
         except OSError:
             return False
         return any(mark in head for mark in marks)
@@ -85,7 +85,7 @@ def archive_with(member: str, mark: bytes) -> Callable[[Path], bool]:
     def one(path: Path) -> bool:
         try:
             with zipfile.ZipFile(path) as opened, opened.open(member) as file:
-                return mark in file.read(64 * HEAD)
+                return mark in file.read(64 * HEAD_BYTES)
         except (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, RuntimeError, ValueError):
             return False
 

@@ -31,8 +31,8 @@ from typing import Self
 from feedsim.errors import OutputError
 
 PREFIX = "feedsim-"  # of folders for temporary files
-_LETTERS, _LENGTH = "abcdefghijklmnopqrstuvwxyz0123456789_", 8  # of their names behind it, as tempfile has them
-_NAME = re.compile(rf"{PREFIX}[{_LETTERS}]{{{_LENGTH}}}")
+_NAME_LETTERS, _LENGTH = "abcdefghijklmnopqrstuvwxyz0123456789_", 8  # of their names behind it, as tempfile has them
+_OWNED_NAME = re.compile(rf"{PREFIX}[{_NAME_LETTERS}]{{{_LENGTH}}}")
 LOCK = ".feedsim.lock"  # in a folder that belongs to a process
 WRITING = 2.0  # s for which processes that are just being ended may still write into a folder that is removed
 YOUNG = 60.0  # s within which a folder without a lock may be one that is just being made
@@ -237,7 +237,7 @@ class TemporaryFolder:
         try:
             parent = within or Path(tempfile.gettempdir())
             while True:
-                self.path = parent / (PREFIX + "".join(secrets.choice(_LETTERS) for _ in range(_LENGTH)))
+                self.path = parent / (PREFIX + "".join(secrets.choice(_NAME_LETTERS) for _ in range(_LENGTH)))
                 held: list[int] = []
                 # Ahead of the folder: a signal may end the program between any two steps, and nobody may close it.
                 self._end = weakref.finalize(self, _remove, self.path, held, os.getpid())
@@ -305,7 +305,7 @@ def remove_orphans() -> None:
         with suppress(OSError):
             found = folder.lstat()
             if (
-                _NAME.fullmatch(folder.name)
+                _OWNED_NAME.fullmatch(folder.name)
                 and stat.S_ISDIR(found.st_mode)
                 and (not hasattr(os, "geteuid") or found.st_uid == os.geteuid())
             ):

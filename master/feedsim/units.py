@@ -22,7 +22,7 @@ from feedsim.errors import InputError, nearest
 from feedsim_packager import units as algebra
 
 # What may be written, in the order of messages.
-SYMBOLS = (
+UNIT_SYMBOLS = (
     "m", "km", "dm", "cm", "mm", "um", "nm", "in", "s", "ms", "us", "ns", "min", "h", "kg", "g", "t", "A", "mA",
     "rad", "mrad", "urad", "rev", "deg", "arcsec", "rpm", "Hz", "kHz", "N", "mN", "kN", "Pa", "MPa", "GPa", "Nm",
     "V", "mV", "kV", "Ohm", "mOhm", "H", "mH", "uH", "Wb", "W", "percent",
@@ -48,7 +48,7 @@ ALIASES = {
     "mΩ": "mOhm",
 }
 # What a quantity in a unit is called, and an example to show.
-KINDS = {
+QUANTITY_NAMES = {
     "m": ("length", "100 mm"),
     "s": ("time", "125 us"),
     "kg": ("mass", "435 kg"),
@@ -84,7 +84,7 @@ KINDS = {
 
 DIMENSIONLESS = "1"
 LONGEST_NUMBER = 1100  # characters; every double, written out, has less
-LONGEST = 60  # characters of a unit
+MAX_UNIT_LENGTH = 60  # characters of a unit
 
 # Names of the dimensions of algebra.BASE, as messages have them.
 _DIMENSIONS = ("mass", "length", "time", "current", "temperature", "amount", "luminosity", "angle")
@@ -122,7 +122,7 @@ class UnknownSymbol(InputError):
 
 def example(text: str) -> str:
     """A quantity that could stand where one in unit `text` is expected."""
-    return KINDS[text][1] if text in KINDS else f"1 {text}"
+    return QUANTITY_NAMES[text][1] if text in QUANTITY_NAMES else f"1 {text}"
 
 
 def parse(text: str, expected: str, example_text: str = "") -> float:
@@ -184,13 +184,13 @@ def unit(text: str) -> Unit:
     InputError: unknown symbol (with a suggestion), a product behind a division without brackets, bad syntax.
     """
     plain = " ".join(text.translate(_SPELLINGS).split())
-    if len(plain) > LONGEST:
-        raise InputError(f"unit {text[:20]!r}... has more than {LONGEST} characters")
+    if len(plain) > MAX_UNIT_LENGTH:
+        raise InputError(f"unit {text[:20]!r}... has more than {MAX_UNIT_LENGTH} characters")
     if not _LEGAL.fullmatch(plain):
         bad = next(c for c in plain if not _LEGAL.fullmatch(c))
         raise InputError(f"unit {text!r} holds {bad!r}")
     for symbol in _SYMBOL.findall(plain):
-        if symbol not in SYMBOLS and symbol not in ALIASES:
+        if symbol not in UNIT_SYMBOLS and symbol not in ALIASES:
             raise UnknownSymbol(symbol)
     plain = _SYMBOL.sub(lambda match: ALIASES.get(match[0], match[0]), plain)
     plain = re.sub(r"(?<=[a-zA-Z])([0-9])", r"^\1", plain).replace("**", "^")
@@ -212,7 +212,7 @@ def unit(text: str) -> Unit:
 @cache
 def _kinds() -> dict[str, str]:
     """Dimension -> what a quantity of it is called."""
-    return {unit(known).dimension: name for known, (name, _) in reversed(KINDS.items())}
+    return {unit(known).dimension: name for known, (name, _) in reversed(QUANTITY_NAMES.items())}
 
 
 def article(kind: str) -> str:
@@ -276,13 +276,13 @@ def _hint(given: Unit, target: Unit) -> str:
 
 
 def _suggest(symbol: str) -> str:
-    near = nearest(symbol, [*SYMBOLS, *ALIASES])
-    return f"; did you mean {near!r}?" if near else f"; known are {', '.join(SYMBOLS)}"
+    near = nearest(symbol, [*UNIT_SYMBOLS, *ALIASES])
+    return f"; did you mean {near!r}?" if near else f"; known are {', '.join(UNIT_SYMBOLS)}"
 
 
 def _suggest_for(symbol: str, text: str, target: Unit) -> str:
     """A symbol close to ``symbol`` with which ``text`` has the dimension of ``target``; else all known ones."""
-    known = [*SYMBOLS, *ALIASES]
+    known = [*UNIT_SYMBOLS, *ALIASES]
     close = [name for name in known if name.lower() == symbol.lower()]
     close += get_close_matches(symbol, known, n=10, cutoff=0.5)
     for name in close:
@@ -290,4 +290,4 @@ def _suggest_for(symbol: str, text: str, target: Unit) -> str:
         with suppress(InputError):
             if unit(corrected).dimension == target.dimension:
                 return f"; did you mean {name!r}?"
-    return f"; known are {', '.join(SYMBOLS)}"
+    return f"; known are {', '.join(UNIT_SYMBOLS)}"

@@ -14,7 +14,7 @@ import pytest
 from command_helpers import feedsim, feedsim_process
 from feedsim.cli import COMMANDS
 from feedsim.cli.completion import SHELLS, places
-from feedsim.cli.kinds import KINDS, kind
+from feedsim.cli.kinds import INPUT_KINDS, kind
 from feedsim.cli.terminal import painted
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -118,7 +118,7 @@ def test_every_shipped_file_is_of_the_kind_that_it_is() -> None:
 
 def test_kinds_name_commands_that_there_are() -> None:
     names = {place.command for place in places(COMMANDS)}
-    for each in KINDS:
+    for each in INPUT_KINDS:
         assert {command.partition(" --")[0] for command in each.commands} <= names  # of an option: its command
 
 

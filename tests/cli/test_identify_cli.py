@@ -22,7 +22,7 @@ from feedsim.identify.friction_file import Line, friction_text
 from feedsim.identify.read import distinct
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Estimate, Plateau
-from feedsim.identify.stages import ORDER, begins, merged_correlation, transitions
+from feedsim.identify.stages import RESULT_ORDER, begins, merged_correlation, transitions
 from feedsim.identify.torque import RecordTorque
 from feedsim.scenario import load_machine
 from feedsim.scenario.load import read_friction
@@ -74,7 +74,7 @@ def test_everything_is_written_and_told(done: Done, traces: Path) -> None:
     lines = done.stdout.splitlines()
     assert lines[0].startswith("axis Z: curve within ")
     assert lines[0].endswith(f"-> {Path('results') / 'identify_z' / 'report.html'}")
-    assert [line.split()[0] for line in lines[2:17]] == list(ORDER)
+    assert [line.split()[0] for line in lines[2:17]] == list(RESULT_ORDER)
     assert any(line.startswith("  constant load M_0 0.2") for line in lines)
     assert lines[-1].endswith(f"machine.axes.Z.friction={Path('results') / 'identify_z' / 'friction.yaml'}")
 
@@ -252,7 +252,7 @@ def no_law(*words: Any, **more: Any) -> Any:
 def test_stages_are_merged(calls: dict[str, Any]) -> None:
     told: list[tuple[str, int, int]] = []
     found = identify(records(), no_law, options(hold={"beta": 1.2, "W": 0.0}), lambda *words: told.append(words))
-    assert list(found.estimates) == list(ORDER)
+    assert list(found.estimates) == list(RESULT_ORDER)
     assert calls["stage 1"]["hold"] == {"beta": 1.2}
     assert calls["stage 2"]["hold"] == {"beta": 1.2, "W": 0.0}
     assert calls["stage 2"]["records"] == ["sine.csv"]
@@ -338,7 +338,7 @@ def test_no_row_counts_twice(calls: dict[str, Any], monkeypatch: pytest.MonkeyPa
         assert len(left) < len(whole)
         return
     assert found.estimates["F_C"].value == 1.6
-    assert found.correlation.names == tuple(name for name in ORDER if name in alone.correlation.names)
+    assert found.correlation.names == tuple(name for name in RESULT_ORDER if name in alone.correlation.names)
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def everything_is_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """Stretches and rings so small that a short run has many of them, their borders at odd places."""
     monkeypatch.setattr(table, "IN_MEMORY", 0)
     monkeypatch.setattr(table, "STRETCH", 101)
-    monkeypatch.setattr(program, "BLOCK", 64)
+    monkeypatch.setattr(program, "SPLINE_POINTS", 64)
     monkeypatch.setattr(spline.LongSpline.__init__, "__defaults__", (64,))
     monkeypatch.setattr(circular, "INSTANTS", 77)
     for room in (loop, recording):

@@ -241,7 +241,7 @@ def with_library(folder: Path, tmp_path: Path, content: bytes | None) -> Path:
     for archive in folder.glob("*.fmu"):
         (tmp_path / archive.name).symlink_to(archive.resolve())
     if content is not None:
-        (tmp_path / exchange.NAME).write_bytes(content)
+        (tmp_path / exchange.LIBRARY_NAME).write_bytes(content)
     return tmp_path
 
 
@@ -273,7 +273,7 @@ def test_without_a_library_python_serves_and_says_so(folder: Path, tmp_path: Pat
     assert not run.native
     (told,) = told_of_loop(run)
     assert severity(told) == "note"
-    assert f"slower than the native one, same bits: {exchange.NAME}: no such file beside the archives" in told
+    assert f"slower than the native one, same bits: {exchange.LIBRARY_NAME}: no such file beside the archives" in told
     assert str(bare) not in told
     assert not told_of_loop(run_short(bare, native=False)), "Python was asked for"
     with pytest.raises(InputError, match=r"no native cycle loop that fits this version: .* `make fmus` builds"):
@@ -294,11 +294,11 @@ def test_library_that_is_none_is_left_alone(folder: Path, tmp_path: Path) -> Non
 
 def test_a_copy_of_a_library_is_not_loaded_again(folder: Path, tmp_path: Path) -> None:
     """Workers get one with each study, and nothing unloads it."""
-    content = (folder / exchange.NAME).read_bytes()
+    content = (folder / exchange.LIBRARY_NAME).read_bytes()
     copies = []
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / exchange.NAME).write_bytes(content)
+        (tmp_path / name / exchange.LIBRARY_NAME).write_bytes(content)
         copies.append(exchange.library(tmp_path / name))
     assert not isinstance(copies[0], str)
     assert copies[0] is copies[1]
@@ -311,7 +311,7 @@ def test_stale_library_is_left_alone(folder: Path, tmp_path: Path) -> None:
         '#include <stdlib.h>\nconst char *exchange_interface(void) { return "0: step"; }\n'
         "int exchange_run(void) { abort(); }\n"
     )
-    library = tmp_path / exchange.NAME
+    library = tmp_path / exchange.LIBRARY_NAME
     compiler = shlex.split(os.environ.get("CC", "cc"))
     subprocess.run([*compiler, "-shared", "-fPIC", str(source), "-o", str(library)], check=True)
     stale = with_library(folder, tmp_path, None)

@@ -55,9 +55,9 @@ def test_packed_once_by_content(packs: list[Path], fmus: Path, tmp_path: Path) -
 
 def test_bounded(packs: list[Path], fmus: Path) -> None:
     folder = ROOT / "scenarios" / "machines" / "one_axis"
-    for i in range(plant.KEPT + 2):
+    for i in range(plant.MAX_PACKED_PLANTS + 2):
         guid(folder, fmus, f"machine.name=M{i}")
-    assert len(packs) == plant.KEPT + 2
-    assert len(plant._PACKED) == plant.KEPT
-    guid(folder, fmus, f"machine.name=M{plant.KEPT + 1}")  # one of the latest
-    assert len(packs) == plant.KEPT + 2
+    assert len(packs) == plant.MAX_PACKED_PLANTS + 2
+    assert len(plant._PACKED) == plant.MAX_PACKED_PLANTS
+    guid(folder, fmus, f"machine.name=M{plant.MAX_PACKED_PLANTS + 1}")  # one of the latest
+    assert len(packs) == plant.MAX_PACKED_PLANTS + 2

@@ -81,10 +81,10 @@ def test_a_library_is_loaded_once_and_its_instances_are_their_own(fmus: Path) ->
 
 def test_only_the_latest_are_kept(fmus: Path, tmp_path: Path, scratch: Path) -> None:
     with Archive(fmus / "friction.fmu") as in_use:
-        for i in range(unpacked.KEPT + 3):
+        for i in range(unpacked.MAX_UNUSED_CONTENTS + 3):
             with Archive(altered(fmus / "friction.fmu", tmp_path / f"{i}.fmu", str(i))) as last:
                 assert last.directory.is_dir()
-        assert len(list(scratch.iterdir())) == unpacked.KEPT + 1
+        assert len(list(scratch.iterdir())) == unpacked.MAX_UNUSED_CONTENTS + 1
         assert in_use.directory.is_dir()
         assert last.directory.is_dir()
 

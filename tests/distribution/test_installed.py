@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from feedsim.cosim.exchange import NAME as LOOP
+from feedsim.cosim.exchange import LIBRARY_NAME as LOOP
 from feedsim_distribution import backend
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -216,7 +216,7 @@ def settings_of(loaded: scenario.Scenario, axis: str, drive: Path | None, fricti
     machine = loaded.machine
     given: dict[str, tuple[Path | None, Any, dict[str, Any]]] = {
         "drive": (drive, scenario.roles.DRIVE, controller_parameters(machine, axis)),
-        "friction": (friction, scenario.roles.FRICTION, machine.shipped_friction(axis, "a test").parameters()),
+        "friction": (friction, scenario.roles.FRICTION_ROLE, machine.shipped_friction(axis, "a test").parameters()),
     }
     return [
         f"machine.axes.{axis}.{name}=" + str({

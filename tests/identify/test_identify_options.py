@@ -13,7 +13,7 @@ import pytest
 from feedsim.cli import main
 from feedsim.errors import InputError
 from feedsim.identify import Estimate, Options
-from feedsim.identify.parameters import DELAYS, FRICTION, KINDS
+from feedsim.identify.parameters import DELAYS, FRICTION_NAMES, PARAMETER_KINDS
 from feedsim.scenario import Friction
 from feedsim.trace import Trace, write_csv
 
@@ -118,8 +118,8 @@ def test_what_is_possible_is_taken() -> None:
 def test_ranges_are_those_of_machine_files() -> None:
     """What may be held may be written to friction.yaml, and what may not, may not."""
     start = {"sigma_0": 300.0, "sigma_1": 0.8, "sigma_2": 0.006, "F_C": 1e-9, "F_S": 10.0, "v_s": 0.6}
-    for name in FRICTION:
-        end = KINDS[name].lower
+    for name in FRICTION_NAMES:
+        end = PARAMETER_KINDS[name].lower
         beside = start | ({"F_S": 1e-9} if name == "F_S" else {})
         assert Friction.model_validate(beside | {name: end}).parameters()[name] == end
         with pytest.raises(ValueError, match=name):
@@ -127,4 +127,4 @@ def test_ranges_are_those_of_machine_files() -> None:
 
 
 def test_the_delay_is_searched_within_what_may_be_given() -> None:
-    assert KINDS["delay"].lower <= DELAYS[0] < DELAYS[1] <= KINDS["delay"].upper
+    assert PARAMETER_KINDS["delay"].lower <= DELAYS[0] < DELAYS[1] <= PARAMETER_KINDS["delay"].upper

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feedsim.errors import InputError
-from feedsim.identify.magnitudes import ROWS, check_found, check_inertia, check_size, check_time
+from feedsim.identify.magnitudes import MAX_ROWS, check_found, check_inertia, check_size, check_time
 from feedsim.identify.parameters import estimate
 from feedsim.identify.read import read_records
 from feedsim.identify.record import Record
@@ -80,7 +80,7 @@ def test_an_inertia_of_another_magnitude() -> None:
 
 
 def test_more_rows_than_can_be_worked_on_are_refused() -> None:
-    for count, interval in ((ROWS + 1, 1e-3), (100_000, 0.1)):
+    for count, interval in ((MAX_ROWS + 1, 1e-3), (100_000, 0.1)):
         record = Record("long", np.arange(count) * interval, np.zeros(count), speed=np.ones(count))
         with pytest.raises(
             InputError, match=f"the traces: {count} rows, .* min; allowed: up to 2000000 rows and 66.7 min"

@@ -176,7 +176,7 @@ def test_steps_of_the_free_axis_are_all_that_is_wrong(
     general: Record, law: FrictionLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     record = general.between(1230, len(general))
-    monkeypatch.setattr("feedsim.identify.open_loop.STEP", 0.05)
+    monkeypatch.setattr("feedsim.identify.open_loop.EXPLICIT_STEP_SHARE", 0.05)
     assert_true(found(record, law, estimates(OFF)), EXACT / 9)  # three steps per interval
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from feedsim.errors import InputError
 from feedsim.identify.read import read_records
-from feedsim.identify.record import EVEN, even_pieces
+from feedsim.identify.record import GRID_TOLERANCE, even_pieces
 from record_helpers import DIGITS, SPEED, TIME, TORQUE, mapped, only, refusal, simple, table
 
 REST = "torque: {column: ActTorque}\n"
@@ -23,7 +23,7 @@ def place(row: int) -> str:
 
 def test_jitter_is_evened_out() -> None:
     rng = np.random.default_rng(4)
-    time = TIME + 0.9 * EVEN * 0.002 * rng.uniform(-1, 1, len(TIME))
+    time = TIME + 0.9 * GRID_TOLERANCE * 0.002 * rng.uniform(-1, 1, len(TIME))
     time[[0, -1]] = TIME[[0, -1]]
     (piece,), said = even_pieces(time, place)
     np.testing.assert_allclose(piece.time, TIME, rtol=0, atol=1e-15)

@@ -84,7 +84,7 @@ def test_a_plant_that_follows_its_pose_is_computed_and_its_end_is_said(tmp_path:
 
 
 def test_a_page_that_is_too_large_is_refused_with_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("feedsim.page.html.LARGEST", 200_000)
+    monkeypatch.setattr("feedsim.page.html.MAX_PAGE_BYTES", 200_000)
     out = tmp_path / "page.html"
     given = scenario.load(SCENARIOS / "one_axis.yaml")
     with pytest.raises(InputError, match=r"its page takes 0\.\d+ MB; allowed are 0\.2 MB"):

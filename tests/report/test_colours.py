@@ -16,7 +16,7 @@ from feedsim.report.show.pictures import looks_of
 from feedsim.trace import Mark
 
 REPORT = Path(style.__file__).parent
-MEANINGS = ("SIMULATED", "RECORDED", "SETPOINT", "AT_TOOL", "LEFT", "ALLOWED", "FRICTION", "OTHERWISE")
+MEANINGS = ("SIMULATED", "RECORDED", "SETPOINT", "AT_TOOL", "RESIDUAL_COLOUR", "ALLOWED", "FRICTION", "OTHERWISE")
 # Word with which the name of a curve begins -> meanings that its colour may have.
 WORDS = {
     "recorded": {"RECORDED"},
@@ -32,7 +32,7 @@ WORDS = {
     "setpoint": {"SETPOINT"},
     "friction": {"FRICTION"},
     "tolerance": {"ALLOWED"},
-    "outside": {"LEFT"},
+    "outside": {"RESIDUAL_COLOUR"},
 }
 # Modules whose colours are a list of many alike things: levels of a parameter, bodies, signals, stretches, sources.
 LISTS = {

@@ -21,7 +21,7 @@ from feedsim.report.run.report import report_of
 from feedsim.scenario import Machine
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.geometry.assemble import assemble
-from feedsim.structure.pose_change import LARGE, LOOKED_AT, PoseChange, pose_change, warnings
+from feedsim.structure.pose_change import LARGE_SHIFT, MAX_MODE_FREQUENCY, PoseChange, pose_change, warnings
 from report_helpers import positioning_run
 from scenario_helpers import MACHINE, default_machine, scenario
 from structure_helpers import default_structure, dense_modes
@@ -50,7 +50,7 @@ def test_whole_travel_against_a_dense_solver() -> None:
     pose = default_machine().pose
     here, at_low, at_high = (dense_modes(assemble(structure, {**pose, "Z": z}))[0] for z in (0.1, *TRAVEL))
     for mode in axis.modes:
-        assert 0 < mode.frequency <= LOOKED_AT
+        assert 0 < mode.frequency <= MAX_MODE_FREQUENCY
         for found, frequencies in ((mode.frequency, here), (mode.ends[0], at_low), (mode.ends[1], at_high)):
             assert np.min(np.abs(frequencies / found - 1)) < 1e-6
         assert abs(mode.change) == pytest.approx(max(abs(end / mode.frequency - 1) for end in mode.ends))
@@ -89,7 +89,7 @@ def test_small_motions() -> None:
     for axis in circle.axes:
         assert axis.modes
         assert axis.largest is not None
-        assert abs(axis.largest.change) < 0.01 < LARGE
+        assert abs(axis.largest.change) < 0.01 < LARGE_SHIFT
     assert not circle.large
     assert not warnings(circle)
     near = changed(Z=(0.0995, 0.1005))
@@ -209,10 +209,10 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
 def test_cells_that_are_refused(texts: list[str], message: str) -> None:
     from feedsim.arguments import as_options
     from feedsim.cli.options import pairs
-    from feedsim.jobs.machine_pack import EXAMPLE, grid_axes
+    from feedsim.jobs.machine_pack import POSITIONS_EXAMPLE, grid_axes
 
     with pytest.raises(InputError) as caught, as_options():
-        grid_axes(default_machine(), pairs("poses", texts, f"{EXAMPLE} is the form"))
+        grid_axes(default_machine(), pairs("poses", texts, f"{POSITIONS_EXAMPLE} is the form"))
     assert message in str(caught.value)
 
 

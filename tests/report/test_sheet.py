@@ -15,7 +15,7 @@ import pytest
 import feedsim as fs
 from command_helpers import feedsim, summary_of
 from feedsim import extras
-from feedsim.report.run.sheet import FAILS, NO_LIMIT, OPEN, PASSES, judged
+from feedsim.report.run.sheet import FAILS, NO_LIMIT_TEXT, OPEN, PASSES, judged
 from feedsim.report.run.workbook import _name
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -152,7 +152,7 @@ def test_the_workbook_has_the_numbers_of_the_table(fmus: Path, tmp_path: Path) -
         _, _, value, *judged_by, verdict = figures[row["Item"]]
         assert value == pytest.approx(float(row["Value"]), abs=1e-6)
         assert judged_by == ([float(row["Limit"]), 0.05] if row["Limit"] else [0.05])
-        assert verdict == (row["Verdict"] or NO_LIMIT)
+        assert verdict == (row["Verdict"] or NO_LIMIT_TEXT)
     head = next(k for k, row in enumerate(rows) if row and row[0] == "Target [mm]")
     readings: dict[tuple[str, str], list[float]] = {}
     for row in rows_of(out, "reading"):
@@ -196,7 +196,7 @@ def test_names_of_worksheets() -> None:
     [
         (5.0, 6.0, 0.0, PASSES), (6.0, 6.0, 0.0, PASSES), (6.1, 6.0, 0.0, FAILS), (5.8, 6.0, 0.5, OPEN),
         (6.4, 6.0, 0.5, OPEN), (6.6, 6.0, 0.5, FAILS), (-6.6, 6.0, 0.5, FAILS), (-5.0, 6.0, 0.5, PASSES),
-        (math.nan, 6.0, 0.0, OPEN), (5.0, math.nan, 0.0, NO_LIMIT),
+        (math.nan, 6.0, 0.0, OPEN), (5.0, math.nan, 0.0, NO_LIMIT_TEXT),
     ],
 )  # fmt: skip
 def test_verdicts(value: float, limit: float, uncertainty: float, verdict: str) -> None:

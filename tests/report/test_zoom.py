@@ -15,7 +15,7 @@ import pytest
 from feedsim.analysis import evaluate
 from feedsim.report import run as report
 from feedsim.report.chart import Axis, Chart, Curve, Panel
-from feedsim.report.chart.embedded import BLOCK, embedded, steps
+from feedsim.report.chart.embedded import BLOCK_ROWS, embedded, steps
 from feedsim.report.chart.scales import ticks
 from feedsim.report.content import Report
 from feedsim.report.page import html
@@ -85,7 +85,7 @@ def test_a_nanometre_over_two_metres() -> None:
     ],
 )
 def test_arrays_of_every_kind(values: list[float]) -> None:
-    found = decoded(BLOCK, steps(np.array(values)))
+    found = decoded(BLOCK_ROWS, steps(np.array(values)))
     wanted = np.where(np.isfinite(values), values, np.nan)
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
 

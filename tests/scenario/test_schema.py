@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from feedsim.cli import main
-from feedsim.cli.files import KINDS
+from feedsim.cli.files import FILE_KINDS
 from feedsim.scenario.schema import json_schema
 
 jsonschema = pytest.importorskip("jsonschema")
@@ -32,7 +32,7 @@ def errors(kind: Literal["scenario", "machine"], data: Any) -> list[str]:
     return [".".join(map(str, error.absolute_path)) for error in validator(kind).iter_errors(data)]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", FILE_KINDS)
 def test_files_are_what_the_command_prints(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", kind]) == 0
     pinned = (SCENARIOS / "schemas" / f"{kind}.schema.json").read_text(encoding="utf-8")
@@ -40,7 +40,7 @@ def test_files_are_what_the_command_prints(kind: str, capsys: pytest.CaptureFixt
 
 
 def test_there_is_a_file_for_every_kind_and_no_other() -> None:
-    assert {path.name for path in (SCENARIOS / "schemas").iterdir()} == {f"{kind}.schema.json" for kind in KINDS}
+    assert {path.name for path in (SCENARIOS / "schemas").iterdir()} == {f"{kind}.schema.json" for kind in FILE_KINDS}
 
 
 # Fragments that other files name have no schema of their own.

@@ -151,9 +151,9 @@ def test_factor_between_units() -> None:
 
 
 def test_every_unit_of_messages_can_be_read() -> None:
-    for unit, (_, example) in units.KINDS.items():
+    for unit, (_, example) in units.QUANTITY_NAMES.items():
         units.parse(example, unit)
-    for spelling in (*units.SYMBOLS, *units.ALIASES):
+    for spelling in (*units.UNIT_SYMBOLS, *units.ALIASES):
         assert units.unit(spelling).factor > 0
 
 

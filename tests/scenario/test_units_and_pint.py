@@ -13,7 +13,7 @@ COMPOUND = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("expression", [*units.SYMBOLS, *units.KINDS, *COMPOUND])
+@pytest.mark.parametrize("expression", [*units.UNIT_SYMBOLS, *units.QUANTITY_NAMES, *COMPOUND])
 def test_units_are_those_of_pint(expression: str, registry: Registry) -> None:
     found = units.unit(expression)
     expected = registry.quantity(expression).to_base_units()

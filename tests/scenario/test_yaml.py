@@ -6,7 +6,7 @@ import pytest
 
 from feedsim.errors import InputError
 from feedsim.files import source
-from feedsim.files.source import LARGEST, Place, _brackets, parse, read
+from feedsim.files.source import MAX_VALUES, Place, _brackets, parse, read
 
 
 def values(text: str) -> object:
@@ -85,7 +85,7 @@ def test_anchors_and_merge_keys() -> None:
 def test_alias_bomb_is_refused_before_it_goes_off() -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 12)]
-    assert f"more than {LARGEST} values, an alias counted as all that it stands for" in refusal("\n".join(lines))
+    assert f"more than {MAX_VALUES} values, an alias counted as all that it stands for" in refusal("\n".join(lines))
 
 
 @pytest.mark.parametrize(

@@ -297,10 +297,10 @@ def test_every_stop_time_can_be_run(exported: Path, tmp_path: Path) -> None:
 
 
 def test_the_rest_that_an_evaluation_needs() -> None:
-    from feedsim.analysis.positioning import LEAST_REST
+    from feedsim.analysis.positioning import MIN_REST_TIME
     from feedsim.ssp import setpoints
 
-    assert setpoints.LEAST_REST == LEAST_REST
+    assert setpoints.EVALUATED_REST == MIN_REST_TIME
 
 
 def test_an_experiment_that_starts_late(exported: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from fe_models import ROOT, STRUCTURES, dense_modes
 
 from feedsim.scenario.structure.load import load_structure
 from feedsim.structure.matrices.build import import_model
-from feedsim.structure.matrices.raw import DIRECTIONS
+from feedsim.structure.matrices.raw import FREEDOM_NAMES
 from feedsim.structure.matrices.tables import BY_NODE, NODE_COLUMNS, read_table
 
 TEXT = (ROOT / "docs" / "fe-import.md").read_text(encoding="utf-8")
@@ -45,7 +45,7 @@ def test_tables_are_read(tmp_path: Path) -> None:
     (tmp_path / "ports.csv").write_text(ports)
     (tmp_path / "nodes.csv").write_text(nodes)
     assert len(read_table(tmp_path / "ports.csv", "ports", [BY_NODE])) == 5
-    rows = read_table(tmp_path / "nodes.csv", "nodes", [NODE_COLUMNS], ("name", "body", *DIRECTIONS))
+    rows = read_table(tmp_path / "nodes.csv", "nodes", [NODE_COLUMNS], ("name", "body", *FREEDOM_NAMES))
     assert rows[-1]["rx"] == "12"
 
 

@@ -12,7 +12,7 @@ import pytest
 from feedsim.scenario import Machine
 from feedsim.structure import pose_change, solve, table_check
 from feedsim.structure.geometry import assemble
-from feedsim.structure.pose_change import NEAR, PoseChange
+from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange
 from scenario_helpers import MACHINE, default_machine
 
 MICROMETRE = 1e-6
@@ -94,9 +94,9 @@ def test_rounding_changes_frequencies_by_less_than_is_said() -> None:
 
 
 def test_whether_an_axis_is_near_the_pose_is_decided_by_where_it_goes(poses: list[dict[str, float]]) -> None:
-    assert not changed(Z=(0.1, 0.1 + 0.99 * NEAR)).axes[0].modes
+    assert not changed(Z=(0.1, 0.1 + 0.99 * MIN_POSE_DISTANCE)).axes[0].modes
     assert not poses
-    assert changed(Z=(0.1, 0.1 + 1.01 * NEAR)).axes[0].modes
+    assert changed(Z=(0.1, 0.1 + 1.01 * MIN_POSE_DISTANCE)).axes[0].modes
 
 
 def test_another_pose_and_another_structure_are_noticed(poses: list[dict[str, float]], tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ import pytest
 
 from feedsim.errors import InputError
 from feedsim.sweep.design import Outcome
-from feedsim.sweep.journal import NAME, Journal
+from feedsim.sweep.journal import JOURNAL_NAME, Journal
 
 HEAD = {"study": "S", "fingerprint": "abc", "parts": {"plant.fmu": "1", "parameters": "2"}}
 RUNS = 50
@@ -49,30 +49,30 @@ def test_cut_at_every_byte_of_its_last_lines(tmp_path: Path) -> None:
     with Journal(tmp_path / "whole", HEAD, RUNS) as journal:
         for run in range(6):
             journal.add(outcome(run))
-    content = (tmp_path / "whole" / NAME).read_bytes()
+    content = (tmp_path / "whole" / JOURNAL_NAME).read_bytes()
     ends = [i + 1 for i, byte in enumerate(content) if byte == ord("\n")]
     folder = tmp_path / "cut"
     folder.mkdir()
     for cut in range(len(content) + 1):
         if ends[0] < cut < ends[3]:
             continue  # the last lines, and the first one, are enough
-        (folder / NAME).write_bytes(content[:cut])
+        (folder / JOURNAL_NAME).write_bytes(content[:cut])
         with Journal(folder, HEAD, RUNS) as journal:
             whole = sum(end <= cut for end in ends)
             assert journal.resumed == max(whole - 1, 0), cut
             assert not journal.damaged
             for run in range(6):
                 assert journal.add(outcome(run)) == (run >= journal.resumed)
-        assert (folder / NAME).read_bytes().splitlines()[1:] == content.splitlines()[1:], cut
+        assert (folder / JOURNAL_NAME).read_bytes().splitlines()[1:] == content.splitlines()[1:], cut
 
 
 def test_a_damaged_line_is_a_run_to_be_made_again(tmp_path: Path) -> None:
     with Journal(tmp_path, HEAD, RUNS) as journal:
         for run in range(5):
             journal.add(outcome(run))
-    lines = (tmp_path / NAME).read_bytes().splitlines(keepends=True)
+    lines = (tmp_path / JOURNAL_NAME).read_bytes().splitlines(keepends=True)
     lines[2] = b"\0" * (len(lines[2]) - 1) + b"\n"
-    (tmp_path / NAME).write_bytes(b"".join(lines))
+    (tmp_path / JOURNAL_NAME).write_bytes(b"".join(lines))
     with Journal(tmp_path, HEAD, RUNS) as journal:
         assert journal.damaged == (3,)
         assert sorted(journal.done) == [0, 2, 3, 4]
@@ -88,22 +88,22 @@ def test_runs_of_another_study_are_refused(tmp_path: Path) -> None:
         Journal(tmp_path, other, RUNS)
     with Journal(tmp_path, other, RUNS, restart=True) as journal:
         assert journal.resumed == 0
-    assert len((tmp_path / NAME).read_bytes().splitlines()) == 1
+    assert len((tmp_path / JOURNAL_NAME).read_bytes().splitlines()) == 1
 
 
 def test_a_file_that_is_no_journal_is_refused_and_kept(tmp_path: Path) -> None:
-    (tmp_path / NAME).write_text("my notes\n")
+    (tmp_path / JOURNAL_NAME).write_text("my notes\n")
     with pytest.raises(InputError, match="not the journal of a study"):
         Journal(tmp_path, HEAD, RUNS)
-    assert (tmp_path / NAME).read_text() == "my notes\n"
+    assert (tmp_path / JOURNAL_NAME).read_text() == "my notes\n"
 
 
 @pytest.mark.parametrize("content", [b"my notes", b'{"format": 2', b'{"format": 1, "study": "T'])
 def test_a_file_without_a_line_feed_that_is_no_journal_is_kept(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / NAME).write_bytes(content)
+    (tmp_path / JOURNAL_NAME).write_bytes(content)
     with pytest.raises(InputError, match="not the journal of a study"):
         Journal(tmp_path, HEAD, RUNS)
-    assert (tmp_path / NAME).read_bytes() == content
+    assert (tmp_path / JOURNAL_NAME).read_bytes() == content
     with Journal(tmp_path, HEAD, RUNS, restart=True) as journal:
         assert journal.resumed == 0
 
@@ -144,7 +144,7 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
         assert f"process {os.getpid()} on " in told.stdout
     told = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True)
     assert told.stdout == ""
-    assert [path.name for path in tmp_path.iterdir()] == [NAME]
+    assert [path.name for path in tmp_path.iterdir()] == [JOURNAL_NAME]
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
@@ -176,6 +176,6 @@ def test_killed_while_it_is_written(tmp_path: Path) -> None:
         assert set(range(told + 1)) <= journal.done <= set(range(told + 2))
         assert not journal.damaged
         runs = [found.run for found in journal.outcomes()]
-    lines = (tmp_path / NAME).read_bytes().splitlines()
+    lines = (tmp_path / JOURNAL_NAME).read_bytes().splitlines()
     assert len(runs) == len(set(runs)) == len(lines) - 1
     assert all(json.loads(line) for line in lines)

@@ -282,7 +282,7 @@ def test_a_value_that_does_not_end_is_not_taken_whole(
     path = tmp_path / "capture.json"
     path.write_text(json.dumps(content({"X1|1": noisy()}) | {key: [0.125] * 100_000}))
     monkeypatch.setattr(json_stream, "CHUNK", 1 << 10)
-    monkeypatch.setattr(json_stream, "LONGEST", 1 << 14)
+    monkeypatch.setattr(json_stream, "MAX_VALUE_LENGTH", 1 << 14)
     with pytest.raises(InputError, match=r"the value at character \d+ does not end within 16,384 characters"):
         read_recording(path)
 

@@ -15,7 +15,7 @@ from command_helpers import feedsim
 from feedsim.scenario import load
 from feedsim.tune import circles as circles_module
 from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
-from feedsim.tune.compensators import SHARES, TIMES, PulseGrid, amplitude, compensated, pulse, score
+from feedsim.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, compensated, pulse, score
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
 PLANE = ("X", "Z")
@@ -55,8 +55,8 @@ def test_characteristic_of_the_manual() -> None:
 
 def made_grid(best: np.ndarray, time: float) -> PulseGrid:
     """Peaks fall and dips grow with the amplitude, alike at `best` (pairs,), and least at the time constant `time`."""
-    share = np.array(SHARES)[:, None, None]
-    late = 0.1 * np.abs(np.log(np.array(TIMES) / time))[None, :, None]
+    share = np.array(AMPLITUDE_SHARES)[:, None, None]
+    late = 0.1 * np.abs(np.log(np.array(TIME_CONSTANTS) / time))[None, :, None]
     peak = 1.0 - 0.9 * share / best + late
     dip = -(0.1 * share / best + late)
     errors = np.stack([peak, dip], axis=-1)
@@ -68,9 +68,9 @@ def test_the_search_finds_a_characteristic() -> None:
     a = np.geomspace(0.01, 2.0, 12)
     wanted = {"adaptation": True, "amplitude": 0.3, "amplitude_min": 0.7, "acceleration_1": 0.03}
     wanted |= {"acceleration_2": 0.1, "acceleration_3": 0.6}
-    grid = made_grid(amplitude(wanted, a), TIMES[3])
+    grid = made_grid(amplitude(wanted, a), TIME_CONSTANTS[3])
     found = pulse(grid, 0, a, "ratio", adapted=True)
-    assert found["time"] == pytest.approx(TIMES[3], rel=0.05)
+    assert found["time"] == pytest.approx(TIME_CONSTANTS[3], rel=0.05)
     assert amplitude(found, a) == pytest.approx(amplitude(wanted, a), rel=0.1)
     constant = pulse(grid, 0, a, "ratio", adapted=False)
 
@@ -82,9 +82,9 @@ def test_the_search_finds_a_characteristic() -> None:
 
 
 def test_interpolation_on_the_grid() -> None:
-    grid = made_grid(np.array([0.5, 0.5]), TIMES[3])
-    at = np.array([[0.5 * (SHARES[1] + SHARES[2]), SHARES[4]]])
-    time = np.array([math.sqrt(TIMES[2] * TIMES[3])])
+    grid = made_grid(np.array([0.5, 0.5]), TIME_CONSTANTS[3])
+    at = np.array([[0.5 * (AMPLITUDE_SHARES[1] + AMPLITUDE_SHARES[2]), AMPLITUDE_SHARES[4]]])
+    time = np.array([math.sqrt(TIME_CONSTANTS[2] * TIME_CONSTANTS[3])])
     by_hand = [
         np.mean([size(grid.errors[i, j, 0, 0]) for i in (1, 2) for j in (2, 3)]),
         np.mean([size(grid.errors[4, j, 1, 0]) for j in (2, 3)]),

@@ -16,7 +16,7 @@ import numpy as np
 from feedsim.analysis.circle.records import read_circle
 from feedsim.analysis.circularity import Turn, fitted_circle
 from feedsim.analysis.figures import Array
-from feedsim.analysis.positioning import LEAST_REST, Approach
+from feedsim.analysis.positioning import MIN_REST_TIME, Approach
 from feedsim.analysis.side_by_side import Source
 from feedsim.compare.shift import estimated_shift
 from feedsim.errors import InputError
@@ -27,7 +27,7 @@ SAME_MOTION = 0.02
 # A record of a circle is about the programmed centre where that of its positions lies closer than this [m].
 SAME_CENTRE = 1e-3
 # An axis is told to move faster than this [m/s], and further [m]: splines through setpoints ring by less.
-SLOWEST, SHORTEST = 10e-6, 1e-6
+MOVING_SPEED, MOVING_DISTANCE = 10e-6, 1e-6
 MOST_TOLD = 4  # signals in a message
 WORDS = {"x_s": "position setpoints x_s", "x_a": "positions x_a, which takes out what all axes lag"}
 
@@ -152,11 +152,11 @@ def _stops(source: Source) -> tuple[Approach, ...]:
 
 def approaches(axis: str, time: Array, setpoint: Array) -> list[Approach]:
     """Motions of an axis that end at rest elsewhere than they began, found in its setpoint (N,) [m]."""
-    changes = np.flatnonzero(np.abs(np.diff(setpoint)) > SLOWEST * np.diff(time)) + 1
+    changes = np.flatnonzero(np.abs(np.diff(setpoint)) > MOVING_SPEED * np.diff(time)) + 1
     if len(changes) == 0:
         return []
-    # Behind a rest of LEAST_REST and more a new motion begins.
-    rests = np.flatnonzero(np.diff(time[changes]) >= LEAST_REST)
+    # Behind a rest of MIN_REST_TIME and more a new motion begins.
+    rests = np.flatnonzero(np.diff(time[changes]) >= MIN_REST_TIME)
     begins = [int(changes[0]) - 1, *(int(changes[k + 1]) - 1 for k in rests)]
     ends = [*(int(changes[k]) for k in rests), int(changes[-1])]
     nexts = [*begins[1:], len(time) - 1]
@@ -165,5 +165,5 @@ def approaches(axis: str, time: Array, setpoint: Array) -> list[Approach]:
     return [
         Approach(axis, float(time[b]), float(time[e]), float(time[n]), origin, target, None)
         for b, e, n, (origin, target) in zip(begins, ends, nexts, pairwise(level), strict=True)
-        if abs(target - origin) > SHORTEST and time[n] - time[e] >= LEAST_REST
+        if abs(target - origin) > MOVING_DISTANCE and time[n] - time[e] >= MIN_REST_TIME
     ]

@@ -17,11 +17,11 @@ from feedsim.analysis.figures import Array, Figure
 from feedsim.trace import Trace
 
 # Samples of a turn below which there is no telling its parts apart: three per degree would show a peak's shape.
-LEAST = 180
+MIN_PEAK_TURN_SAMPLES = 180
 # A glitch by its old definition is misleading where it differs from the peak by this share of it, and this much [m].
 MISLEADING, LEAST_MISLEADING = 0.2, 1e-6
-UNITS = {"s": (1e3, "ms"), "m": (1e6, "um"), "1": (1e6, "um/m"), "rad": (1e6, "um/m")}
-ORDER = (
+FIGURE_UNITS = {"s": (1e3, "ms"), "m": (1e6, "um"), "1": (1e6, "um/m"), "rad": (1e6, "um/m")}
+FIGURE_ORDER = (
     "peaks", "servo", "squareness", "squareness_or_servo", "scale", "lost_motion", "pitch", "straightness", "third",
     "drift", "centres", "radius", "offset", "rest",
 )  # fmt: skip
@@ -47,7 +47,7 @@ def diagnosed(
     paths = []
     for each in turns:
         measured = contour(trace, each, columns)
-        if len(measured.angle) < LEAST:
+        if len(measured.angle) < MIN_PEAK_TURN_SAMPLES:
             return None
         phase = (measured.time - measured.time[0]) * (2 * math.pi / (each.end - each.begin))
         paths.append(TurnedPath(measured.angle, measured.deviation, each.sense, phase))
@@ -76,8 +76,8 @@ def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
         "centres": "distance of the centres of both directions",
         "rest": "what no cause explains, from peak to valley",
     }  # fmt: skip
-    for term in sorted(diagnosis.terms, key=lambda each: (ORDER.index(each.key), each.axis)):
-        factor, unit = UNITS[term.unit]
+    for term in sorted(diagnosis.terms, key=lambda each: (FIGURE_ORDER.index(each.key), each.axis)):
+        factor, unit = FIGURE_UNITS[term.unit]
         found[figure_name(term)] = Figure(factor * term.value, unit, meanings[term.key].format(axis=term.axis))
     if diagnosis.lag is not None:
         meaning = "part of the mean radius deviation that path lag makes, by the response of the position loops"

@@ -178,7 +178,7 @@ OFF_CIRCLE = 20e-6
 # A recording of full turns may lack this share of the last one: its positions are rounded, 1 um of some millimetres.
 CLOSED = 1e-4
 # The speed of a turn is constant where each of its parts takes as long as the others, to this share.
-PARTS, EVEN = 16, 0.05
+TURN_PARTS, EVEN_SPEED_SHARE = 16, 0.05
 
 
 def recorded_circle(
@@ -235,12 +235,12 @@ def recorded_circle(
 
 
 def speed_change(program: Program, circle: Circular, begin: float, end: float) -> float:
-    """Largest deviation of the setpoints' speed within a turn from its mean [1], by the time per 1/PARTS of it."""
+    """Largest deviation of the setpoints' speed within a turn from its mean [1], by the time per 1/TURN_PARTS of it."""
     rows = (program.time >= begin) & (program.time <= end)
     time, x, y = program.time[rows], *(program.x_s[axis][rows] for axis in circle.axes)
     angle = np.unwrap(np.arctan2(y - circle.centre[1], x - circle.centre[0]))
     turned = np.maximum.accumulate(circle.sense * (angle - angle[0]))
-    passed = np.interp(np.linspace(0, turned[-1], PARTS + 1), turned, time)
+    passed = np.interp(np.linspace(0, turned[-1], TURN_PARTS + 1), turned, time)
     parts = np.diff(passed)
     return float(np.abs(parts / parts.mean() - 1).max())
 

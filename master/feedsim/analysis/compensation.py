@@ -25,7 +25,7 @@ Progress = Callable[[str, int, int], None]
 DELAY_ERRORS = (-1e-3, -0.5e-3, -0.2e-3, 0.2e-3, 0.5e-3, 1e-3)  # s
 # Parameters that are wrong together: a static torque below the Coulomb torque is none.
 VARIED = (("F_C", "F_S"), ("sigma_0",), ("W",), ("gamma",), ("sigma_1",), ("v_s",))
-SHARE = 0.1
+FRICTION_ERROR = 0.1
 RESTING = 1e-9  # m; what an axis that is held may move by, from rounding
 # A figure has become worse from this share of G without compensation on, and by this [m] at least.
 WORSE, LEAST_WORSE = 0.01, 1e-9
@@ -361,7 +361,7 @@ def _table(
         for error in DELAY_ERRORS
     ]
     for names in VARIED:
-        for share in (-SHARE, SHARE):
+        for share in (-FRICTION_ERROR, FRICTION_ERROR):
             varied = {axis: _varied(friction, names, 1 + share) for axis, friction in frictions.items()}
             if varied != frictions:
                 wanted.append((", ".join(names), share * 100, "%", varied, delays))

@@ -38,8 +38,8 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Pair = tuple[str, str]  # columns of output and input
 
-EVEN = 1e-6  # of a step: rounding of recorded times
-SILENT = 1e-13  # of the largest value: lines below it are rounding, not response
+EVEN_STEP_SHARE = 1e-6  # of a step: rounding of recorded times
+LINE_ROUNDING = 1e-13  # of the largest value: lines below it are rounding, not response
 
 
 def measured(measurements: Sequence[Measurement], pairs: Sequence[Pair]) -> FrequencyResponse:
@@ -92,7 +92,7 @@ def periodic(
     for trace in traces:
         if rows < 2 or len(trace) < rows or len(trace) % rows:
             raise InputError(f"a trace of {len(trace)} rows does not hold whole periods of {rows} rows")
-        if abs(_step(trace) - step) > EVEN * step:
+        if abs(_step(trace) - step) > EVEN_STEP_SHARE * step:
             raise InputError(f"traces with steps of {step:.9g} s and {_step(trace):.9g} s cannot be averaged")
     if not lines.size or lines[0] < 1 or 2 * lines[-1] >= rows or np.any(np.diff(lines) <= 0):
         raise InputError(f"excited lines must increase, from 1 on to less than half the {rows} rows of a period")
@@ -103,7 +103,7 @@ def periodic(
     frequency = lines / (rows * step)
     for name in dict.fromkeys((reference, *(pair[1] for pair in pairs))):
         strength = np.sqrt(np.mean(np.abs(spectra[name]) ** 2, axis=0))
-        if np.any(weak := strength <= SILENT * loud[name]):
+        if np.any(weak := strength <= LINE_ROUNDING * loud[name]):
             silent = frequency[np.flatnonzero(weak)[0]]
             raise InputError(f"column {name!r} is not excited at {silent:.6g} Hz; there is no response to it")
 
@@ -155,7 +155,7 @@ def _step(trace: Trace) -> float:
     step = float(trace.time[-1] - trace.time[0]) / (len(trace) - 1)
     grid = trace.time[0] + step * np.arange(len(trace))
     off = np.abs(trace.time - grid)
-    if (worst := int(np.argmax(off))) and off[worst] > EVEN * step + 4 * np.spacing(abs(trace.time[-1])):
+    if (worst := int(np.argmax(off))) and off[worst] > EVEN_STEP_SHARE * step + 4 * np.spacing(abs(trace.time[-1])):
         raise InputError(
             f"a frequency response needs even times; {trace.time[worst]:.9g} s lies {off[worst]:.3g} s off the grid of "
             f"{step:.9g} s"

@@ -13,9 +13,16 @@ from numpy.typing import NDArray
 
 from feedsim.analysis.circle import Diagnosis
 from feedsim.analysis.circle_figures import bidirectional, cause_figures, diagnosed, misleading
-from feedsim.analysis.circularity import EVEN, Turn, axis_letters, circularity, recorded_circle, speed_change
+from feedsim.analysis.circularity import (
+    EVEN_SPEED_SHARE,
+    Turn,
+    axis_letters,
+    circularity,
+    recorded_circle,
+    speed_change,
+)
 from feedsim.analysis.figures import Figure
-from feedsim.analysis.positioning import LEAST_REST, Approach, positioning
+from feedsim.analysis.positioning import MIN_REST_TIME, Approach, positioning
 from feedsim.analysis.positioning_accuracy import Accuracy, readings
 from feedsim.cosim.plant import plant_modes
 from feedsim.errors import InputError
@@ -276,13 +283,13 @@ def _short_rest(task: PositioningTask, program: Program) -> list[str]:
     """What is wrong where another motion of the axis, or the end of the program, follows too soon."""
     axis, rest = task.approach.axis, task.approach.until - task.approach.end
     own = f"motions.{task.segment.index}"
-    if rest >= LEAST_REST:
+    if rest >= MIN_REST_TIME:
         return []
     following = program.following(task.segment, axis)
     then = f"the next motion of {axis}, motions.{following.index}" if following else "the end of the program"
     return [
         f"positioning of {axis}: only {max(rest, 0.0) * 1e3:.2g} ms between the end of {own} and {then}; "
-        f"at least {LEAST_REST * 1e3:g} ms are needed: add a dwell"
+        f"at least {MIN_REST_TIME * 1e3:g} ms are needed: add a dwell"
     ]
 
 
@@ -312,11 +319,12 @@ def _even_turn(circle: Circular, number: int | None, program: Program) -> tuple[
     begin, end = circle.turns[at] if circle.turns else (0.0, 0.0)
     name = f"circularity: turn {at + 1} of {len(circle.turns)}"
     if circle.turn_time is None:  # recorded setpoints
-        if (change := speed_change(program, circle, begin, end)) <= EVEN:
+        if (change := speed_change(program, circle, begin, end)) <= EVEN_SPEED_SHARE:
             return begin, end
         raise InputError(
             f"{name} of the recorded setpoints is not driven at constant speed: parts of it take {100 * change:.2g} % "
-            f"more or less time than the mean; allowed: {100 * EVEN:g} %. Take another turn, or the circle alone by "
+            f"more or less time than the mean; allowed: {100 * EVEN_SPEED_SHARE:g} %. Take another turn, or the "
+            "circle alone by "
             "'between'"
         )
     first, last = circle.steady or (math.inf, -math.inf)

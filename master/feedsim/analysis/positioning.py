@@ -18,7 +18,7 @@ RINGING_WINDOW = (0.030, 0.400)  # s after the end of the NC motion: the first s
 REST_DELAY = 1.0  # s after the end of the NC motion
 # An axis' ringing is 20 Hz and more (the default Z axis' 21 Hz): over one period of it the first swing, which makes the
 # overshoot, is seen whole, and an axis that stays within its band so long does not just pass through it.
-LEAST_REST = 0.050  # s
+MIN_REST_TIME = 0.050  # s
 SHORTEST_PLATEAU = 0.125  # s: 40 to 90 % of it then begin and last a period of a ringing of 20 Hz
 PLATEAU = (0.4, 0.9)  # share of the constant-speed phase: its begin still rings from the acceleration
 
@@ -53,7 +53,7 @@ class Approach:
 def positioning(trace: Trace, approach: Approach, *, band: float = 1e-6) -> dict[str, Figure]:
     """Figures of ``approach``: overshoot, settling time to ``band`` [m], ringing, torques; by scale and by tool point.
 
-    Overshoot, settling and ringing are NaN where less than LEAST_REST of the rest behind the motion is recorded,
+    Overshoot, settling and ringing are NaN where less than MIN_REST_TIME of the rest behind the motion is recorded,
     overshoot also where the axis is still under way at its end; the plateau's torque where the plateau is short. Torque
     and tool-point figures are present where M_a, M_fr and tcp.x_<axis> are recorded. Raises InputError where the axis'
     position is not recorded, or not up to the end of the motion.
@@ -93,9 +93,9 @@ def ringing_frequency(time: Array, speed: Array) -> float:
 
 
 def _rest_is_seen(time: Array, approach: Approach, since: float) -> bool:
-    """Whether the rest behind the motion is recorded, at ``time`` (N,) [s], for LEAST_REST after ``since`` [s]."""
+    """Whether the rest behind the motion is recorded, at ``time`` (N,) [s], for MIN_REST_TIME after ``since`` [s]."""
     interval = float(np.median(np.diff(time))) if len(time) > 1 else 0.0  # the end may lie between two samples
-    return min(approach.until, float(time[-1]) + interval) - since >= LEAST_REST
+    return min(approach.until, float(time[-1]) + interval) - since >= MIN_REST_TIME
 
 
 def _rows(trace: Trace, approach: Approach) -> slice:

@@ -27,7 +27,7 @@ from feedsim.trace.response_files import read_overlay
 # Measured responses are held against the closed form where they are known.
 COHERENT, COMPARED = 0.99, (5.0, 500.0)
 # The closed form of a report is drawn up to this multiple of the band: gain margins lie above it.
-BEYOND = 2.0
+BAND_RATIO = 2.0
 BELOW_MIRROR = 0.999  # of half the sampling rate
 
 

@@ -15,13 +15,13 @@ from feedsim import units
 from feedsim.analysis.circularity import Turn
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
-from feedsim.motions.circular import DIRECTIONS
+from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
 
 RESULT, SUMMARY = "result.csv", "summary.json"
 # Columns that are laid over each other, of every axis: name -> SI unit.
-SIGNALS = {"x_s": "m", "x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
-TIMES = ("time", "t")
+COMPARED_SIGNALS = {"x_s": "m", "x_e": "m", "x_a": "m", "n_a": "rad/s", "M_a": "N.m", "M_fr": "N.m", "i_q": "A"}
+TIME_NAMES = ("time", "t")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Source:
     @property
     def signals(self) -> list[str]:
         """Columns that can be laid over those of others."""
-        return [name for name in self.recording.names if "." in name and name.partition(".")[2] in SIGNALS]
+        return [name for name in self.recording.names if "." in name and name.partition(".")[2] in COMPARED_SIGNALS]
 
     @property
     def axes(self) -> list[str]:
@@ -104,7 +104,7 @@ def _read(path: Path, name: str) -> Source:
             "(FOLDER:17, FOLDER:max=FIGURE) is needed"
         )
     recording = read_recording(curves)
-    column = next((each for each in recording.names if each.lower() in TIMES), None)
+    column = next((each for each in recording.names if each.lower() in TIME_NAMES), None)
     if column is None:
         raise InputError(f"{recording.header}: has no column of time; it is called time [s] or t [s]")
     factor = float(units.factor(recording.units[column] or "s", "s"))
@@ -135,7 +135,7 @@ def _turn(told: Mapping[str, Any]) -> Turn:
     first, second = map(str, told["axes"])
     x, y = map(float, told["centre"]["value"])
     span = float(told["begin"]["value"]), float(told["end"]["value"])
-    sense = {word: sense for sense, word in DIRECTIONS.items()}[told["direction"]]
+    sense = {word: sense for sense, word in SENSE_WORDS.items()}[told["direction"]]
     return Turn((first, second), (x, y), float(told["radius"]["value"]), sense, *span)
 
 

@@ -26,8 +26,8 @@ TRUSTED = 0.9
 
 FULL, REDUCED, CORRECTED = "full", "reduced", "with static correction"
 # All modes of a model are full matrices: 2000 degrees of freedom take some seconds, which a comparison may cost.
-LARGEST = 2000
-QUANTITIES = ("n_M", "x_M")  # of an axis
+MAX_MODES_IN_FULL = 2000
+AXIS_QUANTITIES = ("n_M", "x_M")  # of an axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +49,15 @@ def truncation(structure: Structure, pose: Mapping[str, float]) -> Truncation | 
     None where the model has no modes above the cut-off.
 
     Raises:
-        InputError: more than LARGEST degrees of freedom, and what build.assemble and solve.solve refuse.
+        InputError: more than MAX_MODES_IN_FULL degrees of freedom, and what build.assemble and solve.solve refuse.
         FeedsimError: as solve.solve.
     """
     assembly, _ = assemble(structure, pose)
     size = assembly.mass.shape[0]
-    if size > LARGEST:
+    if size > MAX_MODES_IN_FULL:
         raise InputError(
-            f"{assembly.name}: all modes of {size} degrees of freedom would be needed; it is done up to {LARGEST}"
+            f"{assembly.name}: all modes of {size} degrees of freedom would be needed; it is done up to "
+            f"{MAX_MODES_IN_FULL}"
         )
     corrected = solve(assembly, cutoff=structure.cutoff, damping=structure.damping, static_correction=True)
     if not corrected.dropped:
@@ -77,7 +78,7 @@ def figures(
         shown: those of them that are reported; None: all.
         tool: with the compliance at the tool.
     """
-    chosen = [loops.QUANTITIES[key][0].format(axis) for axis in shown or axes for key in QUANTITIES]
+    chosen = [loops.LOOP_QUANTITIES[key][0].format(axis) for axis in shown or axes for key in AXIS_QUANTITIES]
     if tool:
         chosen += [loops.COMPLIANCE.format(direction) for direction in TOOL_DIRECTIONS]
     responses = {

@@ -42,7 +42,7 @@ from feedsim.cli import (
 )
 from feedsim.cli.grammar import Parser
 from feedsim.cli.kinds import meant
-from feedsim.cli.start import START
+from feedsim.cli.start import START_TEXT
 from feedsim.cli.terminal import painted, prepare_streams
 from feedsim.owned import remove_orphans
 
@@ -112,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     options = parser().parse_args(arguments)
     if options.command is None:
-        print(START, end="")
+        print(START_TEXT, end="")
         return 0
     # Small matrices by the thousand: threads for linear algebra only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import CONTROL, FIGURES, QUIET, Command, Option, names, out, pairs
+from feedsim.cli.options import CONTROL, FIGURES, QUIET_OPTION, Command, Option, names, out, pairs
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Take a recorded circle apart: servo mismatch, squareness, scale, lost motion, reversal peaks, pitch
@@ -54,7 +54,7 @@ COMMAND = Command(
         out("circle_<name of the first file>"),
         FIGURES,
         CONTROL,
-        QUIET,
+        QUIET_OPTION,
     ),
     description=DESCRIPTION,
     epilog=EPILOG,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import BooleanOptionalAction, Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET, UNCERTAIN, Command, Option, out, pairs, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, UNCERTAIN, Command, Option, out, pairs, settings
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Run a circle without and with friction compensation. A friction model, driven by the speed setpoint
@@ -58,7 +58,7 @@ COMMAND = Command(
         Option("--table", "",
                "with the runs that show what errors of the delay and of the parameters cost (default: yes)",
                action=BooleanOptionalAction, default=True),
-        UNCERTAIN, settings(), FMUS, QUIET,
+        UNCERTAIN, settings(), FMUS, QUIET_OPTION,
     ),
     DESCRIPTION,
     EPILOG,

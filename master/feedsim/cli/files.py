@@ -42,12 +42,12 @@ def convert(options: Namespace) -> None:
     print(f"{options.out}: {len(written.columns) + 1} columns from {options.file}")
 
 
-KINDS = ("scenario", "machine", "structure", "columns", "tolerances", "study")
+FILE_KINDS = ("scenario", "machine", "structure", "columns", "tolerances", "study")
 SCHEMA = Command(
     "schema",
     "print the JSON Schema of scenario, machine, structure, mapping, tolerance or study files, for editors",
     schema,
-    [Option("kind", "", "", nargs="?", choices=KINDS, default="scenario")],
+    [Option("kind", "", "", nargs="?", choices=FILE_KINDS, default="scenario")],
     needs=(),
 )
 CONVERT = Command(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentTypeError, BooleanOptionalAction, Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Group, Option, names, out, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, Command, Group, Option, names, out, settings
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Frequency responses of a machine's feed drives: speed-controlled system n/M, reference frequency
@@ -79,7 +79,7 @@ COMMAND = Command(
         Option("--full-model", "",
                "where the machine names its structure: compare with all modes of the finite-element model "
                "(default: yes)", action=BooleanOptionalAction, default=True),
-        QUIET,
+        QUIET_OPTION,
         Group(
             "measurement on the units",
             Option("--measure", "", "on the units besides (default: yes; --no-measure: closed form only)",

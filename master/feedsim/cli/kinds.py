@@ -13,8 +13,11 @@ from pathlib import Path
 from typing import Any
 
 NO_RECORD = "a folder of results without a record (result.csv)"
-NAMED = {"tune": "tune compensation", "machine": "machine info"}  # kind of a summary -> command, where they differ
-HEAD = 4096  # bytes of a file that are read to see what it is
+COMMAND_NAMES = {
+    "tune": "tune compensation",
+    "machine": "machine info",
+}  # kind of a summary -> command, where they differ
+KIND_BYTES = 4096  # bytes of a file that are read to see what it is
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ def _table(path: Path) -> bool:
 def _first(path: Path) -> str:
     try:
         with path.open("rb") as file:
-            return file.read(HEAD).decode("utf-8-sig", "replace").partition("\n")[0]
+            return file.read(KIND_BYTES).decode("utf-8-sig", "replace").partition("\n")[0]
     except OSError:
         return ""
 
@@ -93,7 +96,7 @@ _RUN = ("run", "validate", "frf", "compensate", "pack", "page", "ssp", "machine 
 _MACHINES = ("machine info", "machine show", "machine build", "machine pack", "frf", "pack", "machine export",
              "machine import --machine")  # fmt: skip
 _RECORDS = ("identify", "circle", "show", "compare", "convert", "identify-drive", "replay", "identify-modes")
-KINDS = (
+INPUT_KINDS = (
     Kind("a study", ("sweep", "validate"), _keyed({"sampling", "parameters"}, none={"motions", "machine"})),
     Kind("a scenario", _RUN, _keyed({"motions"}, none={"sampling", "parameters"})),
     Kind(
@@ -127,14 +130,14 @@ KINDS = (
 def kind(path: Path) -> Kind | None:
     """What a file or folder is, as far as its names and its beginning show; None: nothing that is known here."""
     try:
-        return next((each for each in KINDS if each.is_one(path)), None)
+        return next((each for each in INPUT_KINDS if each.is_one(path)), None)
     except OSError:
         return None
 
 
 def taken(command: str) -> list[str]:
     """Names of the kinds that a command takes."""
-    return [*dict.fromkeys(each.name for each in KINDS if command in each.commands)]
+    return [*dict.fromkeys(each.name for each in INPUT_KINDS if command in each.commands)]
 
 
 def meant(command: str, values: Iterable[Any]) -> str:
@@ -164,7 +167,7 @@ def _result(folder: Path) -> str:
         return ""
     page = folder / "report.html"
     shown = f", its page is {page}" if page.is_file() else ""
-    return f"has results of feedsim {NAMED.get(of) or _command(of)}, without a record (result.csv){shown}"
+    return f"has results of feedsim {COMMAND_NAMES.get(of) or _command(of)}, without a record (result.csv){shown}"
 
 
 def _command(of: str) -> str:

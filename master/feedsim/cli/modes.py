@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, QUIET, Command, Option, out, settings
+from feedsim.cli.options import FIGURES, QUIET_OPTION, Command, Option, out, settings
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Elastic modes of an axis from a measured response: time signals (--input, --motor) or a file of
@@ -65,7 +65,7 @@ COMMAND = Command(
         Option("--period", "SAMPLES", "period of the excitation (default: looked for)", type=int),
         Option("--time", "NAME[:UNIT]", "column of the time (default: time or t)"),
         Option("--interval", "VALUE", "of the samples, in place of a time, e.g. 0.4ms"),
-        out("modes_<name of the file>"), FIGURES, settings("axes.Z.drive.K_v='2 (m/min)/mm'"), QUIET,
+        out("modes_<name of the file>"), FIGURES, settings("axes.Z.drive.K_v='2 (m/min)/mm'"), QUIET_OPTION,
     ),
     DESCRIPTION,
     EPILOG,

@@ -106,7 +106,7 @@ def folder(text: str) -> Path:
 
 
 FMUS = Option("--fmus", "DIR", "folder of the archives (default: $FEEDSIM_FMUS, else those that come along)", type=Path)
-QUIET = Option("--quiet", "", "no progress bar and no summary")
+QUIET_OPTION = Option("--quiet", "", "no progress bar and no summary")
 
 
 def out(default: str) -> Option:
@@ -116,11 +116,11 @@ def out(default: str) -> Option:
 
 def _kinds(text: str) -> tuple[str, ...]:
     """Kinds of files of figures."""
-    from feedsim.report.picture import KINDS
+    from feedsim.report.picture import PICTURE_FORMATS
 
     asked = names(text)
-    if not asked or any(kind not in KINDS for kind in asked):
-        raise ArgumentTypeError(f"{text!r}: of {', '.join(KINDS)}, one or several, with commas between them")
+    if not asked or any(kind not in PICTURE_FORMATS for kind in asked):
+        raise ArgumentTypeError(f"{text!r}: of {', '.join(PICTURE_FORMATS)}, one or several, with commas between them")
     return tuple(dict.fromkeys(asked))
 
 
@@ -130,10 +130,11 @@ FIGURES = Option(
 )  # fmt: skip
 
 
-CONTROLS = ("sinumerik", "twincat", "heidenhain", "linuxcnc")
+CONTROL_CHOICES = ("sinumerik", "twincat", "heidenhain", "linuxcnc")
 CONTROL = Option(
-    "--control", "NAME", f"show parameters in the names and units of a control, too: {', '.join(CONTROLS)} (default: "
-    "the one that the machine file names)", choices=CONTROLS, default="",
+    "--control", "NAME", f"show parameters in the names and units of a control, too: {', '.join(CONTROL_CHOICES)} "
+    "(default: "
+    "the one that the machine file names)", choices=CONTROL_CHOICES, default="",
 )  # fmt: skip
 
 

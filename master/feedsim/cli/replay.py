@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET, Command, Option, out, settings
+from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET_OPTION, Command, Option, out, settings
 from feedsim.cli.terminal import finish, watching
 
 REPLAY_DESCRIPTION = """Run the position setpoints of a record through the simulated axes, in closed loop, and show
@@ -103,7 +103,7 @@ REPLAY = Command(
         Option("--open-loop", "",
                "the recorded torque drives the rigid axis, from the recorded position and speed on, without its drive"),
         out("replay_<name of the record>"), FIGURES, CONTROL,
-        settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,
+        settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET_OPTION,
     ),
     REPLAY_DESCRIPTION,
     REPLAY_EPILOG,
@@ -126,7 +126,7 @@ IDENTIFY_DRIVE = Command(
                default="0"),
         Option("--name", "NAME", "of the machine that is written (default: name of the record)"),
         out("drive_<name of the record>"), FIGURES, CONTROL,
-        settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET,
+        settings("axes.Z.drive.K_v='2 (m/min)/mm'"), FMUS, QUIET_OPTION,
     ),
     DRIVE_DESCRIPTION,
     DRIVE_EPILOG,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET, UNCERTAIN, Command, Option, out, settings
+from feedsim.cli.options import CONTROL, FIGURES, FMUS, QUIET_OPTION, UNCERTAIN, Command, Option, out, settings
 from feedsim.cli.terminal import finish, watching
 from feedsim.errors import InputError
 
@@ -115,7 +115,7 @@ RUN = Command(
     "run",
     "run a scenario or an SSP; write result.csv, summary.json, report.html and figures",
     run,
-    (*SUBJECT, out("<name of the scenario file>"), FIGURES, PAGE, CONTROL, TRY, UNCERTAIN, QUIET),
+    (*SUBJECT, out("<name of the scenario file>"), FIGURES, PAGE, CONTROL, TRY, UNCERTAIN, QUIET_OPTION),
     epilog=TRUST,
     job="run",
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import CONTROL, FIGURES, QUIET, Command, Option, out
+from feedsim.cli.options import CONTROL, FIGURES, QUIET_OPTION, Command, Option, out
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Lay results of feedsim run, recorded CSV files and runs of studies over each other: contours of
@@ -44,7 +44,7 @@ COMMAND = Command(
         out("show"),
         FIGURES,
         CONTROL,
-        QUIET,
+        QUIET_OPTION,
     ),
     description=DESCRIPTION,
     epilog=EPILOG,

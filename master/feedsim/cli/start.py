@@ -1,6 +1,6 @@
 """What `feedsim` alone says: the four things a person may want, with the command for each."""
 
-START = """feedsim simulates the feed drives of a machine tool: control, friction and structure.
+START_TEXT = """feedsim simulates the feed drives of a machine tool: control, friction and structure.
 
 See it work
   feedsim example xz_circle z_positioning      copies two scenarios into this folder

@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, out, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, Command, Option, out, settings
 from feedsim.cli.terminal import announce, finish, warn, watching
 
 if TYPE_CHECKING:
@@ -168,7 +168,7 @@ COMMAND = Command(
         Option("--restart", "", "begin anew; discards the runs that DIR has"),
         Option("--dry-run", "", "tell what would be done and how long it takes"),
         Option("--row", "RUN", "print the command that makes this one run by itself", type=int),
-        QUIET, FMUS, settings(),
+        QUIET_OPTION, FMUS, settings(),
     ),
     DESCRIPTION,
     EPILOG,

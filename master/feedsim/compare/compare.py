@@ -29,7 +29,7 @@ from feedsim.errors import InputError, few
 from feedsim.trace import Array, Series, Trace, as_series, matches
 
 # A conversion of units rounds twice.
-ROUNDING = 4 * np.finfo(float).eps
+CONVERSION_ROUNDING = 4 * np.finfo(float).eps
 # A variable follows another one where they differ by less than this share of its range.
 FOLLOWS = 0.1
 # Curves are kept of so many variables, the worst ones.
@@ -216,7 +216,7 @@ def _variable(
         off = np.maximum(np.maximum(y - high, low - y), 0.0)
     bad = ~np.isfinite(y)
     off[bad | np.isnan(off)] = inf
-    guard = 0.0 if scale == 1.0 else ROUNDING * np.maximum(np.abs(low), np.abs(high))
+    guard = 0.0 if scale == 1.0 else CONVERSION_ROUNDING * np.maximum(np.abs(low), np.abs(high))
     beyond = (off > limit + guard) | ~np.isfinite(off)
     if scale != 1.0:
         off = np.where(off <= guard, 0.0, off)

@@ -24,12 +24,12 @@ EXPLAINED = 0.1  # of the difference may be left
 MISTAKEN = ("m", "mm", "um", "in", "rad", "deg", "rev", "rad/s", "rpm", "deg/s", "rev/s", "m/s", "mm/s", "mm/min",
             "m/min", "in/min", "N", "kN", "N.m", "N.cm", "mN.m", "A", "mA", "percent", "1")  # fmt: skip
 LIKE_A_UNIT = 1e-3  # relative; a factor is called a unit when it is that near
-SEEN = 2000  # rows of a result that its digits and its shift are looked for in,
-LOOKED_AT = 6  # and variables, the worst, that tell a shift
-FEWEST = 3  # rows that a guess rests on
+ROWS_SEARCHED = 2000  # rows of a result that its digits and its shift are looked for in,
+VARIABLES_SEARCHED = 6  # and variables, the worst, that tell a shift
+MIN_GUESS_ROWS = 3  # rows that a guess rests on
 # Largest shift that is looked for: so many steps, or that long, but no more than a tenth of the compared time.
-STEPS, LONGEST, SHARE = 200, 0.05, 0.1
-WHOLE = 0.01  # of a step; a shift that is so near to whole rows is one of whole rows
+MAX_SHIFT_STEPS, MAX_SHIFT_TIME, MAX_SHIFT_SHARE = 200, 0.05, 0.1
+WHOLE_ROW_TOLERANCE = 0.01  # of a step; a shift that is so near to whole rows is one of whole rows
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def likeness(
         if not guesses or guessed[each.name].outside:
             open_ones.append(each)
     shift = _shifted(open_ones, result, reference, tolerances, options) if open_ones else None
-    if shift is not None and abs(shift - options.shift) <= WHOLE * usual_step(result.time):
+    if shift is not None and abs(shift - options.shift) <= WHOLE_ROW_TOLERANCE * usual_step(result.time):
         shift = None  # where it is now it fits best
     late: list[Variable] = []
     for each in open_ones:
@@ -104,7 +104,7 @@ def _told(those: Sequence[Variable], words: str, outside: Mapping[str, int | Non
 
 
 def _enough(curves: Curves) -> bool:
-    return int(np.isfinite(curves.values).sum()) >= FEWEST
+    return int(np.isfinite(curves.values).sum()) >= MIN_GUESS_ROWS
 
 
 def _difference(curves: Curves) -> Array:
@@ -134,9 +134,9 @@ def _shifted(
     step = usual_step(result.time)
     begin = max(float(reference.time[0]), -np.inf if options.start is None else options.start)
     end = min(float(reference.time[-1]), np.inf if options.end is None else options.end)
-    most = min(SHARE * (end - begin), max(LONGEST, STEPS * step)) + abs(options.shift)
-    names = [each.name for each in sorted(asked, key=lambda each: -each.ratio)[:LOOKED_AT]]
-    thin = max(1, len(result) // SEEN)
+    most = min(MAX_SHIFT_SHARE * (end - begin), max(MAX_SHIFT_TIME, MAX_SHIFT_STEPS * step)) + abs(options.shift)
+    names = [each.name for each in sorted(asked, key=lambda each: -each.ratio)[:VARIABLES_SEARCHED]]
+    thin = max(1, len(result) // ROWS_SEARCHED)
     every = Series(result.time[::thin], {name: y[::thin] for name, y in result.columns.items()}, result.units)
     others = [name for name in reference.all_names if name not in names]
     try:
@@ -144,7 +144,7 @@ def _shifted(
     except InputError:
         return None
     rows = round(found / step) if step else 0
-    return rows * step if rows and abs(found - rows * step) <= WHOLE * step else found
+    return rows * step if rows and abs(found - rows * step) <= WHOLE_ROW_TOLERANCE * step else found
 
 
 def _time_words(shift: float, before: float, result: Series) -> str:
@@ -228,7 +228,7 @@ def _digits(variable: Variable, curves: Curves, result: Series, x: Array) -> str
     except InputError:
         return ""
     picked = np.flatnonzero(np.isfinite(curves.values) & np.isfinite(x))
-    picked = picked[:: max(1, len(picked) // SEEN)]
+    picked = picked[:: max(1, len(picked) // ROWS_SEARCHED)]
     y, x, room = curves.values[picked] / scale, x[picked] / scale, variable.allowed / scale
     unit = f" {header or variable.unit}" if (header or variable.unit) not in ("", "1") else ""
     off = np.abs(y - x)

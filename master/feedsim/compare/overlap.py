@@ -12,13 +12,13 @@ from feedsim.compare.verdict import seconds
 from feedsim.trace import Array, Series
 
 # A gap is worth a word from this many usual steps on.
-GAP = 10.0
+GAP_STEP_RATIO = 10.0
 # Times that a usual step must be longer than the other's to be called coarser.
 FINER = 1.5
 # Rows of the reference that may come on one of the result. Those that lie farther behind it are not seen,
 SPARSE = 10
 # and so many of the reference's may be: beyond, the result says too little about it.
-UNSEEN = 0.25
+MAX_UNSEEN_SHARE = 0.25
 # Share of the compared time that a result may lack at an end for its shift or its tolerance in time, at most.
 LACKING = 0.1
 
@@ -148,8 +148,8 @@ class Overlap:
                 f"rows are missing: no row of the result from {at[longest]:.9g} to {at[longest + 1]:.9g} s, "
                 f"allowed gap {seconds(most)}"
             ]
-        if gaps.size and gaps[longest] > GAP * step > 0:
-            count = int(np.sum(gaps > GAP * step))
+        if gaps.size and gaps[longest] > GAP_STEP_RATIO * step > 0:
+            count = int(np.sum(gaps > GAP_STEP_RATIO * step))
             self.notes.append(
                 f"rows are missing: {count} gap{'s'[: count != 1]} in the result, the longest from {at[longest]:.9g} "
                 f"to {at[longest + 1]:.9g} s; what happens there is not seen"
@@ -172,7 +172,7 @@ class Overlap:
         passed = np.diff(np.r_[0.0, np.interp(at, instants, np.arange(len(instants))), rows])
         unseen = float((passed - SPARSE).clip(0.0).sum()) / rows
         # Tools end a step apart.
-        if rows <= SPARSE * len(at) and unseen <= UNSEEN:
+        if rows <= SPARSE * len(at) and unseen <= MAX_UNSEEN_SHARE:
             return []
         return [
             f"the result has too few rows: {len(at)} for {len(instants)} of the reference, {100 * unseen:.3g} % of "

@@ -19,7 +19,7 @@ from feedsim.trace import Array, Series
 TRIES = 2001
 # Values of the result that a try looks at, of all columns together, and rows at least and at most; the best are then
 # looked at in full.
-LOOKS, FEWEST, MOST = 40_000, 500, 2000
+SAMPLES_COMPARED, MIN_ROWS_COMPARED, MAX_ROWS_COMPARED = 40_000, 500, 2000
 # Minima of the tries that are looked at in full.
 CANDIDATES = 8
 
@@ -159,7 +159,7 @@ class _Misfit:
 
     def thinned(self) -> _Misfit:
         """With fewer rows of the result: even in time, and even in what the columns move."""
-        count = int(np.clip(LOOKS // len(self.values), FEWEST, MOST))
+        count = int(np.clip(SAMPLES_COMPARED // len(self.values), MIN_ROWS_COMPARED, MAX_ROWS_COMPARED))
         if len(self.at) <= count:
             return self
         moved = np.nan_to_num(np.abs(np.diff(self.values, axis=1))).sum(axis=0)

@@ -17,7 +17,7 @@ DEFAULT = 1e-3  # of the range of the reference
 # A reference that hardly moves: its range counts as this share of the largest magnitude of all columns in its unit (of
 # its own where it has none) at least, and as this much in its unit, so that rounding noise of an axis at rest is none.
 OF_MAGNITUDE, OF_UNIT = 1e-6, 1e-9
-EXAMPLE = "1e-6, '1e-3 N.m', '2 nm,1 ms' or 'Z.x_a=2 nm'"
+TOLERANCE_EXAMPLE = "1e-6, '1e-3 N.m', '2 nm,1 ms' or 'Z.x_a=2 nm'"
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def rule(text: str) -> tuple[str, Tolerance]:
     pattern, equals, spec = text.rpartition("=")
     pattern = pattern.strip()
     if equals and not pattern:
-        raise InputError(f"tolerance {text!r}: nothing before '='; write for example {EXAMPLE}")
+        raise InputError(f"tolerance {text!r}: nothing before '='; write for example {TOLERANCE_EXAMPLE}")
     try:
         return pattern or "*", specification(spec)
     except InputError as error:
@@ -149,7 +149,7 @@ def specification(spec: str) -> Tolerance:
 def _part(text: str) -> Tolerance:
     match = re.fullmatch(rf"({units.NUMBER})\s*(.*)", text, re.DOTALL)
     if not match:
-        raise InputError(f"{text!r} is no tolerance; write for example {EXAMPLE}")
+        raise InputError(f"{text!r} is no tolerance; write for example {TOLERANCE_EXAMPLE}")
     value, unit = units.finite(match[1]), match[2].strip()
     if unit in ("", "%"):
         return Tolerance(value=value / 100 if unit else value, relative=True)

@@ -15,7 +15,7 @@ from feedsim.trace import Array
 
 Rows = NDArray[np.int64]
 # Simulators round and add up time differently. Rows this close, in usual steps, are at one instant.
-SLACK = 1e-6
+TUBE_TOLERANCE = 1e-6
 # The same in shares of the largest instant: k h added up 10^5 times.
 ULPS = 1e-12
 
@@ -29,7 +29,7 @@ def usual_step(time: Array) -> float:
 
 def slack_of(time: Array) -> float:
     """Instants that differ by no more than this [s] are the same instant written differently."""
-    return max(SLACK * usual_step(time), ULPS * float(np.abs(time).max())) if time.size else 0.0
+    return max(TUBE_TOLERANCE * usual_step(time), ULPS * float(np.abs(time).max())) if time.size else 0.0
 
 
 def bounds(

@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-LARGEST = 256_000_000  # bytes of a file
+MAX_FILE_BYTES = 256_000_000  # bytes of a file
 MOST_ODD = 1000  # lines that were not understood and are kept
-_NUMBER = re.compile(r"^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE]X?[+-]?\d+)?$", re.IGNORECASE)
+_CONTROL_NUMBER = re.compile(r"^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE]X?[+-]?\d+)?$", re.IGNORECASE)
 HEXADECIMAL = re.compile(r"^[0-9A-F]+H$", re.IGNORECASE)  # as commissioning tools list words of bits
 
 
@@ -112,6 +112,6 @@ def scalar(text: str) -> float | bool | str:
         return float(int(upper[2:], 16))
     if HEXADECIMAL.match(text):
         return float(int(upper[:-1], 16))
-    if _NUMBER.match(text):
+    if _CONTROL_NUMBER.match(text):
         return float(upper.replace("EX", "E"))
     raise ValueError("no number")

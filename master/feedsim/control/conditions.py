@@ -24,7 +24,7 @@ from typing import Literal
 Look = Callable[[str], "float | bool | str | None"]  # name -> value; None: the file has none, several, or no number
 Lack = Callable[[str], str]  # name -> why there is no value
 _TERM = re.compile(r"^(?P<name>[\w.@-]+?)(?P<element>\[\d+\])?=(?P<right>[^:?]+)(?P<free>\?)?$")
-CLOSE = 1e-9
+VALUE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -126,6 +126,6 @@ def _holds(term: str, look: Look) -> tuple[bool | None, str]:
         if isinstance(value, str) or isinstance(wanted, str):
             if value == wanted:
                 return True, name
-        elif wanted is not None and math.isclose(float(value), float(wanted), rel_tol=CLOSE, abs_tol=1e-300):
+        elif wanted is not None and math.isclose(float(value), float(wanted), rel_tol=VALUE_TOLERANCE, abs_tol=1e-300):
             return True, name
     return False, name

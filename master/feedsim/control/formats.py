@@ -12,7 +12,7 @@ from pathlib import PurePath
 from feedsim.control.archive import HEXADECIMAL, Archive, Entry, scalar
 from feedsim.errors import InputError
 
-LONGEST = 4000  # characters of a line; longer ones hold no single value
+MAX_LINE_LENGTH = 4000  # characters of a line; longer ones hold no single value
 _BINARY = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _MACHINE_DATUM = re.compile(
     r"(?:(?<![A-Za-z])N(?P<number>\d{1,6})[ \t]+)?\$(?P<kind>M[ANC]|S[ANC])_(?P<name>[A-Z0-9_]+)"
@@ -108,7 +108,7 @@ def _sinumerik(archive: Archive) -> None:
         if not line.strip() or line.lstrip().startswith((";", "%", "[", "#", "\\SYSTEM.DRV")):
             archive.comments += 1
             continue
-        if len(line) > LONGEST:
+        if len(line) > MAX_LINE_LENGTH:
             archive.add_odd(number, line[:200], "a line of more than 4000 characters")
             continue
         whole = ended or not archive.container

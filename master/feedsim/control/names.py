@@ -14,7 +14,7 @@ from pathlib import Path
 
 from feedsim.errors import InputError
 
-FILE = Path(__file__).with_name("names.csv")
+NAMES_FILE = Path(__file__).with_name("names.csv")
 CONTROLS = ("sinumerik", "twincat", "heidenhain", "linuxcnc")
 
 
@@ -68,7 +68,7 @@ class Name:
 @cache
 def table() -> tuple[Name, ...]:
     """All rows, in the order of the file."""
-    with FILE.open(encoding="utf-8", newline="") as file:
+    with NAMES_FILE.open(encoding="utf-8", newline="") as file:
         return tuple(
             Name(
                 row["control"], row["parameter"], row["number"], row["name"], row["unit"], float(row["factor"]),

@@ -22,7 +22,7 @@ ALL = "all"
 USUAL_MASK, USUAL_GAIN = 0x200, 1000 / 60
 _OF_UNITS = ("SCALING_SYSTEM_IS_METRIC", "MD10240", "MD10220", "MD10230[9]")
 # Software limits beyond this are none [m].
-NO_LIMIT = 1e4
+MAX_SOFTWARE_LIMIT = 1e4
 
 
 @dataclass(frozen=True)
@@ -314,7 +314,7 @@ def _converted(view: View, name: Name, entry: Entry, raw: Value | None) -> tuple
         if isinstance(ratio, str) or ratio == 0:
             return None, f"{other} is {shown(ratio)}"
         number = number * float(ratio) if k == 0 else number / float(ratio)
-    if name.parameter.startswith("travel") and abs(number) >= NO_LIMIT:
+    if name.parameter.startswith("travel") and abs(number) >= MAX_SOFTWARE_LIMIT:
         return None, "so far out that it is no limit"
     if name.parameter == "drive.M_max" and number <= 0:
         return None, "a drive without torque moves nothing"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-FILE = Path(__file__).with_name("usual.csv")
+RANGES_FILE = Path(__file__).with_name("usual.csv")
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Usual:
 @cache
 def usual_ranges() -> Mapping[str, Usual]:
     """Our parameter -> what it usually is. The ranges are judgement, from axes of tens of grams to tens of tonnes."""
-    with FILE.open(encoding="utf-8", newline="") as file:
+    with RANGES_FILE.open(encoding="utf-8", newline="") as file:
         return {
             row["parameter"]: Usual(float(row["low"]), float(row["high"]), row["unit"]) for row in csv.DictReader(file)
         }

@@ -21,7 +21,7 @@ from feedsim.control.view import Value, View
 from feedsim.errors import InputError
 
 # Values this close are the same [relative]: a text of ten digits and its value in SI.
-SAME = 1e-9
+TEXT_TOLERANCE = 1e-9
 # The same filter by two names.
 _BIT = re.compile(r"(p\d+\.\d+)=1(?:;|$)")  # a condition that begins with a bit
 SYNONYMS = {"band_stop": "second_order"}
@@ -134,7 +134,7 @@ def _compare(found: Written, edits: list[_Edit], view: View, taken: Taken, value
         before = view.value(other)
         if pair and isinstance(before, float) and isinstance(taken.value, float):
             raw = scalar(taken.entry.text)
-            if math.isclose(before, sign * float(raw), rel_tol=SAME):
+            if math.isclose(before, sign * float(raw), rel_tol=TEXT_TOLERANCE):
                 text = new if sign > 0 else new.removeprefix("-") if new.startswith("-") else f"-{new}"
                 edits += [_Edit(archive, entry, text) for archive, entry in pair]
                 also.append(f"{other} is set to {text} with it")
@@ -161,7 +161,7 @@ def _equal(old: str, new: str) -> bool:
 def _same(a: Value, b: Value) -> bool:
     if isinstance(a, str) or isinstance(b, str) or isinstance(a, bool) or isinstance(b, bool):
         return a == b
-    return math.isclose(a, b, rel_tol=SAME, abs_tol=1e-300)
+    return math.isclose(a, b, rel_tol=TEXT_TOLERANCE, abs_tol=1e-300)
 
 
 def _text(view: View, name: Name, entry: Entry | None, ours: Value) -> tuple[str, str]:
@@ -217,7 +217,7 @@ def number(value: float) -> str:
         (
             text
             for digits in range(1, 17)
-            if math.isclose(float(text := f"{value:.{digits}g}"), value, rel_tol=SAME / 10)
+            if math.isclose(float(text := f"{value:.{digits}g}"), value, rel_tol=TEXT_TOLERANCE / 10)
         ),
         repr(value),
     )

@@ -20,7 +20,7 @@ from feedsim.cosim.roles import archive_path
 from feedsim.errors import InputError
 from feedsim.installation import shipped
 from feedsim.scenario import Coupling, Machine
-from feedsim.scenario.roles import DRIVE, FRICTION
+from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 
 SHIPPED = ("plant.fmu", "controller.fmu", "friction.fmu", "setpoint.fmu", "machine.fmu")
 Programs = Mapping[str, str]  # path inside the archive -> SHA-256, of all files beside the library for this platform
@@ -50,7 +50,7 @@ def _parts(machine: Machine, folder: Path, coupling: Coupling | None) -> dict[Pa
         return {folder / "machine.fmu": ["machine"]}
     parts: dict[Path, list[str]] = {machine.plant or folder / "plant.fmu": ["plant"]}
     for axis in machine.axes:
-        for role in (DRIVE, FRICTION):
+        for role in (DRIVE, FRICTION_ROLE):
             parts.setdefault(archive_path(machine, axis, role, folder), []).append(f"{role.name} of {axis}")
     return parts
 
@@ -68,8 +68,8 @@ def any_foreign(machine: Machine, fmus: Path, coupling: Coupling | None = None) 
 def _loop(folder: Path, ours: Path) -> str | None:
     """SHA-256 of the cycle loop beside the archives of a folder, where it is another one than the shipped one."""
     with suppress(OSError):
-        if folder != ours and (digest := _digest((folder / exchange.NAME).read_bytes())) != _digest(
-            (ours / exchange.NAME).read_bytes()
+        if folder != ours and (digest := _digest((folder / exchange.LIBRARY_NAME).read_bytes())) != _digest(
+            (ours / exchange.LIBRARY_NAME).read_bytes()
         ):
             return digest
     return None
@@ -95,7 +95,7 @@ def executed(machine: Machine, fmus: Path | None, coupling: Coupling | None = No
     parts = _parts(machine, folder, coupling)
     told = [sentence for path, who in parts.items() for sentence in executing(path, ", ".join(who))]
     if (digest := _loop(folder, fmus_directory())) is not None:
-        told.append(f"executes {folder / exchange.NAME} as cycle loop, SHA-256 {digest}")
+        told.append(f"executes {folder / exchange.LIBRARY_NAME} as cycle loop, SHA-256 {digest}")
     return told
 
 

@@ -25,7 +25,7 @@ from feedsim.installation import mend
 
 # src/exchange/exchange.h, word for word.
 VERSION = 4
-KINDS = (
+OPERATION_CODES = (
     "set_real", "set_slopes", "do_step", "get_real", "get_slopes", "get_boolean", "get_state", "set_state",
     "copy", "line", "rate", "bond", "due", "end",
 )  # fmt: skip
@@ -37,13 +37,14 @@ FIELDS = (
     ("int64_t", "row"),
 )  # fmt: skip
 BOND = tuple(each.name for each in fields(Bond))
-INTERFACE = f"{VERSION}: {' '.join(KINDS)}; {' '.join(f'{kind} {name},' for kind, name in FIELDS)}; " + " ".join(
-    f"address {name}," for name in BOND
+INTERFACE = (
+    f"{VERSION}: {' '.join(OPERATION_CODES)}; {' '.join(f'{kind} {name},' for kind, name in FIELDS)}; "
+    + " ".join(f"address {name}," for name in BOND)
 )
 
 _TYPES = {"int32_t": np.int32, "int64_t": np.int64, "double": np.float64, "function": np.uintp, "address": np.uintp}
 _OPERATION = np.dtype([(name, _TYPES[kind]) for kind, name in FIELDS], align=True)
-NAME = {"win32": "exchange.dll", "darwin": "exchange.dylib"}.get(sys.platform, "exchange.so")
+LIBRARY_NAME = {"win32": "exchange.dll", "darwin": "exchange.dylib"}.get(sys.platform, "exchange.so")
 
 Native = ctypes.CDLL  # the loaded library
 
@@ -59,7 +60,7 @@ _loaded: dict[bytes, Native] = {}
 @cache
 def library(folder: Path) -> Native | str:
     """The native loop beside the archives in `folder`, or why none there can be used, without the folder's name."""
-    path = folder.resolve() / NAME
+    path = folder.resolve() / LIBRARY_NAME
     try:
         digest = hashlib.sha256(path.read_bytes()).digest()
         if (known := _loaded.get(digest)) is not None:
@@ -69,11 +70,11 @@ def library(folder: Path) -> Native | str:
         interface.restype = ctypes.c_char_p
         found = (interface() or b"").decode(errors="replace")
     except FileNotFoundError:
-        return f"{NAME}: no such file beside the archives"
+        return f"{LIBRARY_NAME}: no such file beside the archives"
     except (OSError, AttributeError) as error:
-        return f"{NAME}: cannot be used: {str(error).replace(str(path), NAME)}"
+        return f"{LIBRARY_NAME}: cannot be used: {str(error).replace(str(path), LIBRARY_NAME)}"
     if found != INTERFACE:
-        return f"{NAME}: built from other sources (its interface is {found!r}, wanted is {INTERFACE!r})"
+        return f"{LIBRARY_NAME}: built from other sources (its interface is {found!r}, wanted is {INTERFACE!r})"
     for run in (loaded.exchange_run, loaded.exchange_run_marked):
         run.restype = ctypes.c_int
         run.argtypes = (
@@ -112,12 +113,12 @@ class Exchange(Executor):
         self._native = native
         self._bonds: list[NDArray[np.uintp]] = []  # as the operations point to them
         self._table = np.zeros(len(self._operations) + 1, dtype=_OPERATION)
-        self._table["kind"] = KINDS.index("end")
+        self._table["kind"] = OPERATION_CODES.index("end")
         for at, operation in enumerate(self._operations):
             self._write(self._table[at], operation)
 
     def _write(self, row: Any, o: Operation) -> None:
-        row["kind"], row["count"], row["s"], row["h"] = KINDS.index(o.kind), o.count, o.s, o.h
+        row["kind"], row["count"], row["s"], row["h"] = OPERATION_CODES.index(o.kind), o.count, o.s, o.h
         for name in ("references", "orders", "y", "a", "b"):
             row[name] = getattr(o, name).ctypes.data
         if o.unit is not None:
@@ -126,7 +127,7 @@ class Exchange(Executor):
             self._bonds.append(np.array([getattr(o.bond, name).ctypes.data for name in BOND], dtype=np.uintp))
             row["a"] = self._bonds[-1].ctypes.data
         if o.when is not None:
-            row["kind"], row["what"] = KINDS.index("due"), row["kind"]
+            row["kind"], row["what"] = OPERATION_CODES.index("due"), row["kind"]
             row["next"], row["every"] = o.when.first, o.when.every
             row["rows"], row["stride"] = len(o.y), o.y.strides[0]
 

@@ -43,7 +43,7 @@ DRIVE_SIGNALS = ("n_s", "n_ref", "torque_limited", "voltage_limited")
 TOOL_SIGNALS = ("tool.x_X", "tool.x_Y", "tool.x_Z")
 LIMITS = {"torque_limited": ("M_max", "N.m"), "voltage_limited": ("u_max", "V")}
 # Periods that differ by more than this share of the signal have not settled: 0.01 dB.
-SETTLED = 1e-3
+PERIOD_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,7 +359,7 @@ def _doubts(trace: Trace, axis: str, friction: bool, speed: float | None, unsett
             f"axis {axis} reverses under the excitation, down to {slowest:.3g} rad/s "
             f"at an offset speed of {abs(speed):.4g} rad/s: friction is not linear there; take less, or move faster"
         )
-    if unsettled > SETTLED:
+    if unsettled > PERIOD_TOLERANCE:
         doubts.append(
             f"the last two periods differ by {100 * unsettled:.2g} % of the signal: the response has not settled, or "
             "is not periodic; let more periods settle"

@@ -28,7 +28,7 @@ ON_THE_GRID = 1e-6  # of a control cycle: instants come from decimal text
 # Below this share of the largest speed setpoint an axis stands: the spline of the setpoints rings down exponentially.
 STANDS = 1e-9
 # Rows that are worked on at a time.
-BLOCK = 1 << 19
+ROWS_AT_ONCE = 1 << 19
 
 
 def log(fine: Trace, logging: Logging, ideal: Sequence[str] = (), scratch: Path | None = None) -> Trace:
@@ -55,8 +55,8 @@ def log(fine: Trace, logging: Logging, ideal: Sequence[str] = (), scratch: Path 
         deviation = _deviation(noise[signal], fine, axis, name) if signal in noise else None
         logs.append(_Column(fine[name], course, delay, deviation, _stream(logging.seed, name), steps.get(signal)))
     table = Table(1 + len(logs), rows, scratch)
-    for first in range(0, rows, BLOCK):
-        at = np.arange(first, min(first + BLOCK, rows)) * every
+    for first in range(0, rows, ROWS_AT_ONCE):
+        at = np.arange(first, min(first + ROWS_AT_ONCE, rows)) * every
         table.append(np.array([at * cycle, *(column.at(at) for column in logs)]))
         release(*(column.values for column in logs))
     time, *columns = table.columns()
@@ -154,7 +154,7 @@ def _deviation(level: Level, fine: Trace, axis: str, name: str) -> float:
     stands = STANDS * max(abs(end) for end in least_and_largest(speed))
     means: list[float] = []
     counts: list[int] = []
-    for n, values in stretches(speed, fine[name], rows=BLOCK):
+    for n, values in stretches(speed, fine[name], rows=ROWS_AT_ONCE):
         if (moving := np.abs(n) > stands).any():
             means.append(float(np.mean(values[moving] ** 2)))
             counts.append(int(np.count_nonzero(moving)))

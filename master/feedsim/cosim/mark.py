@@ -15,15 +15,18 @@ import numpy as np
 
 SIZE = 4096
 _HEAD = 24  # bytes of cycle, operation, and how often anything was noted
-CALL, OWN = -1, -2  # in place of an operation: a call that `text` describes; code of our own, which takes its time
+DESCRIBED_CALL, OWN_CODE = (
+    -1,
+    -2,
+)  # in place of an operation: a call that `text` describes; code of our own, which takes its time
 
 
 class Mark:
     """A note in a file that two processes have in their memory.
 
     Attributes:
-        numbers: (3,) control cycle, operation in it (or CALL, or OWN), notes so far. The native loop writes the first
-            two itself (exchange_run_marked).
+        numbers: (3,) control cycle, operation in it (or DESCRIBED_CALL, or OWN_CODE), notes so far. The native loop
+            writes the first two itself (exchange_run_marked).
     """
 
     def __init__(self, path: Path) -> None:
@@ -34,7 +37,7 @@ class Mark:
             self._memory = mmap.mmap(file.fileno(), SIZE)
         self.numbers = np.frombuffer(self._memory, dtype=np.int64, count=3)
 
-    def at(self, text: str, what: int = CALL) -> None:
+    def at(self, text: str, what: int = DESCRIBED_CALL) -> None:
         """Note what comes next."""
         content = text.encode("utf-8", "replace")[: SIZE - _HEAD - 1]
         self._memory[_HEAD : _HEAD + len(content) + 1] = content + b"\0"
@@ -43,7 +46,7 @@ class Mark:
 
     def back(self) -> None:
         """Note that the call has come back."""
-        self.numbers[1] = OWN
+        self.numbers[1] = OWN_CODE
         self.numbers[2] += 1
 
     @property

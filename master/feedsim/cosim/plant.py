@@ -22,7 +22,7 @@ from feedsim.structure.pack import AXES_IN_ARCHIVE, MODES_IN_ARCHIVE, POSES_IN_A
 from feedsim.structure.poses_file import read_cell
 
 _START = ".x_0"  # of every axis of a plant
-KEPT = 4  # packed archives, of about 1 MB each: studies run the same machine again and again
+MAX_PACKED_PLANTS = 4  # packed archives, of about 1 MB each: studies run the same machine again and again
 # With the archive in it, by content of what it is packed from; those used last stand last.
 _PACKED: dict[Any, TemporaryFolder] = {}
 _PACKING = threading.Lock()
@@ -83,7 +83,7 @@ def packed_for(machine: Machine, general: Path, make: Callable[[Path], None]) ->
             folder = TemporaryFolder()
             make(folder.path / general.name)
         _PACKED[key] = folder
-        while len(_PACKED) > KEPT:
+        while len(_PACKED) > MAX_PACKED_PLANTS:
             _PACKED.pop(next(iter(_PACKED))).close()
         return Archive(folder.path / general.name)
 

@@ -24,7 +24,7 @@ from feedsim.cosim.unit import Floats, Log
 from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Machine, Scenario
-from feedsim.scenario.roles import DRIVE, FRICTION
+from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 from feedsim.trace import Table, Trace, matching
 
 PLANT_SIGNALS = ("x_a", "n_a")
@@ -58,7 +58,7 @@ def columns_of(machine: Machine, loaded: Sequence[str] = (), *, residual: bool =
     """All columns that can be recorded, in the order of a trace. loaded: the plant's variables at which loads act."""
     found: list[str] = []
     for name, axis in machine.axes.items():
-        shown = (*DRIVE.shown(axis.drive), *FRICTION.shown(axis.friction), *([RESIDUAL] if residual else []))
+        shown = (*DRIVE.shown(axis.drive), *FRICTION_ROLE.shown(axis.friction), *([RESIDUAL] if residual else []))
         found += (f"{name}.{signal}" for signal in (*wiring.SETPOINT_UNITS, *PLANT_SIGNALS, *shown))
     return [*found, *_effects(machine), *TOOL_SIGNALS, *loaded]
 
@@ -129,7 +129,7 @@ class Recording:
         )
         self.limited: dict[str, int] = {}
         for axis, described in system.machine.axes.items():
-            drive, friction = DRIVE.shown(described.drive), FRICTION.shown(described.friction)
+            drive, friction = DRIVE.shown(described.drive), FRICTION_ROLE.shown(described.friction)
             self.limited |= {f"{axis}.{limit}": 0 for limit in LIMITS if limit in drive}
             self._log(wiring.controller(axis), {signal: f"{axis}.{signal}" for signal in drive}, cycle)
             self._log(wiring.friction(axis), {signal: f"{axis}.{signal}" for signal in friction}, cycle)

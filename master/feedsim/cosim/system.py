@@ -18,9 +18,9 @@ from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.owned import Closing
 from feedsim.scenario import Machine
-from feedsim.scenario.roles import DRIVE, FRICTION, Role
+from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 
-SETPOINT, MEASURED = ("x_s", "n_ffw"), ("x_a", "n_a")
+SETPOINT_INPUTS, MEASURED_INPUTS = ("x_s", "n_ffw"), ("x_a", "n_a")
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class System(Closing):
         wanted: list[tuple[str, str, Role]] = [
             (instance(axis), axis, role)
             for axis in self.axes
-            for instance, role in ((wiring.controller, DRIVE), (wiring.friction, FRICTION))
+            for instance, role in ((wiring.controller, DRIVE), (wiring.friction, FRICTION_ROLE))
             if role is DRIVE or self.friction
         ]
         archives: dict[Path, Archive] = {}
@@ -150,7 +150,9 @@ class System(Closing):
         for i, axis in enumerate(axes):
             name = wiring.controller(axis)
             role, control = self.roles[name], self.units[name]
-            setpoint, both = ([name for name in group if name in role.signals] for group in (SETPOINT, MEASURED))
+            setpoint, both = (
+                [name for name in group if name in role.signals] for group in (SETPOINT_INPUTS, MEASURED_INPUTS)
+            )
             self.controllers.append(
                 Control(
                     role=role,

@@ -21,7 +21,7 @@ from feedsim.scenario import Drive, ForeignUnit, Friction, Machine, Scenario
 from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure import Modes
 from feedsim.structure.pack import POSES_IN_ARCHIVE
-from feedsim.structure.pose_change import NEAR, PoseChange, pose_change, warnings
+from feedsim.structure.pose_change import MIN_POSE_DISTANCE, PoseChange, pose_change, warnings
 from feedsim.structure.poses_file import GridAxis, read_grid
 from feedsim.structure.table_check import table_mismatch
 from feedsim.trace import Trace
@@ -42,7 +42,7 @@ DRIVING, MATTERS = 0.5, 0.05
 FACTOR_OFF, WORK_OFF, FACTOR_SEEN = 0.5, 0.1, 0.3
 # Of its travel: an axis that is off by more has left its setpoint; at rapid traverse without feedforward it is off by
 # 1 %.
-LEFT = 0.02
+SETPOINT_LEFT_SHARE = 0.02
 
 
 def energies(cycle: Cycle) -> dict[str, float]:
@@ -335,7 +335,7 @@ def left_grid(axis: GridAxis, reached: tuple[float, float], machine: Machine) ->
     travel = machine.axes[axis.axis].travel
     first, last = axis.reach
     beyond = max(first - max(reached[0], travel[0]), min(reached[1], travel[1]) - last)
-    if beyond <= NEAR:
+    if beyond <= MIN_POSE_DISTANCE:
         return []
     return [
         f"axis {axis.axis} leaves the plant's grid of poses ({first * 1e3:.6g} mm to {last * 1e3:.6g} mm) by "
@@ -353,8 +353,8 @@ def left_first(trace: Trace, program: Program, machine: Machine) -> str:
     """Which axis was the first to leave its setpoint, for the message of a run that has failed; "" where none has.
 
     trace: the rows so far. The unit that fails first is often that of another axis, which the structure has dragged
-    along. An axis has left its setpoint where it is off by more than LEFT of its travel; of axes that leave in the same
-    row it is the one that is off the furthest, each as a share of its travel.
+    along. An axis has left its setpoint where it is off by more than SETPOINT_LEFT_SHARE of its travel; of axes that
+    leave in the same row it is the one that is off the furthest, each as a share of its travel.
     """
     found: list[tuple[float, float, str, float]] = []
     for name, axis in machine.axes.items():
@@ -364,7 +364,7 @@ def left_first(trace: Trace, program: Program, machine: Machine) -> str:
         with np.errstate(invalid="ignore"):
             off = np.nan_to_num(np.abs(np.asarray(trace[column]) - setpoint), nan=np.inf)
         share = off / (axis.travel[1] - axis.travel[0])
-        if (rows := np.flatnonzero(share > LEFT)).size:
+        if (rows := np.flatnonzero(share > SETPOINT_LEFT_SHARE)).size:
             row = int(rows[0])
             found.append((float(trace.time[row]), -float(share[row]), name, float(off[row])))
     if not found:

@@ -1,7 +1,8 @@
 """What archives unpack to: once for each content and process, kept for the next run, gone when the process ends.
 
 Kept is what an archive's bytes say, not its name: an archive that is built anew under its old name is another one, and
-copies of an archive are the same. What nobody uses any more is kept for the next run, the latest :data:`KEPT` of them.
+copies of an archive are the same. What nobody uses any more is kept for the next run, the latest
+:data:`MAX_UNUSED_CONTENTS` of them.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from feedsim.errors import InputError
 from feedsim.installation import mend, shipped
 from feedsim.owned import TemporaryFolder
 
-KEPT = 8  # contents that no archive uses: the three units', and those of some machines or SSP files
+MAX_UNUSED_CONTENTS = 8  # contents that no archive uses: the three units', and those of some machines or SSP files
 KEPT_SIZE = 64 << 20  # bytes; what is larger, such as the setpoints of a long program, goes with its last user
 # A file that has rested for so long [ns] has other times after its next change; a younger one may change within the
 # same tick of its file system's clock.
@@ -169,7 +170,7 @@ class Store:
                 return
             idle = [key for key, each in self._contents.items() if not each.users]
             large = [key for key in idle if self._contents[key].size > KEPT_SIZE]
-            for key in {*large, *idle[: max(0, len(idle) - KEPT)]}:
+            for key in {*large, *idle[: max(0, len(idle) - MAX_UNUSED_CONTENTS)]}:
                 self._contents.pop(key).remove()
 
     def clear(self) -> None:

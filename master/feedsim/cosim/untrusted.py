@@ -13,13 +13,13 @@ from xml.parsers import expat
 
 from feedsim.errors import InputError, OutputError
 
-LARGEST = 4 << 30  # bytes that a file may unpack to; the setpoints of the longest program take less
+MAX_UNPACKED_BYTES = 4 << 30  # bytes that a file may unpack to; the setpoints of the longest program take less
 RATIO = 100  # to the file's own size; tables of setpoints reach some 10, files made to fill a disk 1000
 FREE = 64 << 20  # bytes up to which the ratio does not count
 LARGEST_DOCUMENT = 64 << 20  # bytes of what is read into memory at once: XML, JSON, YAML
 MOST_ENTRIES = 20_000  # files and folders; archives of simulators have some hundreds
-LONGEST_PART = 240  # bytes of a file's or folder's name; systems know 255
-LONGEST_NAME = 1024  # bytes of a name with its folders
+MAX_PATH_PART_BYTES = 240  # bytes of a file's or folder's name; systems know 255
+MAX_PATH_BYTES = 1024  # bytes of a name with its folders
 # On Windows, with any ending.
 _PORTS = (f"{port}{n}" for port in ("COM", "LPT") for n in "0123456789¹²³")
 _DEVICES = frozenset(("CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$", *_PORTS))
@@ -34,7 +34,7 @@ class Allowance:
             self._size = path.stat().st_size
         except OSError as error:
             raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-        self._limit = min(LARGEST, max(FREE, RATIO * self._size))
+        self._limit = min(MAX_UNPACKED_BYTES, max(FREE, RATIO * self._size))
         self._used = 0
 
     def take(self, size: int, where: str) -> None:
@@ -43,7 +43,8 @@ class Allowance:
         if self._used > self._limit:
             raise InputError(
                 f"{where}: what is needed of it unpacks to {self._used} bytes or more; at most {self._limit} are read "
-                f"of a file of {self._size} bytes ({RATIO} times its size, from {FREE >> 20} MiB to {LARGEST >> 30} "
+                f"of a file of {self._size} bytes ({RATIO} times its size, from {FREE >> 20} MiB to "
+                f"{MAX_UNPACKED_BYTES >> 30} "
                 "GiB)"
             )
 
@@ -89,8 +90,10 @@ def _fault(entry: zipfile.ZipInfo, twice: bool, names: dict[str, str]) -> str | 
     if twice:
         return "is there twice"
     size = len(name.encode("utf-8", "surrogatepass"))
-    if size > LONGEST_NAME or any(len(p.encode("utf-8", "surrogatepass")) > LONGEST_PART for p in name.split("/")):
-        return f"has a name of more than {LONGEST_PART} bytes ({LONGEST_NAME} with its folders)"
+    if size > MAX_PATH_BYTES or any(
+        len(p.encode("utf-8", "surrogatepass")) > MAX_PATH_PART_BYTES for p in name.split("/")
+    ):
+        return f"has a name of more than {MAX_PATH_PART_BYTES} bytes ({MAX_PATH_BYTES} with its folders)"
     if fault := next(filter(None, map(_part_fault, name.split("/"))), None):
         return fault
     folded = _folded(name)

@@ -23,7 +23,7 @@ from feedsim.errors import InputError
 from feedsim.nc import Program
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.coupling import SCHEMES
-from feedsim.scenario.roles import BOOLEAN, DRIVE, FRICTION, Role
+from feedsim.scenario.roles import BOOLEAN, DRIVE, FRICTION_ROLE, Role
 
 
 def system_of(machine: Machine, coupling: Coupling, fmus: Path, *, only_shipped: bool = False) -> System:
@@ -56,7 +56,7 @@ class Whole(System):
         self.plant_axes = axes_of(archive)
         for axis in self.axes:
             self.roles[wiring.controller(axis)] = _part(archive, axis, DRIVE)
-            self.roles[wiring.friction(axis)] = _part(archive, axis, FRICTION)
+            self.roles[wiring.friction(axis)] = _part(archive, axis, FRICTION_ROLE)
         self.units = {wiring.PLANT: self.plant}
         self.units |= {name: self.plant.part(role.signals) for name, role in self.roles.items()}
         self._share_buffers()

@@ -25,7 +25,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, TypeVar
 
-from feedsim.cosim.mark import CALL, OWN, Mark, Watched, watch, watched
+from feedsim.cosim.mark import DESCRIBED_CALL, OWN_CODE, Mark, Watched, watch, watched
 from feedsim.errors import FeedsimError, SimulationError
 from feedsim.owned import TemporaryFolder, remove_orphans
 
@@ -100,7 +100,7 @@ class _Worker:
     ) -> Any:  # fmt: skip
         """As :func:`call`."""
         surroundings = (Path.cwd(), {name: value for name, value in os.environ.items() if name.startswith("FEEDSIM")})
-        self._mark.at("the worker: starting", OWN)
+        self._mark.at("the worker: starting", OWN_CODE)
         try:
             self._to.send((surroundings, function, given, dict(named), sink is not None, progress is not None))
             return self._watch(limit, sink, progress)
@@ -133,7 +133,7 @@ class _Worker:
                 self._lost(operations)
             if (now := self._mark.state()) != state:
                 state, since = now, time.monotonic()
-            elif state[1] != OWN and time.monotonic() - since > limit:
+            elif state[1] != OWN_CODE and time.monotonic() - since > limit:
                 where = self._where(operations)
                 self.end()
                 raise SimulationError(
@@ -161,9 +161,9 @@ class _Worker:
         """Which unit, in what, when; what a sentence begins with."""
         cycle, operation, _ = self._mark.state()
         T_c, known = operations
-        if operation == OWN:
+        if operation == OWN_CODE:
             return f'the worker process, behind "{self._mark.text}",'
-        if operation == CALL or not 0 <= operation < len(known):
+        if operation == DESCRIBED_CALL or not 0 <= operation < len(known):
             return self._mark.text
         unit, about, within = known[operation]
         return f"unit {unit}, t = {cycle * T_c + within:.9g} s: {about}"

@@ -17,7 +17,7 @@ from feedsim.estimation.parameter import Array, Parameter, Prior
 
 # A direction of the scaled parameters that the residuals answer to this much less than to the strongest one determines
 # nothing: below it lies the error of the differences that the Jacobian is made of.
-SILENT = 1e-8
+SINGULAR_RATIO = 1e-8
 AT_BOUND = 1e-6  # of the scale: what counts as sitting at a bound
 
 
@@ -224,7 +224,7 @@ def inverse(jacobian: Array) -> tuple[Array, NDArray[np.bool_]]:
     while not np.all(silent):
         kept = np.flatnonzero(~silent)
         _, strength, directions = np.linalg.svd(jacobian[:, kept], full_matrices=False)
-        quiet = strength <= SILENT * strength[0]
+        quiet = strength <= SINGULAR_RATIO * strength[0]
         if not np.any(quiet) and len(strength) == len(kept):
             break
         # The parameter that leads the quietest direction is given up, then the rest is looked at anew. Of those that

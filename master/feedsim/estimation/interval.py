@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 NORMAL_95 = 1.959964  # standard deviations on either side that hold 95 % of a normal distribution
-MOST = 0.5  # half of the interval of a value that is determined, over the value
+MAX_RELATIVE_HALF = 0.5  # half of the interval of a value that is determined, over the value
 # Loads, delays and differences of both directions have no scale of their own to which an interval could be compared.
 ANY_VALUE = frozenset({"M_0", "asymmetry", "delay", "k_ffw", "T_sym", "T_dyn"})
 
@@ -26,7 +26,7 @@ def determined(value: float, half: float) -> bool:
     >>> determined(2.0, 0.9), determined(-2.0, 1.1), determined(2.0, math.nan)
     (True, False, True)
     """
-    return not half > MOST * abs(value)
+    return not half > MAX_RELATIVE_HALF * abs(value)
 
 
 def shows(value: float, half: float) -> bool:

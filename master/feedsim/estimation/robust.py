@@ -19,10 +19,10 @@ from feedsim.estimation.interval import student
 from feedsim.estimation.parameter import Array
 
 BIWEIGHT = 4.685  # 95 % as efficient as least squares where the noise is normal
-PASSES = 6
+MAX_REWEIGHTINGS = 6
 # Harmonics of what rounding adds to a value, over where the value lies between two steps.
 HARMONICS = 3
-SETTLED = 1e-13  # changes of a term below this [m] are rounding
+CHANGE_FLOOR = 1e-13  # changes of a term below this [m] are rounding
 
 
 class Robust(NamedTuple):
@@ -45,12 +45,12 @@ def robust_fit(matrix: Array, deviation: Array, spread: Array, blocks: Array) ->
     known = _known(matrix, spread)
     _, block = np.unique(blocks, return_inverse=True) if len(spread) else (0, np.empty(0, dtype=np.int64))
     shared = 0.0
-    for _ in range(PASSES):
+    for _ in range(MAX_REWEIGHTINGS):
         normal = matrix.T @ (weights[:, None] * matrix) + shared**2 * known
         values = np.linalg.lstsq(normal, matrix.T @ (weights * deviation), rcond=None)[0]
         off = deviation - matrix @ values
         noise = float(np.median(np.abs(off))) / 0.6745
-        if noise < SETTLED:
+        if noise < CHANGE_FLOOR:
             break
         if len(spread):
             sums = np.bincount(block, np.clip(off, -BIWEIGHT * noise, BIWEIGHT * noise))

@@ -10,7 +10,7 @@ from pathlib import Path
 from feedsim.errors import InputError
 from feedsim.fields import brief
 
-LONGEST, LONGEST_PART = 4096, 255  # bytes of a name that Linux takes, and of each part of it
+MAX_NAME_BYTES, MAX_PART_BYTES = 4096, 255  # bytes of a name that Linux takes, and of each part of it
 _CLOSED: list[str] = []  # folders that hold what archives were unpacked to
 
 
@@ -50,8 +50,8 @@ def _possible(name: str) -> bool:
     try:
         return (
             "\0" not in name
-            and len(os.fsencode(name)) < LONGEST
-            and all(len(os.fsencode(part)) <= LONGEST_PART for part in Path(name).parts)
+            and len(os.fsencode(name)) < MAX_NAME_BYTES
+            and all(len(os.fsencode(part)) <= MAX_PART_BYTES for part in Path(name).parts)
         )
     except UnicodeEncodeError:
         return False

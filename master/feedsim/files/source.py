@@ -21,8 +21,10 @@ from feedsim.files.regular import content
 
 Place = tuple[str | int, ...]
 
-LARGEST = 100_000  # values in a file, aliases expanded
-_MANY = f"more than {LARGEST} values, an alias counted as all that it stands for; a long table is a CSV file of its own"
+MAX_VALUES = 100_000  # values in a file, aliases expanded
+_MANY = (
+    f"more than {MAX_VALUES} values, an alias counted as all that it stands for; a long table is a CSV file of its own"
+)
 LARGEST_FILE = 4_000_000  # bytes; people write some kB, and a long line of text is read at 0.3 MB/s
 _FAST_DEPTH = 2000
 # Where libyaml has a mind of its own: tabs, tags, byte order marks within a text, directives, "#" at the head of a
@@ -180,7 +182,7 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: Any, index: Any) -> Any:
         """As usual, but a file that is too large is given up as soon as that shows."""
         self.nodes += 1
-        if self.nodes > LARGEST:
+        if self.nodes > MAX_VALUES:
             raise _TooLarge
         return super().compose_node(parent, index)
 
@@ -223,7 +225,7 @@ class _Builder:
 
     def build(self, node: yaml.Node, place: Place, marks: dict[Place, Mark]) -> Any:
         self.count += 1
-        if self.count > LARGEST:
+        if self.count > MAX_VALUES:
             raise InputError(f"{self.name}: {_MANY}")
         if id(node) in self.open:
             raise self.error("an alias refers to the value that it is part of", node.start_mark)

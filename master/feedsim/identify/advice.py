@@ -33,7 +33,7 @@ LEAST_FREQUENCY = 5.0
 DEFLECTIONS_W = 0.9
 DEFLECTIONS_GAMMA = 2.25
 # Standard deviations, of the value, up to which nothing needs to be said.
-GOOD = {"sigma_0": 0.02, "W": 0.03, "gamma": 0.03, "sigma_1": 0.06}
+GOOD_RELATIVE_SIGMA = {"sigma_0": 0.02, "W": 0.03, "gamma": 0.03, "sigma_1": 0.06}
 EXCELLENT = 1 / 3  # of those: better than that, nothing is said at all
 TOLERANCE = 0.75  # the axis follows small sines only in part: 20 um that are commanded are some 19, 5 um are 4
 
@@ -74,7 +74,7 @@ def advice(
                 f"sigma_1 {verb} a small sine (up to some {_length(deflection, I_P)}) of at least {LEAST_FREQUENCY:g} "
                 "Hz; " + (f"the fastest has {highest:.3g} Hz" if small else "there is none") + _bound(sigma_1)
             )
-    for name, good in GOOD.items():
+    for name, good in GOOD_RELATIVE_SIGMA.items():
         estimate = estimates.get(name)
         if estimate is None or estimate.status != "estimated" or any(s.startswith(name + " ") for s in sentences):
             continue
@@ -101,7 +101,7 @@ def _wanted(estimate: Estimate) -> str:
         return ""
     if estimate.status == "undetermined" or not np.isfinite(estimate.sigma):
         return "needs"
-    good = GOOD[estimate.name] * abs(estimate.value)
+    good = GOOD_RELATIVE_SIGMA[estimate.name] * abs(estimate.value)
     return "needs" if estimate.sigma > good else "is best determined by" if estimate.sigma > EXCELLENT * good else ""
 
 

@@ -20,9 +20,9 @@ from feedsim.identify.inertia import Inertia, inertia, smooth_speed
 from feedsim.identify.record import Array, Record, runs
 
 MEAN = 5  # rows of the mean that takes noise, added behind the limit, off the heap
-CERTAIN = 4.0  # standard deviations that pass for noise
-SHORTEST = 5  # rows of a heap that tell whether it is one
-MORE = 0.05  # of the limit: what inertia and friction must need beyond it; the simple friction is not better
+CLIPPING_SIGMAS = 4.0  # standard deviations that pass for noise
+MIN_HEAP_ROWS = 5  # rows of a heap that tell whether it is one
+CLIPPED_EXCESS = 0.05  # of the limit: what inertia and friction must need beyond it; the simple friction is not better
 MOST_SHOWN = 3  # stretches of time that the message names
 
 
@@ -57,7 +57,7 @@ def without_clipped(records: Sequence[Record], J: float | None = None) -> tuple[
     if rigid is None and J is None:
         return tuple(records), ()
     needed = [_needed(record, rigid, J or 0.0) for record in records]
-    margin = CERTAIN * rigid.rms if rigid is not None else 0.0
+    margin = CLIPPING_SIGMAS * rigid.rms if rigid is not None else 0.0
     proven = [
         heap for both, torque in zip(heaps, needed, strict=True) for heap in both if _beyond(heap, torque, margin)
     ]
@@ -81,7 +81,7 @@ def _smooth(record: Record) -> Array:
 
 def _reach(record: Record) -> float:
     """By how much the mean of rows at a limit may lie off it [N.m]."""
-    return float(max(CERTAIN * white(record.torque) / np.sqrt(MEAN), resolution(record.torque)))
+    return float(max(CLIPPING_SIGMAS * white(record.torque) / np.sqrt(MEAN), resolution(record.torque)))
 
 
 def _heap(record: Record, side: float) -> _Heap:
@@ -106,9 +106,9 @@ def _needed(record: Record, rigid: Inertia | None, J: float) -> Array:
 def _beyond(heap: _Heap, needed: Array, margin: float) -> bool:
     """Whether the motion needs clearly more than the limit over some run of the heap."""
     limit, side = heap.limit, heap.side
-    inner = [(first, last) for first, last in runs(heap.rows) if last - first >= SHORTEST + MEAN - 1]
+    inner = [(first, last) for first, last in runs(heap.rows) if last - first >= MIN_HEAP_ROWS + MEAN - 1]
     most = max((float(np.median(side * needed[first:last])) for first, last in inner), default=-np.inf)
-    return most > limit + max(MORE * abs(limit), margin)
+    return most > limit + max(CLIPPED_EXCESS * abs(limit), margin)
 
 
 def _words(record: Record, heaps: Sequence[_Heap], needed: Array) -> str:

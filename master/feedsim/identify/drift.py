@@ -12,8 +12,8 @@ from feedsim.identify.record import Array
 from feedsim.identify.result import Plateau
 from feedsim.identify.stribeck_identifiability import SAME_SPEED
 
-SAME = 0.02  # relative difference up to which a speed counts as repeated
-CERTAIN, LEAST_DRIFT = 4.0, 2e-3  # standard deviations, and share of the friction, that a drift must have
+SAME_SPEED_SHARE = 0.02  # relative difference up to which a speed counts as repeated
+DRIFT_SIGMAS, LEAST_DRIFT = 4.0, 2e-3  # standard deviations, and share of the friction, that a drift must have
 # Standard deviation of the relative change of viscous friction from the first plateau to the last one: grease and oil
 # lose a third and more of it while a cold axis warms up.
 WARMS = 0.25
@@ -49,7 +49,11 @@ def repeats(plateaus: Sequence[Plateau]) -> list[tuple[int, int]]:
     """The first and the last plateau of each direction and speed that came back after another speed."""
     found = []
     for k, first in enumerate(plateaus):
-        like = [m for m, other in enumerate(plateaus) if abs(other.speed - first.speed) <= SAME * abs(first.speed)]
+        like = [
+            m
+            for m, other in enumerate(plateaus)
+            if abs(other.speed - first.speed) <= SAME_SPEED_SHARE * abs(first.speed)
+        ]
         between = (abs(abs(other.speed) - abs(first.speed)) for other in plateaus[k : like[-1]])
         if like[0] == k and any(away > SAME_SPEED * abs(first.speed) for away in between):
             found.append((k, like[-1]))
@@ -67,7 +71,7 @@ def repeated(
         n = np.array([first.speed, last.speed])
         before, after = np.array([first.torque, last.torque]) - torque(values, n)
         change, friction, size = float(after - before), float(curve(values, n[:1])[0]), abs(first.speed)
-        if abs(change) < max(CERTAIN * float(np.hypot(first.sigma, last.sigma)), LEAST_DRIFT * friction):
+        if abs(change) < max(DRIFT_SIGMAS * float(np.hypot(first.sigma, last.sigma)), LEAST_DRIFT * friction):
             continue
         # What each would have to change by to make the difference alone, from the first plateau to the last one of all.
         reach = {"sigma_2": size, "F_log": float(np.log1p(size / values["v_log"])), "F_C": 1.0, "F_S": 1.0}

@@ -21,10 +21,10 @@ from feedsim.identify.record import Record
 from feedsim.identify.result import Balance, Estimate, Identification
 from feedsim.scenario import Friction, Subject
 
-FRICTION = "friction.yaml"
+FRICTION_FILE = "friction.yaml"
 # Relative 5e-8 at most: what is calculated from the file is that of the fit to 1e-6, and a person can still read it.
 DIGITS = 8
-WIDTH = 118
+FILE_COLUMNS = 118
 EXACT = 8  # significant digits of the other values of a group `identified`
 
 
@@ -83,7 +83,7 @@ def friction_yaml(identified: Identified, software: Mapping[str, str]) -> str:
     estimates = identified.found.estimates
     lines = {name: _line(estimates[name]) for name in Friction.model_fields if name in estimates}
     origin = _origin(identified, software)
-    return friction_text(lines, origin, _head(identified, software["feedsim"]), name=FRICTION)
+    return friction_text(lines, origin, _head(identified, software["feedsim"]), name=FRICTION_FILE)
 
 
 def constant_load_hint(found: Identification) -> str:
@@ -191,7 +191,7 @@ def _head(identified: Identified, version: str) -> Sequence[str]:
         *(f"  {name}" for name in identified.traces),
         *identified.notes,
         "Motor side. Behind a value its 95 % confidence interval, from the model linearised at the optimum.",
-        f"To use: feedsim run SCENARIO.yaml --set machine.axes.{axis}.friction={FRICTION}",
+        f"To use: feedsim run SCENARIO.yaml --set machine.axes.{axis}.friction={FRICTION_FILE}",
     ]
     hint = constant_load_hint(identified.found)
     return [*lines, f"The {hint}"] if hint else lines
@@ -275,7 +275,7 @@ def friction_text(
         lines.append(f"{entry:<{column}}# {remark}" if remark else entry)
     if identified:
         content = {"identified": _plain(identified)}
-        group: str = yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=WIDTH)
+        group: str = yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=FILE_COLUMNS)
         lines += ["", "# Where the values come from: kept and shown, not calculated with.", group.rstrip("\n")]
     return "\n".join(lines) + "\n"
 

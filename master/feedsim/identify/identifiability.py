@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedsim.estimation.interval import ANY_VALUE, determined, half_width, reason, shows
-from feedsim.identify.parameters import KINDS, NO_EFFECT, inner, outer
+from feedsim.identify.parameters import NO_EFFECT, PARAMETER_KINDS, inner, outer
 from feedsim.identify.search import Solution
 from feedsim.identify.torque import RecordTorque, deflection
 
@@ -75,7 +75,7 @@ def _judge(solution: Solution, name: str) -> tuple[float, Verdict] | None:
     if not np.isfinite(sigma):
         return np.inf, Verdict({name: value}, name, "the record does not answer to it")
     if key in solution.fit.at_bound:
-        why = f"the fit ends at the end of its range ({value:.3g} {KINDS[outer(key)].unit})"
+        why = f"the fit ends at the end of its range ({value:.3g} {PARAMETER_KINDS[outer(key)].unit})"
         return np.inf, Verdict({name: value}, name, why)
     half = half_width(sigma)
     # A Stribeck peak that is not determined is an artefact of what happens within a few rows of the reversals.
@@ -115,7 +115,9 @@ def no_delay(models: Sequence[RecordTorque], solution: Solution, free: Collectio
 
 
 LEAST_EXPLAINED = 0.01  # of the torque's rms: interpolation, ripple and held commands are not modelled to better
-LEAST_ROWS = 5.0  # of the log from a reversal until the bristles have turned over, to tell damping or engaging zone
+MIN_TURNOVER_ROWS = (
+    5.0  # of the log from a reversal until the bristles have turned over, to tell damping or engaging zone
+)
 LEAST_REVERSALS = 4  # to tell the delay of the torque: at each it could also be the bristles'
 FAST = 0.05  # of the top speed: what a direction of motion must reach to count
 

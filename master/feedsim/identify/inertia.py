@@ -19,16 +19,16 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.estimation.fit import correlation
 from feedsim.identify.averages import white
-from feedsim.identify.parameters import RIGID, estimate, torque
+from feedsim.identify.parameters import RIGID_AXIS_NAMES, estimate, torque
 from feedsim.identify.record import Array, Record, runs
 from feedsim.identify.result import Correlation, Estimate
 
-# Length of the Hann window of the low-pass [s]: -6 dB at 1/WINDOW. It is doubled, up to LONGEST, as long as noise of
-# the motion makes up more than the share NOISE of the acceleration's variance (that share is what J comes out too
-# small by).
-WINDOW, LONGEST, NOISE = 0.04, 0.32, 1e-3
+# Length of the Hann window of the low-pass [s]: -6 dB at 1/SHORT_WINDOW. It is doubled, up to LONG_WINDOW, as long as
+# noise of the motion makes up more than the share NOISE_SHARE of the acceleration's variance (that share is what J
+# comes out too small by).
+SHORT_WINDOW, LONG_WINDOW, NOISE_SHARE = 0.04, 0.32, 1e-3
 OVERLAP = 4  # rows that are kept per window length
-SLOW = 0.003  # share of the highest speed of all records below which the axis counts as near rest
+REST_SPEED_SHARE = 0.003  # share of the highest speed of all records below which the axis counts as near rest
 SMOOTH = 0.02  # [s] that the speed is averaged over for that
 
 
@@ -58,10 +58,10 @@ class Inertia:
         return self.estimates["J"]
 
 
-LEAST_ROWS = 20
-USUAL = (0.05, 0.5, 0.95)  # quantiles of the speeds that count as usual
+MIN_INERTIA_ROWS = 20
+SPEED_QUANTILES = (0.05, 0.5, 0.95)  # quantiles of the speeds that count as usual
 CONTRADICTS = 0.5  # of the friction, or of the inertia: by how much line and curve may differ, besides
-CERTAIN = 4.0  # standard deviations of the line
+SIGNIFICANT_SIGMAS = 4.0  # standard deviations of the line
 SIMPLE = "a rigid axis with simple friction"
 LEAST_SHARE = 0.05  # of the torque (rms) that accelerates, below which the friction model's faults may pass for J
 J_WARNED = 0.1  # relative standard deviation of J that is worth a warning
@@ -72,20 +72,20 @@ def inertia(records: Sequence[Record]) -> Inertia:
 
     Raises InputError: nothing moves long enough; the axis does not accelerate.
     """
-    length = WINDOW
+    length = SHORT_WINDOW
     # One threshold for all: what a record of small motions holds is pre-sliding, which is no F_C sgn n.
-    slow = SLOW * max((float(np.max(np.abs(smooth_speed(r)))) for r in records), default=0.0)
+    slow = REST_SPEED_SHARE * max((float(np.max(np.abs(smooth_speed(r)))) for r in records), default=0.0)
     while True:
         stretches = [stretch for record in records for stretch in _stretches(record, length, slow)]
         rows = sum(len(stretch.torque) for stretch in stretches)
-        if rows < LEAST_ROWS:
+        if rows < MIN_INERTIA_ROWS:
             raise InputError(
                 f"{', '.join(record.name for record in records)}: the axis does not move for {length:g} s in one "
                 "direction often enough to tell its inertia; give the inertia, or record moves that accelerate"
             )
         acceleration = np.concatenate([stretch.columns[:, 0] for stretch in stretches])
         noise = max(stretch.noise for stretch in stretches)
-        if noise**2 <= NOISE * float(np.mean(acceleration**2)) or 2 * length > LONGEST:
+        if noise**2 <= NOISE_SHARE * float(np.mean(acceleration**2)) or 2 * length > LONG_WINDOW:
             break
         length *= 2
     return _solve(stretches, length)
@@ -162,14 +162,14 @@ def smooth_speed(record: Record) -> Array:
 
 def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     """Ordinary least squares with a covariance for correlated residuals."""
-    names, held, said = list(RIGID), {}, []
+    names, held, said = list(RIGID_AXIS_NAMES), {}, []
     columns = np.vstack([stretch.columns for stretch in stretches])
     torque = np.concatenate([stretch.torque for stretch in stretches])
     if np.ptp(columns[:, 2]) == 0:
         names.remove("M_0")
         held["M_0"] = "motion in one direction only does not tell it from friction"
         said.append("motion in one direction only: the constant load is taken for friction")
-    chosen = [RIGID.index(name) for name in names]
+    chosen = [RIGID_AXIS_NAMES.index(name) for name in names]
     scale = np.linalg.norm(columns[:, chosen], axis=0)
     scaled = columns[:, chosen] / np.where(scale > 0, scale, 1.0)
     strength = np.linalg.svd(scaled, compute_uv=False)
@@ -186,7 +186,7 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     values, covariance = values / scale, covariance / np.outer(scale, scale)
     sigma = np.sqrt(np.diag(covariance))
     estimates = {}
-    for name in RIGID:
+    for name in RIGID_AXIS_NAMES:
         if name in held:
             estimates[name] = estimate(name, 0.0, status="undetermined", reason=held[name])
             continue
@@ -216,7 +216,9 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
         len(torque),
         length,
         tuple(said),
-        np.concatenate([np.quantile(columns[columns[:, 2] == side, 1], USUAL) for side in np.unique(columns[:, 2])]),
+        np.concatenate(
+            [np.quantile(columns[columns[:, 2] == side, 1], SPEED_QUANTILES) for side in np.unique(columns[:, 2])]
+        ),
     )
 
 
@@ -234,12 +236,12 @@ def contradiction(found: Inertia, estimates: Mapping[str, Estimate]) -> str:
         friction = line["F_C"].value + line["sigma_2"].value * abs(n)
         straight = line["M_0"].value + side * friction
         row = np.array([{"J": 0.0, "sigma_2": n, "F_C": side, "M_0": 1.0}[name] for name in found.correlation.names])
-        margin = CONTRADICTS * friction + CERTAIN * float(np.sqrt(row @ found.covariance @ row))
+        margin = CONTRADICTS * friction + SIGNIFICANT_SIGMAS * float(np.sqrt(row @ found.covariance @ row))
         curved = float(torque(values, np.array([n]))[0])
         if abs(curved - straight) > margin:
             return f"{curved:.3g} N.m at {n:.3g} rad/s, where {SIMPLE} needs {straight:.3g} N.m"
     J = estimates.get("J")
-    margin = CONTRADICTS * line["J"].value + CERTAIN * line["J"].sigma
+    margin = CONTRADICTS * line["J"].value + SIGNIFICANT_SIGMAS * line["J"].sigma
     if J is not None and J.status == "estimated" and abs(J.value - line["J"].value) > margin:
         return f"an inertia of {J.value:.3g} kg.m2, where {SIMPLE} has {line['J'].value:.3g}"
     return ""
@@ -266,7 +268,7 @@ def _scatter(stretches: Sequence[_Stretch], columns: Array, residuals: Array) ->
             near += (1 - k / (lag + 1)) * (product + product.T)
         total = np.sum(part, axis=0)
         whole += np.outer(total, total)
-    if len(stretches) < LEAST_ROWS:
+    if len(stretches) < MIN_INERTIA_ROWS:
         return near
     widen = np.sqrt(np.maximum(np.diag(whole) / np.maximum(np.diag(near), 1e-300), 1.0))
     return np.asarray(near * np.outer(widen, widen), dtype=np.float64)

@@ -17,10 +17,10 @@ from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Estimate
 
 # Controls and drives log every 10 us to 0.1 s.
-SHORTEST, LONGEST = 10e-6, 0.1
+MIN_INTERVAL, MAX_INTERVAL = 10e-6, 0.1
 # Steps of at most 0.5 ms that friction is calculated over: beyond them, memory and time are no longer those of a trace.
-ROWS, STEPS, STEP = 2_000_000, 8_000_000, 0.5e-3
-SPEED, ACCELERATION = 20.0, 200.0  # of the slide [m/s], [m/s2]
+MAX_ROWS, MAX_FRICTION_STEPS, FRICTION_STEP = 2_000_000, 8_000_000, 0.5e-3
+MAX_SLIDE_SPEED, MAX_SLIDE_ACCELERATION = 20.0, 200.0  # of the slide [m/s], [m/s2]
 BRIEF = 0.01  # share of the rows that single wrong rows may be
 SPAN = 0.01  # [s] over which an acceleration is taken
 # At the slide: lowest and highest plausible value, and its unit.
@@ -38,10 +38,11 @@ INERTIA = 10.0  # factor between an inertia that is given and that of accelerati
 def check_time(path: Path, records: Sequence[Record]) -> None:
     """Raises InputError: rows too far apart or too close, or too many of them."""
     for record in records:
-        if not SHORTEST * (1 - 1e-6) <= record.interval <= LONGEST * (1 + 1e-6):
-            wrong = "ms or us for s" if record.interval > LONGEST else "s for ms or us"
+        if not MIN_INTERVAL * (1 - 1e-6) <= record.interval <= MAX_INTERVAL * (1 + 1e-6):
+            wrong = "ms or us for s" if record.interval > MAX_INTERVAL else "s for ms or us"
             raise InputError(
-                f"{path}: the rows are {record.interval:.4g} s apart; allowed: {1e6 * SHORTEST:g} us to {LONGEST:g} s, "
+                f"{path}: the rows are {record.interval:.4g} s apart; allowed: {1e6 * MIN_INTERVAL:g} us to "
+                f"{MAX_INTERVAL:g} s, "
                 f"as controls log. The unit of the time is likely wrong ({wrong}), or it counts cycles (factor: 2 ms)"
             )
     check_size(records, str(path))
@@ -54,8 +55,8 @@ def check_slide(path: Path, records: Sequence[Record], pitch: float | None) -> N
         return
     speed, acceleration = (pitch / (2 * pi) * _largest([each[k] for each in motions]) for k in (0, 1))
     for what, value, limit, unit in (
-        ("moves at", speed, SPEED, "m/s"),
-        ("accelerates with", acceleration, ACCELERATION, "m/s2"),
+        ("moves at", speed, MAX_SLIDE_SPEED, "m/s"),
+        ("accelerates with", acceleration, MAX_SLIDE_ACCELERATION, "m/s2"),
     ):
         if value > limit:
             raise InputError(
@@ -67,11 +68,12 @@ def check_slide(path: Path, records: Sequence[Record], pitch: float | None) -> N
 def check_size(records: Sequence[Record], where: str = "the traces") -> None:
     """Raises InputError: more rows, or a longer time, than an identification can work on."""
     rows = sum(len(record) for record in records)
-    steps = sum(len(record) * max(record.interval / STEP, 1.0) for record in records)
-    if rows > ROWS or steps > STEPS:
+    steps = sum(len(record) * max(record.interval / FRICTION_STEP, 1.0) for record in records)
+    if rows > MAX_ROWS or steps > MAX_FRICTION_STEPS:
         lasting = sum(len(record) * record.interval for record in records)
         raise InputError(
-            f"{where}: {rows} rows, {lasting / 60:.4g} min; allowed: up to {ROWS} rows and {STEPS * STEP / 60:.3g} min "
+            f"{where}: {rows} rows, {lasting / 60:.4g} min; allowed: up to {MAX_ROWS} rows and "
+            f"{MAX_FRICTION_STEPS * FRICTION_STEP / 60:.3g} min "
             "in all. Take the moves that docs/identification.md asks for, which are some minutes, or log less often"
         )
 

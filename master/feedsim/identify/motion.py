@@ -20,9 +20,9 @@ Source = Literal["speed", "angle"]
 
 # Longest step of the friction law between samples.
 LAW_STEP = 0.5e-3
-QUIET = 0.01  # noise of the acceleration over its RMS, from which on a motion is smoothed
-ROUGH = 20.0  # [Hz] up to which the acceleration's RMS is read
-LOWEST = 20.0  # [Hz] cut-off below which no motion is smoothed: friction would be gone with the noise
+SMOOTHING_NOISE = 0.01  # noise of the acceleration over its RMS, from which on a motion is smoothed
+ACCELERATION_BAND = 20.0  # [Hz] up to which the acceleration's RMS is read
+MIN_CUTOFF = 20.0  # [Hz] cut-off below which no motion is smoothed: friction would be gone with the noise
 DIFFERENCES = 4  # order of the differences that noise is read from: what is left of a 10 Hz sine at 500 Hz is 2e-4
 
 
@@ -100,11 +100,15 @@ def quiet(values: Array, interval: float, order: int, smoother: float = 1.0) -> 
     Nyquist frequency.
     """
     noise, rate = noise_of(values), 1 / interval
-    rough = sosfiltfilt(butter(2, ROUGH, fs=rate, output="sos"), values) if rate > 4 * ROUGH else values
+    rough = (
+        sosfiltfilt(butter(2, ACCELERATION_BAND, fs=rate, output="sos"), values)
+        if rate > 4 * ACCELERATION_BAND
+        else values
+    )
     slope = rough
     for _ in range(order):
         slope = np.gradient(slope, interval)
-    allowed = QUIET * float(np.sqrt(np.mean(slope**2)))
+    allowed = SMOOTHING_NOISE * float(np.sqrt(np.mean(slope**2)))
 
     def acceleration_noise(cutoff: float) -> float:
         # White noise up to the cut-off, weighted with omega^order.
@@ -113,7 +117,7 @@ def quiet(values: Array, interval: float, order: int, smoother: float = 1.0) -> 
     highest = rate / 2
     cutoff = 0.45 * rate
     if allowed > 0 and acceleration_noise(highest) > allowed:
-        cutoff = min(max(highest * (allowed / acceleration_noise(highest)) ** (1 / (order + 0.5)), LOWEST), cutoff)
+        cutoff = min(max(highest * (allowed / acceleration_noise(highest)) ** (1 / (order + 0.5)), MIN_CUTOFF), cutoff)
         cutoff /= smoother
     elif smoother == 1:
         return values
@@ -156,9 +160,9 @@ def motion(record: Record, source: Source | None = None, *, smoother: float = 1.
 
 
 PAUSE = 0.08  # [s] at rest that parts two stretches; a reversal of a sine down to 1 Hz is over before
-SLOW = 1e-3  # of the highest speed: what counts as rest, if it is above the noise
+REST_SHARE = 1e-3  # of the highest speed: what counts as rest, if it is above the noise
 NOISES = 6  # standard deviations of the speed's noise that count as motion
-SHORTEST = 20  # rows that make a stretch
+MIN_STRETCH_ROWS = 20  # rows that make a stretch
 LEAST_PERIODS = 2.5  # that make a sine
 SINE_SHARE = (
     0.03  # of the speed's mean square that may be something else: friction bends sines by up to 0.005, ramps are 0.1
@@ -197,18 +201,20 @@ def parts(record: Record, motion: Motion) -> tuple[Part, ...]:
     speed = motion.coarse()
     moving = _moving(record, motion, speed)
     angle = np.asarray(motion.speed.antiderivative()(motion.time), dtype=np.float64)
-    found = [_part(motion, speed, angle, first, last) for first, last in runs(moving) if last - first >= SHORTEST]
+    found = [
+        _part(motion, speed, angle, first, last) for first, last in runs(moving) if last - first >= MIN_STRETCH_ROWS
+    ]
     return tuple(found)
 
 
 def _moving(record: Record, motion: Motion, speed: Array) -> NDArray[np.bool_]:
     """(N,) whether the axis moves within half a pause about each row."""
-    asked = np.abs(speed) > max(SLOW * float(np.max(np.abs(speed))), NOISES * motion.noise)
+    asked = np.abs(speed) > max(REST_SHARE * float(np.max(np.abs(speed))), NOISES * motion.noise)
     if record.setpoint is not None:
         steps = np.abs(np.diff(record.setpoint, prepend=record.setpoint[0]))
         if np.any(steps > 0):
             # A setpoint that changes makes the axis move; a creeping axis alone does not count.
-            asked = steps > SLOW * float(np.max(steps)) * 1e-2
+            asked = steps > REST_SHARE * float(np.max(steps)) * 1e-2
     width = 2 * round(PAUSE / 2 / motion.interval) + 1
     return np.asarray(maximum_filter1d(asked.astype(np.int8), width) > 0)
 

@@ -32,7 +32,7 @@ from feedsim.estimation.fit import Fit, fit
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.estimation.least_squares import Model
 from feedsim.estimation.parameter import Parameter
-from feedsim.identify.parameters import FRICTION, level
+from feedsim.identify.parameters import FRICTION_NAMES, level
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Balance, Drift, Estimate
 from feedsim.identify.torque import RecordTorque, deflection
@@ -41,22 +41,24 @@ if TYPE_CHECKING:
     from feedsim.cosim.friction_law import FrictionLaw
 
 
-SHORTEST = 3.0  # [s]: in less the drift of a wrong torque hardly shows beside the error of the first speed
+MIN_RECORD_TIME = 3.0  # [s]: in less the drift of a wrong torque hardly shows beside the error of the first speed
 SLIDING = 20.0  # times the way of pre-sliding (bristles and engaging zone) that a move must be long
 LEAST_GAIN = 0.02  # of the position's rms that must be won
 FRICTION_MOVES = 0.2  # of F_C, and
 LOAD_MOVES = 1.0  # of F_C: changes of F_C and M_0 beyond which something else is wrong
 ROW, ROW_STEP = 12, 0.025  # values of F_C to either side that are tried, and their distance, of F_C
 TORQUE_GROWS = 0.1  # of the torque residual's rms: what the position may cost
-STEP = 0.25  # of the quickest time of bristles and inertia: the longest step of the free axis, which goes explicitly
+EXPLICIT_STEP_SHARE = (
+    0.25  # of the quickest time of bristles and inertia: the longest step of the free axis, which goes explicitly
+)
 MOST_STEPS = 32  # per interval: beyond that the bristles are too stiff to be told by this record
-START = 0.01, 9  # [s], rows, whichever is more: what the cubic for the first speed goes through
+START_FIT = 0.01, 9  # [s], rows, whichever is more: what the cubic for the first speed goes through
 OUTLIER = 5.0  # standard deviations from that cubic that no sample of it may lie off
 BLOCKS, DRAWS = 10, 24  # stretches of a record whose torque residual may be turned, and how often they are drawn
-CHANGE = "change of M_0 over record"  # with its number, among the values
+LOAD_CHANGE = "change of M_0 over record"  # with its number, among the values
 SINES = "sines; the open loop needs general motion"
 NO_DRIFT = "its interval includes 0: the load is taken as constant"
-NEEDED = (*FRICTION, "M_0", "J")
+NEEDED = (*FRICTION_NAMES, "M_0", "J")
 
 
 def balanced(
@@ -66,7 +68,7 @@ def balanced(
 
     Args:
         records: of general motion, motor side. Those with sines, of small moves, without a position or shorter than
-            `SHORTEST` are left out.
+            `MIN_RECORD_TIME` are left out.
         law: the friction model as it moves an axis, and as a torque (for the residual of the torque).
         estimates: every friction parameter, M_0, J, and the delay of the torque (0 where it is missing). The recorded
             torque is that of `delay` earlier; one that is held over the coming interval h has the delay -h/2.
@@ -94,7 +96,7 @@ def balanced(
         if why:
             whys.append((record.name, why))
         elif model is not None:
-            axes.append(_OpenLoop(record, model, f"{CHANGE} {len(axes)}"))
+            axes.append(_OpenLoop(record, model, f"{LOAD_CHANGE} {len(axes)}"))
             directions |= _directions(model)
     if not axes:
         sines = bool(whys) and all(why == SINES for _, why in whys)
@@ -182,7 +184,7 @@ def reached(record: Record, law: FrictionLaw, values: Mapping[str, float]) -> Ar
     first, n = first_speed(record.angle, record.interval)
     torque = middle_torque(record, values["delay"])
     z = first_deflection(values, n, float(torque[0]) - values["M_0"])
-    parameters = {name: values[name] for name in FRICTION}
+    parameters = {name: values[name] for name in FRICTION_NAMES}
     angle, _ = law.free_axis(parameters, values["J"], values["M_0"], torque, record.interval, n=n, z=z, substeps=steps)
     return np.asarray(first + angle, dtype=np.float64)
 
@@ -214,7 +216,7 @@ class _OpenLoop:
         h = self.record.interval
         drifts = values[self.change] * self._elapsed(self.record.time[:-1] + h / 2)
         torque = self.torque(values["delay"]) - drifts + push
-        parameters = {name: values[name] for name in FRICTION}
+        parameters = {name: values[name] for name in FRICTION_NAMES}
         z = first_deflection(values, self.n, float(torque[0]) - values["M_0"])
         steps = substeps(values, h)
         free_axis = self.model.law.free_axis
@@ -292,7 +294,7 @@ def _load_rates(
 def first_speed(angle: Array, h: float) -> tuple[float, float]:
     """Angle and speed at the first of the instants h apart, by a cubic through the first ones; samples far off it are
     left out."""
-    count = min(max(ceil(START[0] / h), START[1]), len(angle))
+    count = min(max(ceil(START_FIT[0] / h), START_FIT[1]), len(angle))
     t = np.arange(count) / max(count - 1, 1)
     columns, first = np.vander(t, 4, increasing=True), angle[:count]
 
@@ -314,13 +316,14 @@ def first_speed(angle: Array, h: float) -> tuple[float, float]:
 
 
 def first_deflection(values: Mapping[str, float], n: float, torque: float) -> float:
-    """z [rad] at the start. Where the axis moves that far within `START`, it is that of sliding; else what holds the
+    """z [rad] at the start. Where the axis moves that far within `START_FIT`, it is that of sliding; else what
+    holds the
     torque [N.m] on it, the transmission half engaged (c = 0), as far as bristles can."""
 
     def most(side: float) -> float:
         return (1 + values["asymmetry"] * side) * float(level(values, np.array([n]))[0]) / values["sigma_0"]
 
-    if abs(n) * START[0] > most(float(np.sign(n))):
+    if abs(n) * START_FIT[0] > most(float(np.sign(n))):
         return float(np.sign(n)) * most(float(np.sign(n)))
     share = 1.0 if values["W"] == 0 else values["gamma"] + (1 - values["gamma"]) / 2
     return float(np.clip(torque / (share * values["sigma_0"]), -most(-1.0), most(1.0)))
@@ -330,7 +333,7 @@ def substeps(values: Mapping[str, float], h: float) -> int:
     """Steps of the free axis per interval: what friction and inertia exchange has to be slow against them."""
     damping = (values["sigma_1"] + values["sigma_2"]) / values["J"]
     stiffness = sqrt(values["sigma_0"] / values["J"])
-    return max(1, ceil(h * max(damping, stiffness) / STEP))
+    return max(1, ceil(h * max(damping, stiffness) / EXPLICIT_STEP_SHARE))
 
 
 def _model(record: Record, law: FrictionLaw) -> RecordTorque | None:
@@ -347,8 +350,8 @@ def _unfit(record: Record, model: RecordTorque | None, values: Mapping[str, floa
         return "no position"
     if record.clipped is not None and np.any(record.clipped):
         return "its torque is cut off at a limit"
-    if duration < SHORTEST or model is None:
-        return f"{duration:.3g} s are too short; at least {SHORTEST:g} s are needed"
+    if duration < MIN_RECORD_TIME or model is None:
+        return f"{duration:.3g} s are too short; at least {MIN_RECORD_TIME:g} s are needed"
     if not model.parts:
         return "nothing moves"
     if any(part.kind == "sine" for part in model.parts):

@@ -8,7 +8,7 @@ from math import pi
 from pathlib import Path
 
 from feedsim.errors import InputError
-from feedsim.identify.parameters import FRICTION, KINDS, Kind, check_held, estimate
+from feedsim.identify.parameters import FRICTION_NAMES, PARAMETER_KINDS, Kind, check_held, estimate
 from feedsim.identify.read import Provenance
 from feedsim.identify.result import Estimate
 from feedsim.scenario import Machine
@@ -34,7 +34,8 @@ class Options:
         seed: of the random starts.
 
     Raises InputError: a lead or an inertia that is not above 0, a delay or a value of `hold` outside its range
-        (`parameters.KINDS`), F_S held below F_C, a name that is no parameter, or one that is both held and free.
+        (`parameters.PARAMETER_KINDS`), F_S held below F_C, a name that is no parameter, or one that is both held and
+        free.
     """
 
     axis: str
@@ -49,7 +50,7 @@ class Options:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        known = (*FRICTION, "M_0")
+        known = (*FRICTION_NAMES, "M_0")
         for name in (*self.hold, *self.free):
             if name not in known:
                 raise InputError(f"no parameter {name!r}; there are {', '.join(known)}")
@@ -57,9 +58,9 @@ class Options:
                 raise InputError(f"{name} cannot be held and free at once")
         LEAD.check("the lead I_P is given as", self.I_P)
         if self.J is not None:
-            KINDS["J"].check("the inertia is given as", self.J.value)
+            PARAMETER_KINDS["J"].check("the inertia is given as", self.J.value)
         if self.delay is not None:
-            KINDS["delay"].check("the delay of the torque is given as", self.delay)
+            PARAMETER_KINDS["delay"].check("the delay of the torque is given as", self.delay)
         check_held(self.hold)
 
 

@@ -17,7 +17,7 @@ from feedsim.identify.identifiability import (
     GOES_WITH,
     LEAST_EXPLAINED,
     LEAST_REVERSALS,
-    LEAST_ROWS,
+    MIN_TURNOVER_ROWS,
     Verdict,
     explained,
     has_sines,
@@ -26,14 +26,22 @@ from feedsim.identify.identifiability import (
     turnover_rows,
     verdict,
 )
-from feedsim.identify.inertia import SLOW
+from feedsim.identify.inertia import REST_SPEED_SHARE
 from feedsim.identify.motion import noise_of
-from feedsim.identify.parameters import FIXED, KINDS, NO_EFFECT, PRE_SLIDING, STATIONARY, USUAL, estimate
+from feedsim.identify.parameters import (
+    DEFAULT_SHAPES,
+    FIXED,
+    NO_EFFECT,
+    PARAMETER_KINDS,
+    PRE_SLIDING,
+    STATIONARY,
+    estimate,
+)
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Stationary, Status, Stretch
 from feedsim.identify.search import FOLLOWED, Search, Solution, grid, sliding, spread, with_excess
 from feedsim.identify.torque import RecordTorque, deflection, models
-from feedsim.identify.uncertainty import FLOOR, Uncertainty, limits, uncertainty
+from feedsim.identify.uncertainty import MODEL_ACCURACY, Uncertainty, limits, uncertainty
 
 if TYPE_CHECKING:
     from feedsim.cosim.friction_law import FrictionLaw
@@ -41,7 +49,9 @@ if TYPE_CHECKING:
 Progress = Callable[[str, float], None]
 
 FINAL = 1e-9  # tolerance of cost and step for the result
-WORTH = 12.0  # least fall of the sum of squares (of unit variance) per parameter more: significant beyond 99.9 %
+MIN_GAIN_PER_PARAMETER = (
+    12.0  # least fall of the sum of squares (of unit variance) per parameter more: significant beyond 99.9 %
+)
 # In the order in which they are tried where no stage 1 tells them: what friction is first, refinements last. Asymmetry
 # comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
 REFINEMENTS = (
@@ -165,17 +175,17 @@ def _known(
 ) -> _Known:
     values = {**NO_EFFECT, "J": 0.0, "delay": delay if delay is not None else 0.0}
     held: dict[str, tuple[Status, str]] = {
-        name: ("held", "usual value, records of friction hardly tell it") for name in USUAL if name not in free
+        name: ("held", "usual value, records of friction hardly tell it") for name in DEFAULT_SHAPES if name not in free
     }
     priors: list[Prior] = []
     drift: Prior | None = None
     unknown = {"J", "sigma_2", "F_C", "M_0"}
     if prior is not None:
-        values |= {name: estimate.value for name, estimate in prior.estimates.items() if name in KINDS}
+        values |= {name: estimate.value for name, estimate in prior.estimates.items() if name in PARAMETER_KINDS}
         unknown = {"J"}
         for name, estimate in prior.estimates.items():
             # What stage 1 cannot tell is free here: held, it would bend what hangs on it.
-            if estimate.status not in ("estimated", "undetermined") and name in KINDS and name not in free:
+            if estimate.status not in ("estimated", "undetermined") and name in PARAMETER_KINDS and name not in free:
                 held[name] = estimate.status, estimate.reason or "as in stage 1"
             elif estimate.status == "undetermined" and name == "F_S" and name not in hold:
                 values["F_S"] = OPEN_RISE * values["F_C"]
@@ -210,7 +220,7 @@ def _known(
         sliding_speed = np.abs(_sliding(fine))
         values["v_s"] = hold.get("v_s", 0.02 * float(np.max(sliding_speed)))
         typical = float(np.median(sliding_speed))
-        if "v_log" not in hold and "v_log" not in free and typical > FAR_ABOVE * USUAL["v_log"]:
+        if "v_log" not in hold and "v_log" not in free and typical > FAR_ABOVE * DEFAULT_SHAPES["v_log"]:
             values["v_log"] = typical / BEND
             held["v_log"] = "held", "a third of the typical speed, so that the logarithm bends where the axis moves"
     values.setdefault("sigma_0", 0.0)
@@ -220,7 +230,7 @@ def _known(
 
 def _both_directions(fine: Sequence[RecordTorque]) -> bool:
     # A slow way back counts as well as a fast one there: it is friction that both tell apart from the load.
-    fast = _sliding(fine, SLOW)
+    fast = _sliding(fine, REST_SPEED_SHARE)
     return LEAST_SHARE < float(np.mean(fast > 0)) < 1 - LEAST_SHARE
 
 
@@ -235,9 +245,9 @@ def _base(known: _Known, with_prior: bool, with_delay: bool) -> list[str]:
     wanted = ["sigma_0", "J", *(["delay"] if with_delay else [])]
     if with_prior:
         wanted += [*(name for name in PRE_SLIDING if name not in wanted), *STATIONARY]
-        wanted += [name for name in USUAL if name in known.told]
+        wanted += [name for name in DEFAULT_SHAPES if name in known.told]
     else:
-        wanted += ["F_C", "sigma_2", "M_0", *(name for name in USUAL if name not in known.held)]
+        wanted += ["F_C", "sigma_2", "M_0", *(name for name in DEFAULT_SHAPES if name not in known.held)]
     return [name for name in wanted if name not in known.held]
 
 
@@ -253,7 +263,7 @@ def _weights(fine: Sequence[RecordTorque], found: Solution, before: Sequence[Arr
     for model, state, weight in zip(fine, found.states, before, strict=True):
         residual = model.residual(found.values, float(state[0]), float(state[1]))
         levels = np.array([spread(residual[model.stretch == k]) for k in range(len(weight))])
-        made.append(np.hypot(levels, FLOOR * float(np.sqrt(np.mean(model.measured**2)))))
+        made.append(np.hypot(levels, MODEL_ACCURACY * float(np.sqrt(np.mean(model.measured**2)))))
     return made
 
 
@@ -301,7 +311,7 @@ def _refined(
         held["asymmetry"] = "undetermined", "friction that hardly depends on speed leaves it a constant load"
         return found, base
     general = not has_sines(search.models)
-    if general and {"sigma_1", "W"} & set(added) and (rows := turnover_rows(search.models, found)) < LEAST_ROWS:
+    if general and {"sigma_1", "W"} & set(added) and (rows := turnover_rows(search.models, found)) < MIN_TURNOVER_ROWS:
         reason = f"bristles turn over within {rows:.0f} rows of the log"
         held |= dict.fromkeys(added, ("undetermined", reason))
         return found, base
@@ -322,7 +332,7 @@ def _refined(
     judged = verdict(tried, added)
     gain = search.cost(found) - search.cost(tried)
     share = explained(search.models, found, tried) if general else 1.0
-    if judged is None and gain >= WORTH * len(added) and share >= LEAST_EXPLAINED:
+    if judged is None and gain >= MIN_GAIN_PER_PARAMETER * len(added) and share >= LEAST_EXPLAINED:
         for name in added:
             held.pop(name, None)
         known.open.pop(tuple(sorted(added)), None)
@@ -362,12 +372,12 @@ def _result(
     I_P: float | None,
     prior: Stationary | None,
 ) -> Dynamic:
-    names = tuple(name for name in KINDS if name in base)
+    names = tuple(name for name in PARAMETER_KINDS if name in base)
     found = honest.solution
     covariance = found.covariance(names)
     sigma = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     estimates = {}
-    for name in KINDS:
+    for name in PARAMETER_KINDS:
         status, reason = held.get(name, ("estimated" if name in names else "held", ""))
         estimates[name] = estimate(name, found.values[name], sigma.get(name, nan), status, reason)
     without = dict(sigma)

@@ -21,19 +21,21 @@ from feedsim.identify.result import Estimate, Status
 from feedsim.scenario import Friction
 
 _TABLE = variables.parameters("friction")
-FRICTION = tuple(_TABLE)
+FRICTION_NAMES = tuple(_TABLE)
 # What reversals tell (stage 2), and what plateaus of constant speed tell (stage 1), in the order in which it is shown.
 PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma")
 CONSTANT_SPEED = ("F_C", "F_S", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
-RIGID = ("J", "sigma_2", "F_C", "M_0")  # of a rigid axis with Coulomb and viscous friction
+RIGID_AXIS_NAMES = ("J", "sigma_2", "F_C", "M_0")  # of a rigid axis with Coulomb and viscous friction
 # Held at the unit's start values unless they are freed: no record of friction alone tells them well.
-USUAL: Mapping[str, float] = {name: float(_TABLE[name].start) for name in ("beta", "v_log")}
-STATIONARY = tuple(name for name in CONSTANT_SPEED if name not in USUAL)  # all of stage 1 that stage 2 takes over
-FIXED = tuple(name for name in FRICTION if name not in (*PRE_SLIDING, *CONSTANT_SPEED))  # no stage tells them
+DEFAULT_SHAPES: Mapping[str, float] = {name: float(_TABLE[name].start) for name in ("beta", "v_log")}
+STATIONARY = tuple(
+    name for name in CONSTANT_SPEED if name not in DEFAULT_SHAPES
+)  # all of stage 1 that stage 2 takes over
+FIXED = tuple(name for name in FRICTION_NAMES if name not in (*PRE_SLIDING, *CONSTANT_SPEED))  # no stage tells them
 # Where a parameter has no effect: what machine files mean that do not give it; v_s where F_S is F_C.
 NO_EFFECT: Mapping[str, float] = {
     **{"sigma_1": 0.0, "sigma_2": 0.0, "M_0": 0.0, "v_s": float(_TABLE["v_s"].start)},
-    **{name: field.default for name in FRICTION if not (field := Friction.model_fields[name]).is_required()},
+    **{name: field.default for name in FRICTION_NAMES if not (field := Friction.model_fields[name]).is_required()},
 }
 # F_S moves as its excess over F_C: F_S >= F_C then is a bound like any other.
 EXCESS = "excess"
@@ -72,7 +74,7 @@ def _kind(name: str) -> Kind:
     return Kind(row.unit, row.short, row.minimum, row.maximum)
 
 
-KINDS = {
+PARAMETER_KINDS = {
     **{name: _kind(name) for name in (*PRE_SLIDING, *CONSTANT_SPEED) if name in _TABLE},
     "M_0": Kind("N.m", "constant load against the motor torque"),
     **{name: _kind(name) for name in FIXED},
@@ -84,13 +86,13 @@ KINDS = {
 
 def estimate(name: str, value: float, sigma: float = nan, status: Status = "estimated", reason: str = "") -> Estimate:
     """With unit and meaning of the parameter."""
-    return Estimate(name, value, KINDS[name].unit, KINDS[name].meaning, sigma, status, reason)
+    return Estimate(name, value, PARAMETER_KINDS[name].unit, PARAMETER_KINDS[name].meaning, sigma, status, reason)
 
 
 def check_held(hold: Mapping[str, float]) -> None:
     """Raises InputError: a value outside its physical range, or F_S below F_C."""
     for name, value in hold.items():
-        KINDS[name].check(f"{name} is held at", value)
+        PARAMETER_KINDS[name].check(f"{name} is held at", value)
     if "F_S" in hold and "F_C" in hold and hold["F_S"] < hold["F_C"]:
         raise InputError(f"F_S is held at {hold['F_S']:g} N.m, below F_C at {hold['F_C']:g} N.m; allowed: at least F_C")
 
@@ -128,14 +130,14 @@ ASYMMETRY = -0.5, 0.5  # beyond, it plays the constant load's part
 MOST_TORQUE = 2.0  # of the largest measured: no part of the friction, and no load, is more
 LEAST_F_C = 1e-3  # of the largest torque: what is reported is relative to it
 # What may be there though no plateau tells it, of the friction: standard deviations of values that pass for usual. A
-# Stribeck effect that no plateau shows is over by the lowest speed, which is UNSEEN times v_s at least.
-HIDDEN: Mapping[str, float] = {EXCESS: 0.3, "F_log": 0.3, "sigma_2": 0.3, "asymmetry": 0.05, "M_0": 2.0}
-UNSEEN = 2.0
+# Stribeck effect that no plateau shows is over by the lowest speed, which is UNSEEN_SPEED_RATIO times v_s at least.
+PRIOR_DEVIATIONS: Mapping[str, float] = {EXCESS: 0.3, "F_log": 0.3, "sigma_2": 0.3, "asymmetry": 0.05, "M_0": 2.0}
+UNSEEN_SPEED_RATIO = 2.0
 
 
 def hidden(name: str, friction: float, fast: float) -> float:
     """Standard deviation that a parameter may have which no plateau tells: friction [N.m], highest speed [rad/s]."""
-    return HIDDEN[name] * (1.0 if name == "asymmetry" else friction / fast if name == "sigma_2" else friction)
+    return PRIOR_DEVIATIONS[name] * (1.0 if name == "asymmetry" else friction / fast if name == "sigma_2" else friction)
 
 
 def plateau_ranges(slow: float, fast: float, top: float) -> dict[str, Range]:
@@ -167,7 +169,7 @@ LEAST_GAMMA = 1e-3  # at 0 nothing is engaged at a reversal, and sigma_0 acts on
 def reversal_ranges(start: Mapping[str, float]) -> dict[str, Range]:
     """Of what stage 2 moves, from the start values; no wider than what is physical."""
     F_C = start["F_C"]
-    found: dict[str, dict[str, Any]] = {name: {} for name in KINDS}
+    found: dict[str, dict[str, Any]] = {name: {} for name in PARAMETER_KINDS}
     for name, decades in DECADES.items():  # known by their order of magnitude at first, and above 0
         span = 10**decades
         found[name] = {"lower": start[name] / span, "upper": start[name] * span, "log": True}
@@ -179,7 +181,7 @@ def reversal_ranges(start: Mapping[str, float]) -> dict[str, Range]:
     found["F_log"] = found["M_0"] = {"scale": F_C}
     found["asymmetry"] = {"lower": -MOST_ASYMMETRY, "upper": MOST_ASYMMETRY, "scale": 0.1}
     found["delay"] = {"lower": DELAYS[0], "upper": DELAYS[1], "scale": 1e-4}
-    for name, kind in KINDS.items():
+    for name, kind in PARAMETER_KINDS.items():
         lower, upper = found[name].get("lower", -inf), found[name].get("upper", inf)
         found[name] = {**found[name], "lower": max(lower, kind.lower), "upper": min(upper, kind.upper)}
     return {**found, EXCESS: {"lower": 0.0, "upper": MOST_EXCESS * max(F_C, start["F_S"]), "scale": F_C}}

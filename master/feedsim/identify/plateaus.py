@@ -14,8 +14,8 @@ from feedsim.identify.record import Array, Record, runs
 from feedsim.identify.result import Plateau
 
 # How plateaus are looked for: times [s], the travel [rad].
-BLOCK = 0.04  # speeds are compared as means over this time
-CHANGE = 0.01  # largest relative change of speed from block to block, twice that from the plateau's own
+BLOCK_TIME = 0.04  # speeds are compared as means over this time
+BLOCK_SPEED_CHANGE = 0.01  # largest relative change of speed from block to block, twice that from the plateau's own
 SETTLE_TIME = 0.1  # left out at the start: control and structure ring down
 # Left out at the start as well: bristles and the engaging zone (0.04 rad is usual) come to rest. Of a stretch short of
 # travel at most that share is left out for it.
@@ -25,17 +25,19 @@ SETTLE_TRAVEL, SETTLE_SHARE = 0.06, 0.4
 DRIFT, LIMIT = 1e-3, 0.05
 MARGIN = 0.01  # left out at the end, for channels that are late
 TAPER = 0.05  # the weights of the mean rise and fall over it; two periods of the lowest mode damp it best, one does
-SHORTEST = 0.1  # time that must be left
+MIN_PLATEAU_TIME = 0.1  # time that must be left
 MOST_DROPPED = 0.6  # of a stretch, looking for where its torque has settled
-CERTAIN = 4.0  # standard deviations that pass for noise
+PLATEAU_SIGMAS = 4.0  # standard deviations that pass for noise
 QUIETER = 1.5  # times less noise in the speed that the angle tells, for the recorded speed to be passed over
 LONGER = (1, 4, 16)  # times the block, one after the other as far as noise asks for it
-COARSE = 0.2  # share of a speed that the noise of a block may have (CERTAIN of its standard deviations)
+BLOCK_NOISE_SHARE = (
+    0.2  # share of a speed that the noise of a block may have (PLATEAU_SIGMAS of its standard deviations)
+)
 SLOWEST = 1e-5  # of the highest speed: what is slower counts as rest
-GAP = 5  # blocks that an interruption lasts at most
-ALIKE = 0.1  # relative difference of speed on both sides of an interruption
+MAX_GAP_BLOCKS = 5  # blocks that an interruption lasts at most
+SPEED_TOLERANCE = 0.1  # relative difference of speed on both sides of an interruption
 DWELL = 0.1  # of its own duration that a stretch in coarse steps of speed may have in the next step on both sides
-FEWEST = 20  # rows that a mean and its correlation can be had from
+MIN_PLATEAU_ROWS = 20  # rows that a mean and its correlation can be had from
 
 
 def plateaus(record: Record, J: float) -> tuple[Plateau, ...]:
@@ -47,8 +49,8 @@ def plateaus(record: Record, J: float) -> tuple[Plateau, ...]:
     highest = inf
     for longer in LONGER:
         # Blocks as long as noise asks for: slow plateaus show in long ones only, fast ones are too short for them.
-        motion = _Motion(record, longer * BLOCK)
-        lowest = motion.noise(motion.rows) * CERTAIN / COARSE if longer < LONGER[-1] else 0.0
+        motion = _Motion(record, longer * BLOCK_TIME)
+        lowest = motion.noise(motion.rows) * PLATEAU_SIGMAS / BLOCK_NOISE_SHARE if longer < LONGER[-1] else 0.0
         for first, last in _candidates(motion):
             if not lowest <= abs(float(np.median(motion.blocks[first:last]))) < highest:
                 continue
@@ -113,8 +115,8 @@ def _candidates(motion: _Motion) -> list[tuple[int, int]]:
     noise = motion.noise(rows)
     # Blocks that adjoin at each row.
     ahead, behind = np.roll(blocks, -half - 1), np.roll(blocks, half + 1)
-    quiet = np.abs(ahead - behind) <= CHANGE * np.abs(blocks) + CERTAIN * np.sqrt(2) * noise
-    moving = np.abs(blocks) > max(CERTAIN * noise, SLOWEST * float(np.max(np.abs(blocks))))
+    quiet = np.abs(ahead - behind) <= BLOCK_SPEED_CHANGE * np.abs(blocks) + PLATEAU_SIGMAS * np.sqrt(2) * noise
+    moving = np.abs(blocks) > max(PLATEAU_SIGMAS * noise, SLOWEST * float(np.max(np.abs(blocks))))
     inside = quiet & moving
     inside[: half + 1] = inside[len(inside) - half - 1 :] = False
     # A change of sign parts two stretches even if noise hides what lies between.
@@ -127,9 +129,9 @@ def _joined(parts: list[tuple[int, int]], blocks: Array, rows: int) -> list[tupl
     its settling."""
     whole: list[tuple[int, int]] = []
     for first, last in parts:
-        if whole and first - whole[-1][1] <= GAP * rows:
+        if whole and first - whole[-1][1] <= MAX_GAP_BLOCKS * rows:
             here, before = np.median(blocks[first:last]), np.median(blocks[slice(*whole[-1])])
-            if abs(here - before) <= ALIKE * abs(here):
+            if abs(here - before) <= SPEED_TOLERANCE * abs(here):
                 whole[-1] = (whole[-1][0], last)
                 continue
         whole.append((first, last))
@@ -139,14 +141,14 @@ def _joined(parts: list[tuple[int, int]], blocks: Array, rows: int) -> list[tupl
 def _plateau(record: Record, motion: _Motion, first: int, last: int, J: float) -> Plateau | None:
     """The plateau within a candidate, if there is one."""
     interval = motion.interval
-    least = max(ceil(SHORTEST / interval), FEWEST)
+    least = max(ceil(MIN_PLATEAU_TIME / interval), MIN_PLATEAU_ROWS)
     if last - first < least:
         return None
     speed = float(np.median(motion.blocks[first:last]))
-    noise = CERTAIN * motion.noise(motion.rows)
+    noise = PLATEAU_SIGMAS * motion.noise(motion.rows)
     if abs(speed) <= noise:  # joined across a stretch that may be at rest
         return None
-    allowed = 0.5 * CHANGE * abs(speed) + noise
+    allowed = 0.5 * BLOCK_SPEED_CHANGE * abs(speed) + noise
     near = np.flatnonzero(np.abs(motion.blocks[first:last] - speed) <= allowed)
     # Of an even number of blocks in coarse steps the median may lie between two of them, and near to none.
     if len(near) < 0.5 * (last - first):
@@ -196,8 +198,8 @@ def _steady(motion: _Motion, begin: int, end: int) -> bool:
     if bounds[1] - bounds[0] < 3:
         return False
     means = [motion.speed(int(a), int(b)) for a, b in pairwise(bounds)]
-    noise = CERTAIN * np.sqrt(2) * motion.noise(int(bounds[1] - bounds[0]))
-    allowed = CHANGE * abs(float(np.mean(means)))
+    noise = PLATEAU_SIGMAS * np.sqrt(2) * motion.noise(int(bounds[1] - bounds[0]))
+    allowed = BLOCK_SPEED_CHANGE * abs(float(np.mean(means)))
     return bool(np.ptp(means) <= allowed + noise) and _bend(motion, begin, end) <= allowed
 
 
@@ -217,7 +219,7 @@ def _bend(motion: _Motion, begin: int, end: int) -> float:
     else:  # ranges of the derivatives of P_2 and P_3
         ranges, shape = np.array([0.0, 0.0, 6.0, 7.5]), legendre.legder(found)
         scale = 2 / ((rows - 1) * motion.interval)
-    noise = CERTAIN * float(np.linalg.norm(ranges * sigmas))
+    noise = PLATEAU_SIGMAS * float(np.linalg.norm(ranges * sigmas))
     return scale * (float(np.ptp(legendre.legval(place, shape))) - noise)
 
 
@@ -228,7 +230,7 @@ def _crest(motion: _Motion, begin: int, end: int) -> bool:
         return False
     step, rows = resolution(motion.signal), end - begin
     level = float(np.median(motion.signal[begin:end]))
-    if not CHANGE * abs(level) < step < 0.75 * abs(level):  # else fine, or the next step is rest
+    if not BLOCK_SPEED_CHANGE * abs(level) < step < 0.75 * abs(level):  # else fine, or the next step is rest
         return False
     sides = motion.signal[max(begin - rows, 0) : begin], motion.signal[end : end + rows]
     spent = [np.count_nonzero(np.abs(np.abs(side - level) / step - 1) < 0.5) for side in sides]
@@ -261,7 +263,7 @@ def _settled(torque: Array, earliest: int, latest: int, end: int, least: int, st
         before, before_sigma = mean(torque[start : start + third], weights, step, trend=True)
         after, after_sigma = mean(torque[end - third : end], weights, step, trend=True)
         drift = abs(after - before)
-        if drift <= max(CERTAIN * hypot(before_sigma, after_sigma), DRIFT * abs(after)):
+        if drift <= max(PLATEAU_SIGMAS * hypot(before_sigma, after_sigma), DRIFT * abs(after)):
             return int(start), 0.0
         if start == earliest:
             first_drift = drift

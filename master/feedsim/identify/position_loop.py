@@ -21,9 +21,9 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.identify.record import Array, Record
 
-LONGEST = 0.1  # [s]: no control delays its setpoint by more
-ROUNDING = 1e-13  # of the range of a signal: no residual is worth more
-WIDEST = 6  # samples that an interpolation runs over
+MAX_SETPOINT_DELAY = 0.1  # [s]: no control delays its setpoint by more
+SIGNAL_ROUNDING = 1e-13  # of the range of a signal: no residual is worth more
+MAX_TAPS = 6  # samples that an interpolation runs over
 # Weights that are none take off chi^2 of 1 each from the residual: a window is narrowed as long as its residual grows
 # by no more than that, 95 %. Where what is left is a matter of digits (of the setpoint's way from row to row), it is no
 # noise, and may grow by a share.
@@ -143,10 +143,10 @@ def _window(
 
     Returns the taps, the coefficients of `others`, and the covariance of taps and others together.
     """
-    longest = min(round(LONGEST / records[0].interval), min(len(record) for record in records) // 4)
+    longest = min(round(MAX_SETPOINT_DELAY / records[0].interval), min(len(record) for record in records) // 4)
     best: tuple[float, int, int] | None = None
     # Widest windows first: where one of them holds the whole interpolation, the residual falls to the rounding.
-    width = min(WIDEST, longest + 1)
+    width = min(MAX_TAPS, longest + 1)
     for first in range(longest - width + 2):
         left = _solved(records, targets, others, first, width, longest, gain)[1]
         if best is None or left < best[0]:
@@ -156,7 +156,7 @@ def _window(
     rows = sum(len(record) - longest for record in records)
     steps = np.concatenate([np.diff(np.asarray(record.setpoint)) for record in records])
     digits = DIGITS * rms(steps) * (1.0 if gain is None else 1.0 / records[0].interval)
-    rounding = (ROUNDING * max(float(np.ptp(target)) for target in targets)) ** 2
+    rounding = (SIGNAL_ROUNDING * max(float(np.ptp(target)) for target in targets)) ** 2
     chosen = begin, width
     for narrow in range(1, width):
         found = min(

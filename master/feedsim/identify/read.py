@@ -23,10 +23,10 @@ from feedsim.scenario import Drive, Machine
 from feedsim.trace import Recording, read_recording
 
 # Values given twice are the same up to the rounding of what people write.
-SAME = 1e-9
+TYPED_TOLERANCE = 1e-9
 # Share of the residual that may be left for a column to be advised as a load: less than that is chance.
 SMALLER = 0.98
-TOLD = 0.02  # relative; what a pitch that a record tells may be off the machine's without a word
+PITCH_MISMATCH = 0.02  # relative; what a pitch that a record tells may be off the machine's without a word
 # Names of columns that hold a known load; "workload" or "payload" are not.
 LOAD_NAME = re.compile(
     r"(?<![a-z])load|pulse|disturbance|(?<![a-z])external[ _.-]*force|(?<![a-z])ext[ _.-]+force", re.IGNORECASE
@@ -177,18 +177,23 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
     constant = mapping.torque_constant if mapping is not None else None
     warnings: list[str] = []
     if own is not None and machine is not None:
-        if mapping is not None and pitch is not None and abs(pitch - own.pitch) > SAME * own.pitch:
+        if mapping is not None and pitch is not None and abs(pitch - own.pitch) > TYPED_TOLERANCE * own.pitch:
             raise InputError(
                 f"{mapping.where('pitch')}: {1e3 * pitch:.9g} mm; axis {chosen.axis} of machine {machine.name} "
                 f"({machine.directory}) has {1e3 * own.pitch:.9g} mm"
             )
         K_t = own.drive.K_t if isinstance(own.drive, Drive) else None
-        if mapping is not None and constant is not None and K_t is not None and abs(constant - K_t) > SAME * K_t:
+        if (
+            mapping is not None
+            and constant is not None
+            and K_t is not None
+            and abs(constant - K_t) > TYPED_TOLERANCE * K_t
+        ):
             warnings.append(
                 f"{mapping.where('torque_constant')}: {constant:.9g} N.m/A counts, not the {K_t:.9g} N.m/A of axis "
                 f"{chosen.axis} of machine {machine.name}"
             )
-        if chosen.pitch is not None and abs(chosen.pitch - own.pitch) > TOLD * own.pitch:
+        if chosen.pitch is not None and abs(chosen.pitch - own.pitch) > PITCH_MISMATCH * own.pitch:
             warnings.append(
                 f"{recording.path}: the record tells a pitch of {1e3 * chosen.pitch:.4g} mm; axis {chosen.axis} of "
                 f"machine {machine.name} has {1e3 * own.pitch:.9g} mm, which counts"

@@ -17,9 +17,19 @@ from feedsim.errors import InputError
 
 Array = NDArray[np.float64]
 
-EVEN = 1e-3  # of the step: how far an instant may lie off the grid
+GRID_TOLERANCE = 1e-3  # of the step: how far an instant may lie off the grid
 # Of a record, over its time.
-SIGNALS = ("torque", "angle", "speed", "load", "setpoint", "deviation", "speed_setpoint", "feedforward", "clipped")
+RECORD_SIGNALS = (
+    "torque",
+    "angle",
+    "speed",
+    "load",
+    "setpoint",
+    "deviation",
+    "speed_setpoint",
+    "feedforward",
+    "clipped",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +73,11 @@ class Record:
             raise InputError(f"{self.name}: {len(self.time)} row(s); at least 2 are needed")
         if self.angle is None and self.speed is None:
             raise InputError(f"{self.name}: neither a position nor a speed; one of them is needed")
-        for role in SIGNALS:
+        for role in RECORD_SIGNALS:
             values = getattr(self, role)
             if values is not None and len(values) != len(self.time):
                 raise InputError(f"{self.name}: {role} has {len(values)} values, the time has {len(self.time)}")
-        if np.max(np.abs(np.diff(self.time) - self.interval)) > EVEN * self.interval:
+        if np.max(np.abs(np.diff(self.time) - self.interval)) > GRID_TOLERANCE * self.interval:
             raise InputError(f"{self.name}: the time is not even")
 
     @property
@@ -86,16 +96,16 @@ class Record:
 
     def between(self, first: int, last: int) -> Record:
         """Rows first <= i < last."""
-        told = {role: values for role in ("time", *SIGNALS) if (values := getattr(self, role)) is not None}
+        told = {role: values for role in ("time", *RECORD_SIGNALS) if (values := getattr(self, role)) is not None}
         return replace(self, **{role: values[first:last] for role, values in told.items()})
 
 
 # A step of more than that many usual ones is a gap, where rows are missing; the least gap has 2.
-GAP = 1.75
+GAP_RATIO = 1.75
 # More gaps than that, and than that share of all steps, are no gaps but uneven time: a clock of too few digits.
 MOST_GAPS, SHARE_OF_GAPS = 10, 0.05
 # Rows between gaps that make a stretch: fewer tell neither a motion nor whether they are even.
-LEAST_ROWS = 8
+MIN_ROWS_BETWEEN_GAPS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +122,9 @@ def even_pieces(time: Array, row: Callable[[int], str]) -> tuple[tuple[Piece, ..
 
     time: (N,) [s]; row: where a row of that index stands, for messages.
 
-    The usual step is the median. A step of more than GAP of it is a gap. Between gaps every instant must lie within
-    EVEN of a step of the even grid through the first and the last one, which then takes its place. Where there are
-    gaps, fragments of fewer than LEAST_ROWS rows are left out.
+    The usual step is the median. A step of more than GAP_RATIO of it is a gap. Between gaps every instant must lie
+    within GRID_TOLERANCE of a step of the even grid through the first and the last one, which then takes its place.
+    Where there are gaps, fragments of fewer than MIN_ROWS_BETWEEN_GAPS rows are left out.
 
     Returns the pieces and what there is to say about gaps.
 
@@ -129,18 +139,18 @@ def even_pieces(time: Array, row: Callable[[int], str]) -> tuple[tuple[Piece, ..
         at = int(wrong[0]) + 1
         raise InputError(f"{row(at)}: time {time[at]:.9g} s follows {time[at - 1]:.9g} s; it must increase")
     usual = float(np.median(steps))
-    breaks = [int(i) for i in np.flatnonzero(steps > GAP * usual)]
+    breaks = [int(i) for i in np.flatnonzero(steps > GAP_RATIO * usual)]
     if len(breaks) > max(MOST_GAPS, SHARE_OF_GAPS * len(steps)):
         raise _uneven(time, breaks[0] + 1, usual, float(time[-1] - time[0]) / len(steps), row)
     edges = [0, *(i + 1 for i in breaks), len(time)]
     found, dropped = [], []
     for first, last in pairwise(edges):
-        if breaks and last - first < LEAST_ROWS:
+        if breaks and last - first < MIN_ROWS_BETWEEN_GAPS:
             dropped.append(last - first)
             continue
         found.append(_even(time, first, last, row))
     if not found:
-        raise InputError(f"{row(0)}: no {LEAST_ROWS} rows follow one another without a gap")
+        raise InputError(f"{row(0)}: no {MIN_ROWS_BETWEEN_GAPS} rows follow one another without a gap")
     return tuple(found), tuple(_gaps(time, breaks, usual, dropped, row))
 
 
@@ -149,7 +159,7 @@ def _even(time: Array, first: int, last: int, row: Callable[[int], str]) -> Piec
     grid = np.linspace(own[0], own[-1], len(own))
     step = float(grid[-1] - grid[0]) / (len(own) - 1)
     off = np.abs(own - grid)
-    if np.max(off) > EVEN * step:
+    if np.max(off) > GRID_TOLERANCE * step:
         steps = np.diff(own)
         at = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
         raise _uneven(time, first + at, float(np.median(steps)), step, row)
@@ -160,7 +170,8 @@ def _uneven(time: Array, at: int, usual: float, mean: float, row: Callable[[int]
     step = float(time[at] - time[at - 1])
     return InputError(
         f"{row(at)}: the time is not even: {time[at]:.9g} s comes {1e3 * step:.6g} ms after the row before, the usual "
-        f"step is {1e3 * usual:.6g} ms ({100 * EVEN:g} % off the grid is tolerated). If only the digits of the time "
+        f"step is {1e3 * usual:.6g} ms ({100 * GRID_TOLERANCE:g} % off the grid is tolerated). If only the digits of "
+        "the time "
         f"are too few, give its interval in place of its column in a mapping file, where the mean step is "
         f"{1e3 * mean:.6g} ms: time: {{interval: {1e3 * mean:.3g} ms}}; what was sampled unevenly is to be resampled"
     )
@@ -179,7 +190,8 @@ def _gaps(time: Array, breaks: list[int], usual: float, dropped: list[int], row:
     if not dropped:
         return [text]
     left_out = (
-        f"{len(dropped)} fragment{'s'[: len(dropped) > 1]} of fewer than {LEAST_ROWS} rows beside gaps left out "
+        f"{len(dropped)} fragment{'s'[: len(dropped) > 1]} of fewer than {MIN_ROWS_BETWEEN_GAPS} rows beside gaps "
+        "left out "
         f"({sum(dropped)} row{'s'[: sum(dropped) > 1]})"
     )
     return [text, left_out]

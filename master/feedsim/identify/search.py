@@ -10,13 +10,13 @@ import numpy as np
 from feedsim.estimation.covariance import correlation_length
 from feedsim.estimation.fit import Fit, fit
 from feedsim.estimation.parameter import Parameter, Prior
-from feedsim.identify.inertia import SLOW
+from feedsim.identify.inertia import REST_SPEED_SHARE
 from feedsim.identify.parameters import EXCESS, inner, inner_to_outer, reversal_ranges
 from feedsim.identify.record import Array
 from feedsim.identify.torque import START_PRIOR, STARTS, RecordTorque
 
 REACH = {"z": 1.0, "c": 0.5}
-FIRST = 1e-3  # tolerance of cost and step to compare starts
+START_TOLERANCE = 1e-3  # tolerance of cost and step to compare starts
 FOLLOWED = 3  # of the starts; as many again where none of them explains the torque
 EXPLAINED = 2.0  # mean square of the residuals over the weights up to which they are noise: wrong valleys leave 5 to 50
 
@@ -77,7 +77,7 @@ class Search:
         found: list[Solution] = []
         for first in range(0, min(len(starts), 2 * FOLLOWED), FOLLOWED):
             followed = starts[first : first + FOLLOWED]
-            found += [self.solve(start, states, free, tolerance=FIRST, limit=12) for start in followed]
+            found += [self.solve(start, states, free, tolerance=START_TOLERANCE, limit=12) for start in followed]
             best = min(found, key=lambda one: one.fit.cost)
             if 2 * best.fit.cost <= EXPLAINED * len(best.fit.residuals):
                 break
@@ -142,7 +142,7 @@ AFTER_REVERSAL = 3  # rows: what the stiffest bristle that a record can show def
 PER_DECADE = 3  # starts of the stiffness
 MOST_STIFFNESSES = 10
 ZONES = (3.0, 7.0, 14.0)  # width of the engaging zone over the largest deflection F_C/sigma_0
-SHARES = (0.25, 0.6)  # gamma
+GAMMA_STARTS = (0.25, 0.6)  # gamma
 PURE = (0.0, 1.0)  # W and gamma of pure LuGre
 
 
@@ -157,7 +157,7 @@ def sliding(models: Sequence[RecordTorque], values: Mapping[str, float], unknown
     torque = np.concatenate([model.measured - row[3] for model, row in zip(models, rows, strict=True)])
     fast = np.abs(speed) > SLIDING * np.max(np.abs(speed))
     if np.ptp(np.sign(speed[fast])) == 0:  # fast in one direction only: what is slow in the other one tells the load
-        fast = np.abs(speed) > SLOW * np.max(np.abs(speed))
+        fast = np.abs(speed) > REST_SPEED_SHARE * np.max(np.abs(speed))
     shapes = {"J": acceleration, "sigma_2": speed, "F_C": np.sign(speed), "M_0": np.ones_like(speed)}
     names = [name for name in shapes if name in unknown]
     if not names:
@@ -210,7 +210,7 @@ def grid(models: Sequence[RecordTorque], values: Mapping[str, float], free: Coll
     The law is linear in sigma_1: its best value comes with every point of the grid. Parameters that are not free keep
     their values.
     """
-    zones = [PURE, *((zone, share) for zone in ZONES for share in SHARES)]
+    zones = [PURE, *((zone, share) for zone in ZONES for share in GAMMA_STARTS)]
     shapes: Sequence[tuple[float, float] | None] = zones if {"W", "gamma"} <= set(free) else [None]
     levels = stiffnesses(models, values) if "sigma_0" in free else np.array([values["sigma_0"]])
     found: list[tuple[float, dict[str, float]]] = []

@@ -88,7 +88,7 @@ ALIASES = tuple(Alias(name, role, source) for role, source, names in _NAMES for 
 
 # What may stand before the number or the letter of an axis, and letters that axes have.
 _AXIS_WORDS = ("axis", "achse", "joint", "drive", "antrieb")
-_LETTERS = tuple("xyzabcuvw")
+_AXIS_LETTERS = tuple("xyzabcuvw")
 
 
 def _tokens(name: str) -> list[str]:
@@ -111,7 +111,7 @@ def alias_of(name: str, axis: str = "", axes: Iterable[str] = ()) -> Alias | Non
     if found := _BY_KEY.get(_key(_tokens(name))):
         return found
     own = axis.casefold()
-    others = {*_LETTERS, *(each.casefold() for each in axes)} - {own}
+    others = {*_AXIS_LETTERS, *(each.casefold() for each in axes)} - {own}
     for tokens in _without_axis(name, own, others):
         if found := _BY_KEY.get(_key(tokens)):
             return found

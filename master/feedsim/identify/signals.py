@@ -16,11 +16,11 @@ from feedsim.identify.signal_names import alias_of
 from feedsim.trace import Recording
 
 # feedsim's own signals of an axis -> role. The torque is taken before the current: it needs no torque constant.
-OWN = {"x_a": "position", "n_a": "speed", "M_a": "torque", "i_q": "current", "x_s": "setpoint",
+FEEDSIM_COLUMNS = {"x_a": "position", "n_a": "speed", "M_a": "torque", "i_q": "current", "x_s": "setpoint",
        "x_e": "deviation", "n_s": "speed_setpoint", "n_ffw": "feedforward"}  # fmt: skip
 # What a control shows of its position loop: no identification of friction needs it.
 OF_CONTROL = ("deviation", "speed_setpoint", "feedforward")
-_OWN = re.compile(rf"([A-Za-z][A-Za-z0-9_]*)\.({'|'.join(OWN)})")
+_OWN = re.compile(rf"([A-Za-z][A-Za-z0-9_]*)\.({'|'.join(FEEDSIM_COLUMNS)})")
 _EXAMPLE = {"time": "ms", "position": "mm", "speed": "rpm", "torque": "N.m", "current": "A", "setpoint": "mm",
             "deviation": "mm", "speed_setpoint": "rpm", "feedforward": "rpm"}  # fmt: skip
 
@@ -113,7 +113,7 @@ def _by_name(recording: Recording, axis: str, axes: tuple[str, ...], driven: boo
     own: dict[str, dict[str, str]] = {}
     for name in recording.names:
         if match := _OWN.fullmatch(name):
-            own.setdefault(match[1], {})[OWN[match[2]]] = name
+            own.setdefault(match[1], {})[FEEDSIM_COLUMNS[match[2]]] = name
     if own and not axis:
         if len(own) > 1:
             raise InputError(f"{recording.header}: the axes {', '.join(own)} are in the file; which one is meant?")

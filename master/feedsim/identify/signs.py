@@ -17,7 +17,7 @@ SLOPE = 0.05
 # Factor, either way, beyond which a unit, the pitch, a gear or a sign is wrong and nothing good comes of the records.
 WRONG_SLOPE = 1.5
 # Correlation of both above which that factor is one of scale; noise of an encoder at rest lowers it.
-ALIKE = 0.9
+SCALE_CORRELATION = 0.9
 # Recorded speed over slope of the position, unit that the speed is in, and unit that it is read in.
 UNIT_ERRORS = (
     (1000.0, "mm", "m"),
@@ -56,7 +56,7 @@ def _speed(where: str, records: Sequence[Record]) -> Iterator[str]:
     ratio = float(a / b)
     said = f"{where}: the recorded speed is {ratio:.4g} times the slope of the position"
     wrong = not 1 / WRONG_SLOPE <= ratio <= WRONG_SLOPE
-    if wrong and abs(a) >= ALIKE * np.sqrt(b * c):
+    if wrong and abs(a) >= SCALE_CORRELATION * np.sqrt(b * c):
         raise InputError(f"{said} (allowed: {1 / WRONG_SLOPE:.2g} to {WRONG_SLOPE:g}); {_likely(ratio)}")
     if abs(ratio - 1) > SLOPE:
         yield f"{said}; sign, unit, pitch or gear of one of both is not right"

@@ -21,7 +21,15 @@ from feedsim.identify.motion import Part, motion, parts
 from feedsim.identify.open_loop import balanced
 from feedsim.identify.options import Options
 from feedsim.identify.output_error import dynamic
-from feedsim.identify.parameters import CONSTANT_SPEED, FIXED, FRICTION, NO_EFFECT, PRE_SLIDING, USUAL, estimate
+from feedsim.identify.parameters import (
+    CONSTANT_SPEED,
+    DEFAULT_SHAPES,
+    FIXED,
+    FRICTION_NAMES,
+    NO_EFFECT,
+    PRE_SLIDING,
+    estimate,
+)
 from feedsim.identify.plateaus import plateaus
 from feedsim.identify.record import Record
 from feedsim.identify.result import Correlation, Dynamic, Estimate, Identification, Plateau, Stationary
@@ -34,10 +42,13 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, int, int], None]  # what is being done, how many of its steps are done, of how many
 
-ORDER = (*FRICTION, "M_0", "J", "delay")
+RESULT_ORDER = (*FRICTION_NAMES, "M_0", "J", "delay")
 # Pre-sliding of an axis without a word from its records: bristles that give 5 mrad at break-away and relax in 2.5 ms.
 USUAL_DEFLECTION, USUAL_RELAXATION = 5e-3, 2.5e-3
-INERTIA_OFF, CERTAIN = 0.1, 4.0  # relative, standard deviations: a given inertia that is off by both is worth a warning
+INERTIA_MISMATCH, INERTIA_SIGMAS = (
+    0.1,
+    4.0,
+)  # relative, standard deviations: a given inertia that is off by both is worth a warning
 NOTHING_TOLD = Correlation((), np.zeros((0, 0)))
 SLIDING = 1.0  # [rad], some 20 times a usual pre-sliding: amplitude above which a sine is mostly sliding
 
@@ -211,7 +222,7 @@ class _Run:
         others = [record for record in self.records if record.name not in names]
         if first is not None and any(plateau.record in names for plateau in first.plateaus):
             self.prior = len(Points.of(first.plateaus).speeds) >= FEW_SPEEDS
-        hold, free = self._held((*FRICTION, "M_0"))
+        hold, free = self._held((*FRICTION_NAMES, "M_0"))
         rigid = self._rigid(others) if others and self.options.J is None else None
         try:
             return dynamic(
@@ -255,7 +266,7 @@ class _Run:
         if given is None or rigid is None:
             return
         away = rigid.J.value - given.value
-        far = abs(away) > max(INERTIA_OFF * given.value, CERTAIN * rigid.J.sigma)
+        far = abs(away) > max(INERTIA_MISMATCH * given.value, INERTIA_SIGMAS * rigid.J.sigma)
         if far and self._slides():
             check_inertia(given, rigid.J)
             self.warnings.append(
@@ -287,7 +298,7 @@ class _Run:
         if "delay" not in found and self.options.delay is not None:
             reason = "not used: stage 2 is absent"
             found["delay"] = estimate("delay", self.options.delay, status="given", reason=reason)
-        for name in FRICTION:
+        for name in FRICTION_NAMES:
             if name not in found:
                 found[name] = self._absent(name, found)
         if found["F_S"].value < found["F_C"].value:
@@ -295,7 +306,7 @@ class _Run:
             found["F_S"] = replace(
                 found["F_S"], value=found["F_C"].value, sigma=nan, status="undetermined", reason=reason
             )
-        return {name: found[name] for name in ORDER if name in found}
+        return {name: found[name] for name in RESULT_ORDER if name in found}
 
     def _absent(self, name: str, found: Mapping[str, Estimate]) -> Estimate:
         """A parameter that no stage tells."""
@@ -306,8 +317,8 @@ class _Run:
 
         if name in options.hold:
             return estimate(name, options.hold[name], status="held", reason="as asked for")
-        if name in USUAL and name not in options.free:
-            return estimate(name, USUAL[name], status="held", reason="usual value")
+        if name in DEFAULT_SHAPES and name not in options.free:
+            return estimate(name, DEFAULT_SHAPES[name], status="held", reason="usual value")
         if name in options.fallback:
             return held(options.fallback[name], "value of the machine file")
         if name in ("F_C", "F_S"):
@@ -360,7 +371,7 @@ def merged_correlation(first: Stationary | None, second: Dynamic | None) -> Corr
         at = [names.index(name) for name in each.names]
         matrix[np.ix_(at, at)] = each.matrix
     np.fill_diagonal(matrix, 1.0)
-    order = [name for name in ORDER if name in names] + [name for name in names if name not in ORDER]
+    order = [name for name in RESULT_ORDER if name in names] + [name for name in names if name not in RESULT_ORDER]
     at = [names.index(name) for name in order]
     return Correlation(tuple(order), matrix[np.ix_(at, at)])
 

@@ -16,11 +16,11 @@ from feedsim.identify import drift
 from feedsim.identify import stribeck_identifiability as identifiability
 from feedsim.identify.parameters import (
     CONSTANT_SPEED,
+    DEFAULT_SHAPES,
     EXCESS,
-    HIDDEN,
     NO_EFFECT,
-    UNSEEN,
-    USUAL,
+    PRIOR_DEVIATIONS,
+    UNSEEN_SPEED_RATIO,
     check_held,
     curve,
     estimate,
@@ -38,12 +38,12 @@ from feedsim.identify.stribeck_identifiability import Points
 SPEEDS = 200  # of the curve that is handed on
 STARTS = 6
 DOUBTFUL = 0.95  # probability of a smaller chi^2 from which on plateaus count as scattering more than their noise
-CLEAR = 0.99  # the same, of the drop that a Stribeck effect, or a shape that is else held, must bring
+STRIBECK_PROBABILITY = 0.99  # the same, of the drop that a Stribeck effect, or a shape that is else held, must bring
 HALF = 0.5  # of the sum of squares: what lies below is worth to free a parameter that is held by default
 SHAPED: Mapping[str, str] = {"beta": "v_s", "v_log": "F_log"}  # held by default -> without which it has no effect
 
 # The fit moves F_C and F_S - F_C >= 0 in place of F_S.
-ORDER = tuple(inner(name) for name in CONSTANT_SPEED)
+MOVED_ORDER = tuple(inner(name) for name in CONSTANT_SPEED)
 
 
 def stationary(
@@ -57,8 +57,9 @@ def stationary(
     """Friction over speed from plateaus.
 
     Args:
-        hold: name -> value of what is not estimated, on top of `USUAL`; any of the estimates' names. None: nothing.
-        free: names of `hold` and `USUAL` that are estimated nevertheless.
+        hold: name -> value of what is not estimated, on top of `DEFAULT_SHAPES`; any of the estimates' names. None:
+        nothing.
+        free: names of `hold` and `DEFAULT_SHAPES` that are estimated nevertheless.
         seed: of the further starts. I_P: lead [m/rad], for advice in mm/min.
 
     What the plateaus cannot tell is held with a reason and a warning (F_S = F_C, v_s, F_log = 0, sigma_2 = 0,
@@ -77,12 +78,12 @@ def stationary(
     for name in (*asked, *free):
         if name not in CONSTANT_SPEED:
             raise InputError(f"{name} is no parameter of stationary friction: {', '.join(CONSTANT_SPEED)}")
-    held = {name: value for name, value in {**USUAL, **asked}.items() if name not in free}
+    held = {name: value for name, value in {**DEFAULT_SHAPES, **asked}.items() if name not in free}
     check_held(held)
     points = Points.of(plateaus)
     problem = _Problem(points, held, seed)
     found, reasons, extra = problem.solve()
-    usual = [name for name in USUAL if name in held and name not in asked]
+    usual = [name for name in DEFAULT_SHAPES if name in held and name not in asked]
     better = _better(problem, found, reasons, usual) if extra > 0 else ""
     return _conclude(tuple(plateaus), points, problem, found, reasons, extra, better, I_P)
 
@@ -96,7 +97,7 @@ class _Problem:
 
     def solve(self) -> tuple[Fit, dict[str, str], float]:
         """The fit that stands, why what is held, and the share of the torque that plateaus scatter by besides noise."""
-        free = [name for name in ORDER if outer(name) not in self.given]
+        free = [name for name in MOVED_ORDER if outer(name) not in self.given]
         reasons = identifiability.unseparated(self.points) | identifiability.too_few(self.points, free)
         reasons = {name: reason for name, reason in reasons.items() if name in free}
         while True:
@@ -129,7 +130,7 @@ class _Problem:
         without = {**reasons} | dict.fromkeys(parts, reason)
         left = [name for name in found.names if name not in parts]
         bare = self.fit(left, without, extra, 1, found)
-        if 2 * (bare.cost - found.cost) > chi2.ppf(CLEAR, len(parts)):
+        if 2 * (bare.cost - found.cost) > chi2.ppf(STRIBECK_PROBABILITY, len(parts)):
             return {}
         return dict.fromkeys(parts, reason)
 
@@ -185,15 +186,15 @@ class _Problem:
         known = np.isfinite(within) & np.isfinite(without)
         part = np.where(known, within - np.where(known, without, 0.0), 0.0) + np.outer(warmed - moved, warmed - moved)
         # With nothing hidden what was found is the best there is, at a bound too.
-        best = not any(name in HIDDEN for name in reasons)
+        best = not any(name in PRIOR_DEVIATIONS for name in reasons)
         return without + (0.0 if best else np.outer(moved, moved)) + part, part
 
     def _hidden(self, found: Fit, reasons: Mapping[str, str], extra: float, warms: float) -> tuple[Array, Array]:
         """Covariance with what is hidden as nuisances, and how far what was found is from the best with them."""
         points, values = self.points, self.inner(found.mapping(), reasons)
         if "v_s" in reasons:
-            values["v_s"] = float(points.speeds[0]) / UNSEEN
-        names = [name for name in reasons if name in HIDDEN]
+            values["v_s"] = float(points.speeds[0]) / UNSEEN_SPEED_RATIO
+        names = [name for name in reasons if name in PRIOR_DEVIATIONS]
         weight = 1.0 / np.hypot(points.sigma, extra * np.abs(points.torque))
         columns = [found.jacobian]
         for name in names:
@@ -244,7 +245,7 @@ def _guess(points: Points) -> dict[str, float]:
         "sigma_2": 0.5 * max(climb, 0.0) / fast,
         "asymmetry": 0.0,
         "M_0": float(np.mean(points.torque)) if points.both else 0.0,
-        **USUAL,
+        **DEFAULT_SHAPES,
     }
 
 
@@ -265,11 +266,11 @@ def _better(problem: _Problem, found: Fit, reasons: Mapping[str, str], usual: Se
             continue
         given = {key: value for key, value in problem.given.items() if key != name}
         trial = _Problem(problem.points, given, problem.seed)
-        free = [key for key in ORDER if key in (*moved, name)]
+        free = [key for key in MOVED_ORDER if key in (*moved, name)]
         freed = trial.fit(free, reasons, 0.0, STARTS, found)
         after = 2 * freed.cost
         fits = after <= chi2.ppf(DOUBTFUL, freedom)
-        clear = before - after > f.ppf(CLEAR, 1, freedom) * after / freedom
+        clear = before - after > f.ppf(STRIBECK_PROBABILITY, 1, freedom) * after / freedom
         if name in freed.at_bound or not clear or not (fits or after < HALF * before):
             continue
         gain = (

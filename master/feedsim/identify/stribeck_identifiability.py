@@ -17,7 +17,7 @@ FEW_SPEEDS = 8
 SLOW_ENOUGH = 50e-3 / 60  # m/s: a lowest speed above leaves the Stribeck range open at its lower end
 # Relative standard deviation of v_s that asks whether there is a Stribeck effect at all, and for a warning.
 V_S_WARNED = 0.3
-CLEAR = 2.0  # standard deviations that a fall of torque over speed must have
+FALL_SIGMAS = 2.0  # standard deviations that a fall of torque over speed must have
 LIKE = 0.99  # correlation above which two parameters are one
 VARIED = 0.05  # range of the level over its mean that tells an asymmetry from a constant load
 
@@ -68,7 +68,7 @@ def falls(points: Points) -> bool:
     torque, sigma = points.friction()
     for slow in range(len(torque)):
         drop = torque[slow] - torque[slow + 1 :]
-        if np.any(drop > CLEAR * np.hypot(sigma[slow], sigma[slow + 1 :])):
+        if np.any(drop > FALL_SIGMAS * np.hypot(sigma[slow], sigma[slow + 1 :])):
             return True
     return False
 

@@ -25,7 +25,7 @@ from feedsim.structure import Modes
 
 # [Hz] Friction's harmonics above are small, noise of the speed is not; and there the structure has modes enough for
 # the difference to be anything. It fades out over the upper half.
-HIGHEST = 60.0
+MAX_CORRECTION_FREQUENCY = 60.0
 SETTLE = 2.0  # s by which a record is continued to its beginning, as the transform takes it for periodic
 
 
@@ -43,7 +43,7 @@ def with_structure(record: Record, modes: Modes, axis: str) -> Record:
 def structure_torque(n: Array, interval: float, modes: Modes, axis: str) -> Array:
     """(N,) torque [N.m] of the structure beyond J_tot dn/dt, for the rotor's speed n (N,) [rad/s] every `interval` [s].
 
-    Exact for what lies within half of HIGHEST, and below that of Nyquist's frequency.
+    Exact for what lies within half of MAX_CORRECTION_FREQUENCY, and below that of Nyquist's frequency.
     """
     rows = len(n)
     more = round(SETTLE / interval)
@@ -54,7 +54,7 @@ def structure_torque(n: Array, interval: float, modes: Modes, axis: str) -> Arra
     s = np.asarray(2j * np.pi * frequency[1:], dtype=np.complex128)
     beyond = np.zeros(len(frequency), dtype=np.complex128)
     beyond[1:] = 1 / mobility(s, modes, axis) - s * modes.J_tot(axis)
-    highest = min(HIGHEST, 0.5 / interval)
+    highest = min(MAX_CORRECTION_FREQUENCY, 0.5 / interval)
     fading = np.clip((frequency / highest - 0.5) / 0.5, 0.0, 1.0)
     beyond *= 0.5 * (1 + np.cos(np.pi * fading))
     return np.fft.irfft(np.fft.rfft(whole) * beyond, len(whole))[:rows]

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feedsim.identify.averages import resolution
-from feedsim.identify.motion import SHORTEST, Motion, Part, motion, noise_of, parts
-from feedsim.identify.parameters import FRICTION
+from feedsim.identify.motion import MIN_STRETCH_ROWS, Motion, Part, motion, noise_of, parts
+from feedsim.identify.parameters import FRICTION_NAMES
 from feedsim.identify.record import Array, Record
 from feedsim.identify.result import Plateau
 
@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 STARTS = ("z", "c")  # state at a record's begin, as shares
 START_PRIOR = {"z": 3**-0.5, "c": 12**-0.5}  # standard deviation of what may lie anywhere within its range
-COARSE = 0.1  # of the noise: steps of samples that are drawn as such; finer ones are white noise
-KEPT = 4  # results of the law kept per record: a difference quotient of another record's start asks for the same again
+QUANTISATION_SHARE = 0.1  # of the noise: steps of samples that are drawn as such; finer ones are white noise
+MAX_CACHED_RESPONSES = (
+    4  # results of the law kept per record: a difference quotient of another record's start asks for the same again
+)
 
 
 def deflection(values: Mapping[str, float]) -> float:
@@ -54,7 +56,7 @@ class RecordTorque:
             if plateau.record == record.name:
                 counted &= (record.time < plateau.begin) | (record.time > plateau.end)
         moving = [(part, part.first + np.flatnonzero(counted[part.rows])) for part in parts(record, self.motion)]
-        moving = [(part, rows) for part, rows in moving if len(rows) >= SHORTEST]
+        moving = [(part, rows) for part, rows in moving if len(rows) >= MIN_STRETCH_ROWS]
         self.parts: tuple[Part, ...] = tuple(part for part, _ in moving)
         chosen = [rows for _, rows in moving]
         self.rows = np.concatenate(chosen) if chosen else np.zeros(0, dtype=np.intp)
@@ -71,14 +73,14 @@ class RecordTorque:
 
     def friction(self, values: Mapping[str, float], z: float, c: float) -> Array:
         """(rows,) friction torque [N.m] without its viscous part."""
-        key = (*(values[name] for name in FRICTION if name != "sigma_2"), values["delay"], z, c)
+        key = (*(values[name] for name in FRICTION_NAMES if name != "sigma_2"), values["delay"], z, c)
         if key not in self._law:
             fine = self.moved(values["delay"])[0]
             # Linear in sigma_2: that part is added outside and costs no run.
-            law = {name: values[name] for name in FRICTION} | {"sigma_2": 0.0}
+            law = {name: values[name] for name in FRICTION_NAMES} | {"sigma_2": 0.0}
             h, start = self.record.interval / self.count, z * deflection(values)
             found = self.law(law, fine, h, z=start, c=c * values["W"])
-            if len(self._law) >= KEPT:
+            if len(self._law) >= MAX_CACHED_RESPONSES:
                 del self._law[next(iter(self._law))]
             self._law[key] = np.asarray(found[:: self.count][self.rows], dtype=np.float64)
         return self._law[key]
@@ -94,7 +96,7 @@ class RecordTorque:
             load = np.zeros(len(self.rows))
             if self.record.load is not None:
                 load = np.interp(self.record.time - delay, self.record.time, self.record.load)[self.rows]
-            if len(self._moved) >= KEPT:
+            if len(self._moved) >= MAX_CACHED_RESPONSES:
                 del self._moved[next(iter(self._moved))]
             self._moved[delay] = (
                 np.ascontiguousarray(fine),
@@ -129,7 +131,7 @@ class RecordTorque:
         true = np.asarray(path(self.motion.time), dtype=np.float64)
         # Of steps above the noise the steps are drawn: where the axis is slow, their errors hang together in time.
         seen = true + np.sqrt(max(noise**2 - step**2 / 12, 0.0)) * rng.standard_normal(len(true))
-        if step > COARSE * noise:
+        if step > QUANTISATION_SHARE * noise:
             first = rng.uniform(0, step)
             seen = np.round((seen + first) / step) * step - first
         return self._by(motion(replace(self.record, **{source: seen}), source))

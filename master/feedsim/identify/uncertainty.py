@@ -16,7 +16,7 @@ from feedsim.identify.torque import RecordTorque
 
 # Of the record's RMS torque, and of the inertia: what the model itself is not better than (interpolation between the
 # samples, modes of the structure). Without it the quietest move of a record without noise would count for all.
-FLOOR = 1e-3
+MODEL_ACCURACY = 1e-3
 DRAWS = 8  # their mean square is known to within a half, their root to a quarter: an order of magnitude is wanted
 BY_CHANCE = 3.84  # variances that one stretch pulls by chance, 95 % (chi^2): a few stretches that agree tell no more
 # Of a row's interval: to better than that no cubic between rows tells when something happened. A delay that is too
@@ -25,7 +25,7 @@ INSTANT = 0.01
 SMOOTHER = 1.5  # times lower a cut-off: what it takes off more is about what the first one did
 AT_ODDS = 3.0  # times the deviation by noise that stretches which contradict each other make of it: worth a warning
 WORTH_A_WORD, LEAST_DELAY = 0.01, 2e-5  # of the value, and [s]: deviations that are worth it
-ROUGH = 2.0  # times the deviation by the torque's noise that the motion's makes of it: worth a warning
+MOTION_NOISE_RATIO = 2.0  # times the deviation by the torque's noise that the motion's makes of it: worth a warning
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def uncertainty(
     covariance = np.where(np.isfinite(fit.covariance), fit.covariance * np.outer(factor, factor), fit.covariance)
     covariance = covariance + motion + drift_covariance(search.prior, fit, drift)
     if "J" in fit.names:
-        covariance[fit.names.index("J"), fit.names.index("J")] += (FLOOR * found.values["J"]) ** 2
+        covariance[fit.names.index("J"), fit.names.index("J")] += (MODEL_ACCURACY * found.values["J"]) ** 2
     variance = np.diag(covariance)
     wanted = (*left_open, _least(search.models, found.values))
     most = [max(float(v), *(each.get(n, 0.0) for each in wanted)) for n, v in zip(fit.names, variance, strict=True)]
@@ -103,7 +103,7 @@ def limits(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorqu
 def _rough(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
     """A warning where the recorded motion, not the torque, limits what is told."""
     told = [name for name in names if name in (*PRE_SLIDING, "delay") and _matters(honest, name)]
-    rough = [name for name in told if np.hypot(1, honest.motion[name] / honest.torque[name]) > ROUGH]
+    rough = [name for name in told if np.hypot(1, honest.motion[name] / honest.torque[name]) > MOTION_NOISE_RATIO]
     if not rough:
         return ()
     sources = sorted({"position" if model.motion.source == "angle" else "speed" for model in fine})

@@ -15,7 +15,7 @@ from feedsim.arguments import Value, lengths, listed, quantity, spelt
 from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report import circle as page
 from feedsim.report.content import Report
 
@@ -84,7 +84,7 @@ def circle(
     figures: Sequence[str] = (),
     force: bool = False,
     control: str = "",
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> CircleResult:
     """Take a recorded circle apart: servo mismatch, squareness, scale, lost motion, reversal peaks, pitch errors.
 

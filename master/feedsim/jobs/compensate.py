@@ -16,7 +16,7 @@ from feedsim.arguments import Changes, Value, amount, by_name, settings, spelt
 from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.report import compensate as page
 from feedsim.report import uncertainty as intervals
 from feedsim.report.content import Report
@@ -121,7 +121,7 @@ def compensate(
     out: File | None = None,
     figures: Sequence[str] = (),
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> CompensateResult:
     """Run a circle without and with friction compensation of every axis that moves.
 

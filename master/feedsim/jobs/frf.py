@@ -18,7 +18,7 @@ from feedsim.errors import FeedsimError, InputError
 from feedsim.findings import severity
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.linear.judgement import judge
 from feedsim.report import frf as page
 from feedsim.report.content import Report
@@ -30,7 +30,7 @@ from feedsim.trace import Array
 from feedsim.trace.response import Complexes, FrequencyResponse
 
 REALISATIONS_WITH_FRICTION = 4
-LOWEST, HIGHEST = 1.0, 1000.0  # [Hz]; the band where none is given
+DEFAULT_LOWEST, DEFAULT_HIGHEST = 1.0, 1000.0  # [Hz]; the band where none is given
 ONE_REALISATION = (
     "measured with friction and one realisation: every period is alike, so that the coherence says nothing of what is "
     "not linear; take more realisations"
@@ -147,7 +147,7 @@ def frf(
     out: File | None = None,
     figures: Sequence[str] = (),
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> FrfResult:
     """Frequency responses of feed drives and structure, in closed form and, friction off, measured on the units.
 
@@ -201,7 +201,7 @@ def frf(
     )
     archives = None if fmus is None else Path(fmus)
     modes, doubts = plant_modes(machine)
-    frequency = responses.frequencies(machine, modes, plan.band, responses.BEYOND)
+    frequency = responses.frequencies(machine, modes, plan.band, responses.BAND_RATIO)
     wanted = linear.names(chosen, tool=tool)
     overlays, warnings = _overlays(overlay, wanted)
     warnings += doubts
@@ -292,7 +292,7 @@ def _unit_of(inject: str) -> tuple[str, str]:
 def _band(band: Band | None, machine: Machine) -> tuple[float, float]:
     """Lowest and highest frequency [Hz]."""
     if band is None:
-        return LOWEST, min(HIGHEST, highest_frequency(machine))
+        return DEFAULT_LOWEST, min(DEFAULT_HIGHEST, highest_frequency(machine))
     return between("band", band, "1 Hz", "1000 Hz")
 
 

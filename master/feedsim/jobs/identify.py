@@ -16,12 +16,12 @@ from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.files.columns import load_columns
 from feedsim.identify import STAGES, Asked, Estimate, Identification, Identified, named_apart, read_traces
-from feedsim.identify.friction_file import FRICTION
-from feedsim.identify.parameters import KINDS
+from feedsim.identify.friction_file import FRICTION_FILE
+from feedsim.identify.parameters import PARAMETER_KINDS
 from feedsim.identify.stages import identify as identified_from
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report import identify as page
 from feedsim.report.content import Report
 from feedsim.report.results import Content
@@ -92,7 +92,7 @@ class IdentifyResult(Result):
     @property
     def keeps(self) -> Sequence[str]:
         """friction.yaml."""
-        return (FRICTION,)
+        return (FRICTION_FILE,)
 
     def summary(self, names: Sequence[str]) -> Mapping[str, Any]:
         """Content of summary.json."""
@@ -122,7 +122,7 @@ def identify(
     out: File | None = None,
     figures: Sequence[str] = (),
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> IdentifyResult:
     """Identify the friction of an axis: the Stribeck curve from constant speeds, pre-sliding from reversals.
 
@@ -202,12 +202,12 @@ def _asked(
         # A plain 0 needs no unit.
         zero = isinstance(delay, str) and delay.strip() in ("0", "0.0")
         later = 0.0 if zero else quantity("delay", delay, "s")
-    names = [name for name in KINDS if name not in ("J", "delay")]
+    names = [name for name in PARAMETER_KINDS if name not in ("J", "delay")]
 
     def value_of(name: str, value: Value) -> float:
         if name not in names:
             raise InputError(f"no parameter {name!r}; there are {', '.join(names)}")
-        return amount(value, KINDS[name].unit)
+        return amount(value, PARAMETER_KINDS[name].unit)
 
     estimated = tuple(name for name, value in (("inertia", inertia), ("delay", delay)) if value == ESTIMATE)
     return Asked(

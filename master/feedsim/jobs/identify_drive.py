@@ -15,7 +15,7 @@ from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.records import Asked
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.replay.elastic import MOST_MODES
 from feedsim.replay.identified import identify_drives
 from feedsim.report.content import Report
@@ -99,7 +99,7 @@ def identify_drive(
     figures: Sequence[str] = (),
     force: bool = False,
     control: str = "",
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> DriveResult:
     """Identify the drive of axes: delay of the setpoint, position loop, speed controller, inertia and friction.
 

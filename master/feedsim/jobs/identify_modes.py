@@ -13,7 +13,7 @@ from feedsim.errors import InputError
 from feedsim.fields import no_axis
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.modal.identified import AxisModes
 from feedsim.modal.identified import identify_modes as identified
 from feedsim.modal.measured import Channel, from_responses, from_signals
@@ -42,7 +42,7 @@ class ModesResult(Result):
     @property
     def keeps(self) -> Sequence[str]:
         """The table of modes: machine files name it."""
-        return (page.MODES,)
+        return (page.MODES_FILE,)
 
     @property
     def inputs(self) -> Sequence[Path]:
@@ -104,7 +104,7 @@ def identify_modes(
     out: File | None = None,
     figures: Sequence[str] = (),
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> ModesResult:
     """Elastic modes of an axis from a measured response: time signals, or a file of frequency responses.
 

@@ -16,11 +16,11 @@ from feedsim.arguments import Value, lengths, quantity, spelt
 from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.outputs import begins_with, forced, replacing
 from feedsim.report.content import Report
 from feedsim.report.machine import record as shown
-from feedsim.report.picture import KINDS
+from feedsim.report.picture import PICTURE_FORMATS
 from feedsim.report.provenance import to_json
 from feedsim.report.results import Content, check_place, write_results, write_text
 from feedsim.scenario.described import Described, load_described
@@ -34,9 +34,9 @@ from feedsim.structure.table_check import stale
 # Exchange step where no machine file says what the control cycle is [s].
 USUAL_STEP = 125e-6
 USUAL_MODES = 20  # that are listed
-MODES, RECORD = "modes.csv", "build.json"
+TABLE_FILE, BUILD_FILE = "modes.csv", "build.json"
 # A frequency that is asked for belongs to the nearest mode if that is not farther away than this share.
-NEAR = 0.1
+MODE_DISTANCE = 0.1
 Positions = Mapping[str, Value]  # axis -> position [m], or a text with a unit
 
 
@@ -137,7 +137,7 @@ class MachineResult(Result):
         check_place(folder, ("report.html", "summary.json"), inputs, kind=self.kind)
 
     def save(
-        self, folder: str | Path, *, figures: Sequence[str] = KINDS, force: bool = False, control: str = ""
+        self, folder: str | Path, *, figures: Sequence[str] = PICTURE_FORMATS, force: bool = False, control: str = ""
     ) -> tuple[Path, ...]:
         """As :meth:`Result.save`; the pictures are drawn as files unless `figures` says otherwise."""
         return super().save(folder, figures=figures, force=force, control=control)
@@ -165,11 +165,11 @@ class BuildResult(MachineResult):
 
     def files(self) -> Mapping[str, Content]:
         """The table of modes, and the record of its origin."""
-        return {MODES: lambda path: write_modes(path, self.info.modes), RECORD: to_json(self.record())}
+        return {TABLE_FILE: lambda path: write_modes(path, self.info.modes), BUILD_FILE: to_json(self.record())}
 
     def check_writable(self, folder: Path, inputs: Sequence[Path] = ()) -> None:
         """Raise OutputError unless the result can be written to `folder`."""
-        check_place(folder, (MODES, RECORD), inputs, kind=self.kind, own=_of_build(folder))
+        check_place(folder, (TABLE_FILE, BUILD_FILE), inputs, kind=self.kind, own=_of_build(folder))
 
     def save(
         self, folder: str | Path, *, figures: Sequence[str] = (), force: bool = False, control: str = ""
@@ -178,17 +178,17 @@ class BuildResult(MachineResult):
         place = Path(folder)
 
         def fill(fresh: Path, names: Sequence[str]) -> None:
-            write_modes(fresh / MODES, self.info.modes)
-            write_text(fresh / RECORD, to_json(self.record()))
+            write_modes(fresh / TABLE_FILE, self.info.modes)
+            write_text(fresh / BUILD_FILE, to_json(self.record()))
 
         with replacing(force or forced()):
             self.check_writable(place, self.inputs)
-            return write_results(place, (MODES, RECORD), (), fill, kind=self.kind, own=_of_build(place))
+            return write_results(place, (TABLE_FILE, BUILD_FILE), (), fill, kind=self.kind, own=_of_build(place))
 
 
 def _of_build(folder: Path) -> Sequence[str]:
     """Files of an earlier build, which has no summary that lists them."""
-    return (MODES, RECORD) if begins_with(b'"format"')(folder / RECORD) else ()
+    return (TABLE_FILE, BUILD_FILE) if begins_with(b'"format"')(folder / BUILD_FILE) else ()
 
 
 def machine_info(
@@ -199,7 +199,7 @@ def machine_info(
     static_correction: bool = False,
     step: Value | None = None,
     modes: int | str | None = USUAL_MODES,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> MachineResult:
     """Masses, inertias, leads, coupling limits and modes of a machine.
 
@@ -232,7 +232,7 @@ def machine_build(
     cutoff: Value | None = None,
     static_correction: bool = False,
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> BuildResult:
     """Compute the modes of a machine from its structure.
 
@@ -257,7 +257,7 @@ def machine_build(
         )
 
     def check(folder: Path, inputs: Sequence[Path]) -> None:
-        check_place(folder, (MODES, RECORD), inputs, kind=BuildResult.kind, own=_of_build(folder))
+        check_place(folder, (TABLE_FILE, BUILD_FILE), inputs, kind=BuildResult.kind, own=_of_build(folder))
 
     with kept(out, check, watch, [file for _, file in described.files], force=force):
         info = _info(machine, described, at or {}, cutoff, static_correction, None, watch, fresh=True)
@@ -279,7 +279,7 @@ def machine_show(
     animate: bool = False,
     scale: float | str = "auto",
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> MachineResult:
     """Draw the structure of a machine and its modes.
 
@@ -421,7 +421,7 @@ def _mode(asked: int | str, modes: Modes) -> int:
     if not (math.isfinite(f) and f > 0):
         raise InputError(f"{option}: a frequency above 0 Hz is needed; rigid modes are chosen by their number")
     k = int(np.argmin(np.abs(modes.frequency - f)))
-    if abs(modes.frequency[k] - f) > NEAR * f:
+    if abs(modes.frequency[k] - f) > MODE_DISTANCE * f:
         first = ", ".join(f"{value:.4g}" for value in modes.frequency[modes.frequency > 0][:8])
         raise InputError(
             f"{option}: no mode near; the nearest is {modes.frequency[k]:.4g} Hz (the first elastic ones: "

@@ -17,7 +17,7 @@ from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.machine_import import Pairs, assumed, axes_of, inputs_of, pairs, read_files
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report.content import Report
 from feedsim.report.control_files import exported as page
 from feedsim.report.results import Content
@@ -93,7 +93,7 @@ def machine_export(
     checked: str | Sequence[str] = (),
     out: File | None = None,
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> MachineExportResult:
     """Write the values of a machine file into copies of a control's files, and a sheet of old and new values.
 

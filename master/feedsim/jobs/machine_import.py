@@ -10,12 +10,12 @@ from typing import Any
 from feedsim.analysis import Figure, Named
 from feedsim.arguments import listed, spelt
 from feedsim.control import Archive, Reading, opened, read
-from feedsim.control.archive import LARGEST, scalar
+from feedsim.control.archive import MAX_FILE_BYTES, scalar
 from feedsim.errors import InputError, no_such_file
 from feedsim.files.regular import content
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report.content import Report
 from feedsim.report.control_files import imported as page
 from feedsim.report.results import Content
@@ -98,7 +98,7 @@ def machine_import(
     name: str | None = None,
     out: File | None = None,
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> MachineImportResult:
     """Fill drive, limits, filters and compensations of a machine file from the files of a control.
 
@@ -159,7 +159,7 @@ def read_files(paths: Sequence[Path], watch: Watch) -> list[Archive]:
         watch.progress("reading", k, len(paths))
         if path.is_dir():
             raise InputError(f"{path} is a folder; name the files in it")
-        archives.append(opened(path.name, content(path, LARGEST), path))
+        archives.append(opened(path.name, content(path, MAX_FILE_BYTES), path))
     return archives
 
 

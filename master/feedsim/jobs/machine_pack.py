@@ -13,7 +13,7 @@ from feedsim.jobs.folder import File
 from feedsim.jobs.machine import Positions, positions
 from feedsim.jobs.made import Kind, Made
 from feedsim.jobs.pack import PACKED
-from feedsim.jobs.watch import SILENT, Watch, announce_archive
+from feedsim.jobs.watch import NO_WATCH, Watch, announce_archive
 from feedsim.outputs import same
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine
@@ -32,8 +32,8 @@ KIND = Kind("machine pack", "unit", PACKED, makes_folder=True)
 # A cell takes a tenth of a second and, with two axes and a hundred modes, 0.2 MB in the archive and in the plant.
 MOST_CELLS = 3000
 # Positions that are typed twice are the same where they differ by less [m].
-START = 1e-9
-EXAMPLE = "Z=20mm or Z=0mm..400mm/20mm"
+START_TOLERANCE = 1e-9
+POSITIONS_EXAMPLE = "Z=20mm or Z=0mm..400mm/20mm"
 
 
 def machine_pack(
@@ -46,7 +46,7 @@ def machine_pack(
     note: str | None = None,
     base: File | None = None,
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> Made:
     """Pack the machine's axes, pose and table of modes into a plant archive; needs no compiler.
 
@@ -177,7 +177,7 @@ def _size(machine: Machine, pose: Mapping[str, float], grid: Sequence[GridAxis],
     """
     for axis in grid:
         low, high = axis.reach
-        if not low - START <= pose[axis.axis] <= high + START:
+        if not low - START_TOLERANCE <= pose[axis.axis] <= high + START_TOLERANCE:
             raise InputError(
                 f"{spelt('poses')}: the machine stands at {axis.axis} {pose[axis.axis] * 1e3:.6g} mm, outside of the "
                 f"grid, {low * 1e3:.6g} mm to {high * 1e3:.6g} mm; choose a range that holds it, or another pose with "
@@ -207,7 +207,7 @@ def grid_axes(machine: Machine, poses: Mapping[str, Value]) -> list[GridAxis]:
         rest = given if isinstance(given, str) else f"{given} m"
         limits, slash, cell = rest.rpartition("/") if ".." in rest else ("", "", rest)
         if ".." in rest and not slash:
-            raise InputError(f"the size of the cells is missing; {EXAMPLE} is the form")
+            raise InputError(f"the size of the cells is missing; {POSITIONS_EXAMPLE} is the form")
         width = units.parse(cell, "m", "20 mm")
         if slash:
             first, _, last = limits.partition("..")

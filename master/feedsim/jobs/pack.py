@@ -10,7 +10,7 @@ from feedsim.cosim.one_unit import UNIT, pack_whole
 from feedsim.errors import InputError
 from feedsim.jobs.folder import File
 from feedsim.jobs.made import Kind, Made
-from feedsim.jobs.watch import SILENT, Watch, announce_archive
+from feedsim.jobs.watch import NO_WATCH, Watch, announce_archive
 from feedsim.outputs import archive_with
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Scenario
@@ -29,7 +29,7 @@ def pack(
     fmus: File | None = None,
     set: Changes = None,
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> Made:
     """Pack a scenario, or a machine, as one FMI 2.0 co-simulation unit; needs no compiler.
 

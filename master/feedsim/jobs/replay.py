@@ -13,7 +13,7 @@ from feedsim.arguments import Changes
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.records import Asked
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.replay.compare import replayed
 from feedsim.replay.open_loop import driven
 from feedsim.report.content import Report
@@ -100,7 +100,7 @@ def replay(
     figures: Sequence[str] = (),
     force: bool = False,
     control: str = "",
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> ReplayResult:
     """Run the position setpoints of a record through the simulated axes, in closed loop, and compare.
 

@@ -21,7 +21,7 @@ from feedsim.report.results import Content, write_report
 if TYPE_CHECKING:
     from feedsim.analysis import Figure
 
-HEIGHT = 900  # [px] of a report in a notebook; it scrolls
+NOTEBOOK_HEIGHT = 900  # [px] of a report in a notebook; it scrolls
 
 
 class Result(ABC):
@@ -122,7 +122,7 @@ class Result(ABC):
 
     def _repr_html_(self) -> str:
         page = escape(html(self.report(), self.kind), quote=True)
-        return f"<iframe style='width:100%;height:{HEIGHT}px;border:0' srcdoc=\"{page}\"></iframe>"
+        return f"<iframe style='width:100%;height:{NOTEBOOK_HEIGHT}px;border:0' srcdoc=\"{page}\"></iframe>"
 
 
 def in_words_of(control: str) -> AbstractContextManager[None]:

@@ -19,7 +19,7 @@ from feedsim.findings import ranked, severity
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result, in_words_of
 from feedsim.jobs.subject import Opened, opened
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.outputs import forced, replacing
 from feedsim.report import run as report
 from feedsim.report.content import Report
@@ -213,7 +213,7 @@ def run(
     figures: Sequence[str] = (),
     force: bool = False,
     control: str = "",
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> RunResult:
     """Run a scenario.
 

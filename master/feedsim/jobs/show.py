@@ -17,7 +17,7 @@ from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
 from feedsim.jobs.run import RunResult
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.owned import TemporaryFolder
 from feedsim.report.content import Report
 from feedsim.report.show import report as page
@@ -110,7 +110,7 @@ def show(
     figures: Sequence[str] = (),
     force: bool = False,
     control: str = "",
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
     **named: Shown,
 ) -> Overlay:
     """Lay results over each other.

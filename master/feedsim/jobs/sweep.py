@@ -16,7 +16,7 @@ from feedsim.arguments import Changes, settings
 from feedsim.findings import WRONG, Wrong
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.owned import TemporaryFolder
 from feedsim.report.content import Report
 from feedsim.report.results import Content, discard
@@ -141,7 +141,7 @@ def sweep(
     fmus: File | None = None,
     figures: Sequence[str] = (),
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> SweepResult:
     """Make the runs of a study; those that `out` has are not made again.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from feedsim import cosim
 from feedsim.jobs.run import RunResult
 from feedsim.jobs.show import show
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.report import run as report
 from feedsim.report.changes import change_lines
 from feedsim.report.show import report as show_report
@@ -16,7 +16,7 @@ from feedsim.scenario import load
 from feedsim.tune import Proposal, of_run
 
 # Figures whose change is shown, by what stands behind the last dot.
-SHOWN = ("G", "overshoot", "settling_time")
+TRIED_FIGURES = ("G", "overshoot", "settling_time")
 SHOWN_OF_AXES = ("peak_", "servo_mismatch")
 
 
@@ -35,7 +35,7 @@ def check_writable(directory: Path) -> None:
     show_report.check_writable(_overlaid(directory))
 
 
-def tried(run: RunResult, directory: Path, *, fmus: Path | None = None, watch: Watch = SILENT) -> Tried:
+def tried(run: RunResult, directory: Path, *, fmus: Path | None = None, watch: Watch = NO_WATCH) -> Tried:
     """Run again with all proposals that have a value; write FOLDER_tried and the overlay FOLDER_overlay.
 
     run: the first one, which was written to `directory`. Raises as :func:`feedsim.cosim.run`, and OutputError.
@@ -61,7 +61,7 @@ def tried(run: RunResult, directory: Path, *, fmus: Path | None = None, watch: W
 
 def _leading(name: str) -> bool:
     prefix, _, key = name.partition(".")
-    return key in SHOWN or (key.startswith(SHOWN_OF_AXES) and "." not in key and bool(prefix))
+    return key in TRIED_FIGURES or (key.startswith(SHOWN_OF_AXES) and "." not in key and bool(prefix))
 
 
 def _second(directory: Path) -> Path:

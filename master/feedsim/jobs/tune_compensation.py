@@ -15,14 +15,14 @@ from feedsim.errors import InputError
 from feedsim.fields import no_axis
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
-from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.report import tune as page
 from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
 from feedsim.report.tune.report import SETTINGS, SHEET
 from feedsim.tune.compensation import Judged, tune
-from feedsim.tune.compensators import KINDS, OBJECTIVES
+from feedsim.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,7 +86,7 @@ def tune_compensation(
     out: File | None = None,
     figures: Sequence[str] = (),
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> TuneCompensationResult:
     """Find the values of a friction compensation on short circles, and judge them on other radii and feeds.
 
@@ -112,7 +112,7 @@ def tune_compensation(
     >>> float(result.figures["held_out.median"]) > 95
     True
     """
-    for name, value, known in (("kind", kind, KINDS), ("objective", objective, OBJECTIVES)):
+    for name, value, known in (("kind", kind, COMPENSATOR_KINDS), ("objective", objective, OBJECTIVES)):
         if value not in known:
             raise InputError(f"{spelt(name)} {value}: of {', '.join(known)}")
     changes = settings(set)

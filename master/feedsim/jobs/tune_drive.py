@@ -14,7 +14,7 @@ from feedsim.arguments import Changes, Value, amount, given, quantity, settings,
 from feedsim.errors import InputError
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result, in_words_of
-from feedsim.jobs.watch import SILENT, Watch, announce
+from feedsim.jobs.watch import NO_WATCH, Watch, announce
 from feedsim.report.content import Report
 from feedsim.report.provenance import input_paths
 from feedsim.report.results import Content
@@ -114,7 +114,7 @@ def tune_drive(
     figures: Sequence[str] = (),
     force: bool = False,
     control: str = "",
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> TuneDriveResult:
     """Tune the drive of an axis within margins: K_p, T_n, K_v, T_sym, T_dyn, reference model, current filters.
 

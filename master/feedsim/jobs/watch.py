@@ -40,7 +40,7 @@ class Watch:
         """What takes longer, and why."""
 
 
-SILENT = Watch()
+NO_WATCH = Watch()
 
 
 def announce(watch: Watch, machine: Machine, fmus: Path | None, coupling: Coupling | None = None) -> None:

@@ -10,7 +10,7 @@ from feedsim.analysis import check
 from feedsim.arguments import Changes, listed, settings
 from feedsim.jobs.folder import File
 from feedsim.jobs.made import Kind, Made
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.outputs import begins_with
 from feedsim.page.content import content
 from feedsim.page.html import MARK, page
@@ -28,7 +28,7 @@ def write_page(
     fmus: File | None = None,
     set: Changes = None,
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> Made:
     """Write one HTML file that holds the scenario's machine, compiled as WebAssembly, and knobs.
 

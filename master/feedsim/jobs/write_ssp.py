@@ -10,7 +10,7 @@ from feedsim.errors import InputError
 from feedsim.files.source import is_ssp
 from feedsim.jobs.folder import File
 from feedsim.jobs.made import Kind, Made
-from feedsim.jobs.watch import SILENT, Watch
+from feedsim.jobs.watch import NO_WATCH, Watch
 from feedsim.outputs import archive_with
 from feedsim.owned import TemporaryFolder
 from feedsim.report.provenance import input_paths
@@ -29,7 +29,7 @@ def write_ssp(
     fmus: File | None = None,
     set: Changes = None,
     force: bool = False,
-    watch: Watch = SILENT,
+    watch: Watch = NO_WATCH,
 ) -> Made:
     """Write a scenario as one SSP file (System Structure and Parameterization 1.0): units, parameters, wiring, motion.
 

@@ -27,7 +27,9 @@ from feedsim.linear.stability import GROWTH
 from feedsim.scenario import Drive, Machine
 from feedsim.structure import Modes
 
-HIGHEST = 4.0  # resonances that show with gains so many times the present ones are looked at closely from the start
+MAX_GAIN_RATIO = (
+    4.0  # resonances that show with gains so many times the present ones are looked at closely from the start
+)
 MOTOR = ("current", "R", "L_d", "L_q", "p", "K_t", "ideal_current_loop")  # what the current loop consists of
 
 
@@ -119,7 +121,7 @@ class Candidates:
         plant = ModalPlant.of(modes, axes)
         self._index = axes.index(axis)
         own = drives[self._index].drive
-        stiff = own.model_copy(update={"K_p": HIGHEST * own.K_p, "K_v": HIGHEST * own.K_v})
+        stiff = own.model_copy(update={"K_p": MAX_GAIN_RATIO * own.K_p, "K_v": MAX_GAIN_RATIO * own.K_v})
         wide = Sampled(axes, self._with(drives, stiff), held, plant)
         self._base = Structure(axes, drives, held, plant, (wide.free_resonances(), wide.locked_resonances()))
 

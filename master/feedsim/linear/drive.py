@@ -24,7 +24,9 @@ from scipy.linalg import expm
 from feedsim.linear.plant import Complexes, Floats
 from feedsim.scenario import Cycles, Drive, Filter
 
-WHOLE = 1e-9  # a delay this close to a whole number of samples is one: quotients of times are off by some 1e-16
+WHOLE_SAMPLE_TOLERANCE = (
+    1e-9  # a delay this close to a whole number of samples is one: quotients of times are off by some 1e-16
+)
 
 
 @dataclass(frozen=True)
@@ -235,7 +237,7 @@ def _filter(s: Complexes, described: Filter, T_c: float) -> Complexes:
 def _cubic_delay(s: Complexes, samples: float, T: float) -> Complexes:
     """A delay of `samples` cycles of T: Lagrange through the ages m-1 ... m+2 about it, 0 ... 3 below one sample."""
     nearest = round(samples)
-    if abs(samples - nearest) < WHOLE * max(1, nearest):
+    if abs(samples - nearest) < WHOLE_SAMPLE_TOLERANCE * max(1, nearest):
         return np.exp(-s * nearest * T)
     ages = max(math.floor(samples) - 1, 0) + np.arange(4)
     # weights that are right for 1, a, a^2, a^3, ages counted from the delayed instant
@@ -245,7 +247,7 @@ def _cubic_delay(s: Complexes, samples: float, T: float) -> Complexes:
 
 def _linear_delay(s: Complexes, samples: float, T: float) -> Complexes:
     """A delay of `samples` cycles of T, linear between two samples."""
-    whole = math.floor(samples + WHOLE)
+    whole = math.floor(samples + WHOLE_SAMPLE_TOLERANCE)
     rest = max(samples - whole, 0.0)
     return np.asarray(np.exp(-s * whole * T) * (1 - rest + rest * np.exp(-s * T)))
 

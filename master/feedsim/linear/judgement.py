@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.linear.drive import LinearDrive
 from feedsim.linear.plant import CHUNK, Complexes, Floats, Hold, ModalPlant, modal_sums
-from feedsim.linear.stability import GROWTH, TURN
+from feedsim.linear.stability import GROWTH, MAX_PHASE_STEP
 from feedsim.scenario import Cycles, Drive, Friction, Machine
 from feedsim.structure import Modes
 
@@ -36,7 +36,7 @@ PHASE_MARGIN = 30.0  # [deg]
 Kind = Literal["speed", "position"]
 State = Literal["moving", "at rest"]
 STATES: tuple[State, State] = ("moving", "at rest")
-STEP = 0.05  # relative step of the frequencies between resonances; drives and delays are smooth
+FREQUENCY_STEP = 0.05  # relative step of the frequencies between resonances; drives and delays are smooth
 # Points about a resonance, in its half widths: a circle is a polygon of these.
 ABOUT = np.array([-5.0, -2.4, -1.3, -0.7, -0.3, 0.0, 0.3, 0.7, 1.3, 2.4, 5.0])
 SHOWS = 0.03  # of an open-loop gain: a resonance that adds less at its peak is not looked at closely
@@ -44,14 +44,14 @@ SHOWS = 0.03  # of an open-loop gain: a resonance that adds less at its peak is 
 # since a unit left out may be 1000. A step is 1.2 %.
 WITHIN = 1e-2, 1e2
 GAINS = np.geomspace(1e-6, 1e6, 2401)
-LEAST = np.finfo(np.float64).tiny  # a loop without gain is no reason to take the logarithm of 0
+SMALLEST_GAIN = np.finfo(np.float64).tiny  # a loop without gain is no reason to take the logarithm of 0
 # Components either side of 0 Hz that a position loop is the sum of. Further ones are (f/(2/T_pos - f))^3 times smaller:
 # 1 % of the gain at 0.35/T_pos, where a position loop has none left.
 IMAGES = 1
-# Where an open-loop gain, or one COUNTS times larger or smaller, passes -1 within SECTOR [rad], it is followed in steps
-# of CHANGE: limits and margins lie there.
-SECTOR, COUNTS, CHANGE = 1.0, 8.0, 0.2
-ROUNDS = 12  # of halving steps at most
+# Where an open-loop gain, or one CRITICAL_RATIO times larger or smaller, passes -1 within CRITICAL_SECTOR [rad], it is
+# followed in steps of CRITICAL_STEP: limits and margins lie there.
+CRITICAL_SECTOR, CRITICAL_RATIO, CRITICAL_STEP = 1.0, 8.0, 0.2
+MAX_HALVINGS = 12  # of halving steps at most
 REAL = 1e-3  # [rad] from -180 degrees: as much of a phase is rounding, at half the sampling rate
 
 
@@ -176,7 +176,7 @@ def _edges(ends: Floats, inside: NDArray[np.bool_]) -> list[float]:
 
 def _limits(L: Complexes, within: tuple[float, float]) -> Floats:
     """Factors on an open-loop gain (F,), ascending, that take it through -1, between two."""
-    angle, size = np.angle(-L), np.log(np.maximum(np.abs(L), LEAST))
+    angle, size = np.angle(-L), np.log(np.maximum(np.abs(L), SMALLEST_GAIN))
     turn = np.diff(angle)
     through = np.flatnonzero((np.signbit(angle[1:]) != np.signbit(angle[:-1])) & (np.abs(turn) < np.pi))
     share = -angle[through] / turn[through]
@@ -191,7 +191,7 @@ def _gain_margin(limits: Floats, factor: float) -> float:
 
 
 def _phase_margin(L: Complexes, factor: float) -> float:
-    angle, size = np.angle(-L), np.log(np.maximum(np.abs(L) * factor, LEAST))
+    angle, size = np.angle(-L), np.log(np.maximum(np.abs(L) * factor, SMALLEST_GAIN))
     through = np.flatnonzero((size[1:] < 0) != (size[:-1] < 0))
     if not through.size:
         return 180.0
@@ -253,14 +253,14 @@ class Sampled:
             pairs = zip(self.axes, self.drives, strict=True)
             gains = ", ".join(f"axis {axis}: {drive.drive.K_p:.3g}" for axis, drive in pairs)
             raise InputError(f"the loops are beyond all numbers that a computer has; K_p [N.m.s/rad], {gains}")
-        for _ in range(ROUNDS):
+        for _ in range(MAX_HALVINGS):
             turns = np.abs(np.angle(values[..., 1:] / values[..., :-1])).max(axis=(0, 1))
             L = values[:, :1] / values[:, 1:] - 1
             size = np.abs(L)
-            counts = (np.abs(np.angle(-L)) < SECTOR) & (size > 1 / COUNTS) & (size < COUNTS)
-            changes = np.abs(np.diff(L)) > CHANGE * size[..., 1:]
+            counts = (np.abs(np.angle(-L)) < CRITICAL_SECTOR) & (size > 1 / CRITICAL_RATIO) & (size < CRITICAL_RATIO)
+            changes = np.abs(np.diff(L)) > CRITICAL_STEP * size[..., 1:]
             told = (changes & (counts[..., 1:] | counts[..., :-1])).any(axis=(0, 1))
-            wide = np.flatnonzero((turns > TURN) | told)
+            wide = np.flatnonzero((turns > MAX_PHASE_STEP) | told)
             if not wide.size:
                 break
             between = 0.5 * (frequency[wide] + frequency[wide + 1])
@@ -271,7 +271,7 @@ class Sampled:
     def _frequencies(self, highest: float, near: Floats) -> Floats:
         """Frequencies to begin with [Hz], 0, `highest` and points about resonances included."""
         slow = np.geomspace(GROWTH * 1e-2, 1.0, 30, endpoint=False)  # around the integrators
-        fast = np.geomspace(1.0, highest, math.ceil(math.log(highest) / STEP))
+        fast = np.geomspace(1.0, highest, math.ceil(math.log(highest) / FREQUENCY_STEP))
         return np.unique(np.concatenate([[0.0], slow, fast, near[(near > 0) & (near < highest)]]))
 
     def free_resonances(self) -> Floats:

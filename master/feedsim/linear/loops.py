@@ -18,7 +18,7 @@ from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
 from feedsim.linear.system import LinearSystem
 from feedsim.linear.system import unit_of as unit_of_response
 
-QUANTITIES = {  # of an axis: part of a figure's name -> response, what it is
+LOOP_QUANTITIES = {  # of an axis: part of a figure's name -> response, what it is
     "n_M": ("{0}.n_a/{0}.M_a", "n/M"),
     "x_M": ("{0}.x_a/{0}.M_a", "x/M"),
     "n_n": ("{0}.n_a/{0}.n_s", "n_a/n_s"),
@@ -30,7 +30,7 @@ LOOPS = ("speed_loop", "position_loop")
 
 def names(axes: Sequence[str], *, tool: bool) -> tuple[str, ...]:
     """Responses of these axes that have a closed form, and those at the tool."""
-    own = [name.format(axis) for axis in axes for name, _ in QUANTITIES.values()]
+    own = [name.format(axis) for axis in axes for name, _ in LOOP_QUANTITIES.values()]
     gains = [f"{axis}.{loop}" for axis in axes for loop in LOOPS]
     return (*own, *gains, *((COMPLIANCE.format(d) for d in TOOL_DIRECTIONS) if tool else ()))
 
@@ -44,7 +44,7 @@ def unit_of(name: str) -> str:
 def figure_key(name: str) -> str:
     """First part of a figure's name for a response: "Z.n_M", "tool.compliance_X"."""
     axis = name.partition(".")[0]
-    for key, (known, _) in QUANTITIES.items():
+    for key, (known, _) in LOOP_QUANTITIES.items():
         if name == known.format(axis):
             return f"{axis}.{key}"
     return f"tool.compliance_{name[-1]}" if axis == "tool" else name
@@ -62,8 +62,8 @@ def response(system: LinearSystem, name: str, frequency: Floats) -> Complexes:
         if rest == "position_loop":
             return position_gain(system, axis, s)
         functions = (speed_controlled_system, scale_response, speed_reference, position_reference)
-        for key, function in zip(QUANTITIES, functions, strict=True):
-            if name == QUANTITIES[key][0].format(axis):
+        for key, function in zip(LOOP_QUANTITIES, functions, strict=True):
+            if name == LOOP_QUANTITIES[key][0].format(axis):
                 return function(system, axis, frequency)
     known = ", ".join(names(system.axes, tool=True))
     raise InputError(f"no frequency response '{name}'; there are {known}")

@@ -18,7 +18,7 @@ from feedsim.structure import Modes
 Curve = Callable[[Floats], Floats]
 
 STEP_PER_DAMPING = 1 / 3
-STEPS = (5e-4, 1e-2)  # finest, coarsest relative step of the grid
+GRID_STEPS = (5e-4, 1e-2)  # finest, coarsest relative step of the grid
 INSIDE = 15  # points looked at within every bracket in one call of the curve, which costs little more than a single one
 CROSSING_ROUNDS = 10  # each narrows a bracket to 1/16: a step of the grid to 1e-14 of the frequency
 EXTREME_ROUNDS = 6  # each narrows a bracket to 1/8: two steps to 1e-7; an extreme's place shows to the rounding's root
@@ -44,7 +44,7 @@ def grid(modes: Modes, low: float, high: float) -> Floats:
     """Frequencies [Hz] from low to high, close enough together that no feature of the structure falls between."""
     damping = modes.damping[~modes.rigid]
     least = float(damping.min()) if damping.size else 1.0
-    step = min(max(STEP_PER_DAMPING * least, STEPS[0]), STEPS[1])
+    step = min(max(STEP_PER_DAMPING * least, GRID_STEPS[0]), GRID_STEPS[1])
     return np.asarray(np.geomspace(low, high, math.ceil(math.log(high / low) / step) + 1))
 
 

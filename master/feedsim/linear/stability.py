@@ -18,9 +18,9 @@ from feedsim.linear.plant import Complexes
 from feedsim.linear.system import LinearSystem
 
 GROWTH = 1e-2  # [1/s] what grows more slowly counts as stable: the contour passes integrators at this distance
-TURN = 0.6  # [rad] and
-CHANGE = 1.0  # largest steps of the logarithm's parts between neighbours on the contour
-ROUNDS = 40
+MAX_PHASE_STEP = 0.6  # [rad] and
+MAX_LOG_STEP = 1.0  # largest steps of the logarithm's parts between neighbours on the contour
+MAX_REFINEMENTS = 40
 
 
 def unstable_poles(system: LinearSystem) -> int:
@@ -51,9 +51,9 @@ def _windings(function: Callable[[Complexes], Complexes], system: LinearSystem, 
     slow = np.geomspace(GROWTH * 1e-3, 1.0, 200, endpoint=False)  # around the integrators
     frequency = np.concatenate([[0.0], slow, grid(system.modes, 1.0, highest)])
     values = function(GROWTH + 2j * np.pi * frequency)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_REFINEMENTS):
         steps = np.log(values[1:] / values[:-1])
-        wide = np.flatnonzero((np.abs(steps.imag) > TURN) | (np.abs(steps.real) > CHANGE))
+        wide = np.flatnonzero((np.abs(steps.imag) > MAX_PHASE_STEP) | (np.abs(steps.real) > MAX_LOG_STEP))
         if not wide.size:
             # the other half of the circle is the mirror image
             return round(float(np.sum(steps.imag)) / np.pi)

@@ -30,8 +30,10 @@ from feedsim.trace.response import FrequencyResponse, quotient_unit
 # Which loops of an axis are closed: position and speed; speed alone (K_v = k_ffw = 0); none (the torque is an input).
 Closed = Literal["position", "speed", "none"]
 
-UNITS = {"M_add": "N.m", "M_a": "N.m", "n_add": "rad/s", "n_a": "rad/s", "n_s": "rad/s", "n_ffw": "rad/s"}
-UNITS |= {"x_s": "m", "x_a": "m"} | {f"F_{d}": "N" for d in TOOL_DIRECTIONS} | {f"x_{d}": "m" for d in TOOL_DIRECTIONS}
+PORT_UNITS = {"M_add": "N.m", "M_a": "N.m", "n_add": "rad/s", "n_a": "rad/s", "n_s": "rad/s", "n_ffw": "rad/s"}
+PORT_UNITS |= (
+    {"x_s": "m", "x_a": "m"} | {f"F_{d}": "N" for d in TOOL_DIRECTIONS} | {f"x_{d}": "m" for d in TOOL_DIRECTIONS}
+)
 
 FAST_INPUTS = ("n_add", "M_add", "M_a")  # per axis, sampled every T_c
 SLOW_INPUTS = ("x_s", "n_ffw")  # per axis, sampled every T_pos
@@ -362,4 +364,4 @@ class LinearSystem:
 
 def unit_of(output: str, name: str) -> str:
     """Unit of the response of `output` to `name`, such as "(rad/s)/(N.m)"; "1" where both have the same."""
-    return quotient_unit(*(UNITS[each.partition(".")[2]] for each in (output, name)))
+    return quotient_unit(*(PORT_UNITS[each.partition(".")[2]] for each in (output, name)))

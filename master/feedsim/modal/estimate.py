@@ -21,8 +21,8 @@ LEAST_PERIODS = 3
 REPEATS = 0.1  # share of the input's variance by which one period may differ from the next
 # Of the largest line of the input, and of the median of what is above that: less is no excitation, but what the input
 # answers with (harmonics).
-EXCITED, USUAL = 0.1, 0.4
-CERTAIN = 5.0  # standard deviations that an excited line has to stand out of its scatter
+EXCITED, MEDIAN_SHARE = 0.1, 0.4
+LINE_SIGMAS = 5.0  # standard deviations that an excited line has to stand out of its scatter
 SEGMENTS = 8  # that a record without a period is cut into at least, with half overlap twice as many
 COHERENT = 0.5  # least coherence of a line that is used
 
@@ -116,10 +116,10 @@ def _by_periods(
     frequency = np.arange(1, U.shape[1] + 1) / (period * interval)
     size = np.sqrt(power)
     excited = size > EXCITED * np.max(size)
-    excited &= size > USUAL * np.median(size[excited])
+    excited &= size > MEDIAN_SHARE * np.median(size[excited])
     if len(inputs) == 1 and count > 2:
         mean = np.abs(np.mean(U, axis=0))
-        excited &= mean > CERTAIN * np.std(U, axis=0) / np.sqrt(count)
+        excited &= mean > LINE_SIGMAS * np.std(U, axis=0) / np.sqrt(count)
     values, relative = {}, {}
     for name, lines in Y.items():
         cross = np.mean(lines * np.conj(U), axis=0)

@@ -23,9 +23,9 @@ from feedsim.trace.response import Complexes
 from feedsim.trace.trace import Array
 
 MOTOR, SCALE = "motor", "scale"
-NEAR = 0.1  # share of a frequency within which a measured dip or peak is that of the fit
+DIP_DISTANCE = 0.1  # share of a frequency within which a measured dip or peak is that of the fit
 OFF = 0.1  # share by which inertia and lead may differ from the machine's without a word
-POOR = 3.0, 30.0  # dB and degrees that 90 % of the motor's lines have to be within
+MAX_DEVIATIONS = 3.0, 30.0  # dB and degrees that 90 % of the motor's lines have to be within
 HELD = 0.9  # share of the lines that a fit is judged by
 
 
@@ -72,10 +72,11 @@ def identify_modes(measured: Measured, machine_modes: Modes, axis: str, modes: i
             float(np.quantile(np.abs(np.degrees(np.angle(ratio))), HELD)),
         )
     decibel, degrees = left[MOTOR]
-    if decibel > POOR[0] or degrees > POOR[1]:
+    if decibel > MAX_DEVIATIONS[0] or degrees > MAX_DEVIATIONS[1]:
         raise InputError(
             f"axis {axis}: a rigid body with up to {MOST_MODES} modes and a delay meets 90 % of the lines within "
-            f"{decibel:.2g} dB and {degrees:.2g} degrees only; {POOR[0]:g} dB and {POOR[1]:g} degrees are allowed. Is "
+            f"{decibel:.2g} dB and {degrees:.2g} degrees only; {MAX_DEVIATIONS[0]:g} dB and {MAX_DEVIATIONS[1]:g} "
+            "degrees are allowed. Is "
             "the input the torque or current at the motor, and not the setpoint of a closed loop? Else choose lines "
             "(--band)"
         )
@@ -116,7 +117,7 @@ def _lead(modes: Modes, axis: str) -> float:
 
 def _near(frequency: Array, height: Array, at: float) -> float:
     """The highest measured line near a frequency, by a parabola through it and its neighbours [Hz]."""
-    near = np.flatnonzero(np.abs(frequency / at - 1) < NEAR)
+    near = np.flatnonzero(np.abs(frequency / at - 1) < DIP_DISTANCE)
     if len(near) < 3:
         return float("nan")
     k = int(near[np.argmax(height[near])])

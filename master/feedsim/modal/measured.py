@@ -24,7 +24,7 @@ from feedsim.trace.trace import Array
 # Units of a channel -> how often it is differentiated in time to be an acceleration.
 OUTPUTS = {"rad": 2, "m": 2, "rad/s": 1, "m/s": 1, "rad/s^2": 0, "m/s^2": 0}
 INPUTS = ("N.m", "A")
-EVEN = 1e-3  # of an interval: by how much sampling may be uneven
+EVEN_INTERVAL_SHARE = 1e-3  # of an interval: by how much sampling may be uneven
 COHERENT = 0.5  # least coherence of a line of a file that is used
 
 
@@ -191,7 +191,7 @@ def _interval(recording: Recording, channel: Channel | None) -> float:
     values = recording.read([name])[name] * float(units.factor(unit, "s"))
     steps = np.diff(values)
     h = float(np.median(steps)) if len(steps) else 0.0
-    if not h > 0 or float(np.max(np.abs(steps - h))) > EVEN * h:
+    if not h > 0 or float(np.max(np.abs(steps - h))) > EVEN_INTERVAL_SHARE * h:
         raise InputError(
             f"{path}: samples are {1e3 * float(np.min(steps, initial=0)):.6g} to "
             f"{1e3 * float(np.max(steps, initial=0)):.6g} ms apart; a frequency response needs even ones"

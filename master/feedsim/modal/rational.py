@@ -33,10 +33,10 @@ FINAL = 1e-12  # of the cost: the last fit ends there
 BETTER = 0.05  # share of the predicted residual that a further mode has to take away
 MOST_MODES = 5
 LEAST_LINES = 20
-GRID = 80  # frequencies at which a further mode is tried
+TRIAL_FREQUENCIES = 80  # frequencies at which a further mode is tried
 TRIED_DAMPING = (0.01, 0.04)
 LOW_D, HIGH_D = 1e-4, 0.7
-LONGEST = 5e-3  # [s] of a delay
+MAX_DELAY = 5e-3  # [s] of a delay
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ class _Lines:
 
     def bounds(self, shape: _Shape) -> tuple[Array, Array]:
         first, last = float(np.abs(self.s[0])), float(np.abs(self.s[-1]))
-        own = [(-LONGEST, LONGEST), *[(-np.inf, np.inf)] * (1 + shape.modes)]
+        own = [(-MAX_DELAY, MAX_DELAY), *[(-np.inf, np.inf)] * (1 + shape.modes)]
         ends = [(np.log(1e-3 * first), np.log(10 * first))]
         ends += [(np.log(first), np.log(last)), (np.log(LOW_D), np.log(HIGH_D))] * shape.modes
         ends += own * shape.outputs
@@ -241,7 +241,7 @@ def _chain(problem: _Lines, lines: Lines, most: int) -> list[Array]:
     shape = _Shape(outputs, 0)
     begin = shape.without_residues(np.array([np.log(0.3 * first)]), np.zeros(outputs), s, G, weight)
     found = [problem.solved(shape, begin, lines)]
-    grid = np.geomspace(1.1 * first, 0.95 * float(np.abs(problem.s[-1])), GRID)
+    grid = np.geomspace(1.1 * first, 0.95 * float(np.abs(problem.s[-1])), TRIAL_FREQUENCIES)
     for count in range(1, most + 1):
         before, last = shape, found[-1]
         shape = _Shape(outputs, count)

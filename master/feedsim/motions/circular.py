@@ -21,7 +21,7 @@ from feedsim.motions.profile import Profile
 
 Direction = Literal["counterclockwise", "clockwise"]
 # Sense of a turn -> its word: +1 from the first axis towards the second.
-DIRECTIONS: dict[int, Direction] = {1: "counterclockwise", -1: "clockwise"}
+SENSE_WORDS: dict[int, Direction] = {1: "counterclockwise", -1: "clockwise"}
 
 # How far an arc's programmed end point may lie off the circle through its start [m]; it then ends on the circle.
 END_POINT_TOLERANCE = 1e-6
@@ -51,7 +51,7 @@ class PlaneMotion(PathMotion):
 
 
 def _sense(direction: Direction) -> int:
-    return {word: sense for sense, word in DIRECTIONS.items()}[direction]
+    return {word: sense for sense, word in SENSE_WORDS.items()}[direction]
 
 
 class Arc(PlaneMotion):

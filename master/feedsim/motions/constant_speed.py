@@ -15,7 +15,7 @@ from feedsim.motions.kind import LIST_OR_RANGE, Array, Course, Geometry, MotionK
 from feedsim.motions.profile import Profile, rest_to_rest
 
 # Time at constant speed [s] below which a stroke says nothing of the stationary friction: the drive settles in it.
-SHORTEST = 0.1
+MIN_CONSTANT_TIME = 0.1
 
 Speed = Annotated[float, Quantity("m/s", above=0)]
 
@@ -144,7 +144,7 @@ class ConstantSpeed(MotionKind):
         for speed in self.feeds:
             ramp = ramp_time(speed, acceleration, jerk)
             at_speed = min(max(self.duration, self.distance / speed), room / speed - ramp)
-            wanted = min(SHORTEST, self.duration)
+            wanted = min(MIN_CONSTANT_TIME, self.duration)
             if at_speed >= wanted:
                 profiles.append(rest_to_rest(speed * (ramp + at_speed), speed, acceleration, jerk))
                 continue

@@ -16,7 +16,7 @@ from feedsim.motions.kind import Array, Course, Geometry, MotionKind, Peaks, Sta
 # Points of the interpolator per period. With 10 of them the spline's amplitude is (2 pi/10)^4/384 = 4e-4 off.
 FEWEST_POINTS = 10
 # Instants per period at which the peaks while fading are looked for; the largest is met within 1e-4 of itself.
-LOOKED_AT = 256
+INSTANTS_PER_PERIOD = 256
 
 
 class SineMove(Model):
@@ -131,7 +131,7 @@ def _window(s: Array) -> tuple[Array, Array, Array]:
 def _peaks(move: SineMove, fade: float) -> tuple[float, float]:
     """Largest speed [m/s] and acceleration [m/s2] (magnitudes)."""
     periods = fade + 1
-    t = np.linspace(0, periods / move.frequency, math.ceil(periods * LOOKED_AT) + 1)
+    t = np.linspace(0, periods / move.frequency, math.ceil(periods * INSTANTS_PER_PERIOD) + 1)
     _, v, a = faded_sine(move, fade, t)
     omega = 2 * math.pi * move.frequency
     return max(move.amplitude * omega, float(np.abs(v).max())), max(move.amplitude * omega**2, float(np.abs(a).max()))

@@ -35,7 +35,7 @@ FEWEST_STAGES, MOST_STAGES = 3, 20  # of the shift register
 # Lines of a held sequence weaker than this share of its strongest say little: those about a zero of the hold.
 WEAKEST_LINE = 0.1
 MOST_DECIMATIONS = 256  # sequences of a length to choose from
-ROUNDING = 1e-9
+LINE_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def multisine(
     if spacing not in ("linear", "logarithmic"):
         raise InputError(f"spacing {spacing!r} of a multisine: linear or logarithmic is expected")
     per_cycle = round(cycles.T_pos / cycles.T_c)
-    zones = max(1, math.ceil(2 * high * cycles.T_pos - ROUNDING))
+    zones = max(1, math.ceil(2 * high * cycles.T_pos - LINE_ROUNDING))
     position_cycles = max(1, round(zones / (resolution * cycles.T_pos)))
     if position_cycles * per_cycle > MOST_SAMPLES:
         raise InputError(
@@ -116,7 +116,7 @@ def multisine(
             f"allowed are {MOST_SAMPLES * cycles.T_c:.6g} s"
         )
     period = position_cycles * cycles.T_pos
-    first, last = math.ceil(low * period - ROUNDING), math.floor(high * period + ROUNDING)
+    first, last = math.ceil(low * period - LINE_ROUNDING), math.floor(high * period + LINE_ROUNDING)
     lines = distinct_lines(np.arange(max(first, 1), last + 1), position_cycles, zones)
     if spacing == "logarithmic" and lines.size:
         wanted = math.ceil(math.log10(last / max(first, 1)) * lines_per_decade) + 1
@@ -206,7 +206,7 @@ def binary_sequence(
     strength = np.abs(np.fft.rfft(once))
     harmonics = np.arange(len(strength))
     frequency = harmonics / (length * cycles.T_c)
-    inside = (frequency >= low * (1 - ROUNDING)) & (frequency <= high * (1 + ROUNDING)) & (harmonics > 0)
+    inside = (frequency >= low * (1 - LINE_ROUNDING)) & (frequency <= high * (1 + LINE_ROUNDING)) & (harmonics > 0)
     lines = harmonics[inside & (strength > WEAKEST_LINE * strength.max())] * repeats
     if not lines.size:
         raise InputError(

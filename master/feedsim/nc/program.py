@@ -21,14 +21,14 @@ from feedsim.motions import Motion
 from feedsim.motions.kind import Array, Course, Peaks, Points, Start
 from feedsim.motions.points import Held, Joined
 from feedsim.nc.segment import Program, Segment
-from feedsim.nc.spline import BLOCK, LongSpline
+from feedsim.nc.spline import SPLINE_POINTS, LongSpline
 from feedsim.scenario import Axis, Machine, Scenario
 from feedsim.trace import Table
 
 # Position cycles that a program may have; its setpoints then take about 2 GB for three axes, in a file.
-LONGEST = 40_000_000
+MAX_POSITION_CYCLES = 40_000_000
 # Limits are compared with results of arithmetic on them: a relative 1e-9, and 1 nm of travel, are rounding.
-ROUNDING = 1e-9
+LIMIT_ROUNDING = 1e-9
 
 
 # Position [m] and speed [m/s] of an axis at position cycles, counted from the first one of its piece.
@@ -119,13 +119,13 @@ def plan(scenario: Scenario, *, scratch: Path | None = None) -> Program:
             found = list(error.problems)
             _leave_out(state, motion)
         cycles = state.instant * _ratio(machine)
-        if cycles > LONGEST:
+        if cycles > MAX_POSITION_CYCLES:
             found.append(
                 f"the program lasts {cycles * machine.cycles.T_pos:.6g} s up to its end, which is {cycles:.3g} "
-                f"position cycles; allowed: {LONGEST:.3g}"
+                f"position cycles; allowed: {MAX_POSITION_CYCLES:.3g}"
             )
         state.problems += [f"{scenario.at('motions', index)} ({motion.kind}): {problem}" for problem in found]
-        if cycles > LONGEST:
+        if cycles > MAX_POSITION_CYCLES:
             break
     if state.problems:
         raise InputError.of(f"{scenario.file}: the motions cannot be driven", state.problems)
@@ -153,7 +153,7 @@ def _append(state: _Plan, scenario: Scenario, index: int, motion: Motion) -> lis
         time=state.instant * cycles.T_ipo,
         T_ipo=cycles.T_ipo,
         T_pos=cycles.T_pos,
-        most=LONGEST // _ratio(machine) - state.instant,
+        most=MAX_POSITION_CYCLES // _ratio(machine) - state.instant,
         acceleration=machine.path.acceleration,
         jerk=machine.path.jerk,
         travel={name: axis.travel for name, axis in machine.axes.items()},
@@ -217,8 +217,8 @@ def _sample(state: _Plan, scenario: Scenario, scratch: Path | None) -> Program:
         for axis in axes:
             sampled[axis] = piece.sampled(axis, held[axis], ratio, cycles.T_ipo)
             held[axis] = piece.end(axis, held[axis])
-        for begin in range(first, last, BLOCK * ratio):
-            instants = np.arange(begin, min(begin + BLOCK * ratio, last))
+        for begin in range(first, last, SPLINE_POINTS * ratio):
+            instants = np.arange(begin, min(begin + SPLINE_POINTS * ratio, last))
             block = np.empty((1 + 2 * len(axes), len(instants)))
             block[0] = instants * cycles.T_pos
             for i, axis in enumerate(axes):
@@ -241,16 +241,18 @@ def violations(name: str, axis: Axis, start: float, peaks: Peaks) -> list[str]:
     """
     found = []
     least, most = axis.travel
-    outside = [x for x in (peaks.low, peaks.high) if x != start and not least - ROUNDING <= x <= most + ROUNDING]
+    outside = [
+        x for x in (peaks.low, peaks.high) if x != start and not least - LIMIT_ROUNDING <= x <= most + LIMIT_ROUNDING
+    ]
     if outside:
         reached = " and ".join(f"{x * 1e3:.7g}" for x in dict.fromkeys(outside))
         found.append(f"axis {name} reaches {reached} mm; allowed travel {least * 1e3:.7g} to {most * 1e3:.7g} mm")
-    if peaks.speed > axis.max_speed * (1 + ROUNDING):
+    if peaks.speed > axis.max_speed * (1 + LIMIT_ROUNDING):
         found.append(
             f"axis {name} reaches a speed of {peaks.speed * 60:.5g} m/min; "
             f"allowed at most {axis.max_speed * 60:.5g} m/min"
         )
-    if peaks.acceleration > axis.max_acceleration * (1 + ROUNDING):
+    if peaks.acceleration > axis.max_acceleration * (1 + LIMIT_ROUNDING):
         found.append(
             f"axis {name} reaches an acceleration of {peaks.acceleration:.5g} m/s^2; "
             f"allowed at most {axis.max_acceleration:.5g} m/s^2"

@@ -19,7 +19,7 @@ from feedsim.motions.kind import Array, Points
 REST_POINTS = 28
 # Points between which a spline is solved at a time, and how far it then reaches on to either side: what begins
 # differently there is the same to the last bit long before.
-BLOCK, OVERLAP = 1 << 14, 96
+SPLINE_POINTS, SPLINE_OVERLAP = 1 << 14, 96
 
 
 class RestSpline:
@@ -76,7 +76,7 @@ def _clamped(y: Array) -> Array:
 class LongSpline:
     """A :class:`RestSpline` of step 1, solved a block of points at a time, in memory that does not grow with them."""
 
-    def __init__(self, points: Points, block: int = BLOCK) -> None:
+    def __init__(self, points: Points, block: int = SPLINE_POINTS) -> None:
         self._points, self._block, self._count = points, block, len(points)
         self._whole = RestSpline(points, 1.0) if self._count <= block else None
         self._at, self._solved = -1, self._whole
@@ -97,7 +97,7 @@ class LongSpline:
 
     def _of(self, block: int) -> RestSpline:
         if self._at != block or self._solved is None:
-            first, last = block * self._block - OVERLAP, (block + 1) * self._block + OVERLAP
+            first, last = block * self._block - SPLINE_OVERLAP, (block + 1) * self._block + SPLINE_OVERLAP
             self._solved = RestSpline(
                 self._points, 1.0, (max(first, -REST_POINTS), min(last, self._count + REST_POINTS - 1))
             )

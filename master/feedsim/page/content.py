@@ -41,15 +41,15 @@ from feedsim.scenario.coupling import SCHEMES
 from feedsim.structure import Modes, checked_modes
 
 # Longer runs take a phone more than a second or two at every turn of a knob.
-LONGEST = 60.0  # s
+MAX_RUN_TIME = 60.0  # s
 MOST_CYCLES = 1_000_000
 # [1/s]: with no larger K_v does a page look closely at modes with the motors held.
 MOST_K_V = 1e4
 PER_AXIS = ("x_a", "n_a", "x_e", "M_a", "M_fr")
-TOOL = ("tcp.x_X", "tcp.x_Y", "tcp.x_Z")
+TOOL_COLUMNS = ("tcp.x_X", "tcp.x_Y", "tcp.x_Z")
 # Of so many degrees of freedom and more, the page has a series for Student's quantile, as feedsim.analysis has.
-FEW = 20
-KINDS = {"Real": "r", "Integer": "i", "Boolean": "b"}
+SERIES_FREEDOM = 20
+TYPE_LETTERS = {"Real": "r", "Integer": "i", "Boolean": "b"}
 
 
 @dataclass(frozen=True)
@@ -102,10 +102,10 @@ def check(scenario: Scenario, program: Program) -> None:
         f"{scenario.at('loads', i)}: the load {load.words} does not go into a page: --set loads=[] leaves it out"
         for i, load in enumerate(scenario.loads)
     ]
-    if program.duration > LONGEST or cycles > MOST_CYCLES:
+    if program.duration > MAX_RUN_TIME or cycles > MOST_CYCLES:
         problems.append(
             f"{scenario.file}: the motions last {program.duration:.4g} s, {cycles:.3g} control cycles; a page computes "
-            f"them at every turn of a knob: allowed are {LONGEST:g} s and {MOST_CYCLES:.0e} cycles"
+            f"them at every turn of a knob: allowed are {MAX_RUN_TIME:g} s and {MOST_CYCLES:.0e} cycles"
         )
     if problems:
         raise InputError.of(f"{scenario.file}: there is no page of it", problems)
@@ -121,7 +121,7 @@ def _machine(scenario: Scenario, archive: Archive) -> dict[str, Any]:
     """Axes, cycles, limits, and where signals are in the unit."""
     machine = scenario.machine
     axes = list(machine.axes)
-    signals = [*(f"{axis}.{name}" for axis in axes for name in PER_AXIS), *TOOL]
+    signals = [*(f"{axis}.{name}" for axis in axes for name in PER_AXIS), *TOOL_COLUMNS]
     names = [*signals, *(f"{axis}.{flag}" for axis in axes for flag in LIMITS), "coupling.friction",
              *(f"{axis}.{name}" for axis in axes for name in ("M_0", "drive.K_v"))]  # fmt: skip
     cycles = machine.cycles
@@ -135,8 +135,8 @@ def _machine(scenario: Scenario, archive: Archive) -> dict[str, Any]:
         "signs": {name: axis.display_sign for name, axis in machine.axes.items()},
         "feeds": [_reference(archive, f"{axis}.{name}")[0] for axis in axes for name in ("x_s", "n_ffw")],
         "every": round(scenario.recording.interval / cycles.T_c), "signals": signals, "flags": list(LIMITS),
-        "students": [student(free) for free in range(2, FEW)],
-        "references": {name: _reference(archive, name) for name in names}, "longest": LONGEST,
+        "students": [student(free) for free in range(2, SERIES_FREEDOM)],
+        "references": {name: _reference(archive, name) for name in names}, "longest": MAX_RUN_TIME,
     }  # fmt: skip
 
 
@@ -174,7 +174,7 @@ def _table(modes: Modes, machine: Machine) -> dict[str, Any]:
 
 def _reference(archive: Archive, name: str) -> list[Any]:
     variable = archive.variables[name]
-    return [int(variable.valueReference), KINDS[str(variable.type)]]
+    return [int(variable.valueReference), TYPE_LETTERS[str(variable.type)]]
 
 
 def _knob(knob: Knob, archive: Archive) -> dict[str, Any]:

@@ -33,7 +33,7 @@ from feedsim.report.style import PALETTE
 from feedsim.trace.files import written_whole
 
 # With a plant of thousands of modes or a grid of poses; a mail takes it, and a phone.
-LARGEST = 1_500_000  # bytes
+MAX_PAGE_BYTES = 1_500_000  # bytes
 MARK = b'content="feedsim page"'
 
 
@@ -56,9 +56,10 @@ def page(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> byte
     Raises InputError: there is no such page (:func:`feedsim.page.content.content`), or it is too large.
     """
     content = html(run, wanted, fmus).encode()
-    if len(content) > LARGEST:
+    if len(content) > MAX_PAGE_BYTES:
         raise InputError(
-            f"{run.scenario.file}: its page takes {len(content) / 1e6:.3g} MB; allowed are {LARGEST / 1e6:g} MB: "
+            f"{run.scenario.file}: its page takes {len(content) / 1e6:.3g} MB; allowed are {MAX_PAGE_BYTES / 1e6:g} "
+            "MB: "
             "take fewer modes (feedsim machine build), no grid of poses, or shorter motions that a page does not plan"
         )
     return content

@@ -22,7 +22,7 @@ from feedsim.scenario.machine import EFFECTS, Axis
 from feedsim.variables import Variable
 
 # Shown where nobody chooses, of every axis that a motion moves.
-USUAL = {
+DEFAULT_KNOBS = {
     "drive": ("K_v", "T_sym", "k_ffw", "K_p", "T_n"),
     "friction": ("F_S", "F_C", "W", "gamma", "sigma_0"),
 }
@@ -46,7 +46,7 @@ SETTINGS = (
 FIXED = ("T_c", "T_pos", "I_P")
 # How far a slider goes about the scenario's value; a number may be typed beyond, within the table's range.
 REACH = 4.0
-SYMBOLS = {"1": ""}
+UNIT_TEXTS = {"1": ""}
 SHOWN_UNIT = {"1/s": "(m/min)/mm"}
 
 
@@ -94,7 +94,10 @@ def chosen(scenario: Scenario, wanted: Sequence[str], *, planned: bool) -> list[
     if not wanted:
         moved = {axis for motion in scenario.motions for axis in motion.axes} or set(scenario.machine.axes)
         usual = {
-            f"machine.axes.{axis}.{part}.{name}" for axis in moved for part, names in USUAL.items() for name in names
+            f"machine.axes.{axis}.{part}.{name}"
+            for axis in moved
+            for part, names in DEFAULT_KNOBS.items()
+            for name in names
         } | {f"machine.axes.{axis}.drive.{CORRECTION}" for axis in moved}
         return [knob for knob in known if knob.motion or knob.key in usual or _is_on(knob)]
     lost = [pattern for pattern in wanted if not any(fits(knob, pattern) for knob in known)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from feedsim.errors import InputError
 from feedsim.installation import checkout
 
-FILE = "machine.wasm"
+MODULE_FILE = "machine.wasm"
 SECTION = b"feedsim"
 MAGIC = b"\0asm\1\0\0\0"
 
@@ -19,7 +19,7 @@ def read(fmus: Path, guid: str) -> bytes:
     Raises:
         InputError: it is missing, no module, or built from another table of variables.
     """
-    path = fmus / FILE
+    path = fmus / MODULE_FILE
     mend = "`make page-module` builds it" if checkout() else "a wheel of feedsim brings it along: install it anew"
     if not path.is_file():
         raise InputError(f"{path}: there is no module of the machine for pages; {mend}")

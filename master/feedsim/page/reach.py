@@ -16,14 +16,14 @@ from feedsim.nc import Program
 from feedsim.page.knobs import REACH
 from feedsim.scenario import Machine
 from feedsim.structure.pack import POSES_IN_ARCHIVE
-from feedsim.structure.pose_change import LARGE, NEAR, over_axis, pose_change, warnings
+from feedsim.structure.pose_change import LARGE_SHIFT, MIN_POSE_DISTANCE, over_axis, pose_change, warnings
 from feedsim.structure.poses_file import GridAxis, read_grid
 
 # Distance of positions at which modes are carried along [m]: up to some times what the program reaches, and beyond.
 # Between close ones a cubic is right to some 1e-5 of a frequency.
-CLOSE, WIDE, USUAL = 0.02, 0.06, 1.6
+CLOSE_DISTANCE, WIDE_DISTANCE, REACH_FACTOR = 0.02, 0.06, 1.6
 # Where no mode changes by more than this share of what is worth a warning as far as sliders reach, none are carried.
-QUIET = 0.5
+NEGLIGIBLE_CHANGE = 0.5
 
 
 def reached(machine: Machine, program: Program) -> dict[str, tuple[float, float]]:
@@ -42,7 +42,8 @@ def described(machine: Machine, program: Program, resources: Path) -> dict[str, 
     grid = _grid(machine, resources)
     return {
         "grid": {axis.axis: list(axis.reach) for axis in grid if len(axis.centres) > 1},
-        "over": dict(_over(machine, program, {axis.axis for axis in grid})), "near": NEAR, "large": LARGE,
+        "over": dict(_over(machine, program, {axis.axis for axis in grid})), "near": MIN_POSE_DISTANCE,
+        "large": LARGE_SHIFT,
     }  # fmt: skip
 
 
@@ -62,12 +63,12 @@ def _grid(machine: Machine, resources: Path) -> tuple[GridAxis, ...]:
 def _over(machine: Machine, program: Program, followed: set[str]) -> Iterator[tuple[str, Mapping[str, Any]]]:
     for axis, (low, high) in reached(machine, program).items():
         pose = machine.pose[axis]
-        if axis in followed or max(pose - low, high - pose) <= NEAR:
+        if axis in followed or max(pose - low, high - pose) <= MIN_POSE_DISTANCE:
             continue
         ends = over_axis(machine, axis, [low, high])
         if ends is None:
             continue
-        if ends.largest < QUIET * LARGE:
+        if ends.largest < NEGLIGIBLE_CHANGE * LARGE_SHIFT:
             yield axis, {"low": low, "high": high}
             continue
         here = program.reached(axis)
@@ -83,11 +84,11 @@ def _over(machine: Machine, program: Program, followed: set[str]) -> Iterator[tu
 
 
 def _steps(far: float, near: float) -> list[float]:
-    """Distances from the pose on one side [m], up to `far`; close together up to USUAL times `near`."""
-    if far <= NEAR:
+    """Distances from the pose on one side [m], up to `far`; close together up to REACH_FACTOR times `near`."""
+    if far <= MIN_POSE_DISTANCE:
         return []
-    close = min(USUAL * max(near, 0.0), far)
-    count, wide = max(math.ceil(close / CLOSE), 1), math.ceil((far - close) / WIDE)
+    close = min(REACH_FACTOR * max(near, 0.0), far)
+    count, wide = max(math.ceil(close / CLOSE_DISTANCE), 1), math.ceil((far - close) / WIDE_DISTANCE)
     return [
         *(k * close / count for k in range(1, count + 1)),
         *(close + k * (far - close) / wide for k in range(1, wide + 1)),

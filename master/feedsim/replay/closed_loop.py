@@ -32,11 +32,11 @@ from feedsim.trace.trace import Array
 
 Mask = NDArray[np.bool_]
 
-SETTLED = 0.6  # [s] at rest ahead of the record
+SETTLING_TIME = 0.6  # [s] at rest ahead of the record
 BEFORE = 2.0  # [s] of the record ahead of a window that are run, too
 # What drive and friction bring along is not known where a record begins in motion; it has died away after that.
-UNKNOWN = 0.1  # [s]
-BEHIND = 4  # position cycles that the program goes on behind the last row
+START_TRANSIENT = 0.1  # [s]
+CYCLES_BEHIND = 4  # position cycles that the program goes on behind the last row
 # The setpoint moves where its speed is more than a share of the top speed; the axis follows for a while behind.
 MOVES, FOLLOWS = 1e-4, 0.02  # share, [s]
 
@@ -109,7 +109,7 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
 
     window: begin and end [s]; an end of inf is that of the stretch.
 
-    Of a stretch that begins in motion the first UNKNOWN do not count.
+    Of a stretch that begins in motion the first START_TRANSIENT do not count.
 
     Raises InputError: no stretch without a gap holds the window, or less than ten rows of it.
     """
@@ -141,7 +141,7 @@ def windowed(axis: str, read: Recorded, window: tuple[float, float] | None) -> A
     slack = 0.5 * record.interval
     rows = np.asarray((record.time >= begin - slack) & (record.time <= end + slack))
     if _begins_in_motion(record):
-        rows &= np.asarray(record.time >= record.time[0] + UNKNOWN)
+        rows &= np.asarray(record.time >= record.time[0] + START_TRANSIENT)
     if np.count_nonzero(rows) < 10:
         raise InputError(f"{read.provenance.file}: {np.count_nonzero(rows)} rows in the window; at least 10 are needed")
     return AxisRecord(axis, record, pitch / (2 * np.pi), rows)
@@ -187,7 +187,7 @@ class Replay:
             self._into[axis] = speed_change(speed, *limits)
             self.pose[axis] = float(each.setpoint[0]) - self._into[axis].distance
         run_in = max(change.duration for change in self._into.values())
-        self.lead = self.interval * np.ceil((SETTLED + run_in) / self.interval)
+        self.lead = self.interval * np.ceil((SETTLING_TIME + run_in) / self.interval)
         self._programs: dict[float, Program] = {}
         self._loads = [self._load(each) for each in records.values() if each.record.load is not None]
 
@@ -215,7 +215,7 @@ class Replay:
 
     def _planned(self, machine: Machine, T_pos: float) -> Program:
         length = float(self.time[-1] - self.time[0])
-        count = int(np.ceil((self.lead + length) / T_pos)) + BEHIND
+        count = int(np.ceil((self.lead + length) / T_pos)) + CYCLES_BEHIND
         time = T_pos * np.arange(count + 1, dtype=np.float64)
         x_s = {axis: np.full(len(time), position) for axis, position in machine.pose.items()}
         n_ffw = {axis: np.zeros(len(time)) for axis in machine.axes}

@@ -23,7 +23,7 @@ from feedsim.trace.trace import Array
 TO_RPM = 30 / np.pi
 BINS = 60  # of the position
 LATEST = 5e-3  # [s]: no channel of a control is later than that against another
-NEAR = 0.98  # of a torque limit: what the record shows of it, behind its filters
+NEAR_TORQUE_LIMIT = 0.98  # of a torque limit: what the record shows of it, behind its filters
 LEAST_STILL = 10  # rows at standstill that make a figure
 HELPS = 0.99  # of what is left without a delay
 
@@ -78,7 +78,7 @@ class Comparison:
         found: list[str] = []
         torque = self.each.record.torque[self.each.rows] if self.each.record.driven else np.zeros(1)
         recorded = float(np.max(np.abs(torque), initial=0.0))
-        if self.limited and not NEAR * self.limit < recorded < self.limit / NEAR:
+        if self.limited and not NEAR_TORQUE_LIMIT * self.limit < recorded < self.limit / NEAR_TORQUE_LIMIT:
             found.append(Wrong(
                 f"axis {self.axis}: the simulated drive is at its torque limit, M_max = {self.limit:.4g} N.m, in "
                 f"{100 * self.limited:.2g} % of the rows, and that of the record is not; give the limit that the "

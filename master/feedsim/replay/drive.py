@@ -41,7 +41,7 @@ from feedsim.replay.selection import (
     with_elastic_modes,
 )
 from feedsim.replay.start import Begin
-from feedsim.replay.tuning import FINAL, ROUGH, Problem, Tuned
+from feedsim.replay.tuning import FINAL_TOLERANCE, FIRST_TOLERANCE, Problem, Tuned
 from feedsim.scenario import Machine
 from feedsim.structure import checked_modes
 
@@ -49,9 +49,9 @@ Known = TypeVar("Known")
 
 # Of the way per row, of the top speed: a regression that leaves more is a start, not an answer.
 EXACT_DELAY, EXACT_GAIN = 1e-5, 1e-6
-LEAST_ROWS = 50  # in which the axis moves
+MIN_MOVING_ROWS = 50  # in which the axis moves
 MOST_TURNS = 8  # of fits and weights in turns; two or three do where the start is near
-SETTLED = 0.01  # change of a weight that moves no value by what its interval shows
+WEIGHT_TOLERANCE = 0.01  # change of a weight that moves no value by what its interval shows
 DECISIVE = 2.0  # of the logarithm of the likelihood: below it two cycles are as likely as one another
 
 
@@ -135,9 +135,10 @@ def identify_drive(
             values["T_sym"] = min(values["T_sym"], taps.delay)
             values["T_dyn"] = taps.delay - values["T_sym"]
     rows = np.flatnonzero(each.moving)
-    if len(rows) < LEAST_ROWS:
+    if len(rows) < MIN_MOVING_ROWS:
         raise InputError(
-            f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least {LEAST_ROWS} are needed"
+            f"{each.record.name}: {len(rows)} rows in which axis {each.axis} moves; at least {MIN_MOVING_ROWS} are "
+            "needed"
         )
     problem = Problem(
         machine, each, Replay(machine, {each.axis: each}, fmus=fmus), candidates[0], total, J,
@@ -173,8 +174,8 @@ def identify_drive(
     for _ in range(MOST_TURNS):
         before = problem.weights
         problem.weigh(found)
-        found = problem.fitted(found.names, found.values, found, FINAL)
-        if all(abs(problem.weights[channel] / weight - 1) < SETTLED for channel, weight in before.items()):
+        found = problem.fitted(found.names, found.values, found, FINAL_TOLERANCE)
+        if all(abs(problem.weights[channel] / weight - 1) < WEIGHT_TOLERANCE for channel, weight in before.items()):
             break
     refuse_poor(each, found)
     found = problem.exact(found, central=True)
@@ -256,14 +257,14 @@ def _likelier(problem: Problem, found: Tuned, T_pos: float) -> float:
     problem.machine = machine.model_copy(update={"cycles": cycles})
     try:
         # Such a fit is nearer to its least than two cycles are to one another.
-        return likely(problem.fitted(found.names, found.values, found, ROUGH)) - likely(found)
+        return likely(problem.fitted(found.names, found.values, found, FIRST_TOLERANCE)) - likely(found)
     finally:
         problem.machine = machine
 
 
 def _first(problem: Problem, free: Sequence[str]) -> Tuned:
     """A first fit, whose weights are those of what is left."""
-    found = problem.fitted(free, {}, tolerance=ROUGH)
+    found = problem.fitted(free, {}, tolerance=FIRST_TOLERANCE)
     problem.weigh(found)
     found = problem.fitted(free, found.values, found)
     problem.weigh(found)

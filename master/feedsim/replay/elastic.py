@@ -28,7 +28,7 @@ from feedsim.structure.modes import Modes, write_modes
 from feedsim.trace.trace import Array
 
 MOST_MODES = 5
-GRID = 60  # frequencies
+RESONANCE_FREQUENCIES = 60  # frequencies
 DAMPING = (0.01, 0.03, 0.06, 0.1)
 # Below twice the position loop's corner its gains do the same as a mode; above a fifth of the rows' rate nothing shows.
 ABOVE_LOOP, BELOW_RATE = 2.0, 0.2
@@ -72,7 +72,7 @@ def resonance(each: AxisRecord, simulated: Array, per_row: int, K_v: float) -> R
     acceleration = np.gradient(np.gradient(simulated, h / per_row), h / per_row)
     low, high = ABOVE_LOOP * K_v / (2 * pi), BELOW_RATE / h
     best: tuple[float, Resonance] | None = None
-    for f in np.geomspace(low, high, GRID) if low < high else ():
+    for f in np.geomspace(low, high, RESONANCE_FREQUENCIES) if low < high else ():
         for D in DAMPING:
             A = _filtered(float(f), D, acceleration, h / per_row)[::per_row][rows]
             c = _solved(A, left[rows])

@@ -24,12 +24,12 @@ from feedsim.replay.elastic import KEYS, ElasticMode, modes_of
 from feedsim.replay.tuning import Problem, Tuned
 from feedsim.trace.trace import Array
 
-POOR = 0.3  # share of the torque, or of the lag, that a fit may leave
+MAX_RESIDUAL_SHARE = 0.3  # share of the torque, or of the lag, that a fit may leave
 EXACT = 1e-5  # of the travel: a position that a fit leaves within it is met, however small the lag
 ONE_WAY = 0.15  # share of the mean torque to which the constant load has to be known where the axis moves one way
 SHAPE = 0.25  # standard deviation of the friction, of itself, where only its usual shape separates it from the load
 STRETCHES = 8  # of the motion, each of which is left out once
-HIDDEN = 0.8  # share of the usual deviation that is left: the record does not determine the value
+PRIOR_SHARE = 0.8  # share of the usual deviation that is left: the record does not determine the value
 _CONTROLLER = variables.parameters("controller")
 ON_THE_MODEL = (
     "without the control's own speed setpoint or following error it rests on an axis that is taken to be rigid"
@@ -38,8 +38,8 @@ ONE_PHASE = (
     "the torque is recorded once a cycle of the position loop, at one phase of it: it may be a quarter too small; rows "
     "of a shorter interval show it"
 )
-ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "J", "M_0", "F_C", "F_S", "v_s", "F_log",
-         "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
+ESTIMATE_ORDER = ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p", "T_n", "omega_0", "D", "J", "M_0", "F_C", "F_S", "v_s",
+         "F_log", "sigma_0", "sigma_1", "sigma_2", "W", "gamma", "asymmetry", "delay")  # fmt: skip
 
 
 def refuse_poor(each: AxisRecord, found: Tuned) -> None:
@@ -52,10 +52,11 @@ def refuse_poor(each: AxisRecord, found: Tuned) -> None:
     exact = rms(found.position) <= EXACT * float(np.ptp(each.position[each.moving]))  # the setpoint may be the encoder
     for channel, (left, whole, scale, unit, meaning) in signal.items():
         judged = each.record.driven if channel == "torque" else not exact
-        if judged and left > POOR * whole:
+        if judged and left > MAX_RESIDUAL_SHARE * whole:
             raise InputError(
                 f"{each.record.name}, axis {each.axis}: the best fit leaves {scale * left:.3g} {unit} rms of a "
-                f"{meaning} of {scale * whole:.3g} {unit} rms while the axis moves; at most {100 * POOR:.0f} % are "
+                f"{meaning} of {scale * whole:.3g} {unit} rms while the axis moves; at most "
+                f"{100 * MAX_RESIDUAL_SHARE:.0f} % are "
                 "allowed. No drive is identified: check signs, units and pitch, give a longer window with motion in "
                 "both directions, or a machine to begin with (--machine)"
             )
@@ -101,7 +102,7 @@ def estimates_of(
         put("F_S", values["F_C"] + values[EXCESS], float(np.sqrt(rise @ covariance @ rise)), EXCESS)
     if known:
         result["J"] = replace(estimate("J", values["J"]), status="given", reason="of the machine's modes")
-    return {name: result[name] for name in ORDER if name in result}
+    return {name: result[name] for name in ESTIMATE_ORDER if name in result}
 
 
 def one_way(each: AxisRecord, estimates: Mapping[str, Estimate], only: str) -> dict[str, Estimate]:
@@ -177,7 +178,7 @@ def _judged(name: str, value: float, sigma: float, left: float) -> Estimate:
         found = Estimate(name, value, row.unit, row.short, sigma)
     else:
         found = estimate(name, value, sigma)
-    if left > HIDDEN:
+    if left > PRIOR_SHARE:
         return replace(found, status="undetermined", reason="the record hardly depends on it")
     return found.judged()
 

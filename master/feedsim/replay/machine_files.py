@@ -19,7 +19,7 @@ from feedsim.replay.elastic import ElasticMode
 from feedsim.scenario import Drive, Filter, Friction
 from feedsim.scenario.parameter_group import ParameterGroup
 
-TOOL = ("X", "Y", "Z")
+TOOL_AXES = ("X", "Y", "Z")
 CONTROL = 125e-6  # [s] control cycle of a machine that tells none
 ASSUMED = "assumed: the record does not show it"
 
@@ -74,7 +74,7 @@ def friction_file(axis: str) -> str:
 
 
 def _modes(axes: Mapping[str, RigidAxis]) -> str:
-    ports = [f"{kind}_{axis}" for kind in ("n", "x") for axis in axes] + [f"tcp_{axis}" for axis in TOOL]
+    ports = [f"{kind}_{axis}" for kind in ("n", "x") for axis in axes] + [f"tcp_{axis}" for axis in TOOL_AXES]
     lines = [",".join(["mode", "frequency [Hz]", "damping ratio [1]", *ports])]
     rows: list[tuple[float, float, dict[str, float]]] = []
     for axis, each in axes.items():

@@ -16,7 +16,7 @@ from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.identify import Recorded
 from feedsim.identify.open_loop import reached
-from feedsim.identify.parameters import FRICTION
+from feedsim.identify.parameters import FRICTION_NAMES
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.compare import Channel, Comparison
 from feedsim.scenario import Machine
@@ -42,7 +42,7 @@ def driven(
                     "what drives the axis"
                 )
             friction = machine.shipped_friction(axis, "a replay in open loop")
-            values = {name: float(getattr(friction, name)) for name in FRICTION}
+            values = {name: float(getattr(friction, name)) for name in FRICTION_NAMES}
             values |= {"J": checked_modes(machine).J_tot(axis), "M_0": machine.axes[axis].M_0}
             values["delay"] = read[axis].provenance.torque_delay or 0.0
             rows = np.flatnonzero(each.rows)

@@ -31,7 +31,7 @@ BLOCKS: Mapping[str, tuple[str, ...]] = {
 FOLDS = 4
 FAST = 0.1  # of the top speed: what is faster is another kind of motion
 BETTER = 2.0  # of the logarithm of the likelihood: what predicts hardly better is not worth having
-BLOCK = 0.05  # [s]: residuals further apart than that are taken to be independent
+INDEPENDENT_TIME = 0.05  # [s]: residuals further apart than that are taken to be independent
 
 
 def friction_parts(
@@ -158,4 +158,4 @@ def unpredicted(problem: Problem, found: Tuned, folds: Sequence[Rows]) -> tuple[
 
 def independent(problem: Problem, count: int) -> float:
     """How many of `count` rows say something of their own: neighbouring ones say the same."""
-    return count * problem.each.record.interval / BLOCK
+    return count * problem.each.record.interval / INDEPENDENT_TIME

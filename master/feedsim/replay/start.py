@@ -20,11 +20,11 @@ PRESLIDING = 5e-6  # [m] of travel after which friction is full
 ZONE = 0.06  # [rad] width of an engaging zone
 RESERVE = 1.5  # what the machine may do beyond what the record shows
 # Shares of the mean torque that friction may have of it, where the record does not separate it from the constant load.
-SHARES = (0.05, 0.15, 0.4)
+FRICTION_SHARES = (0.05, 0.15, 0.4)
 LEAST_TRAVEL = 0.01  # rad: a motor that turns less tells no drive
 SEPARATED = 0.5  # relative half width of F_C below which the rigid line separates friction from the constant load
 # A torque limit that is not known must not act: gentle moves tell nothing of the torque of rapid ones.
-NO_LIMIT = 20.0
+TORQUE_LIMIT_RATIO = 20.0
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def start_values(each: AxisRecord) -> Begin:
     there = moving & (way * each.speed > 0)
     n = float(np.mean(each.speed[there])) / each.I_P
     load = line["M_0"] + way * line["F_C"] + line["sigma_2"] * n
-    starts = [_values(each, J, J_sigma, load - way * share * abs(load), share * abs(load)) for share in SHARES]
+    starts = [_values(each, J, J_sigma, load - way * share * abs(load), share * abs(load)) for share in FRICTION_SHARES]
     if way * load > 0:  # friction alone may do it
         starts.append(_values(each, J, J_sigma, 0.0, max(abs(load), least)))
     if line["F_C"] > 0 and "M_0" in spread:
@@ -114,5 +114,5 @@ def limits(each: AxisRecord) -> Mapping[str, float]:
         "acceleration": RESERVE * float(np.max(np.abs(acceleration))),
         "jerk": RESERVE * float(np.max(np.abs(jerk))),
         "low": low - reserve, "high": high + reserve,
-        "torque": NO_LIMIT * float(np.max(np.abs(each.record.torque))),
+        "torque": TORQUE_LIMIT_RATIO * float(np.max(np.abs(each.record.torque))),
     }  # fmt: skip

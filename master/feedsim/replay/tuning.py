@@ -34,10 +34,10 @@ LEAST_DAMPING, DAMPING_DEVIATION = 0.7, 0.2
 LEAST_WEIGHT = {"position": 1e-9, "torque": 1e-3}
 
 # Share of the cost: predicted reduction of a step at which a fit ends. The cost counts independent rows, some hundred.
-# A fit that ends COMPARED off its least is off by a few hundredths of the logarithm of the likelihood, or a fifth of a
-# standard deviation; FINAL is a tenth of that, and a third of the deviation. ROUGH is to begin with, where weights are
-# guessed.
-ROUGH, COMPARED, FINAL = 3e-3, 2e-4, 3e-5
+# A fit that ends COMPARED_TOLERANCE off its least is off by a few hundredths of the logarithm of the likelihood, or a
+# fifth of a standard deviation; FINAL_TOLERANCE is a tenth of that, and a third of the deviation. FIRST_TOLERANCE is to
+# begin with, where weights are guessed.
+FIRST_TOLERANCE, COMPARED_TOLERANCE, FINAL_TOLERANCE = 3e-3, 2e-4, 3e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,11 @@ class Problem:
         }
 
     def fitted(
-        self, free: Sequence[str], begin: Mapping[str, float], near: Tuned | None = None, tolerance: float = COMPARED
+        self,
+        free: Sequence[str],
+        begin: Mapping[str, float],
+        near: Tuned | None = None,
+        tolerance: float = COMPARED_TOLERANCE,
     ) -> Tuned:
         """From `begin`, with the weights as they are, to where no step has a predicted reduction above that share.
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from feedsim.analysis import Figure
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-SMALL = Decimal("1e-4")  # below which a number is written with a power of ten
+EXPONENT_BELOW = Decimal("1e-4")  # below which a number is written with a power of ten
 DISPLAY_UNITS = {"um": "µm", "1": "", "deg": "°"}
 NOT_DETERMINED = "not determined"
 SHORT = 10.0  # [ms] a delay, of which microseconds are told
@@ -61,11 +61,11 @@ def minus(text: str) -> str:
 
 
 def powers(text: str) -> str:
-    """Numbers of a text that are smaller than SMALL, digit by digit, with a power of ten: 1.47×10⁻⁵."""
+    """Numbers of a text that are smaller than EXPONENT_BELOW, digit by digit, with a power of ten: 1.47×10⁻⁵."""
 
     def written(match: re.Match[str]) -> str:
         number = Decimal(match[0])
-        if not 0 < abs(number) < SMALL:
+        if not 0 < abs(number) < EXPONENT_BELOW:
             return match[0]
         mantissa, _, exponent = f"{number:e}".partition("e")
         return f"{mantissa}×10{str(int(exponent)).translate(SUPERSCRIPTS)}"
@@ -139,7 +139,7 @@ def three(value: float) -> str:
     """Three digits that count, zeros at the end among them; a dash where there is no number."""
     if not np.isfinite(value):
         return "–"
-    whole = abs(value) >= 100 or 0 < abs(value) < SMALL
+    whole = abs(value) >= 100 or 0 < abs(value) < EXPONENT_BELOW
     return minus(powers(f"{value:.3g}" if whole else f"{value:#.3g}".rstrip(".")))
 
 

@@ -14,7 +14,7 @@ from feedsim.report.chart.printed import printed
 from feedsim.report.style import PALETTE, PAPER, REMARK, Drawn, said
 
 # Files that a drawing is written as.
-KINDS = ("png", "svg")
+PICTURE_FORMATS = ("png", "svg")
 
 
 @dataclass(frozen=True, repr=False)
@@ -66,8 +66,8 @@ class Picture:
         """Write it as .png or .svg, which the name tells; returns the path. Raises InputError, OutputError."""
         path = Path(path)
         kind = path.suffix.lower().removeprefix(".")
-        if kind not in KINDS:
-            raise InputError(f"{path}: a picture is saved as {' or '.join(f'.{each}' for each in KINDS)}")
+        if kind not in PICTURE_FORMATS:
+            raise InputError(f"{path}: a picture is saved as {' or '.join(f'.{each}' for each in PICTURE_FORMATS)}")
         try:
             path.write_bytes(self.content(kind))
         except OSError as error:
@@ -75,7 +75,7 @@ class Picture:
         return path
 
     def content(self, kind: str) -> bytes:
-        """What a file of one of KINDS holds."""
+        """What a file of one of PICTURE_FORMATS holds."""
         return self.png if kind == "png" else _standalone(self.svg).encode()
 
     def __repr__(self) -> str:

@@ -36,7 +36,7 @@ SIMULATED = AFTER = BLUE
 RECORDED = BEFORE = INK
 SETPOINT = MUTED
 AT_TOOL = ORANGE
-LEFT = VERMILLION  # what is left, stands out or lies outside
+RESIDUAL_COLOUR = VERMILLION  # what is left, stands out or lies outside
 ALLOWED = GREEN  # bands that are allowed or targets
 FRICTION = PURPLE
 OTHERWISE = SKY  # simulated in another way: another set, another side

@@ -25,10 +25,10 @@ from feedsim.scenario.machine import Axis, Drive, Filter, Machine
 # Switches of the machine file follow from what was taken.
 SWITCHES = {"omega_0": "reference_model", "D": "reference_model"}
 # Groups that are taken whole or not at all.
-WHOLE = ("drive.filter_", "drive.friction_pulse")
+GROUP_PREFIXES = ("drive.filter_", "drive.friction_pulse")
 # Files that a machine file names and that stay where they are; the modes go with it.
 _NAMED = ("structure", "plant")
-MODES = "modes.csv"
+MODES_TABLE = "modes.csv"
 _PLAIN = re.compile(r"^[A-Za-z_][\w .,/()%-]*$")
 _WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
@@ -61,7 +61,7 @@ class Imported:
 
     def files(self) -> dict[str, str | bytes]:
         """Name -> content, of the whole folder."""
-        modes = {} if self.base is None else {MODES: self.base.modes.read_bytes()}
+        modes = {} if self.base is None else {MODES_TABLE: self.base.modes.read_bytes()}
         return {Machine.IN_FOLDER: self.text(), **modes}
 
 
@@ -87,7 +87,7 @@ def imported(reading: Reading, machine: Path | None, name: str) -> Imported:
         trial = source.copy()
         for each in group:
             _put(trial, each)
-        if (group[0].axis, whole := _group(group[0].parameter)) in halved and whole.startswith(WHOLE):
+        if (group[0].axis, whole := _group(group[0].parameter)) in halved and whole.startswith(GROUP_PREFIXES):
             reason = "a value that belongs to it was not taken; a half of a filter or of a pulse would be another one"
             found.refused += [_not(each, reason) for each in group]
             continue
@@ -138,7 +138,7 @@ def _base(machine: Path | None, name: str, reading: Reading) -> tuple[Source, Ma
     faults: list[str] = []
     fetch(source, Machine, (), faults)
     translate(source, ("axes",), faults)
-    source.data["modes"] = MODES
+    source.data["modes"] = MODES_TABLE
     for key in _NAMED:
         if isinstance(source.data.get(key), str):
             source.data[key] = str(Path(source.data[key]).resolve())

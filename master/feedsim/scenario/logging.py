@@ -21,7 +21,7 @@ from pydantic_core import core_schema
 from feedsim import units
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, Model, Quantity, Reading, fault, is_multiple
-from feedsim.scenario.roles import DRIVE, FRICTION
+from feedsim.scenario.roles import DRIVE, FRICTION_ROLE
 
 Signal = Literal[
     "x_s", "n_ffw", "x_a", "n_a", "M_a", "x_e", "n_s", "n_ref", "M_s", "i_d", "i_q", "u_d", "u_q",
@@ -107,7 +107,7 @@ _RESOLUTIONS = {"m": "1 nm", "rad/s": "0.001 rad/s", "N.m": "0.01 N.m", "A": "1 
 
 def _per_signal(name: str, text: str, value: Callable[[str, str], tuple[Any, str]]) -> Any:
     """A group with a key per measured signal; `value`: signal and its unit -> what the key takes, its description."""
-    units_of = {name: signal.unit for role in (DRIVE, FRICTION) for name, signal in role.signals.items()}
+    units_of = {name: signal.unit for role in (DRIVE, FRICTION_ROLE) for name, signal in role.signals.items()}
     found = {signal: value(signal, units_of[signal]) for signal in _MEASURED}
     fields: Any = {name: (kind | None, Field(default=None, description=said)) for name, (kind, said) in found.items()}
     return create_model(name, __base__=_PerSignal, __module__=__name__, __doc__=text, **fields)

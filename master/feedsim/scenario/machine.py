@@ -24,7 +24,7 @@ from feedsim import variables
 from feedsim.errors import InputError
 from feedsim.fields import AxisName, File, Model, Quantity, Reading, fault, is_multiple, parameter
 from feedsim.scenario.parameter_group import Parameter, ParameterGroup, effects, group
-from feedsim.scenario.roles import DRIVE, FOREIGN, FRICTION, SHIPPED, ForeignUnit, filled, mapping
+from feedsim.scenario.roles import DRIVE, FOREIGN, FRICTION_ROLE, SHIPPED, ForeignUnit, filled, mapping
 
 FilterType = Literal["off", "second_order", "band_stop", "low_pass"]
 FILTER_TYPES: dict[str, int] = {"off": 0, "second_order": 1, "band_stop": 1, "low_pass": 2}
@@ -307,10 +307,10 @@ class ForeignDrive(ForeignUnit):
 class ForeignFriction(ForeignUnit):
     """Another maker's unit as friction of an axis."""
 
-    role = FRICTION
+    role = FRICTION_ROLE
     shipped = Friction
-    inputs: mapping("FrictionInputs", FRICTION.inputs)  # type: ignore[valid-type]
-    outputs: mapping("FrictionOutputs", FRICTION.outputs)  # type: ignore[valid-type]
+    inputs: mapping("FrictionInputs", FRICTION_ROLE.inputs)  # type: ignore[valid-type]
+    outputs: mapping("FrictionOutputs", FRICTION_ROLE.outputs)  # type: ignore[valid-type]
 
 
 class Axis(Model):

@@ -75,7 +75,7 @@ def _role(name: str, shipped: str, *needed: str) -> Role:
 
 
 DRIVE = _role("drive", "controller", "x_s", "x_a", "M_a")
-FRICTION = _role("friction", "friction", "n_fr", "M_fr")
+FRICTION_ROLE = _role("friction", "friction", "n_fr", "M_fr")
 
 VariableName = Annotated[StrictStr, Field(min_length=1)]
 

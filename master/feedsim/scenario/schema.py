@@ -64,10 +64,10 @@ def _structure_schema() -> dict[str, Any]:
     """One of the kinds; which is for `kind` to say."""
     from pydantic.json_schema import models_json_schema
 
-    from feedsim.scenario.structure.load import KINDS
+    from feedsim.scenario.structure.load import STRUCTURE_KINDS
 
-    references, schema = models_json_schema([(model, "validation") for model in KINDS.values()])
-    options = [references[model, "validation"] for model in KINDS.values()]
+    references, schema = models_json_schema([(model, "validation") for model in STRUCTURE_KINDS.values()])
+    options = [references[model, "validation"] for model in STRUCTURE_KINDS.values()]
     for option in options:
         model = schema["$defs"][option["$ref"].rpartition("/")[2]]
         model["required"] = ["kind", *model.get("required", [])]

@@ -18,16 +18,20 @@ from feedsim.errors import InputError
 from feedsim.nc import Program, plan
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Machine, Scenario
-from feedsim.scenario.roles import DRIVE, FRICTION, Role
+from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.ssp import archive, described, one, parameter_set, system_structure
 from feedsim.ssp.parameter_set import ParameterSet, Value
 from feedsim.ssp.setpoints import pack_setpoints
 from feedsim.ssp.system_structure import Binding, Component, Connector, Link, Structure
 from feedsim.structure.pack import pack
 
-SETPOINT = "setpoint"  # the instance that plays the setpoints
+SETPOINT_INSTANCE = "setpoint"  # the instance that plays the setpoints
 RESOURCES = "resources"
-WIDTH, HEIGHT, GAP = 40.0, 30.0, 20.0  # of a component and between them, in a picture [mm]
+COMPONENT_WIDTH, COMPONENT_HEIGHT, COMPONENT_GAP = (
+    40.0,
+    30.0,
+    20.0,
+)  # of a component and between them, in a picture [mm]
 
 
 @dataclass(frozen=True)
@@ -83,11 +87,11 @@ def export(scenario: Scenario, out: Path, *, fmus: Path | None = None) -> Export
 def _sources(machine: Machine, fmus: Path) -> dict[Path, str]:
     """Archives of drives and frictions -> their names inside the SSP, each archive once."""
     names: dict[Path, str] = {}
-    for role in (DRIVE, FRICTION):
+    for role in (DRIVE, FRICTION_ROLE):
         for axis in machine.axes:
             path = archive_path(machine, axis, role, fmus)
             stem = role.shipped if path == fmus / f"{role.shipped}.fmu" else path.stem
-            taken = {SETPOINT, "plant", *(other for at, other in names.items() if at != path)}
+            taken = {SETPOINT_INSTANCE, "plant", *(other for at, other in names.items() if at != path)}
             taken |= {"controller", "friction"} if path.parent != fmus else set()
             free = (name for name in (stem, *(f"{stem}_{i}" for i in range(2, 100))) if name not in taken)
             names.setdefault(path, next(free))
@@ -99,7 +103,7 @@ def _archives(
 ) -> dict[str, bytes]:
     """Bytes of the archives by name, in the order of the signal flow; they are left in `folder` too."""
     machine = scenario.machine
-    plant, setpoint = machine.plant or fmus / "plant.fmu", fmus / f"{SETPOINT}.fmu"
+    plant, setpoint = machine.plant or fmus / "plant.fmu", fmus / f"{SETPOINT_INSTANCE}.fmu"
     for path in (plant, *sources, setpoint):
         check_there(path)
     if machine.plant is not None:
@@ -115,7 +119,7 @@ def _archives(
         (folder / f"{name}.fmu").write_bytes(path.read_bytes())
     drives = dict.fromkeys(sources[archive_path(machine, axis, DRIVE, fmus)] for axis in machine.axes)
     others = [name for name in sources.values() if name not in drives]
-    return {name: (folder / f"{name}.fmu").read_bytes() for name in (SETPOINT, *drives, "plant", *others)}
+    return {name: (folder / f"{name}.fmu").read_bytes() for name in (SETPOINT_INSTANCE, *drives, "plant", *others)}
 
 
 def _instances(machine: Machine, fmus: Path, sources: Mapping[Path, str]) -> dict[str, str]:
@@ -125,10 +129,10 @@ def _instances(machine: Machine, fmus: Path, sources: Mapping[Path, str]) -> dic
         return sources[archive_path(machine, axis, role, fmus)]
 
     return {
-        SETPOINT: SETPOINT,
+        SETPOINT_INSTANCE: SETPOINT_INSTANCE,
         **{wiring.controller(axis): name(axis, DRIVE) for axis in machine.axes},
         wiring.PLANT: "plant",
-        **{wiring.friction(axis): name(axis, FRICTION) for axis in machine.axes},
+        **{wiring.friction(axis): name(axis, FRICTION_ROLE) for axis in machine.axes},
     }
 
 
@@ -141,14 +145,14 @@ def _files(
     units: dict[str, RoleUnit] = {}
     whole = UNIT in instances  # which has its parameters inside, and nothing to be connected
     for axis in () if whole else axes:
-        for role, instance in ((DRIVE, wiring.controller(axis)), (FRICTION, wiring.friction(axis))):
+        for role, instance in ((DRIVE, wiring.controller(axis)), (FRICTION_ROLE, wiring.friction(axis))):
             units[instance] = filled(machine, axis, role, archives[instances[instance]])
     parameters: dict[str, Mapping[str, Value]] = {} if whole else {wiring.PLANT: plant_parameters(machine, None)}
     parameters |= {instance: unit.parameters for instance, unit in units.items()}
 
     def end(variable: wiring.Variable) -> tuple[str, str]:
         if variable.instance == wiring.NC:
-            return SETPOINT, variable.name
+            return SETPOINT_INSTANCE, variable.name
         unit = units.get(variable.instance)
         return variable.instance, variable.name if unit is None else unit.signals[variable.name].name
 
@@ -187,12 +191,17 @@ def _files(
 def _box(instance: str, axes: tuple[str, ...]) -> tuple[float, float, float, float]:
     """Place in a picture: the signal flow from the left to the right, the axes from the top to the bottom."""
     if instance == UNIT:
-        return 0.0, -HEIGHT, WIDTH, 0.0
+        return 0.0, -COMPONENT_HEIGHT, COMPONENT_WIDTH, 0.0
     rows = {name(axis): i for i, axis in enumerate(axes) for name in (wiring.controller, wiring.friction)}
     kind = instance if instance not in rows else "friction" if instance.startswith("friction") else "controller"
-    left = (WIDTH + GAP) * (SETPOINT, "controller", wiring.PLANT, "friction").index(kind)
+    left = (COMPONENT_WIDTH + COMPONENT_GAP) * (SETPOINT_INSTANCE, "controller", wiring.PLANT, "friction").index(kind)
     first, last = (rows[instance],) * 2 if instance in rows else (0, len(axes) - 1)
-    return left, -(HEIGHT + GAP) * last - HEIGHT, left + WIDTH, -(HEIGHT + GAP) * first
+    return (
+        left,
+        -(COMPONENT_HEIGHT + COMPONENT_GAP) * last - COMPONENT_HEIGHT,
+        left + COMPONENT_WIDTH,
+        -(COMPONENT_HEIGHT + COMPONENT_GAP) * first,
+    )
 
 
 def _identifier(name: str) -> str:

@@ -20,7 +20,7 @@ from feedsim.errors import InputError
 from feedsim.files.references import closed
 from feedsim.motions.setpoints import Recorded
 from feedsim.nc import Program, Segment, plan
-from feedsim.nc.program import LONGEST
+from feedsim.nc.program import MAX_POSITION_CYCLES
 from feedsim.owned import TemporaryFolder
 from feedsim.scenario import Scenario, load
 from feedsim.ssp import archive, one, rebuilt, setpoints, system_structure
@@ -33,7 +33,7 @@ from feedsim.ssp.values import values
 from feedsim.structure.assembly import SAME_POSITION
 from feedsim.structure.pack import MODES_IN_ARCHIVE
 
-WHOLE = 1e-6  # of a position cycle: a stop time this little behind an instant of the grid lies on it
+WHOLE_CYCLE_TOLERANCE = 1e-6  # of a position cycle: a stop time this little behind an instant of the grid lies on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,10 @@ def _lay_out(folder: Path, files: archive.Files, parts: Parts, own: Mapping[str,
     roles = parts.roles
     for component, name in parts.places.items():
         parts.archives[component].path.replace(folder / name)
-    inside = {rebuilt.MODES: (roles.plant, MODES_IN_ARCHIVE), rebuilt.SETPOINTS: (roles.setpoint, SETPOINTS_IN_ARCHIVE)}
+    inside = {
+        rebuilt.MODES_RESOURCE: (roles.plant, MODES_IN_ARCHIVE),
+        rebuilt.SETPOINTS_RESOURCE: (roles.setpoint, SETPOINTS_IN_ARCHIVE),
+    }
     for name, (component, place) in inside.items():
         source = parts.archives[component].directory / place
         if not source.is_file():
@@ -172,9 +175,11 @@ def _sampled(parts: Parts, structure: Structure, path: Path) -> Program:
     """What the controllers see of the setpoints: the rows at their position cycle, from start to stop."""
     table, T_pos = parts.table, parts.T_pos
     last = float(table.time[-1]) if structure.stop is None else structure.stop - structure.start
-    cycles = np.ceil(last / T_pos - WHOLE)
-    if not 1 <= cycles <= LONGEST:
-        raise InputError(f"{path}: it lasts {last:.6g} s, {cycles:.6g} position cycles; allowed: 1 to {LONGEST}")
+    cycles = np.ceil(last / T_pos - WHOLE_CYCLE_TOLERANCE)
+    if not 1 <= cycles <= MAX_POSITION_CYCLES:
+        raise InputError(
+            f"{path}: it lasts {last:.6g} s, {cycles:.6g} position cycles; allowed: 1 to {MAX_POSITION_CYCLES}"
+        )
     time = np.arange(int(cycles) + 1, dtype=np.float64) * T_pos
     rows = table.rows(time, parts.T_c)
     names = parts.roles.setpoints

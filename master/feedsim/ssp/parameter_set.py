@@ -15,9 +15,9 @@ from feedsim.ssp import xml
 from feedsim.ssp.xml import append_units, read_units
 
 # The same name in every set of a file: ecos asks for the sets of one name, in whichever component they are.
-NAME = "parameters"
+SET_NAME = "parameters"
 MOST_PROBLEMS = 20  # told at once
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?INF|NaN")  # of XML Schema
+_XML_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?INF|NaN")  # of XML Schema
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 
 Value = float | int | bool | str
@@ -45,7 +45,7 @@ class ParameterSet:
 def to_bytes(parameter_set: ParameterSet) -> bytes:
     """The SSV document."""
     described = {"description": parameter_set.description} if parameter_set.description else {}
-    root = xml.element("ssv:ParameterSet", {"version": "1.0", "name": NAME, **described})
+    root = xml.element("ssv:ParameterSet", {"version": "1.0", "name": SET_NAME, **described})
     group = xml.child(root, "ssv:Parameters")
     for parameter in parameter_set.parameters:
         entry = xml.child(group, "ssv:Parameter", {"name": parameter.name})
@@ -130,7 +130,7 @@ def number(text: str) -> float:
     shown = text if len(text) <= 40 else f"{text[:40]}..."
     if len(text) > units.LONGEST_NUMBER:
         raise InputError(f"{shown} has {len(text)} characters; a number has at most {units.LONGEST_NUMBER}")
-    if not _NUMBER.fullmatch(text):
+    if not _XML_NUMBER.fullmatch(text):
         raise InputError(f"{shown!r} is no number")
     found = float(text)
     if not isfinite(found):

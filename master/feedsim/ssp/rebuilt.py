@@ -17,7 +17,7 @@ from feedsim.cosim.archive import Archive
 from feedsim.cosim.one_unit import UNIT
 from feedsim.errors import InputError
 from feedsim.scenario.machine import EFFECTS, FILTER_TYPES
-from feedsim.scenario.roles import DRIVE, FRICTION, Role
+from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.ssp.described import RECORDINGS, STRUCTURE
 from feedsim.ssp.parameter_set import Value, number
 from feedsim.ssp.roles import Roles
@@ -25,10 +25,10 @@ from feedsim.ssp.setpoints import Table
 from feedsim.ssp.values import start_value
 
 FILTER_NAMES = {number: name for name, number in reversed(FILTER_TYPES.items())}
-MODES, SETPOINTS = "modes.csv", "setpoints.csv"  # beside the scenario's data
+MODES_RESOURCE, SETPOINTS_RESOURCE = "modes.csv", "setpoints.csv"  # beside the scenario's data
 # What the annotation may tell at its top.
 OWN_KEYS = ("name", "note", "machine", "motions", "coupling", "recording", "logging", "evaluate")
-DEEPEST = 50  # levels of the annotation; a scenario has some 10
+MAX_ANNOTATION_DEPTH = 50  # levels of the annotation; a scenario has some 10
 MARGIN = 1e-3  # m, that an axis may travel beyond its setpoints where nobody tells how far
 
 
@@ -156,7 +156,7 @@ def named_files(own: Mapping[str, Any] | None) -> list[str]:
 
 def _check_types(data: Any, what: str) -> None:
     """What is read here has the types that :func:`feedsim.ssp.described.text` writes; the rest is the loader's."""
-    if _depth(data) > DEEPEST:
+    if _depth(data) > MAX_ANNOTATION_DEPTH:
         raise InputError(f"{what} is nested too deeply")
     try:
         json.dumps(data, ensure_ascii=False).encode("utf-8")
@@ -172,7 +172,7 @@ def _check_types(data: Any, what: str) -> None:
         raise InputError(f"{what}: its motions are no list of groups")
     if not all(isinstance(motion.get("file", ""), str) for motion in motions):
         raise InputError(f"{what}: a motion's file is no text")
-    for role in (DRIVE, FRICTION):
+    for role in (DRIVE, FRICTION_ROLE):
         groups = [axis.get(role.name, {}) for axis in axes.values()]
         if not all(isinstance(group, dict) and isinstance(group.get("outputs", {}), dict) for group in groups):
             raise InputError(f"{what}: an axis's {role.name} is no group")
@@ -199,7 +199,7 @@ def scenario_data(
     told = own.get("machine", {})
     if not motions or "motions" not in own:
         columns = {axis: {"column": f"{setpoint}.x_s"} for axis, setpoint in roles.setpoints.items()}
-        own["motions"] = [{"kind": "setpoints", "file": SETPOINTS, "columns": columns}]
+        own["motions"] = [{"kind": "setpoints", "file": SETPOINTS_RESOURCE, "columns": columns}]
         own["evaluate"] = []
     plant = parts.values[roles.plant]
     axes = {}
@@ -208,7 +208,7 @@ def scenario_data(
     machine = {
         "name": told.get("name", name),
         "note": told.get("note", ""),
-        "modes": MODES,
+        "modes": MODES_RESOURCE,
         "plant": parts.places[roles.plant],
         "pose": {axis: f"{plant[f'{axis}.x_0']!r} m" for axis in roles.axes},
         "cycles": {"interpolation": f"{parts.T_pos!r} s"}
@@ -238,7 +238,7 @@ def _axis(parts: Parts, axis: str, told: Mapping[str, Any], folder: Path) -> dic
     else:
         drive, pitch = _shipped_drive(parts, control), _pitch(float(parts.values[control]["I_P"]), told.get("pitch"))
     if contact in roles.foreign:
-        friction = _foreign(parts, contact, FRICTION, told, folder)
+        friction = _foreign(parts, contact, FRICTION_ROLE, told, folder)
     else:
         identified = {key: value for key, value in told.get("friction", {}).items() if key == "identified"}
         friction = {**_group(parts, contact), **identified}

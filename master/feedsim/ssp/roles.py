@@ -10,11 +10,11 @@ from feedsim.cosim import wiring
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.plant import axes_of
 from feedsim.errors import InputError
-from feedsim.scenario.roles import DRIVE, FRICTION, Role
+from feedsim.scenario.roles import DRIVE, FRICTION_ROLE, Role
 from feedsim.ssp.system_structure import Component, Link, Structure
 
 End = tuple[str, str]  # component, variable
-TORQUES = {"M_a": DRIVE, "M_fr": FRICTION}  # inputs of the plant on an axis -> role of what drives them
+TORQUES = {"M_a": DRIVE, "M_fr": FRICTION_ROLE}  # inputs of the plant on an axis -> role of what drives them
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def _assigned(driven: Mapping[End, End], archives: Mapping[str, Archive], where:
     )
     problems: list[str] = []
     outputs: dict[str, End] = {}  # input of the plant -> what drives it
-    partners: dict[Role, dict[str, str]] = {DRIVE: {}, FRICTION: {}}
+    partners: dict[Role, dict[str, str]] = {DRIVE: {}, FRICTION_ROLE: {}}
     for axis in axes_of(archives[plant]):
         for torque, role in TORQUES.items():
             source = driven.get((plant, f"{axis}.{torque}"))
@@ -171,7 +171,7 @@ def _assigned(driven: Mapping[End, End], archives: Mapping[str, Archive], where:
         problems += [f"{where}: {name} drives {axes.count(name)} axes; one is allowed" for name in dict.fromkeys(axes)
                      if axes.count(name) > 1]  # fmt: skip
     problems += [f"{where}: {name} is connected as drive and as friction; one is allowed"
-                 for name in partners[DRIVE].values() if name in partners[FRICTION].values()]  # fmt: skip
+                 for name in partners[DRIVE].values() if name in partners[FRICTION_ROLE].values()]  # fmt: skip
     problems += [f"{where}: component {name} drives no axis" for name in archives
                  if name not in (plant, setpoint, *names) and not problems]  # fmt: skip
     if problems:
@@ -185,7 +185,7 @@ def _assigned(driven: Mapping[End, End], archives: Mapping[str, Archive], where:
                 offered = _offered(axis, role, plant, setpoint, setpoints[axis])
                 foreign[name] = {torque: outputs[f"{axis}.{torque}"][1]}
                 foreign[name] |= _signals(driven, name, role, offered, where, problems)
-    assigned = Roles(setpoint, plant, partners[DRIVE], partners[FRICTION], setpoints, foreign)
+    assigned = Roles(setpoint, plant, partners[DRIVE], partners[FRICTION_ROLE], setpoints, foreign)
     problems += _other_wiring(driven, assigned, where)
     if problems:
         raise InputError.of(where, problems)

@@ -20,7 +20,7 @@ from feedsim.structure.pack import packaging, packed, setpoint_table
 EVALUATED = {"circle": "circularity", "positioning_accuracy": "positioning accuracy"}
 SETPOINTS_IN_ARCHIVE = "resources/setpoints.csv"
 UNEVEN = 1e-6  # of a row, as in the unit
-LEAST_REST = 0.050  # s, behind a motion whose positioning is evaluated (feedsim.analysis)
+EVALUATED_REST = 0.050  # s, behind a motion whose positioning is evaluated (feedsim.analysis)
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,7 @@ def _needed(item: Positioning | CircleTest | PositioningAccuracy, planned: Progr
     chosen = planned.segments if item.motion is None else planned.segments[item.motion : item.motion + 1]
     if isinstance(item, Positioning):
         moved = [each.end for each in chosen if each.origin[item.axis] != each.target[item.axis]]
-        return min(moved[-1] + LEAST_REST, planned.duration) if moved else None
+        return min(moved[-1] + EVALUATED_REST, planned.duration) if moved else None
     if isinstance(item, PositioningAccuracy):
         cycles = [each.end for each in chosen if isinstance(each.geometry, Visits)]
         return min(cycles[-1], planned.duration) if cycles else None

@@ -16,9 +16,9 @@ SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
-OWN = "urn:feedsim:ssp"
+FEEDSIM_NAMESPACE = "urn:feedsim:ssp"
 # ecos, libcosim and OMSimulator compare the prefixed text, not the namespace: to them, prefixes are of the format.
-PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS, "feedsim": OWN}
+PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS, "feedsim": FEEDSIM_NAMESPACE}
 
 Element = ET.Element
 

@@ -19,7 +19,7 @@ Integers = NDArray[np.int64]
 
 # Positions that are typed twice are the same where they differ by less [m].
 SAME_POSITION = 1e-9
-SHOWN = 5  # labels in a message
+MAX_SHOWN_LABELS = 5  # labels in a message
 DEGREES = ("degree of freedom", "degrees of freedom")
 
 
@@ -89,7 +89,7 @@ def translating_mass(assembly: Assembly) -> Floats:
 
 def few(labels: Sequence[str], indices: Integers) -> str:
     """The first labels, and how many there are beyond."""
-    return errors.few([labels[int(i)] for i in indices], SHOWN)
+    return errors.few([labels[int(i)] for i in indices], MAX_SHOWN_LABELS)
 
 
 def counted(count: int, one: str, several: str) -> str:

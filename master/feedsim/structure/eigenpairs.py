@@ -21,7 +21,7 @@ Say = Callable[[str], None]
 
 # Of a large model that many modes above the cut-off are computed as well: they are reported, and the ones below
 # converge the faster for them.
-BEYOND = 6
+EXTRA_MODES = 6
 # 1/(lambda + shift) below this part of the largest one is rounding: a mode without mass.
 MASSLESS = 1e-12
 # A matrix shifted onto an eigenvalue cannot be factorised: the shift is then moved by this part, more each time.
@@ -86,7 +86,7 @@ def lanczos(assembly: Assembly, cutoff: float, shift: float, say: Say) -> Eigenp
     border, below = _count(assembly, cutoff, say)
     massless = int(np.count_nonzero(assembly.mass.diagonal() == 0))
     finite = assembly.mass.shape[0] - massless
-    if below is not None and below + BEYOND >= finite // 2:
+    if below is not None and below + EXTRA_MODES >= finite // 2:
         return dense(assembly, shift)  # nearly all modes: no case for Lanczos, and larger than usual at worst
     say(f"factorising K + shift M, {assembly.mass.shape[0]} equations")
     factor = SparseFactor(assembly, -shift)
@@ -133,7 +133,7 @@ def _counted(
             break
         if len(values):
             say(f"{missing} of {below} modes are missing: looking for them beside those found")
-        wanted = min(missing + BEYOND, finite - 1 - len(values))
+        wanted = min(missing + EXTRA_MODES, finite - 1 - len(values))
         if wanted <= 0:
             break
         more = _run(assembly, factor, shift, wanted, shapes, say)

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from feedsim.errors import InputError
 from feedsim.structure.assembly import (
     DEGREES,
-    SHOWN,
+    MAX_SHOWN_LABELS,
     Assembly,
     Floats,
     Integers,
@@ -30,7 +30,7 @@ from feedsim.structure.factor import symmetric_factors
 # Round-off of an element's assembly is 1e-12 of an entry's scale and less; a matrix that is wrong is off by more.
 ASYMMETRY = 1e-9
 # Round-off makes rigid modes of large stiff models mHz; a machine's or a mount's lowest mode is above 1 Hz.
-RIGID = (2 * math.pi * 0.1) ** 2
+RIGID_EIGENVALUE = (2 * math.pi * 0.1) ** 2
 MOST_RIGID = 7  # more than a free body has
 
 
@@ -246,15 +246,15 @@ def _flying(
     count: int,
 ) -> list[str]:
     faults = []
-    for p, members, axes in parts[:SHOWN]:
+    for p, members, axes in parts[:MAX_SHOWN_LABELS]:
         allowed = f" ({len(axes)} for the axes {', '.join(axes)} that act on it)" if axes else ""
         size = counted(len(members), *DEGREES)
         faults.append(
             f"a part flies freely: {size} ({few(assembly.labels, members)}) that nothing connects to the "
             f"{sizes[main]} of the largest part, with {_modes(free[p])}{allowed}; connect it, hold it or leave it out"
         )
-    if len(parts) > SHOWN:
-        faults.append(f"{len(parts) - SHOWN} more of the {count} parts fly freely")
+    if len(parts) > MAX_SHOWN_LABELS:
+        faults.append(f"{len(parts) - MAX_SHOWN_LABELS} more of the {count} parts fly freely")
     return faults
 
 
@@ -268,10 +268,10 @@ def _held(assembly: Assembly, parts: list[Integers], largest: int) -> list[str]:
     warnings = [
         f"a part of {counted(len(members), *DEGREES)} "
         f"({few(assembly.labels, members)}) is connected to the ground alone, not to the {largest} of the largest part"
-        for members in parts[:SHOWN]
+        for members in parts[:MAX_SHOWN_LABELS]
     ]
-    if len(parts) > SHOWN:
-        warnings.append(f"{len(parts) - SHOWN} more parts are connected to the ground alone")
+    if len(parts) > MAX_SHOWN_LABELS:
+        warnings.append(f"{len(parts) - MAX_SHOWN_LABELS} more parts are connected to the ground alone")
     return warnings
 
 
@@ -283,7 +283,7 @@ def _free_single(assembly: Assembly, part: Integers, sizes: Integers) -> dict[in
     """Rigid modes of the parts of one degree of freedom, all at once: there may be many."""
     alone = np.flatnonzero(sizes[part] == 1)
     k, m = assembly.stiffness.diagonal()[alone], assembly.mass.diagonal()[alone]
-    rigid = (k <= RIGID * m) & (m > 0)
+    rigid = (k <= RIGID_EIGENVALUE * m) & (m > 0)
     return {int(part[i]): int(r) for i, r in zip(alone, rigid, strict=True)}
 
 
@@ -294,7 +294,8 @@ def _rigid_modes(assembly: Assembly, members: Integers) -> int:
     (Sylvester's law of inertia). Scaled, so that displacements and rotations are eliminated alike.
     """
     shifted = sparse.csc_array(
-        assembly.stiffness[members][:, members] - RIGID * assembly.mass[members][:, members], dtype=np.float64
+        assembly.stiffness[members][:, members] - RIGID_EIGENVALUE * assembly.mass[members][:, members],
+        dtype=np.float64,
     )
     diagonal = np.abs(shifted.diagonal())
     root = sparse.diags_array(1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)))

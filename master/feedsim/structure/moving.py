@@ -9,16 +9,16 @@ import numpy as np
 
 from feedsim.structure.assembly import Assembly, Floats, Integers
 
-DIRECTIONS = "XYZ"
+AXIS_LETTERS = "XYZ"
 # Bodies are named up to this number and down to this share.
-NAMED, WORTH_NAMING = 3, 0.1
+MAX_NAMED_BODIES, WORTH_NAMING = 3, 0.1
 # A body moves as one where a rigid motion explains this part of its kinetic energy. The half wave of a screw between
 # its bearings, which is bending, comes to 8/pi^2 = 0.81.
 AS_ONE = 0.85
 # Of translation and rotation the lesser is named as well from this part of their energy on.
 AS_WELL = 0.1
 # A body turns about its own axis where its rotary inertia, not its width, holds this part of the rotation's energy.
-OWN = 0.5
+OWN_INERTIA_SHARE = 0.5
 # "bed B1[3] ux": the body is what stands before the index or the direction.
 LABEL = re.compile(r"(\[[^]]*\])?(\s+[ur][xyz])?\s*$")
 
@@ -40,7 +40,7 @@ class Motion:
 
     def __str__(self) -> str:
         """Such as "bed 71 % (rocking about X), column 20 % (moving along Z)"."""
-        named = [share for share in self.shares[:NAMED] if share.energy >= WORTH_NAMING] or self.shares[:1]
+        named = [share for share in self.shares[:MAX_NAMED_BODIES] if share.energy >= WORTH_NAMING] or self.shares[:1]
         return ", ".join(
             f"{share.body} {100 * share.energy:.0f} %" + (f" ({share.words})" if share.words else "") for share in named
         )
@@ -122,10 +122,10 @@ def _words(body: _Body, weights: Floats, shapes: Floats) -> list[str]:
         if energy.sum() < AS_ONE * whole[mode]:
             strongest = int(np.argmax(by_direction[:, mode]))
             how = "deforming along" if strongest < 3 else "twisting about"
-            words.append(f"{how} {DIRECTIONS[strongest % 3]}")
+            words.append(f"{how} {AXIS_LETTERS[strongest % 3]}")
             continue
         spin = float(weights[body.directions >= 3].sum() * (motion[3:, mode] @ motion[3:, mode]))
-        turning = "turning" if spin > OWN * energy[3:].sum() else "rocking"
+        turning = "turning" if spin > OWN_INERTIA_SHARE * energy[3:].sum() else "rocking"
         named = [f"moving along {_strongest(energy[:3])}", f"{turning} about {_strongest(energy[3:])}"]
         shares = [energy[:3].sum() / energy.sum(), energy[3:].sum() / energy.sum()]
         if _turns(energy, motion[:3, mode], np.cross(motion[3:, mode], arms)):
@@ -135,7 +135,7 @@ def _words(body: _Body, weights: Floats, shapes: Floats) -> list[str]:
 
 
 def _strongest(energy: Floats) -> str:
-    return DIRECTIONS[int(np.argmax(energy))]
+    return AXIS_LETTERS[int(np.argmax(energy))]
 
 
 def _turns(parts: Floats, translation: Floats, by_rotation: Floats) -> bool:

@@ -29,21 +29,21 @@ if TYPE_CHECKING:
     from feedsim.structure.solve import Solution
 
 # Closer to the pose nothing is calculated [m]: modes change by 0.1 % and less per millimetre.
-NEAR = 1e-3
+MIN_POSE_DISTANCE = 1e-3
 # Ends are calculated at positions rounded to so many decimals of a metre: the same in all runs whose motions differ by
 # nanometres, as those of a study do. Up to 0.05 mm, modes change by 0.005 % and less.
 DECIMALS = 4
 # Modes up to here are looked at [Hz]; drives have their control loops below. At other poses up to twice that.
-LOOKED_AT = 200.0
+MAX_MODE_FREQUENCY = 200.0
 # A mode is of interest where it holds this share of the static compliance of any port: who does not excite or see it
 # need not know that it moves.
-SEEN = 0.01
+COMPLIANCE_SHARE = 0.01
 # A shift beyond which the machine is another one. The resonance curve of a mode is 2 zeta wide at half its power, 4 to
 # 6 % with the usual 2 to 3 %: one that has moved by as much answers where it did not before, and filters miss it.
-LARGE = 0.05
+LARGE_SHIFT = 0.05
 # The static displacement is found step by step, the error shrinking by shift/(omega^2 + shift) each time; of a mode at
 # 5 Hz to a seventh.
-SHIFT, STEPS = (2 * math.pi * 2.0) ** 2, 12
+EIGENVALUE_SHIFT, SHIFT_STEPS = (2 * math.pi * 2.0) ** 2, 12
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,8 @@ class PoseChange:
 
     @property
     def large(self) -> tuple[AxisChange, ...]:
-        """The axes over whose positions a mode changes by more than LARGE."""
-        return tuple(axis for axis in self.axes if axis.largest is not None and abs(axis.largest.change) > LARGE)
+        """The axes over whose positions a mode changes by more than LARGE_SHIFT."""
+        return tuple(axis for axis in self.axes if axis.largest is not None and abs(axis.largest.change) > LARGE_SHIFT)
 
 
 def pose_change(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> PoseChange:
@@ -124,13 +124,13 @@ def pose_change(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> 
 
     The ends of what is returned are exact; their modes and compliances belong to positions rounded to 0.1 mm, always,
     so that a run says the same alone and in a study, where solutions are kept for further runs. Modes change by 0.1 %
-    and less per millimetre, hence by 0.005 % and less over the rounding: a thousandth of what is LARGE.
+    and less per millimetre, hence by 0.005 % and less over the rounding: a thousandth of what is LARGE_SHIFT.
     """
     axes = tuple(
         AxisChange(axis, machine.pose[axis], min(low, machine.pose[axis]), max(high, machine.pose[axis]))
         for axis, (low, high) in ranges.items()
     )
-    if all(axis.distance <= NEAR for axis in axes):
+    if all(axis.distance <= MIN_POSE_DISTANCE for axis in axes):
         return PoseChange(axes, "")
     if machine.structure is None:
         return PoseChange(axes, "the machine file names no structure file to compute the modes of other poses from")
@@ -172,9 +172,10 @@ def over_axis(machine: Machine, axis: str, positions: Sequence[float]) -> ModesO
         if axis not in _assembler(pose).structure.axes:
             return None
         solution, frequency = _middle(pose)[1], _middle(pose)[1].modes.frequency
-        own = np.flatnonzero(_seen(solution) & (frequency > 0) & (frequency <= LOOKED_AT))
+        own = np.flatnonzero(_seen(solution) & (frequency > 0) & (frequency <= MAX_MODE_FREQUENCY))
         there = [
-            _end(pose, axis, None if abs(x - machine.pose[axis]) <= NEAR else round(x, DECIMALS)) for x in positions
+            _end(pose, axis, None if abs(x - machine.pose[axis]) <= MIN_POSE_DISTANCE else round(x, DECIMALS))
+            for x in positions
         ]
     except (OSError, FeedsimError):
         return None
@@ -242,10 +243,11 @@ def _kept_between(
 
 def _with_modes(pose: _Pose, axis: AxisChange) -> AxisChange:
     """The axis with its modes, where it goes far enough and the structure knows it."""
-    if axis.distance <= NEAR:
+    if axis.distance <= MIN_POSE_DISTANCE:
         return axis
     low, high = (
-        None if abs(position - axis.pose) <= NEAR else round(position, DECIMALS) for position in (axis.low, axis.high)
+        None if abs(position - axis.pose) <= MIN_POSE_DISTANCE else round(position, DECIMALS)
+        for position in (axis.low, axis.high)
     )
     modes, compliances = _kept_between(pose, axis.axis, low, high)
     return replace(axis, modes=modes, compliances=compliances)
@@ -291,7 +293,7 @@ def _model(pose: _Pose, moved: Mapping[str, float], described: bool) -> tuple[As
     assembly = assembler.at({**here, **moved})
     damping = assembler.structure.damping
     # The sparse way: a few modes of many.
-    cutoff = 2 * math.pi * 2 * LOOKED_AT
+    cutoff = 2 * math.pi * 2 * MAX_MODE_FREQUENCY
     return assembly, solve(assembly, cutoff=cutoff, damping=damping, dense_limit=0, described=described)
 
 
@@ -299,7 +301,7 @@ def _modes(pose: _Pose, ends: Sequence[_End]) -> tuple[ModeChange, ...]:
     solution = _middle(pose)[1]
     frequency = solution.modes.frequency
     changes = []
-    for mode in np.flatnonzero(_seen(solution) & (frequency > 0) & (frequency <= LOOKED_AT)).tolist():
+    for mode in np.flatnonzero(_seen(solution) & (frequency > 0) & (frequency <= MAX_MODE_FREQUENCY)).tolist():
         at_ends = [float(end.frequency[mode]) for end in ends]
         shifts = [f / float(frequency[mode]) - 1 for f in at_ends]
         changes.append(
@@ -335,7 +337,7 @@ def _seen(solution: Solution) -> NDArray[np.bool_]:
     stiffness = np.where(modes.rigid, np.inf, (2 * math.pi * modes.frequency) ** 2)
     shares = np.array([port**2 / stiffness for port in modes.ports.values()])
     total = shares.sum(axis=1, keepdims=True)
-    return np.asarray(np.any(shares > SEEN * total, axis=0))
+    return np.asarray(np.any(shares > COMPLIANCE_SHARE * total, axis=0))
 
 
 def _compliances(axis: str, ends: tuple[_End, _End, _End]) -> tuple[Compliance, ...]:
@@ -359,9 +361,9 @@ def _static(axis: str, assembly: Assembly, solution: Solution) -> list[float]:
     loads = np.column_stack([n, *(assembly.ports[port] for port in TOOL_PORTS)])
     seen = np.column_stack([x - lead * n, *(assembly.ports[port] for port in TOOL_PORTS)])
     target = loads - moved @ (rigid.T @ loads)
-    factor = SparseFactor(assembly, -SHIFT)
+    factor = SparseFactor(assembly, -EIGENVALUE_SHIFT)
     u = np.zeros_like(loads)
-    for _ in range(STEPS):
+    for _ in range(SHIFT_STEPS):
         u = u + factor.solve(target - assembly.stiffness @ u)
         u -= rigid @ (moved.T @ u)
     return [float(a @ b) for a, b in zip(seen.T, u.T, strict=True)]

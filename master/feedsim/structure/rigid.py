@@ -21,7 +21,7 @@ CANCELLED = 1e-12
 # Whatever is slower than this [rad/s], a turn of seventeen minutes, is held by nothing: rounding of large models.
 AT_REST = 2 * math.pi * 1e-3
 # More than the axes have, and the six of a machine that is not held, is not worth looking at one by one.
-LOOKED_AT = 30
+MAX_RIGID_MOTIONS = 30
 # An axis is blocked where this part or less of its rotor's motion is rigid (an inertia that many times the rotor's).
 BLOCKED = 1e-9
 # Two axes that turn together to this part are one.
@@ -29,7 +29,7 @@ TOGETHER = 1e-9
 # The lowest mode worth naming for a blocked axis turns its rotor by this part of what the strongest one does.
 NOTABLE = 0.1
 SWEEPS = 3
-NAMED = 6
+MAX_NAMED_PARTS = 6
 
 
 def rigid_count(assembly: Assembly, pairs: Eigenpairs) -> int:
@@ -38,7 +38,7 @@ def rigid_count(assembly: Assembly, pairs: Eigenpairs) -> int:
     Raises:
         InputError: a mode has negative stiffness.
     """
-    shapes = pairs.shapes[:, : len(assembly.axes) + LOOKED_AT]
+    shapes = pairs.shapes[:, : len(assembly.axes) + MAX_RIGID_MOTIONS]
     energy = np.einsum("ij,ij->j", shapes, assembly.stiffness @ shapes)
     parts = np.einsum("ij,ij->j", abs(shapes), abs(assembly.stiffness) @ abs(shapes))
     if np.any(energy < -CANCELLED * parts):
@@ -70,7 +70,7 @@ def check_count(assembly: Assembly, rigid: Floats, elastic: Floats, values: Floa
     if rank < len(free):
         problems.append(f"axes {', '.join(free)} do not move independently of one another: {rank} of {len(free)} do")
     surplus = rigid @ directions[rank:].T
-    problems += [_surplus(assembly, surplus[:, [i]]) for i in range(min(NAMED, surplus.shape[1]))]
+    problems += [_surplus(assembly, surplus[:, [i]]) for i in range(min(MAX_NAMED_PARTS, surplus.shape[1]))]
     if problems:
         count, axes = rigid.shape[1], ", ".join(assembly.axes)
         headline = f"{assembly.name}: {count} rigid modes; one for each of the axes {axes} is needed"

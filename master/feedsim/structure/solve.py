@@ -28,7 +28,7 @@ FULL = 5000
 # The shift stands this far below zero: rigid modes do no harm, and the factorisation keeps its digits.
 SHIFT = 0.1
 # Without a finite cut-off [rad/s]: 1000 Hz, in whose range machine tools have their modes.
-USUAL = 2 * math.pi * 1000
+DEFAULT_CUTOFF = 2 * math.pi * 1000
 # Eigenvalues closer than this, relative, are one multiple eigenvalue: rounding would choose the shapes.
 EQUAL = 1e-9
 CG_TOLERANCE = 1e-10
@@ -103,7 +103,7 @@ def solve(
     say = progress or (lambda _: None)
     _check_ports(assembly)
     size = assembly.mass.shape[0]
-    shift = (SHIFT * (cutoff if math.isfinite(cutoff) else USUAL)) ** 2
+    shift = (SHIFT * (cutoff if math.isfinite(cutoff) else DEFAULT_CUTOFF)) ** 2
     if not math.isfinite(cutoff) and size > FULL:
         raise InputError(
             f"{assembly.name}: all modes of {size} degrees of freedom are wanted; without a cut-off frequency at most "

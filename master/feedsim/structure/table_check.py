@@ -16,7 +16,7 @@ from feedsim.structure.file import CODE, State, digest_of, state_of
 from feedsim.structure.modes import Modes, read_modes
 
 # A table and a structure that belong together agree to the eigensolver's error (1e-8); a changed structure is far off.
-SAME = 1e-5
+EIGENVALUE_TOLERANCE = 1e-5
 # A mode table belongs to a structure where its frequencies are the structure's, to the digits that tables are given in.
 SAME_FREQUENCY = 1e-3
 
@@ -70,7 +70,7 @@ def _modes(structure: Path, state: State, pose: tuple[tuple[str, float], ...]) -
     return solve(assembly, cutoff=description.cutoff, damping=description.damping, dense_limit=0, described=False).modes
 
 
-def stale(table: Modes, built: Modes, tolerance: float = SAME) -> str:
+def stale(table: Modes, built: Modes, tolerance: float = EIGENVALUE_TOLERANCE) -> str:
     """In words where a table of modes is not what the structure gives at the pose that it belongs to; "" where it is.
 
     Compared are what the drives see of it: frequencies of modes and inertias of axes. A table may have been cut off

@@ -16,8 +16,8 @@ from math import ceil
 from feedsim.sweep.design import Outcome, Task
 
 AIM = 0.5  # s of work in a batch: handing one over costs some 10 ms, and as much progress as this may be lost
-LONGEST = 2.0  # a batch that takes so many times longer than meant is handed back unfinished
-MOST = 1000  # runs in a batch
+MAX_BATCH_DELAY = 2.0  # a batch that takes so many times longer than meant is handed back unfinished
+MAX_BATCH_RUNS = 1000  # runs in a batch
 DEEP = 2  # batches per worker at a time, so that the next one is there when one ends
 DEATHS = 3  # of its worker, the last one in nobody's company, after which a task is not tried again
 WAITING = 8  # tasks to be run in nobody's company, for which the others are made to wait
@@ -81,7 +81,7 @@ class Batches:
         return batch
 
     def _fresh_batch(self, workers: int) -> Batch | None:
-        size = 1 if self._mean is None else max(1, min(MOST, round(AIM / max(self._mean, 1e-6))))
+        size = 1 if self._mean is None else max(1, min(MAX_BATCH_RUNS, round(AIM / max(self._mean, 1e-6))))
         self._read(4 * size * workers)
         if not self._fresh:
             return None

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim import analysis, cosim, units
-from feedsim.cosim.exchange import NAME as NATIVE
+from feedsim.cosim.exchange import LIBRARY_NAME as NATIVE
 from feedsim.cosim.unpacked import check_there
 from feedsim.errors import FeedsimError
 from feedsim.findings import WRONG, ranked, severity

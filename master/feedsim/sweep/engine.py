@@ -20,7 +20,7 @@ from typing import Any, Protocol
 from feedsim.errors import InputError, SimulationError
 from feedsim.extras import ask
 from feedsim.sweep import cluster, provenance
-from feedsim.sweep.batches import AIM, LONGEST, Batch, Batches
+from feedsim.sweep.batches import AIM, MAX_BATCH_DELAY, Batch, Batches
 from feedsim.sweep.bundle import Bundle, Workplace
 from feedsim.sweep.design import Outcome, Task
 
@@ -246,7 +246,7 @@ class _Flight:
         key = f"{self._name}-{self._count}"
         only = self._fit if self._crowd.refused else None
         future = self._client.submit(
-            work_batch, self._key, batch.tasks, AIM * LONGEST, key=key, pure=False, retries=0,
+            work_batch, self._key, batch.tasks, AIM * MAX_BATCH_DELAY, key=key, pure=False, retries=0,
             priority=10 if batch.suspect else 0, workers=None if only is None else sorted(only),
         )  # fmt: skip
         self._of[key] = _Sent(future, batch, only)

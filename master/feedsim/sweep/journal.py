@@ -21,7 +21,7 @@ from feedsim.errors import InputError, OutputError
 from feedsim.owned import Closing, claimed
 from feedsim.sweep.design import Outcome
 
-NAME = "runs.jsonl"
+JOURNAL_NAME = "runs.jsonl"
 _EXTENT = "runs"  # key of the lines that say how many
 FORMAT = 1
 SYNC = 1.0  # seconds after which what was written is on the disk at the latest
@@ -57,7 +57,7 @@ class Journal(Closing):
             InputError: the journal is that of another study, or of more runs.
             OutputError: it cannot be written, or another process has claimed the folder.
         """
-        self.path = directory / NAME
+        self.path = directory / JOURNAL_NAME
         self.runs = runs
         self.done: set[int] = set()
         self.failed = 0

@@ -25,7 +25,7 @@ from feedsim.sweep.design import Design
 
 # What a worker is asked, in words that every Python knows, whatever is installed there.
 QUESTION = "__import__('feedsim.sweep.provenance', fromlist=['versions']).versions()"
-UNITS = ("plant", "controller", "friction")
+UNIT_NAMES = ("plant", "controller", "friction")
 # Methods of which a study with more runs has those of a smaller one, with the same seed, as its first ones: points of a
 # Sobol sequence, and for indices what is made of them sample by sample.
 PREFIXED = ("sobol", "sensitivity")
@@ -50,7 +50,7 @@ def parts(study: Study, design: Design, fmus: Path) -> dict[str, str]:
 def units_of(base: Base, parameters: Iterable[Parameter] = ()) -> tuple[str, ...]:
     """Shipped units that runs of a scenario may need, where `parameters` change it."""
     varied = any(key.startswith("coupling") for parameter in parameters for key in parameter.keys)
-    return (*UNITS, "machine") if varied or base.scenario.coupling.units == "one" else UNITS
+    return (*UNIT_NAMES, "machine") if varied or base.scenario.coupling.units == "one" else UNIT_NAMES
 
 
 def fingerprint(found: Mapping[str, str]) -> str:

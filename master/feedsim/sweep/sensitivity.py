@@ -37,7 +37,7 @@ MOST_LEFT_OUT = 0.1
 LEAST_POINTS = 8  # base points below which there are no indices
 # With 16, 95 % intervals of even a linear figure's largest index held in less than one of ten studies.
 USEFUL_POINTS = 64
-SLACK = 0.02  # that indices and their intervals may lie beyond 0 and 1: too little to mislead
+INDEX_TOLERANCE = 0.02  # that indices and their intervals may lie beyond 0 and 1: too little to mislead
 # Scatter below this share of a figure's size is what rounding leaves, not an effect.
 CONSTANT = 1e-12
 _BLOCK = 4_000_000  # numbers of a block of resampling weights, 32 MB
@@ -191,8 +191,10 @@ def beyond(found: Indices) -> list[int]:
     """Parameters of which an interval lies wholly beyond 0 to 1, or the first order wholly above the total."""
     if found.reason:
         return []
-    wrong = (found.total_interval[:, 0] > 1 + SLACK) | (found.first_interval[:, 0] > 1 + SLACK)
-    wrong |= (found.first_interval[:, 1] < -SLACK) | (found.first_interval[:, 0] > found.total_interval[:, 1] + SLACK)
+    wrong = (found.total_interval[:, 0] > 1 + INDEX_TOLERANCE) | (found.first_interval[:, 0] > 1 + INDEX_TOLERANCE)
+    wrong |= (found.first_interval[:, 1] < -INDEX_TOLERANCE) | (
+        found.first_interval[:, 0] > found.total_interval[:, 1] + INDEX_TOLERANCE
+    )
     return [int(k) for k in np.flatnonzero(wrong)]
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import pandas
 
 OK, FAILED = "ok", "failed"
-FIRST, LAST = ("run",), ("status", "message", "warnings", "seconds")
+FIRST_COLUMNS, LAST_COLUMNS = ("run",), ("status", "message", "warnings", "seconds")
 Format = Literal["csv", "parquet"]
 STEM = "table"
 RECORD = "study.json"
@@ -142,7 +142,9 @@ def table_of(
     heads = {parameter.name: parameter.unit for parameter in design.parameters}
     return Table(
         columns,
-        {"run": "", **heads, **{name: units[name] for name in names}} | dict.fromkeys(LAST, "") | {"seconds": "s"},
+        {"run": "", **heads, **{name: units[name] for name in names}}
+        | dict.fromkeys(LAST_COLUMNS, "")
+        | {"seconds": "s"},
         tuple(heads),
         tuple(names),
         design.runs,
@@ -274,7 +276,7 @@ def _head(text: str) -> tuple[str, str]:
 
 
 def _read_table(columns: dict[str, NDArray[Any]], units: dict[str, str], record: Mapping[str, Any]) -> Table:
-    between = [name for name in columns if name not in FIRST + LAST]
+    between = [name for name in columns if name not in FIRST_COLUMNS + LAST_COLUMNS]
     listed = record.get("parameters")
     entries = listed if isinstance(listed, list) else []
     parameters = [entry["name"] for entry in entries if isinstance(entry, dict) and "name" in entry]

@@ -17,7 +17,7 @@ from feedsim.sweep.design import Design, Outcome
 
 ENOUGH = 6  # runs that work, the first of which does not count for the time
 TRIES = 16
-LONGEST = 20.0  # s after which no further run is begun
+MAX_TRIAL_TIME = 20.0  # s after which no further run is begun
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def trial(study: Study, design: Design, fmus: Path | None = None) -> Trial:
     begun = perf_counter()
     try:
         for run in islice(spread(design.runs), TRIES):
-            if len(done) == ENOUGH or (done and perf_counter() - begun > LONGEST):
+            if len(done) == ENOUGH or (done and perf_counter() - begun > MAX_TRIAL_TIME):
                 break
             try:
                 _checked(study, design, run)

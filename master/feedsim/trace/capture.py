@@ -22,12 +22,12 @@ from feedsim.errors import InputError
 from feedsim.files import regular
 from feedsim.trace.capture_axes import CaptureAxis, axes_of
 from feedsim.trace.json_stream import JsonStream
-from feedsim.trace.trace import LARGEST, Array, recorded
+from feedsim.trace.trace import MAX_MAGNITUDE, Array, recorded
 
 SUFFIX = ".json"
 COUNTER = "CYCLE"
 LEAST_CYCLE = 1e-3  # ms
-LONGEST_NAME, MOST_SHOWN = 200, 60  # characters: of a name; of a cell in a message
+MAX_NAME_LENGTH, MOST_SHOWN = 200, 60  # characters: of a name; of a cell in a message
 # 1.1 GB as numbers, in memory twice while they are sorted into columns; a file of some 1.3 GB.
 MOST_NUMBERS, MOST_BLOCKS = 1 << 27, 1_000_000
 LENGTHS = {"DES_POS": "mm", "ENC_POS": "mm", "ENC1_POS": "mm", "ENC2_POS": "mm", "CONT_DEV": "mm",
@@ -85,7 +85,7 @@ def read_capture(path: Path) -> Capture:
         if wrong.any():
             row = int(np.argmax(wrong))
             cell = values[row, k]
-            allowed = f"; allowed: up to {LARGEST:g}" if np.isfinite(cell) else ", no finite number"
+            allowed = f"; allowed: up to {MAX_MAGNITUDE:g}" if np.isfinite(cell) else ", no finite number"
             raise InputError(f"{path}, row {row + 1}: {name} is {_shown(float(cell))}{allowed}")
         values[:, k] = column
     counter = values[:, names.index(COUNTER)]
@@ -177,17 +177,17 @@ def _row(found: _Content, row: object) -> None:
         found.cells.extend(row)
     except (TypeError, OverflowError):
         for k, cell in enumerate(row):
-            if not isinstance(cell, (int, float)) or abs(cell) > LARGEST:
+            if not isinstance(cell, (int, float)) or abs(cell) > MAX_MAGNITUDE:
                 name = found.names[k] if found.names else f"value {k + 1}"
                 fault = ", no finite number"
                 if isinstance(cell, int) and not isinstance(cell, bool):
-                    fault = f"; allowed: up to {LARGEST:g}"
+                    fault = f"; allowed: up to {MAX_MAGNITUDE:g}"
                 raise InputError(f"{found.path}, row {found.rows}: {name} is {_shown(cell)}{fault}") from None
 
 
 def _event(found: _Content, event: Mapping[str, Any]) -> None:
     at, block = event.get("HFProbeCounter"), event.get("GCode")
-    if isinstance(at, (int, float)) and abs(at) <= LARGEST and isinstance(block, str):
+    if isinstance(at, (int, float)) and abs(at) <= MAX_MAGNITUDE and isinstance(block, str):
         if len(found.blocks) == MOST_BLOCKS:
             raise InputError(f"{found.path}: more than {MOST_BLOCKS:,} NC blocks; allowed: up to that")
         found.blocks.append((float(at), block.strip()))
@@ -221,10 +221,10 @@ def _signals(header: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def _names(path: Path, header: Mapping[str, Any]) -> list[str]:
     names = [str(signal.get("Address") or signal.get("Name")) for signal in _signals(header)]
     texts = [*names, *(str(signal.get("Axis", "")) for signal in _signals(header))]
-    if long := [text for text in texts if len(text) > LONGEST_NAME]:
+    if long := [text for text in texts if len(text) > MAX_NAME_LENGTH]:
         raise InputError(
             f"{path}: Header.SignalListHFData has a name of {len(long[0])} characters, {_shown(long[0])}; allowed: up "
-            f"to {LONGEST_NAME}"
+            f"to {MAX_NAME_LENGTH}"
         )
     if COUNTER not in names:
         raise InputError(f"{path}: Header.SignalListHFData has no {COUNTER}, the counter that is the clock")

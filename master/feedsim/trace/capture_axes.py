@@ -22,16 +22,16 @@ from feedsim.trace.trace import Array
 USUAL_PITCHES = (1, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 12.5, 15, 16, 20, 25, 30, 32, 40, 50)  # mm
 LEAST_PITCH = 0.9  # mm: below it the positions are in another unit, where the figure is a usual pitch in it
 OTHER_LENGTHS = {"in": 25.4, "m": 1000.0}  # unit -> mm
-TURN = 360.0  # deg: what a rotary axis travels with a turn
+DEGREES_PER_TURN = 360.0  # deg: what a rotary axis travels with a turn
 FITS = 0.1  # relative residual up to which POWER is TORQUE times a speed
-NEAR = 0.01  # relative; a pitch is told to that at best, as the channels are sampled at different instants
+PITCH_TOLERANCE = 0.01  # relative; a pitch is told to that at best, as the channels are sampled at different instants
 NEAR_WITHOUT = 0.03  # the same where rows had to be left out, of which some beside are touched, too
 # N.m of TORQUE for an A of CURRENT that motors of feed axes with a screw have.
 TORQUE_CONSTANTS = (0.05, 5.0)
 TOGETHER = 0.9  # of a correlation, above which TORQUE and CURRENT are the same thing in two units
 HEAP = 0.005  # share of the rows that are one value to the last digit, at an end of the range: it is cut off there
-LOOKED_AT = 20_000  # rows that a fit rests on
-FEW = 0.02  # share of the rows that may stand out
+FIT_ROWS = 20_000  # rows that a fit rests on
+OUTLIER_SHARE = 0.02  # share of the rows that may stand out
 
 
 @dataclass(frozen=True)
@@ -143,16 +143,16 @@ def _spikes(values: Array) -> Rows:
     """One or two rows that stand far off both their neighbours, and far off what the signal does elsewhere."""
     padded = np.pad(values, 3, mode="edge")
     off = np.abs(values - np.median(np.lib.stride_tricks.sliding_window_view(padded, 7), axis=1))
-    usual = float(np.quantile(off, 1 - FEW))
+    usual = float(np.quantile(off, 1 - OUTLIER_SHARE))
     span = float(np.quantile(values, 0.99) - np.quantile(values, 0.01))
     found: Rows = off > max(10 * usual, 0.5 * span)
-    return found if found.mean() < FEW else np.zeros(len(values), dtype=bool)
+    return found if found.mean() < OUTLIER_SHARE else np.zeros(len(values), dtype=bool)
 
 
 def _jumps(position: Array) -> Rows:
     """Rows before which a position goes on by far more than it does elsewhere."""
     steps = np.abs(np.diff(position, prepend=position[0]))
-    usual = float(np.quantile(steps, 1 - FEW))
+    usual = float(np.quantile(steps, 1 - OUTLIER_SHARE))
     found: Rows = steps > (20 * usual if usual else np.inf)
     return found
 
@@ -179,7 +179,7 @@ def _fit(time: Array, torque: Array, power: Array, position: Array, rows: Rows) 
     """
     step = float(np.median(np.diff(time)))
     picked = np.flatnonzero(rows)
-    picked = picked[:: max(1, len(picked) // LOOKED_AT)]
+    picked = picked[:: max(1, len(picked) // FIT_ROWS)]
     at, power, torque = time[picked], power[picked], torque[picked]
     scatter = float(power @ power)
     best = _Fit(np.inf, np.inf)
@@ -219,7 +219,7 @@ def _swapped(number: str, names: Mapping[str, str], columns: Mapping[str, Array]
 def _with_units(axis: CaptureAxis, fit: _Fit, columns: Mapping[str, Array]) -> CaptureAxis:
     """With pitch and units. A figure that no screw has is another unit of length, or, if CURRENT says so, of torque."""
     size = abs(fit.pitch)
-    rotary = abs(size - TURN) < NEAR * TURN
+    rotary = abs(size - DEGREES_PER_TURN) < PITCH_TOLERANCE * DEGREES_PER_TURN
     found = replace(axis, sign=1 if fit.pitch > 0 else -1, rotary=rotary)
     if not rotary and (constant := _torque_constant(axis.number, columns)) is not None:
         low, high = TORQUE_CONSTANTS
@@ -239,11 +239,11 @@ def _with_units(axis: CaptureAxis, fit: _Fit, columns: Mapping[str, Array]) -> C
                     f"makes it {usual:g} mm"
                 )
                 return replace(found, pitch=usual, length=unit, doubts=(*axis.doubts, doubt))
-    pitch = TURN if rotary else _usual(size, NEAR_WITHOUT if axis.doubts else NEAR)
+    pitch = DEGREES_PER_TURN if rotary else _usual(size, NEAR_WITHOUT if axis.doubts else PITCH_TOLERANCE)
     return replace(found, pitch=float(pitch) if pitch is not None else size)
 
 
-def _usual(size: float, near: float = NEAR) -> float | None:
+def _usual(size: float, near: float = PITCH_TOLERANCE) -> float | None:
     """The usual pitch that an estimate [mm] holds, `near` at the most (relative); None where it holds none."""
     usual = min(USUAL_PITCHES, key=lambda each: abs(np.log(each / size)))
     return float(usual) if abs(usual - size) < near * usual else None

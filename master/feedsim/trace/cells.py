@@ -23,7 +23,7 @@ from feedsim import units
 from feedsim.errors import InputError, few
 from feedsim.files.regular import content
 from feedsim.files.spellings import known_unit
-from feedsim.trace.trace import LARGEST, Array, check_name, check_unit, recorded, suggest
+from feedsim.trace.trace import MAX_MAGNITUDE, Array, check_name, check_unit, recorded, suggest
 
 _HEADER = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?")
 _ROUND = re.compile(r"(.*?[^\s])(\s*)\(([^()]*[^()0-9\s][^()]*)\)")
@@ -355,8 +355,8 @@ def numbers(cells: Sequence[str], decimal: Decimal, lines: Sequence[int], where:
             raise InputError(f"{where}:{line}: {cell!r} in column {name!r}; every value must be a finite number")
         if not _PLAIN.fullmatch(text):
             raise InputError(f"{where}:{line}: {cell!r} in column {name!r} is no number")
-        if abs(float(text)) > LARGEST:
+        if abs(float(text)) > MAX_MAGNITUDE:
             raise InputError(
-                f"{where}:{line}: {few([cell], 1)} in column {name!r} is too large; allowed: up to {LARGEST:g}"
+                f"{where}:{line}: {few([cell], 1)} in column {name!r} is too large; allowed: up to {MAX_MAGNITUDE:g}"
             )
     return np.array([float(text) for text in plain], dtype=np.float64)

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 from feedsim.errors import InputError
 
 CHUNK = 1 << 20  # characters
-LONGEST = 1 << 26  # characters of a value that is taken whole
+MAX_VALUE_LENGTH = 1 << 26  # characters of a value that is taken whole
 _BLANK = re.compile(r"[ \t\n\r]*")
 
 
@@ -63,10 +63,10 @@ class JsonStream:
             try:
                 value, end = self._decode(self._buffer, self._at)
             except json.JSONDecodeError:
-                if len(self._buffer) - self._at > LONGEST:
+                if len(self._buffer) - self._at > MAX_VALUE_LENGTH:
                     raise InputError(
                         f"{self._path} is no JSON file that can be read: the value at character "
-                        f"{self._before + self._at} does not end within {LONGEST:,} characters"
+                        f"{self._before + self._at} does not end within {MAX_VALUE_LENGTH:,} characters"
                     ) from None
                 if self._fill():
                     self._chunk *= 2  # a long value, which is scanned again

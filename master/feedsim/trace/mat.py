@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from feedsim.errors import InputError
 from feedsim.files import regular
 
-LARGEST = 2 << 30  # bytes that the variables of a file may inflate to,
+MAX_INFLATED_BYTES = 2 << 30  # bytes that the variables of a file may inflate to,
 RATIO = 100  # nor more than this many times the file's own size,
 FREE = 256 << 20  # from so many bytes on
-DEEPEST = 50  # structures within structures
-MOST = 100_000  # variables and fields
+MAX_DEPTH = 50  # structures within structures
+MAX_FIELDS = 100_000  # variables and fields
 
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}  # of data
 _CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
@@ -72,7 +72,9 @@ def _variables(content: bytes) -> dict[str, Value]:
         raise NotImplementedError
     if content[124:128] not in (b"\x00\x01IM", b"\x01\x00MI"):
         raise _Fault("its head is that of no known version")
-    reader = _Reader("<" if content[126:128] == b"IM" else ">", min(LARGEST, max(FREE, RATIO * len(content))))
+    reader = _Reader(
+        "<" if content[126:128] == b"IM" else ">", min(MAX_INFLATED_BYTES, max(FREE, RATIO * len(content)))
+    )
     found: dict[str, Value] = {}
     at = 128
     while at < len(content):
@@ -126,8 +128,8 @@ class _Reader:
     def matrix(self, data: memoryview, depth: int) -> tuple[str, Value]:
         """Name and value of a variable or a field."""
         self.count += 1
-        if depth > DEEPEST or self.count > MOST:
-            raise _Fault(f"more than {DEEPEST} structures within one another, or {MOST} fields")
+        if depth > MAX_DEPTH or self.count > MAX_FIELDS:
+            raise _Fault(f"more than {MAX_DEPTH} structures within one another, or {MAX_FIELDS} fields")
         if not len(data):
             return "", np.zeros(0)
         kind, flags, at = self.element(data, 0, "the head of a variable")

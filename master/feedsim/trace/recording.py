@@ -20,7 +20,7 @@ from feedsim.trace.cells import Table, read_table
 from feedsim.trace.csv import write_csv
 from feedsim.trace.mat import Other, Value, flat, read_mat
 from feedsim.trace.scopes import read_scope
-from feedsim.trace.trace import LARGEST, Array, Trace, recorded, suggest
+from feedsim.trace.trace import MAX_MAGNITUDE, Array, Trace, recorded, suggest
 
 MAT = ".mat"
 REAL = "fiu"  # kinds of numpy's types
@@ -129,7 +129,9 @@ def _check(path: Path, columns: Mapping[str, Array]) -> None:
     for name, values in columns.items():
         if (wrong := recorded(values)[1]).any():
             row = int(np.argmax(wrong))
-            raise InputError(f"{path}: {name!r} is {values[row]:.6g} at sample {row + 1}; allowed: up to {LARGEST:g}")
+            raise InputError(
+                f"{path}: {name!r} is {values[row]:.6g} at sample {row + 1}; allowed: up to {MAX_MAGNITUDE:g}"
+            )
 
 
 def _read_mat(path: Path) -> Recording:
@@ -216,5 +218,7 @@ def _vector(path: Path, variables: Mapping[str, Value], variable: str) -> Array:
     numbers, wrong = recorded(numbers)
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise InputError(f"{path}: {variable!r} is {numbers[row]:g} at element {row + 1}; allowed: up to {LARGEST:g}")
+        raise InputError(
+            f"{path}: {variable!r} is {numbers[row]:g} at element {row + 1}; allowed: up to {MAX_MAGNITUDE:g}"
+        )
     return numbers

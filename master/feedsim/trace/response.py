@@ -17,7 +17,7 @@ from feedsim.trace.trace import Array, Columns, check_name, check_unit, matching
 
 Complexes = NDArray[np.complex128]
 
-ROUNDING = 1e-9  # of a frequency: quotients of times carry it
+FREQUENCY_ROUNDING = 1e-9  # of a frequency: quotients of times carry it
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,7 +65,7 @@ class FrequencyResponse(Columns[Complexes]):
             if unknown := sorted(set(names) - set(columns)):
                 raise InputError(f"{what} given for {unknown[0]!r}, which is no column")
         for name, values in coherence.items():
-            if size and not (values.min() >= -ROUNDING and values.max() <= 1 + ROUNDING):
+            if size and not (values.min() >= -FREQUENCY_ROUNDING and values.max() <= 1 + FREQUENCY_ROUNDING):
                 row = int(np.argmax(np.maximum(values - 1, -values)))
                 raise InputError(
                     f"coherence of {name!r} is {values[row]:.6g} at {frequency[row]:.6g} Hz; 0 to 1 is allowed"

@@ -28,15 +28,15 @@ from feedsim.trace.uff import read_response_uff
 UNIVERSAL = (".uff", ".unv", ".uf", ".bunv")
 FREQUENCY_NAMES = ("frequency", "freq", "f")
 # What a column holds, by the end of its name.
-PARTS = {
+COLUMN_PARTS = {
     "magnitude": ("magnitude", "mag", "amplitude", "gain", "abs", "modulus"),
     "phase": ("phase", "angle", "arg"),
     "re": ("re", "real"),
     "im": ("im", "imag", "imaginary"),
     "coherence": ("coherence", "coh"),
 }
-_PART = {word: part for part, words in PARTS.items() for word in words}
-_NAME = re.compile(rf"(?:(.*?)[\s_.:]+)?({'|'.join(sorted(_PART, key=len, reverse=True))})", re.IGNORECASE)
+_PART = {word: part for part, words in COLUMN_PARTS.items() for word in words}
+_COLUMN_NAME = re.compile(rf"(?:(.*?)[\s_.:]+)?({'|'.join(sorted(_PART, key=len, reverse=True))})", re.IGNORECASE)
 _DECIBELS = re.compile(r"dB(?:\s+re\s+(.+))?")
 
 
@@ -147,7 +147,7 @@ def _by_name(table: Table, at: int, file: str) -> dict[str, dict[str, int]]:
     """Responses that the columns' names tell; columns of other names are left alone."""
     found: dict[str, dict[str, int]] = {}
     for i, column in enumerate(table.names):
-        match = _NAME.fullmatch(column)
+        match = _COLUMN_NAME.fullmatch(column)
         if i == at or not match:
             continue
         name, part = match[1] or file, _PART[match[2].lower()]

@@ -20,7 +20,7 @@ from feedsim.files import regular
 from feedsim.files.spellings import known_unit, spelled
 from feedsim.trace.trace import Array
 
-HEAD = 65536  # bytes within which a file tells what it is
+SCOPE_BYTES = 65536  # bytes within which a file tells what it is
 # Rows of a TwinCAT header; they repeat their key ahead of every column of time.
 KEYS = frozenset({
     "Name", "SymbolName", "SymbolComment", "NetId", "NetID", "Port", "IndexGroup", "IndexOffset", "Data-Type",
@@ -33,7 +33,7 @@ _TWINCAT = re.compile(
 _HALSCOPE = re.compile(r"\s*Sampling period is (\d+) ns")
 TICKS = 1e15  # a time beyond is a date in 100 ns, not in ms since the start
 TICK, MS = 1e-7, 1e-3  # s
-LONGEST = 12  # digits of halscope's sampling period in ns: 1000 s
+MAX_PERIOD_DIGITS = 12  # digits of halscope's sampling period in ns: 1000 s
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ def read_scope(path: Path) -> Signals | None:
     if not path.is_file():
         return None  # a pipe is read once
     with regular.opened(path) as file:
-        raw = file.read(HEAD)
+        raw = file.read(SCOPE_BYTES)
     head = _decoded(raw)
     if _HALSCOPE.match(head):
         return _halscope(path, _decoded(regular.content(path)))
@@ -194,8 +194,10 @@ def _halscope(path: Path, text: str) -> Signals:
     """Lines of `label value label value`, below the sampling period in ns."""
     first, *lines = text.splitlines()
     found = _HALSCOPE.match(first)
-    if found is None or not int(found[1][:LONGEST]) or len(found[1]) > LONGEST:
-        raise InputError(f"{path}:1: {first[:80]!r}; a sampling period in ns is expected, of up to {LONGEST} digits")
+    if found is None or not int(found[1][:MAX_PERIOD_DIGITS]) or len(found[1]) > MAX_PERIOD_DIGITS:
+        raise InputError(
+            f"{path}:1: {first[:80]!r}; a sampling period in ns is expected, of up to {MAX_PERIOD_DIGITS} digits"
+        )
     rows = [(k, line.split()) for k, line in enumerate(lines, 2) if line.strip()]
     if len(rows) < 3:
         raise InputError(f"{path}: {len(rows)} rows of samples; at least 3 are needed")

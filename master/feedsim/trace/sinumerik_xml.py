@@ -27,7 +27,7 @@ from feedsim.trace.trace import Array
 SUFFIX = ".xml"
 ALPHABET = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"
 NOTHING = 9.2188684372274e18  # and above: no value, the bits of an infinity as a whole number
-LARGEST = 256 << 20  # bytes of a file
+MAX_TRACE_BYTES = 256 << 20  # bytes of a file
 
 
 class _Plain(ElementTree.TreeBuilder):
@@ -40,7 +40,7 @@ class _Plain(ElementTree.TreeBuilder):
 def _root(path: Path) -> ElementTree.Element:
     parser = ElementTree.XMLParser(target=_Plain())
     try:
-        parser.feed(regular.content(path, LARGEST))
+        parser.feed(regular.content(path, MAX_TRACE_BYTES))
         root: ElementTree.Element = parser.close()
     except ElementTree.ParseError as error:
         raise InputError(f"{path} is no XML file that can be read: {error}") from None

@@ -188,17 +188,20 @@ def suggest(name: str, known: Iterable[str]) -> str:
     return f"; there is {few(names, 12) or 'none'}"
 
 
-LARGEST, SMALLEST = 1e100, 1e-100  # magnitudes of recorded values: squares and products of three stay numbers
+MAX_MAGNITUDE, MIN_MAGNITUDE = (
+    1e100,
+    1e-100,
+)  # magnitudes of recorded values: squares and products of three stay numbers
 
 
 def recorded(values: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Values as a record may hold them, and which of them it may not: no finite number, or beyond LARGEST.
+    """Values as a record may hold them, and which of them it may not: no finite number, or beyond MAX_MAGNITUDE.
 
-    What is below SMALLEST is zero: no sensor resolves it, and a quotient by it would be no number.
+    What is below MIN_MAGNITUDE is zero: no sensor resolves it, and a quotient by it would be no number.
     """
     with np.errstate(invalid="ignore"):
-        wrong = ~(np.abs(values) <= LARGEST)
-        return np.where(np.abs(values) < SMALLEST, 0.0, values), wrong
+        wrong = ~(np.abs(values) <= MAX_MAGNITUDE)
+        return np.where(np.abs(values) < MIN_MAGNITUDE, 0.0, values), wrong
 
 
 def first_not_finite(values: Array) -> int | None:

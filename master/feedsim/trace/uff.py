@@ -27,11 +27,11 @@ FUNCTIONS = {
     0: "general function", 1: "time response", 2: "auto spectrum", 3: "cross spectrum", 5: "transmissibility",
     9: "power spectral density", 12: "spectrum",
 }  # fmt: skip
-FREQUENCY, UNKNOWN = (18, 0, 1), 0  # specific data types that an axis of frequencies may have
-DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
-DIRECTIONS |= {-code: text.replace("+", "-") for code, text in DIRECTIONS.items() if code}
+FREQUENCY_TYPES, UNKNOWN_TYPE = (18, 0, 1), 0  # specific data types that an axis of frequencies may have
+DIRECTION_CODES = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
+DIRECTION_CODES |= {-code: text.replace("+", "-") for code, text in DIRECTION_CODES.items() if code}
 # Frequencies of functions that go together agree up to the digits of the file, 13.5E.
-SAME = 1e-4
+FREQUENCY_TOLERANCE = 1e-4
 NONE = ("", "NONE")
 
 
@@ -106,7 +106,7 @@ def _sets(path: Path) -> list[Mapping[str, Any]]:
 
 def _frequencies(path: Path, name: str, function: Mapping[str, Any]) -> Floats:
     kind = int(function["abscissa_spec_data_type"])
-    if kind not in FREQUENCY:
+    if kind not in FREQUENCY_TYPES:
         raise InputError(
             f"{path}: function {name!r} is not over frequency (abscissa of data type {kind}; 18 is expected)"
         )
@@ -132,7 +132,7 @@ def _hertz(path: Path, name: str, label: str) -> float:
 
 
 def _check_same(path: Path, name: str, frequency: Floats, first: Floats) -> None:
-    if frequency.shape != first.shape or not np.allclose(frequency, first, rtol=SAME, atol=0):
+    if frequency.shape != first.shape or not np.allclose(frequency, first, rtol=FREQUENCY_TOLERANCE, atol=0):
         raise InputError(
             f"{path}: function {name!r} has {frequency.size} lines from {frequency[0]:.6g} to {frequency[-1]:.6g} Hz, "
             f"the first one {first.size} from {first[0]:.6g} to {first[-1]:.6g} Hz; functions over different "
@@ -148,7 +148,7 @@ def _point(function: Mapping[str, Any], end: str) -> str:
     entity = str(function.get(f"{end}_ent_name") or "").strip()
     node, direction = int(function[f"{end}_node"]), int(function[f"{end}_dir"])
     named = node if entity.upper() in NONE else f"{entity}.{node}"
-    where = DIRECTIONS.get(direction, str(direction))
+    where = DIRECTION_CODES.get(direction, str(direction))
     return f"{named}:{where}" if where else str(named)
 
 

@@ -16,7 +16,7 @@ from feedsim.scenario import Machine, Scenario
 from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
 from feedsim.tune.compensators import NEVER_WORSE, Found, Progress, PulseGrid, instant, pulse, table
 
-CHANGE = 0.2  # of the friction, with which a setting is tried besides
+FRICTION_CHANGE = 0.2  # of the friction, with which a setting is tried besides
 SCALED = ("F_C", "F_S", "F_log")
 
 
@@ -98,7 +98,7 @@ def tune(
         progress("judging", len(results), total)
         results.append(errors(circles, machine, compensated=compensated))
     changed: dict[float, Array] = {}
-    for change in (CHANGE, -CHANGE):
+    for change in (FRICTION_CHANGE, -FRICTION_CHANGE):
         progress("judging", 4 + 2 * len(changed), total)
         own = _with_friction(machine, axes, 1 + change)
         changed[change] = np.array([errors(off, own, compensated=each) for each in (False, True)])

@@ -24,20 +24,20 @@ from feedsim.scenario import Drive, Machine
 from feedsim.tune.circles import Circles, size
 from feedsim.tune.closed_forms import axis_lag
 
-KINDS = ("pulse", "pulse_characteristic", "table", "model")
+COMPENSATOR_KINDS = ("pulse", "pulse_characteristic", "table", "model")
 OBJECTIVES = ("ratio", "worst", "largest")
 Progress = Callable[[str, int, int], None]
 
 # Amplitudes in shares of 2 F_C/K_p, the speed error that turns the friction torque round; time constants [s].
-SHARES = (0.0, 0.08, 0.16, 0.25, 0.35, 0.5, 0.7, 1.0)
-TIMES = (0.01, 0.02, 0.035, 0.06, 0.1, 0.17, 0.3)
-POPULATION, KEPT, ROUNDS, NARROWER = 4000, 200, 40, 0.88  # of the search on the grid
+AMPLITUDE_SHARES = (0.0, 0.08, 0.16, 0.25, 0.35, 0.5, 0.7, 1.0)
+TIME_CONSTANTS = (0.01, 0.02, 0.035, 0.06, 0.1, 0.17, 0.3)
+POPULATION, SURVIVORS, GENERATIONS, NARROWER = 4000, 200, 40, 0.88  # of the search on the grid
 NEVER_WORSE = 1.05  # of the error without compensation, where a pair counts as worse
 WEIGHT = 4.0  # exponent of the mean of ratios: large ones count more
 # Speeds of the table's points [m/s]: from standstill, where friction turns round, to fast circles.
 SPEEDS = tuple(speed / 60000 for speed in (0.0, 10.0, 30.0, 90.0, 250.0, 700.0, 2000.0, 6000.0))
 DISTANCE = 1e-6  # [m] the longest that the control allows
-STEPS = (0.5, 0.25, 0.12)  # of the friction F_C, by which torques are changed
+TORQUE_STEPS = (0.5, 0.25, 0.12)  # of the friction F_C, by which torques are changed
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +104,11 @@ class PulseGrid:
         """A run for every point of the grid, with both axes at the same share."""
         scales = tuple(scale_of(machine, axis) if axis in axes else 0.0 for axis in circles.plane)
         none = circles.errors(machine, fmus=fmus)
-        found = np.empty((len(SHARES), len(TIMES), *none.shape))
+        found = np.empty((len(AMPLITUDE_SHARES), len(TIME_CONSTANTS), *none.shape))
         found[0] = none
-        total, done = (len(SHARES) - 1) * len(TIMES), 0
-        for i, share in enumerate(SHARES[1:], start=1):
-            for j, time in enumerate(TIMES):
+        total, done = (len(AMPLITUDE_SHARES) - 1) * len(TIME_CONSTANTS), 0
+        for i, share in enumerate(AMPLITUDE_SHARES[1:], start=1):
+            for j, time in enumerate(TIME_CONSTANTS):
                 progress("pulses", done, total)
                 own = machine
                 for axis, scale in zip(circles.plane, scales, strict=True):
@@ -125,8 +125,8 @@ class PulseGrid:
 
         Linear between the points of the grid, over the amplitude and the logarithm of the time constant.
         """
-        i, p = _between(np.array(SHARES), amplitudes / self.scales[axis])
-        j, q = _between(np.log(TIMES), np.log(time)[:, None])
+        i, p = _between(np.array(AMPLITUDE_SHARES), amplitudes / self.scales[axis])
+        j, q = _between(np.log(TIME_CONSTANTS), np.log(time)[:, None])
         of, pairs = self.errors[..., axis, :], np.arange(amplitudes.shape[1])
         p, q = p[..., None], q[..., None]
         low = (1 - p) * of[i, j, pairs] + p * of[i + 1, j, pairs]
@@ -165,8 +165,8 @@ def pulse(
     """
     before, scale = size(grid.errors[0, 0, :, axis]), grid.scales[axis]
     edges = math.log(accelerations.min()) - 0.5, math.log(accelerations.max()) + 0.5
-    low = np.array([0.0, math.log(TIMES[0]), *([0.0, edges[0], edges[0], edges[0]] if adapted else [])])
-    high = np.array([1.0, math.log(TIMES[-1]), *([1.0, edges[1], edges[1], edges[1]] if adapted else [])])
+    low = np.array([0.0, math.log(TIME_CONSTANTS[0]), *([0.0, edges[0], edges[0], edges[0]] if adapted else [])])
+    high = np.array([1.0, math.log(TIME_CONSTANTS[-1]), *([1.0, edges[1], edges[1], edges[1]] if adapted else [])])
 
     def costs(x: Array) -> Array:
         top, time = scale * x[:, 0], np.exp(x[:, 1])
@@ -179,10 +179,10 @@ def pulse(
     random = np.random.default_rng(1)
     population = random.uniform(low, high, (POPULATION, len(low)))
     width = 0.25 * (high - low)
-    for _ in range(ROUNDS):
+    for _ in range(GENERATIONS):
         population[:, 3:] = np.sort(population[:, 3:], axis=1)
-        best = population[np.argsort(costs(population), kind="stable")[:KEPT]]
-        varied = best[random.integers(0, KEPT, POPULATION - KEPT)]
+        best = population[np.argsort(costs(population), kind="stable")[:SURVIVORS]]
+        varied = best[random.integers(0, SURVIVORS, POPULATION - SURVIVORS)]
         varied = varied + width * random.normal(size=varied.shape)
         population = np.clip(np.concatenate([best, varied]), low, high)
         width = width * NARROWER
@@ -232,8 +232,8 @@ def table(
 
     best = scores(torques)
     directions = [np.ones(len(SPEEDS)), *np.eye(len(SPEEDS)), *(_from(i) for i in range(1, len(SPEEDS)))]
-    total, done = len(STEPS) * len(directions) * 2, 0
-    for step in STEPS:
+    total, done = len(TORQUE_STEPS) * len(directions) * 2, 0
+    for step in TORQUE_STEPS:
         for direction in directions:
             for sign in (1.0, -1.0):
                 progress("torques", done, total)

@@ -25,14 +25,14 @@ from feedsim.scenario import Drive, Machine, Scenario
 from feedsim.structure import Modes
 from feedsim.structure.modes import write_modes
 from feedsim.tune.drive_program import DriveProgram, Errors, circles_of, partner_of, stops_of
-from feedsim.tune.drive_result import FLOOR, WORSE, Case, Limits, Margins, Point, Tuned, decibels
+from feedsim.tune.drive_result import ERROR_FLOOR, WORSE, Case, Limits, Margins, Point, Tuned, decibels
 from feedsim.tune.knobs import Knobs, matched
 from feedsim.tune.search import Rank, least
 
 Progress = Callable[[str, int, int], None]
 
-MODES = (1.0, 0.9, 1.1)  # factors on the frequencies of elastic modes
-FRICTION = (1.2, 0.8)  # factors on the friction, with which the result is judged besides
+FREQUENCY_FACTORS = (1.0, 0.9, 1.1)  # factors on the frequencies of elastic modes
+FRICTION_FACTORS = (1.2, 0.8)  # factors on the friction, with which the result is judged besides
 # Moves as distance [m] and feed [m/s], circles as radius [m] and feed [m/s]: to search on, to choose on, to judge on.
 _MM, _MPM = 1e-3, 1 / 60
 SEARCHED = (((1 * _MM, 2 * _MPM), (10 * _MM, 5 * _MPM), (100 * _MM, 10 * _MPM)),
@@ -43,10 +43,10 @@ HELD = (((0.5 * _MM, 1 * _MPM), (5 * _MM, 3 * _MPM), (30 * _MM, 10 * _MPM), (100
         ((10 * _MM, 1.5 * _MPM), (15 * _MM, 3.5 * _MPM), (30 * _MM, 5 * _MPM)))  # fmt: skip
 GAINED = 0.95  # of the errors' mean ratio: what gains less is not worth a change
 WEIGHT = 4.0  # exponent of the mean of ratios: large ones count more
-NEAR = 0.75  # of the margins asked for: candidates from there on run, for the picture
+MARGIN_SHARE = 0.75  # of the margins asked for: candidates from there on run, for the picture
 TORQUE = 0.95  # of the torque limit
 NOISE = 0.02  # of the torque limit: torque that encoder noise may make [1]
-STEPS, EVALUATIONS = (0.12, 0.12, 0.05), 130  # of the search's starts; evaluations per start
+SIMPLEX_STEPS, EVALUATIONS = (0.12, 0.12, 0.05), 130  # of the search's starts; evaluations per start
 BACK = (1.0, 0.8, 0.6, 0.4, 0.2)  # ways back to the present drive that are tried
 FINALISTS = 4
 FASTER = {"K_p": 4.0, "T_n": 0.15, "K_v": 2.0, "omega_0": 3.0}  # direction of the closed-form start
@@ -109,12 +109,12 @@ class _Search:
         partner = partner_of(scenario, axis)
         with TemporaryFolder() as folder:
             scaled = {1.0: machine.modes}
-            for factor in MODES[1:]:
+            for factor in FREQUENCY_FACTORS[1:]:
                 scaled[factor] = folder / f"modes_{factor}.csv"
                 write_modes(scaled[factor], _scaled(own, factor))
             judges = {}
             for name, modes in {"pose of the machine file": own, **poses}.items():
-                for factor in MODES if not own.rigid.all() else MODES[:1]:
+                for factor in FREQUENCY_FACTORS if not own.rigid.all() else FREQUENCY_FACTORS[:1]:
                     what = name if factor == 1 else f"{name}, {_percent('modes', factor)}"
                     judges[what] = Candidates(machine, _scaled(modes, factor), axis)
             knobs = Knobs(machine.shipped_drive(axis, "tuning"), machine.cycles, own.J_tot(axis))
@@ -132,7 +132,7 @@ class _Search:
         are."""
         stops, circles = wanted
         moves = _program(self.scenario, self.axis, self.partner, (stops, ()))
-        factors = MODES if len(self.judges) > len(self.poses) else MODES[:1]
+        factors = FREQUENCY_FACTORS if len(self.judges) > len(self.poses) else FREQUENCY_FACTORS[:1]
         turns = _program(self.scenario, self.axis, self.partner, ((), circles))
         return (Part(turns, 1.0), *(Part(moves, factor) for factor in factors))
 
@@ -166,7 +166,8 @@ class _Search:
     def _rank(self, drive: Drive, margins: Margins) -> Rank:
         violation = self.violation(margins)
         if violation > 0 and (
-            margins.gain < NEAR * self.limits.gain_margin or margins.phase < NEAR * self.limits.phase_margin
+            margins.gain < MARGIN_SHARE * self.limits.gain_margin
+            or margins.phase < MARGIN_SHARE * self.limits.phase_margin
         ):
             return violation, math.inf
         errors = self.errors(self.parts, self.machine_with(drive))
@@ -206,7 +207,7 @@ class _Search:
 
     def searched(self) -> list[Array]:
         """Places of the best candidates within the limits, the best first."""
-        done, total = 0, len(STEPS) * self.evaluations
+        done, total = 0, len(SIMPLEX_STEPS) * self.evaluations
 
         def counted(x: Array) -> Rank:
             nonlocal done
@@ -215,7 +216,7 @@ class _Search:
             return self.rank(x)
 
         starts: tuple[Callable[[], Array], ...] = (self.fast_start, self.as_present, self.best_yet)
-        for seed, (start, step) in enumerate(zip(starts, STEPS, strict=True), start=1):
+        for seed, (start, step) in enumerate(zip(starts, SIMPLEX_STEPS, strict=True), start=1):
             least(counted, start(), step=step, evaluations=self.evaluations, seed=seed)
         self.progress("candidates", total, total)
         allowed = sorted((each for each in self.tried if each[0][0] == 0), key=lambda each: each[0])
@@ -302,8 +303,8 @@ class _Search:
         program = _program(self.scenario, self.axis, self.partner, HELD)
         cases: dict[str, Callable[[Machine], Machine]] = {"as the machine file has it": lambda own: own}
         if len(self.judges) > len(self.poses):
-            cases |= {_percent("modes", f): partial(self.with_modes, factor=f) for f in MODES[1:]}
-        cases |= {_percent("friction", f): partial(_with_friction, axis=self.axis, factor=f) for f in FRICTION}
+            cases |= {_percent("modes", f): partial(self.with_modes, factor=f) for f in FREQUENCY_FACTORS[1:]}
+        cases |= {_percent("friction", f): partial(_with_friction, axis=self.axis, factor=f) for f in FRICTION_FACTORS}
         for k, (name, change) in enumerate(cases.items()):
             self.progress("judging", k, len(cases))
             before = program.errors(change(self.scenario.machine), fmus=self.fmus)
@@ -342,12 +343,15 @@ def _program(
 
 
 def _ratios(before: Sequence[Errors], after: Sequence[Errors]) -> tuple[Array, float]:
-    """After over before, of distances and means behind stops and of peaks, where what is below FLOOR counts as FLOOR;
+    """After over before, of distances and means behind stops and of peaks, where what is below ERROR_FLOOR
+    counts as ERROR_FLOOR;
     and their mean, to which stops and reversals add one half each."""
     groups = []
     for names in (("miss", "tail"), ("peak",)):
         pairs = [(getattr(b, name), getattr(a, name)) for b, a in zip(before, after, strict=True) for name in names]
-        groups.append(np.concatenate([np.maximum(new, FLOOR) / np.maximum(old, FLOOR) for old, new in pairs]))
+        groups.append(
+            np.concatenate([np.maximum(new, ERROR_FLOOR) / np.maximum(old, ERROR_FLOOR) for old, new in pairs])
+        )
     mean = np.mean([np.mean(group**WEIGHT) for group in groups if group.size])
     return np.concatenate(groups), float(mean ** (1 / WEIGHT))
 

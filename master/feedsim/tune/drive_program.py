@@ -31,10 +31,10 @@ from feedsim.tune.closed_forms import axis_lag
 
 BAND = 1e-6  # [m] within which an axis has settled
 ROOM = 0.9  # of the travel on either side of the pose that is used
-SPEED = 0.9  # of the highest speed of an axis, at most
+SPEED_SHARE = 0.9  # of the highest speed of an axis, at most
 ACCELERATION = 0.8  # of the highest acceleration, at most, on circles
 RESTS = 20.0  # rest behind a move, in 1/K_v
-LEAST_REST = 0.3  # [s]
+MIN_PROGRAM_REST = 0.3  # [s]
 APPROACH = 0.5  # of the highest speed, to where a circle begins
 SLOWER = (1.0, 0.7, 0.5, 0.35, 0.2, 0.1)  # of the feeds: a path may ask an axis for more acceleration than it has
 INTERVAL = 250e-6  # [s] between the rows that are looked at
@@ -109,7 +109,7 @@ class DriveProgram:
         stops = [Stop(each.distance, slower * each.feed) for each in stops]
         circles = [Pair(each.radius, slower * each.feed) for each in circles]
         approach = APPROACH * slower * machine.axes[axis].max_speed
-        rest = max(LEAST_REST, RESTS / machine.shipped_drive(axis, "tuning").K_v)
+        rest = max(MIN_PROGRAM_REST, RESTS / machine.shipped_drive(axis, "tuning").K_v)
         motions: list[Move | Arc | Sine | Dwell] = [Dwell(duration=REST)]
         stopping, turning = [], []
         at = machine.pose[axis]
@@ -214,7 +214,7 @@ def stops_of(machine: Machine, axis: str, shares: Sequence[tuple[float, float]])
         size = min(distance, ROOM * room / 2)
         if not 0 <= at + sense * size <= ROOM * room if sense > 0 else not -ROOM * room <= at + sense * size <= 0:
             sense = -sense
-        found.append(Stop(sense * size, min(feed, SPEED * machine.axes[axis].max_speed)))
+        found.append(Stop(sense * size, min(feed, SPEED_SHARE * machine.axes[axis].max_speed)))
         at += sense * size
         sense = -sense if abs(at) > 0 else sense
     return found
@@ -229,7 +229,7 @@ def circles_of(machine: Machine, axis: str, partner: str, wanted: Sequence[tuple
     found = []
     for radius, feed in wanted:
         r = min(radius, ROOM * span / 2)
-        v = min(feed, SPEED * speed, math.sqrt(ACCELERATION * most * r))
+        v = min(feed, SPEED_SHARE * speed, math.sqrt(ACCELERATION * most * r))
         # the limit of the jerk along the path holds for the turn as well: v^3/r^2
         v = min(v, (ACCELERATION * machine.path.jerk * r**2) ** (1 / 3))
         found.append(Pair(r, v))

@@ -11,7 +11,7 @@ from feedsim.tune.changed import Changed, changed_values
 from feedsim.tune.drive_program import DriveProgram, Errors
 
 WORSE = 1.05  # of an error, from where on it counts as worse
-FLOOR = 0.05e-6  # [m] of an error: below it nothing counts
+ERROR_FLOOR = 0.05e-6  # [m] of an error: below it nothing counts
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Case:
     @property
     def worse(self) -> list[tuple[str, str, float, float]]:
         """Those that got worse by more than 5 %."""
-        return [row for row in self.rows if row[3] > WORSE * row[2] + FLOOR]
+        return [row for row in self.rows if row[3] > WORSE * row[2] + ERROR_FLOOR]
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ import numpy as np
 from feedsim.analysis.figures import Array
 from feedsim.scenario import Cycles, Drive, Filter, Machine
 from feedsim.tune.closed_forms import axis_lag, loop_lag, model_gain
-from feedsim.tune.proposals import NEUTRAL, NEUTRAL_SHARE, SHORTEST
+from feedsim.tune.proposals import MIN_RESET_TIME, NEUTRAL, NEUTRAL_SHARE
 from feedsim.units import convert
 from feedsim.variables import parameters
 
@@ -136,7 +136,7 @@ class Knobs:
     def _ranged(self, name: str) -> Knob:
         low, high = RANGES[name]
         value = float(getattr(self.drive, name))
-        least = min(SHORTEST, value) if name == "T_n" else 0.0
+        least = min(MIN_RESET_TIME, value) if name == "T_n" else 0.0
         return Knob(name, max(low * value, least), high * value)
 
     def _values(self, d: Drive) -> dict[str, float]:

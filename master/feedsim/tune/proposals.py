@@ -26,8 +26,8 @@ NEUTRAL_SHARE, NEUTRAL = 0.02, 20e-6
 FITS = 0.1
 # Margins that a proposed gain keeps.
 GAIN_MARGIN, PHASE_MARGIN = 8.0, 40.0  # [dB], [deg]
-SHORTEST = 1e-3  # T_n [s] below which none is proposed
-ROUNDS = 6  # of halving the range of T_n on a logarithmic scale: 3 % of its value
+MIN_RESET_TIME = 1e-3  # T_n [s] below which none is proposed
+RESET_HALVINGS = 6  # of halving the range of T_n on a logarithmic scale: 3 % of its value
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ def _without_feedforward(machine: Machine, axes: Sequence[str], cause: str) -> I
 
 def _shorter(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str, searched: bool) -> Iterator[Proposal]:
     """A shorter T_n: the integral part answers friction sooner, as far as margins allow."""
-    if not drive.speed_integrator or drive.T_n is None or drive.T_n <= SHORTEST:
+    if not drive.speed_integrator or drive.T_n is None or drive.T_n <= MIN_RESET_TIME:
         return
     reason = f"shortest with {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g} deg left in every loop of {axis}"
     if not searched:
@@ -260,8 +260,8 @@ def _shorter(machine: Machine, modes: Modes, axis: str, drive: Drive, cause: str
         yield Proposal(cause, axis, "drive.T_n", drive.T_n, None, "s", reason, "lower")
         return
     before = least_margins(judge(machine, modes), axis)
-    low, high, after = math.log(SHORTEST), math.log(drive.T_n), before
-    for _ in range(ROUNDS):
+    low, high, after = math.log(MIN_RESET_TIME), math.log(drive.T_n), before
+    for _ in range(RESET_HALVINGS):
         middle = 0.5 * (low + high)
         there = least_margins(judge(changed(machine, axis, {"T_n": math.exp(middle)}), modes), axis)
         if there[0] >= GAIN_MARGIN and there[1] >= PHASE_MARGIN:

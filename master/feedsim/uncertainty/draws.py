@@ -28,12 +28,12 @@ from feedsim.fields import Quantity
 from feedsim.scenario import Drive, Friction, Machine
 
 Array = NDArray[np.float64]
-SAME = 1e-3  # of the standard deviation: a value that is nearer to that of its identification is that value
+SAME_VALUE_SHARE = 1e-3  # of the standard deviation: a value that is nearer to that of its identification is that value
 ATTEMPTS = 10_000  # draws until one is possible
 LOAD, INERTIA = "constant_load", "inertia"
 # Symbol of the correlation matrix -> key of the group `identified`, of what is no parameter of the friction.
 BESIDE = {"M_0": LOAD, "J": INERTIA}
-UNITS = {LOAD: "N.m", INERTIA: "kg.m2"}
+DRAWN_UNITS = {LOAD: "N.m", INERTIA: "kg.m2"}
 TORQUES = ("sigma_0", "sigma_1", "sigma_2", "F_C", "F_S", "F_log")  # what friction multiplies a torque with
 
 
@@ -125,7 +125,10 @@ def known_of(friction: Friction, axis: str, present: Mapping[str, Any]) -> Known
 
 def _known(identified: Mapping[str, Any], axis: str, present: Mapping[str, Any]) -> Known:
     ends: dict[str, tuple[float, float]] = {}
-    for name, one in (*identified.get("parameters", {}).items(), *((key, identified.get(key, {})) for key in UNITS)):
+    for name, one in (
+        *identified.get("parameters", {}).items(),
+        *((key, identified.get(key, {})) for key in DRAWN_UNITS),
+    ):
         if "interval" in one:
             low, high = (_si(end, name) for end in one["interval"])
             ends[name] = low, high
@@ -135,7 +138,7 @@ def _known(identified: Mapping[str, Any], axis: str, present: Mapping[str, Any])
         spread = (high - low) / (2 * NORMAL_95)
         if not spread > 0:
             continue
-        same = name == INERTIA or abs(present.get(name, np.inf) - (low + high) / 2) <= SAME * spread
+        same = name == INERTIA or abs(present.get(name, np.inf) - (low + high) / 2) <= SAME_VALUE_SHARE * spread
         (names if same else fixed).append(name)
     sigma = np.array([(ends[name][1] - ends[name][0]) / (2 * NORMAL_95) for name in names])
     mean = np.array([present.get(name, sum(ends[name]) / 2) for name in names], dtype=np.float64)
@@ -159,8 +162,8 @@ def _si(end: str | float, name: str) -> float:
 
 def unit_of(name: str) -> str:
     """SI unit of a value by its name. KeyError: no such value."""
-    if name in UNITS:
-        return UNITS[name]
+    if name in DRAWN_UNITS:
+        return DRAWN_UNITS[name]
     model, key = (Drive, name.removeprefix("drive.")) if name.startswith("drive.") else (Friction, name)
     quantity = Quantity.of(model.model_fields[key])
     return quantity.unit if quantity is not None else units.DIMENSIONLESS

@@ -23,7 +23,7 @@ from feedsim.uncertainty.spread import interval, share_of
 
 Array = NDArray[np.float64]
 ANGLES = 1440  # points of a contour
-INSTANTS, BEHIND = 600, 0.3  # points of a stop, and the time behind it [s] that they lie in
+STOP_POINTS, TIME_BEHIND_STOP = 600, 0.3  # points of a stop, and the time behind it [s] that they lie in
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ def curves_of(result: Result) -> dict[tuple[str, str], tuple[Array, Array]]:
             found[task.prefix, "contour"] = _angles(), contour_of(contour(result.trace, task.turn))
         elif isinstance(task, PositioningTask):
             stop = task.approach
-            at = np.linspace(0.0, min(stop.until - stop.end, BEHIND), INSTANTS)
+            at = np.linspace(0.0, min(stop.until - stop.end, TIME_BEHIND_STOP), STOP_POINTS)
             sense = math.copysign(1.0, stop.target - stop.origin)
             x = np.interp(stop.end + at, result.trace.time, np.asarray(result.trace[f"{stop.axis}.x_a"]))
             found[task.prefix, "stop"] = at, sense * (x - stop.target)

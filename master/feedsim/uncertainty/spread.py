@@ -14,15 +14,16 @@ from feedsim.arguments import spelt
 from feedsim.errors import InputError
 
 Array = NDArray[np.float64]
-SHARE = 0.95
-LEAST = 19  # draws: they hold 90 %
+BAND_PROBABILITY = 0.95
+MIN_DRAWS = 19  # draws: they hold 90 %
 
 
 def check_count(count: int) -> None:
     """InputError: too few draws for an interval."""
-    if count < LEAST:
+    if count < MIN_DRAWS:
         raise InputError(
-            f"{spelt('uncertain')} {count}: at least {LEAST} draws are needed; {LEAST} hold 90 % of what may be, 39 "
+            f"{spelt('uncertain')} {count}: at least {MIN_DRAWS} draws are needed; {MIN_DRAWS} hold 90 % of what may "
+            "be, 39 "
             "and more hold 95 %"
         )
 
@@ -33,7 +34,7 @@ def share_of(count: int) -> float:
     >>> share_of(19), share_of(200)
     (0.9, 0.95)
     """
-    return min(SHARE, (count - 1) / (count + 1))
+    return min(BAND_PROBABILITY, (count - 1) / (count + 1))
 
 
 def interval(values: Array) -> tuple[Array, Array]:

@@ -21,13 +21,13 @@ from feedsim.estimation.interval import shows
 # A peak is seen where its mean over this angle [deg], or over half of it again and again down to the least count of
 # samples, exceeds this multiple of what noise makes of such means and of the fitted rest below them, and that multiple
 # of what only this share of such means between the reversals exceed.
-OVER, LEAST, SEEN, ELSEWHERE, SELDOM = 1.0, 3, 5.5, 1.5, 1e-3
+PEAK_ANGLE, MIN_PEAK_SAMPLES, PEAK_SIGMAS, OFF_REVERSAL_RATIO, CHANCE_SHARE = 1.0, 3, 5.5, 1.5, 1e-3
 # Noise may change a height by this share: over so many samples it is averaged, and no more; nor over more than half of
 # the angle in which the peak falls to half its height on its steeper side, which would take from its height.
 BLUR = 0.015
-FLOOR = 1e-9  # a deviation of less [m] is not worth a word
+DEVIATION_FLOOR = 1e-9  # a deviation of less [m] is not worth a word
 FORM = (3, 4, 5)
-PARTS = 36  # of a turn, over whose means turns of one sense are compared
+SECTORS = 36  # of a turn, over whose means turns of one sense are compared
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Term:
     def shows(self) -> bool:
         """Whether it differs from zero by more than its interval and rounding."""
         size = abs(self.value) if self.key == "radius" else self.size
-        return size > FLOOR and shows(self.value, self.half)
+        return size > DEVIATION_FLOOR and shows(self.value, self.half)
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,12 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
         G=G,
         terms=tuple(
             sorted(
-                terms, key=lambda term: (not term.shows or term.key == "rest", -round(term.gain / FLOOR), -term.size)
+                terms,
+                key=lambda term: (
+                    not term.shows or term.key == "rest",
+                    -round(term.gain / DEVIATION_FLOOR),
+                    -term.size,
+                ),
             )
         ),
         peaks=peaks,
@@ -277,9 +282,9 @@ def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak
     rate = circle.speed / circle.radius
     calm = _Calm(found, k, sense)
     per_sample = 2 * math.pi / len(found.angle[k])
-    wide = max(1, round(math.radians(OVER) / per_sample))
+    wide = max(1, round(math.radians(PEAK_ANGLE) / per_sample))
     counts = [wide]
-    while counts[-1] // 2 >= LEAST:
+    while counts[-1] // 2 >= MIN_PEAK_SAMPLES:
         counts.append(counts[-1] // 2)
     levels = {count: calm.level(count) for count in counts}
     ellipse = math.hypot(found["scale"], found["squareness"] + sense * found["servo"]) / circle.radius
@@ -370,8 +375,12 @@ class _Calm:
 
     def level(self, count: int) -> float:
         """What such a mean must exceed to be a peak [m]; noise does not, nor what swings all the way round."""
-        usual = float(np.quantile(np.abs(self._means(count)), 1 - SELDOM))
-        return max(SEEN * math.hypot(self._noise / math.sqrt(count), self._rest), ELSEWHERE * usual, FLOOR)
+        usual = float(np.quantile(np.abs(self._means(count)), 1 - CHANCE_SHARE))
+        return max(
+            PEAK_SIGMAS * math.hypot(self._noise / math.sqrt(count), self._rest),
+            OFF_REVERSAL_RATIO * usual,
+            DEVIATION_FLOOR,
+        )
 
     def _means(self, count: int) -> Array:
         whole = np.convolve(self._free, np.ones(count), "same") > count - 0.5
@@ -393,7 +402,7 @@ def _falls(since: Array, relative: Array, at: int, level: float, way: int) -> fl
 
 
 def _apart(paths: Sequence[TurnedPath]) -> float:
-    """Difference of turns of one sense, from peak to valley of its means over PARTS of a turn; the largest [m].
+    """Difference of turns of one sense, from peak to valley of its means over SECTORS of a turn; the largest [m].
 
     Without its mean and its first order: the centre and the radius may drift from one turn to the next.
     """
@@ -402,14 +411,14 @@ def _apart(paths: Sequence[TurnedPath]) -> float:
         if one.sense == other.sense:
             orders = np.fft.rfft(_coarse(one) - _coarse(other))
             orders[:2] = 0
-            worst = max(worst, float(np.ptp(np.fft.irfft(orders, PARTS))))
+            worst = max(worst, float(np.ptp(np.fft.irfft(orders, SECTORS))))
     return worst
 
 
 def _coarse(path: TurnedPath) -> Array:
-    """Mean deviation in each of PARTS of a turn (PARTS,) [m]; 0 where there is no sample."""
-    part = np.floor((path.angle / (2 * math.pi) + 0.5) * PARTS).astype(int) % PARTS
-    return np.bincount(part, path.deviation, PARTS) / np.maximum(np.bincount(part, minlength=PARTS), 1)
+    """Mean deviation in each of SECTORS of a turn (SECTORS,) [m]; 0 where there is no sample."""
+    part = np.floor((path.angle / (2 * math.pi) + 0.5) * SECTORS).astype(int) % SECTORS
+    return np.bincount(part, path.deviation, SECTORS) / np.maximum(np.bincount(part, minlength=SECTORS), 1)
 
 
 def _form(found: Fit) -> dict[int, float]:

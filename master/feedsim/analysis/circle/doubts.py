@@ -18,7 +18,7 @@ from feedsim.errors import InputError
 
 # Of a radius and of a feed that are given, the share by which the record may differ: path lag changes the former.
 OFF_RADIUS, OFF_FEED = 0.2, 0.05
-NEAR = 0.02  # relative; a ratio that is so near to one of these is called so
+RATIO_TOLERANCE = 0.02  # relative; a ratio that is so near to one of these is called so
 RATIOS = {
     2.0: "the diameter?", 25.4: "inches, under a header of mm?", 1000.0: "another unit of length?",
     10.0: "centimetres?", 60.0: "per minute for per second?", 0.06: "m/min for mm/s?",
@@ -27,16 +27,16 @@ RATIOS = {
 # millimetres per minute, or of thousands of metres, where seconds and milliseconds were [m], [m/s].
 LEAST_RADIUS, MOST_RADIUS = 1e-3, 5.0
 LEAST_FEED, MOST_FEED, USUAL_FEEDS = 10e-3 / 60, 1000.0 / 60, (50e-3 / 60, 200.0 / 60)
-ROUND, IN_INCHES, SMALL = 0.5e-3, 5e-3, 5e-4  # a radius in mm is a multiple of these [m], to this share
+RADIUS_STEP, IN_INCHES, ROUND_TOLERANCE = 0.5e-3, 5e-3, 5e-4  # a radius in mm is a multiple of these [m], to this share
 # Samples are missing where the angle goes on by so many usual steps, and by so much [rad].
-STEPS, SECTOR = 5.0, math.radians(2)
+GAP_STEPS, GAP_ANGLE = 5.0, math.radians(2)
 # A step of the positions that is this share of the range of the deviation hides what there is to see.
-COARSE = 0.2
+COARSE_STEP_SHARE = 0.2
 # A scale is at its end where it says the same in so many samples, and the circle would move by so many of its steps.
 STILL, MOVED = 5, 3.0
 # A sample stands out alone where it is off the median of so many neighbours by so many times their scatter, and by so
 # much of the range of all others: more where an axis reverses, as peaks of friction are narrow.
-AROUND, ALONE, OF_RANGE, OF_RANGE_AT_REVERSAL, REVERSAL = 3, 8.0, 0.3, 2.0, math.radians(6)
+OUTLIER_NEIGHBOURS, OUTLIER_SCATTER, OF_RANGE, OF_RANGE_AT_REVERSAL, REVERSAL = 3, 8.0, 0.3, 2.0, math.radians(6)
 FINEST = 1e-12  # [m]; below it a step is rounding
 
 
@@ -71,7 +71,7 @@ def check_feed(where: str, given: float | None, own: float | None) -> None:
 
 def _ratio(ratio: float) -> str:
     for each, words in RATIOS.items():
-        if min(abs(ratio / each - 1), abs(ratio * each - 1)) < NEAR:
+        if min(abs(ratio / each - 1), abs(ratio * each - 1)) < RATIO_TOLERANCE:
             return f": {words}"
     larger = max(ratio, 1 / ratio)
     return f", {larger:.3g} times {'less' if ratio > 1 else 'as much'}"
@@ -81,9 +81,9 @@ def unusual_radius(radius: float) -> list[str]:
     """That a radius [m] which nobody has given would be usual if the record were in inches, metres or mm."""
 
     def multiple(value: float, of: float) -> bool:
-        return value >= of and abs(value / of - round(value / of)) * of < SMALL * value
+        return value >= of and abs(value / of - round(value / of)) * of < ROUND_TOLERANCE * value
 
-    if multiple(25.4 * radius, IN_INCHES) and not multiple(radius, ROUND) and radius < 0.02:
+    if multiple(25.4 * radius, IN_INCHES) and not multiple(radius, RADIUS_STEP) and radius < 0.02:
         return [
             f"the radius is {radius * 1e3:.5g} mm; were the record in inches, it would be {radius * 25.4e3:.5g} mm: "
             "look at the unit in its header, or give --radius"
@@ -124,7 +124,7 @@ def checked(angle: Array, deviation: Array, radius: float, by_axes: bool, axes: 
         doubts += _clipped_deviation(rest)
     span = float(np.ptp(rest))
     for what, step in steps.items():
-        if step > COARSE * span > 0:
+        if step > COARSE_STEP_SHARE * span > 0:
             doubts.append(
                 f"{what} has steps of {step * 1e6:.4g} um, the radial deviation ranges over {span * 1e6:.4g} um: "
                 "nothing smaller than a step can be diagnosed"
@@ -134,15 +134,15 @@ def checked(angle: Array, deviation: Array, radius: float, by_axes: bool, axes: 
 
 def _alone(turned: Array, deviation: Array) -> NDArray[np.bool_]:
     """Rows that stand out alone, one or two beside each other."""
-    padded = np.pad(deviation, AROUND, mode="edge")
-    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1), axis=1)
+    padded = np.pad(deviation, OUTLIER_NEIGHBOURS, mode="edge")
+    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * OUTLIER_NEIGHBOURS + 1), axis=1)
     off = np.abs(deviation - median)
     scatter = 1.4826 * float(np.median(off))
     ordered = np.sort(deviation)
     span = float(min(ordered[-3] - ordered[0], ordered[-1] - ordered[2], ordered[-2] - ordered[1]))
     to_reversal = np.abs((turned + math.pi / 4) % (math.pi / 2) - math.pi / 4)
     share = np.where(to_reversal < REVERSAL, OF_RANGE_AT_REVERSAL, OF_RANGE)
-    found = (off > ALONE * scatter) & (off > share * span) & (off > FINEST)
+    found = (off > OUTLIER_SCATTER * scatter) & (off > share * span) & (off > FINEST)
     # Three beside each other are a motion.
     three = found & np.r_[False, found[:-1]] & np.r_[found[1:], False]
     wide = three | np.r_[False, three[:-1]] | np.r_[three[1:], False]
@@ -154,7 +154,7 @@ def _spikes(turned: Array, deviation: Array, keep: NDArray[np.bool_]) -> Iterato
     rows = np.flatnonzero(~keep)
     if rows.size:
         worst = int(rows[np.argmax(np.abs(deviation[rows] - np.median(deviation)))])
-        near = float(np.median(deviation[max(0, worst - AROUND) : worst + AROUND + 1]))
+        near = float(np.median(deviation[max(0, worst - OUTLIER_NEIGHBOURS) : worst + OUTLIER_NEIGHBOURS + 1]))
         several = f"{len(rows)} samples stand" if len(rows) > 1 else "one sample stands"
         yield (
             f"{several} out alone, at {_degrees(turned[worst])} deg by {(deviation[worst] - near) * 1e6:.4g} um: a "
@@ -165,7 +165,7 @@ def _spikes(turned: Array, deviation: Array, keep: NDArray[np.bool_]) -> Iterato
 def _missing(turned: Array) -> Iterator[str]:
     steps = np.abs(np.diff(turned))
     usual = float(np.median(steps))
-    for row in np.flatnonzero((steps > STEPS * usual) & (steps > SECTOR)):
+    for row in np.flatnonzero((steps > GAP_STEPS * usual) & (steps > GAP_ANGLE)):
         yield (
             f"samples are missing from {_degrees(turned[row])} to {_degrees(turned[row + 1])} deg: what happens there "
             "is not seen, and G may be larger"

@@ -19,7 +19,7 @@ PLAY, PLAYED = 0.2e-6, "play"
 # Travel in pitches from which an error that repeats with the pitch differs from the circle's own shape.
 PITCHES = 2.0
 # More samples of a turn add nothing to its shape.
-MOST = 8000
+MAX_TURN_SAMPLES = 8000
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class TurnedPath:
     phase: Array | None = None
 
     def thinned(self) -> TurnedPath:
-        """At most MOST samples, evenly chosen."""
-        step = -(-len(self.angle) // MOST)
+        """At most MAX_TURN_SAMPLES samples, evenly chosen."""
+        step = -(-len(self.angle) // MAX_TURN_SAMPLES)
         phase = None if self.phase is None else self.phase[::step]
         return TurnedPath(self.angle[::step], self.deviation[::step], self.sense, phase)
 

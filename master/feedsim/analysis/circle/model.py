@@ -47,30 +47,30 @@ from feedsim.analysis.circle.geometry import (
 from feedsim.analysis.circle.setup import Offset, angle_offset, centre_moves
 from feedsim.analysis.circle.tails import NEXT, Tails, fading_tails, known_tails, what_is_left
 from feedsim.analysis.figures import Array
-from feedsim.estimation.robust import SETTLED, covariance_of, robust_fit, rounding
+from feedsim.estimation.robust import CHANGE_FLOOR, covariance_of, robust_fit, rounding
 
 # Angle ahead of a reversal and behind it that is left out [deg]; the second grows while the peak has not died away.
-AHEAD, BEHIND = 2.0, (30.0, 45.0, 60.0)
+ANGLE_AHEAD, ANGLES_BEHIND = 2.0, (30.0, 45.0, 60.0)
 # Just behind the window the deviation is calm if it is below this share of the peak, or not larger than noise makes it.
 CALM = 0.05
 # The same where the angles may be off by as much [deg]: edges are looked for within.
-AROUND = 10.0, 40.0
+EDGE_SEARCH_ANGLES = 10.0, 40.0
 # Of the difference in third order that bent guides show, what their sum may add to the squareness.
-HIDDEN = 0.45
+THIRD_ORDER_SHARE = 0.45
 # Neighbouring samples share what disturbs them. Blocks of this angle [deg] do not, as far as intervals are concerned.
-BLOCK = 6.0
+BLOCK_ANGLE = 6.0
 # Friction is no clean step: the response to it outside the windows is known to this share.
 KNOWN = 0.3
 # Before it slides, friction is elastic, and no step at all: of a peak this share may look like lost motion.
 WOUND = 0.02
 # Time in which a control that nobody knows lets a peak of friction fall to 1/e, or sooner [s].
 SETTLES = 0.05
-PASSES = 6
+MAX_WINDOW_PASSES = 6
 # Left out, they must leave this share of the noise to be taken in after all.
 CLEARER = 0.5
 REPEATS = 2.0  # and pitches that must lie between two windows, where the drives are known
 # The angle that is programmed and the one where the machine is differ by more than rounding from this deviation [m] on.
-UNSEEN = 5e-9
+PROGRAMMED_TOLERANCE = 5e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +139,8 @@ class Fit:
         if "third" not in self.names:
             return 0.0
         row = self.names.index("third")
-        size, variance = abs(float(self.values[row])), max(float(self.covariance[row, row]), SETTLED**2)
-        return HIDDEN * size * size**2 / (size**2 + 4 * variance)
+        size, variance = abs(float(self.values[row])), max(float(self.covariance[row, row]), CHANGE_FLOOR**2)
+        return THIRD_ORDER_SHARE * size * size**2 / (size**2 + 4 * variance)
 
 
 def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
@@ -151,7 +151,7 @@ def fit(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> Fit:
     """
     if not circle.recorded:
         return _told(circle, paths, 0.0)
-    wide = _fit(circle, paths, Left(*np.radians(AROUND)), Shape())
+    wide = _fit(circle, paths, Left(*np.radians(EDGE_SEARCH_ANGLES)), Shape())
     lost = [sum(wide[f"lost_{i}"] * columns[f"lost_{i}"] for i in (0, 1)) for columns in wide.columns]
     signals = [residual + step for residual, step in zip(wide.residual, lost, strict=True)]
     offset = angle_offset(paths, wide.angle, signals, [which < 0 for which in wide.reversal])
@@ -167,7 +167,7 @@ def _told(circle: CircleUnderTest, paths: Sequence[TurnedPath], angle: float) ->
     found = _pitched(circle, paths, Shape(angle=angle))
     moved = sum(math.hypot(found[a], found[b]) for a, b in (("offset_0", "offset_1"), ("scale", "servo")))
     moved += abs(found["squareness"])
-    if all(path.phase is not None for path in paths) or moved**2 < circle.radius * UNSEEN:
+    if all(path.phase is not None for path in paths) or moved**2 < circle.radius * PROGRAMMED_TOLERANCE:
         return found
     other = _pitched(circle, paths, Shape(by_program=True, angle=angle))
     return other if other.noise < found.noise else found
@@ -222,8 +222,8 @@ def _behind(found: Fit) -> float:
 
 
 def _windowed(circle: CircleUnderTest, paths: Sequence[TurnedPath], shape: Shape) -> Fit:
-    for degrees in BEHIND:
-        found = _fit(circle, paths, Left(math.radians(AHEAD), math.radians(degrees)), shape)
+    for degrees in ANGLES_BEHIND:
+        found = _fit(circle, paths, Left(math.radians(ANGLE_AHEAD), math.radians(degrees)), shape)
         if _calm(found):
             break
     return found
@@ -236,14 +236,14 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
     # Where friction's response reaches far, an error must be seen to repeat between two windows.
     free = math.inf
     if circle.drag and not shape.pitches:
-        free = circle.radius * (math.pi / 2 - window - math.radians(AHEAD))
+        free = circle.radius * (math.pi / 2 - window - math.radians(ANGLE_AHEAD))
     circle = replace(circle, pitch={axis: p for axis, p in circle.pitch.items() if REPEATS * p <= free})
     values: dict[str, float] = {"angle": shape.angle} | ({PLAYED: 1.0} if shape.play else {})
     moves = centre_moves(paths) if circle.recorded else [{} for _ in paths]
     ends = np.cumsum([len(path.angle) for path in paths])[:-1]
     tails = Tails(np.empty((sum(len(path.angle) for path in paths), 0)), np.empty(0))
     residual: Array = np.empty(0)
-    for number in range(PASSES):
+    for number in range(MAX_WINDOW_PASSES):
         undone = [undo(circle, path, values, shape.by_program, moved) for path, moved in zip(paths, moves, strict=True)]
         parts = [columns_of(circle, each, path.sense, both, values) for each, path in zip(undone, paths, strict=True)]
         windows = [_windows(each, path.sense, out) for each, path in zip(undone, paths, strict=True)]
@@ -265,7 +265,7 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
         step = robust.values[: len(names)]
         values |= {name: values.get(name, 0.0) + float(d) for name, d in zip(names, step, strict=True)}
         residual = deviation - matrix @ step
-        if number > 1 and float(np.abs(step).max()) < SETTLED:
+        if number > 1 and float(np.abs(step).max()) < CHANGE_FLOOR:
             break
     tail = tails.columns @ robust.values[len(names) :]
     rounded = rounding([path.deviation for path in paths], np.split(residual - tail, ends), robust.noise)[kept]
@@ -307,8 +307,10 @@ def _unsure(circle: CircleUnderTest, tail: Array, peaks: Array, window: float) -
 
 
 def _blocks(undone: Sequence[Undone]) -> Array:
-    """Which block of BLOCK each sample of all paths is in (N,)."""
-    return np.concatenate([1000 * k + np.floor(each.angle / math.radians(BLOCK)) for k, each in enumerate(undone)])
+    """Which block of BLOCK_ANGLE each sample of all paths is in (N,)."""
+    return np.concatenate(
+        [1000 * k + np.floor(each.angle / math.radians(BLOCK_ANGLE)) for k, each in enumerate(undone)]
+    )
 
 
 def _windows(undone: Undone, sense: int, out: Left) -> tuple[NDArray[np.int64], Array]:

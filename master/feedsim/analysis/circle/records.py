@@ -19,11 +19,11 @@ from feedsim import units
 from feedsim.analysis.circle.doubts import OFF_FEED, check_feed, check_radius, checked, unusual_feed, unusual_radius
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.header import Told, own_format
-from feedsim.analysis.circularity import EVEN, PARTS, fitted_circle
+from feedsim.analysis.circularity import EVEN_SPEED_SHARE, TURN_PARTS, fitted_circle
 from feedsim.analysis.figures import Array
 from feedsim.errors import InputError
 from feedsim.files.spellings import spelled
-from feedsim.motions.circular import DIRECTIONS
+from feedsim.motions.circular import SENSE_WORDS
 from feedsim.trace import Recording, read_recording
 
 ANGLES = ("angle", "phi", "theta", "winkel", "angular position")
@@ -38,7 +38,7 @@ WAYS = {
 }
 RADII = ("radius", "r", "length", "ballbar length", "radius length", "rayon")
 LEAST_RADIUS = 1e-3  # [m]; where a name does not tell, what is never less is a radius and no deviation
-TIMES = ("time", "t", "zeit", "temps")
+TIME_COLUMNS = ("time", "t", "zeit", "temps")
 # The angle has turned round where it goes back by this [rad]: less is noise at rest.
 TURNED_ROUND = math.radians(10)
 # A full turn may lack this share of it; files often end one sample ahead of the full turn.
@@ -48,7 +48,7 @@ RESTING = 0.05
 # Turns whose feeds differ by more than this share are of different circles: path lag and peaks grow with the feed.
 SAME_FEED = 0.02
 # A turn needs so many samples for its parts to be told apart.
-LEAST = 180
+MIN_TURN_SAMPLES = 180
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +189,7 @@ def _values(recording: Recording, name: str, unit: str) -> Array:
 
 
 def _time(recording: Recording) -> Array | None:
-    name = _column(recording, TIMES, "s")
+    name = _column(recording, TIME_COLUMNS, "s")
     if name is None:
         return None
     time = _values(recording, name, "s")
@@ -213,7 +213,7 @@ def _polar(recording: Recording, axes: tuple[str, str]) -> tuple[str, str, bool]
             return angle, length, float(np.abs(_values(recording, length, "m")).min()) > LEAST_RADIUS
         return angle, length, deviation is None
     has = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in recording.units.items())
-    if all(_plain(name) in (*units.SYMBOLS, *units.ALIASES) for name in recording.names):
+    if all(_plain(name) in (*units.UNIT_SYMBOLS, *units.ALIASES) for name in recording.names):
         raise InputError(
             f"{recording.header}: is a row of units, {has}; needed is one row of names with their units, such as "
             "Angle [deg] and Deviation [um], and no other row between it and the values"
@@ -341,12 +341,13 @@ def _named(
         begin = duration = phase = None
         if time is not None:
             turned = np.abs(np.unwrap(angle[rows]) - angle[rows][0])
-            passed = np.interp(np.linspace(0, turned[-1], PARTS + 1), turned, time[rows])
+            passed = np.interp(np.linspace(0, turned[-1], TURN_PARTS + 1), turned, time[rows])
             parts = np.diff(passed)
-            if (uneven := float(np.abs(parts / parts.mean() - 1).max())) > EVEN:
+            if (uneven := float(np.abs(parts / parts.mean() - 1).max())) > EVEN_SPEED_SHARE:
                 raise InputError(
                     f"{recording.path}: a turn from {time[rows][0]:.6g} s on is not driven at constant speed: parts of "
-                    f"it take {100 * uneven:.2g} % more or less time than the mean; allowed: {100 * EVEN:g} %"
+                    f"it take {100 * uneven:.2g} % more or less time than the mean; allowed: "
+                    f"{100 * EVEN_SPEED_SHARE:g} %"
                 )
             begin = float(time[rows][0])
             duration = float(time[rows][-1] - begin) * 2 * math.pi / float(turned[-1])
@@ -359,7 +360,7 @@ def _named(
             sense,
             None if phase is None else phase[kept],
         )
-        name = f"a turn {DIRECTIONS[sense]}, {rows.stop - rows.start} samples"
+        name = f"a turn {SENSE_WORDS[sense]}, {rows.stop - rows.start} samples"
         found.append(RecordedTurn(name, path, begin, duration, told.doubts))
     return found
 
@@ -378,8 +379,8 @@ def _turns(angle: Array, where: str) -> list[tuple[slice, int]]:
         turned = np.maximum.accumulate(sense * (angle[first:last] - angle[first]))
         begin = max((covered - 2 * math.pi) / 2, 0.0)
         rows = np.flatnonzero((turned >= begin) & (turned < begin + 2 * math.pi))
-        if len(rows) < LEAST:
-            raise InputError(f"{where}: a turn has {len(rows)} samples; {LEAST} or more are needed")
+        if len(rows) < MIN_TURN_SAMPLES:
+            raise InputError(f"{where}: a turn has {len(rows)} samples; {MIN_TURN_SAMPLES} or more are needed")
         found.append((slice(first + int(rows[0]), first + int(rows[-1]) + 1), sense))
     if not found:
         raise InputError(

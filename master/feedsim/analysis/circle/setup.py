@@ -25,11 +25,11 @@ from feedsim.analysis.figures import Array
 
 # Angles [deg]: over which means are compared for an edge, how far it may be off its place, how far apart places are
 # that are tried; an edge must exceed what lies between the reversals by this.
-EDGE, OFF, STEP, CLEAR = 1.0, 7.0, 0.05, 5.0
-# Where no edge is seen, the angles may be off by this (standard deviation) [deg]; no place is known better than LEAST.
-# Of one direction, friction shows this far behind a reversal, or not at all.
-UNKNOWN, LEAST, BEHIND = 2.5, 0.1, 0.7
-FLOOR = 20e-9  # [m]
+EDGE_ANGLE, MAX_ANGLE_OFFSET, ANGLE_STEP, EDGE_RATIO = 1.0, 7.0, 0.05, 5.0
+# Where no edge is seen, the angles may be off by this (standard deviation) [deg]; no place is known better than
+# ANGLE_ACCURACY. Of one direction, friction shows this far behind a reversal, or not at all.
+UNKNOWN_ANGLE, ANGLE_ACCURACY, FRICTION_DELAY_ANGLE = 2.5, 0.1, 0.7
+EDGE_FLOOR = 20e-9  # [m]
 
 
 class Offset(NamedTuple):
@@ -64,7 +64,7 @@ def angle_offset(
     angles: of every path, with its distortion undone (N,) [rad]. signals: what the form, fitted away from the
     reversals, leaves (N,) [m]. free: which samples are away from all reversals (N,).
     """
-    places = np.radians(np.arange(-2 * OFF, 2 * OFF + STEP / 2, STEP))
+    places = np.radians(np.arange(-2 * MAX_ANGLE_OFFSET, 2 * MAX_ANGLE_OFFSET + ANGLE_STEP / 2, ANGLE_STEP))
     edges: dict[tuple[int, int], list[Array]] = {}
     calm = []
     for path, angle, signal, apart in zip(paths, angles, signals, free, strict=True):
@@ -75,45 +75,45 @@ def angle_offset(
             edge = path.sense * np.interp(at, even, jumps, period=2 * math.pi)
             edges.setdefault((which, path.sense), []).append(edge)
     around = np.concatenate(calm)
-    scatter = max(1.4826 * float(np.median(np.abs(around))) if len(around) else 0.0, FLOOR / CLEAR)
-    level = max(CLEAR * scatter, float(np.abs(around).max(initial=0.0)) if len(around) else 0.0)
-    near = np.abs(places) <= math.radians(OFF + 2)
+    scatter = max(1.4826 * float(np.median(np.abs(around))) if len(around) else 0.0, EDGE_FLOOR / EDGE_RATIO)
+    level = max(EDGE_RATIO * scatter, float(np.abs(around).max(initial=0.0)) if len(around) else 0.0)
+    near = np.abs(places) <= math.radians(MAX_ANGLE_OFFSET + 2)
     found: list[tuple[float, float]] = []
     for which in range(4):
         own = {sense: np.mean(edges[which, sense], axis=0) for sense in (1, -1) if (which, sense) in edges}
         height = min(float(np.abs(edge[near]).max()) for edge in own.values())
         if height <= level:
             continue
-        noise = math.radians(EDGE) * scatter / height
+        noise = math.radians(EDGE_ANGLE) * scatter / height
         if len(own) == 2:
             shift = _shift(own[1], own[-1])
             found.append((shift / 2, noise))
         else:
             ((sense, edge),) = own.items()
             at = float(places[near][np.abs(edge[near]).argmax()])
-            found.append((sense * at, math.hypot(noise, math.radians(BEHIND))))
+            found.append((sense * at, math.hypot(noise, math.radians(FRICTION_DELAY_ANGLE))))
     if not found:
-        return Offset(0.0, math.radians(UNKNOWN), False)
+        return Offset(0.0, math.radians(UNKNOWN_ANGLE), False)
     values, errors = (np.array(column) for column in zip(*found, strict=True))
-    weights = 1 / (errors**2 + math.radians(LEAST) ** 2)
+    weights = 1 / (errors**2 + math.radians(ANGLE_ACCURACY) ** 2)
     mean = float(weights @ values / weights.sum())
     own_error = 1 / math.sqrt(float(weights.sum()))
     apart_error = math.sqrt(float(weights @ (values - mean) ** 2 / weights.sum()) / max(len(values) - 1, 1))
-    error = max(own_error, apart_error, math.radians(LEAST))
+    error = max(own_error, apart_error, math.radians(ANGLE_ACCURACY))
     if abs(mean) < 3 * error:
         return Offset(0.0, math.hypot(error, mean), True)
     return Offset(mean, error, True)
 
 
 def _jumps(angle: Array, signal: Array, free: NDArray[np.bool_]) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Even angles (M,) [rad]; there mean over EDGE towards larger angles minus that towards smaller ones [m]; and
+    """Even angles (M,) [rad]; there mean over EDGE_ANGLE towards larger angles minus that towards smaller ones [m]; and
     where both are away from all reversals."""
-    count = round(360 / STEP)
+    count = round(360 / ANGLE_STEP)
     even = np.arange(count) * (2 * math.pi / count) - math.pi
     order = np.argsort(angle)
     values = np.interp(even, angle[order], signal[order], period=2 * math.pi)
     clear = np.interp(even, angle[order], free[order].astype(float), period=2 * math.pi)
-    width = round(EDGE / STEP)
+    width = round(EDGE_ANGLE / ANGLE_STEP)
     total = np.concatenate([[0.0], np.cumsum(np.concatenate([values, values, values]))])
     at = np.arange(count) + count
     jumps = (total[at + width] - 2 * total[at] + total[at - width]) / width
@@ -124,8 +124,8 @@ def _jumps(angle: Array, signal: Array, free: NDArray[np.bool_]) -> tuple[Array,
 
 def _shift(there: Array, back: Array) -> float:
     """How much later the edge of one direction comes than that of the other [rad], both by the way of the motion, in
-    steps of STEP about 0 at the middle: where their product is largest."""
-    most = round(2 * OFF / STEP)
+    steps of ANGLE_STEP about 0 at the middle: where their product is largest."""
+    most = round(2 * MAX_ANGLE_OFFSET / ANGLE_STEP)
     product = np.correlate(np.pad(there, most), back, "valid")
     at = int(product.argmax())
     fine = 0.0
@@ -133,4 +133,4 @@ def _shift(there: Array, back: Array) -> float:
         below, top, above = product[at - 1 : at + 2]
         bend = below - 2 * top + above
         fine = float(0.5 * (below - above) / bend) if bend < 0 else 0.0
-    return math.radians((at + fine - most) * STEP)
+    return math.radians((at + fine - most) * ANGLE_STEP)

@@ -13,14 +13,17 @@ from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath, enough
 from feedsim.analysis.circle.model import Fit
 from feedsim.analysis.figures import Array
 
-FLOOR = 10e-9  # an amplitude of less [m] is not worth a word, and may be what the model of the circle leaves
+AMPLITUDE_FLOOR = 10e-9  # an amplitude of less [m] is not worth a word, and may be what the model of the circle leaves
 # Lines of the spectrum that belong to one vibration, and how far their mean stands out of what is around them, and of
 # that on either side of them: a spectrum that falls steeply is form. Noise of the radius alone is modulated by the turn
 # in the axes, so that its lines are not independent: five times is then reached now and then among some thousand lines.
-LINES, AROUND, STANDS_OUT = 7, 101, 10.0
+VIBRATION_LINES, BACKGROUND_LINES, STANDS_OUT = 7, 101, 10.0
 FIRST_ORDER = 13  # below it is form
 FINE = 0.05  # of a line: the step in which the frequency is looked for
-AHEAD, BEHIND = math.radians(5), math.radians(60)  # about an axis' reversal its friction swings, not the machine
+SECTOR_AHEAD, SECTOR_BEHIND = (
+    math.radians(5),
+    math.radians(60),
+)  # about an axis' reversal its friction swings, not the machine
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def _signals(circle: CircleUnderTest, found: Fit, k: int, path: TurnedPath) -> l
         position = ((circle.radius + path.deviation) * wave(path.angle))[: len(phase)]
         a, b = np.linalg.lstsq(first, position - position.mean(), rcond=None)[0]
         # The axis turns round where it is farthest out, at atan2(b, a), and half a turn on.
-        free = (phase - math.atan2(b, a) + AHEAD) % math.pi > AHEAD + BEHIND
+        free = (phase - math.atan2(b, a) + SECTOR_AHEAD) % math.pi > SECTOR_AHEAD + SECTOR_BEHIND
         matrix = [np.ones(len(phase)), *first.T, np.sign(first @ (b, -a))]
         if enough_pitches(circle, axis):
             along = 2 * math.pi / circle.pitch[axis] * position
@@ -81,24 +84,26 @@ def _strongest(
     even = np.arange(len(angle)) * (2 * math.pi / len(angle))
     still = np.interp(even, angle, np.where(free, off, 0.0), period=2 * math.pi)
     usable = np.abs(np.fft.rfft(still))[FIRST_ORDER:] ** 2
-    if len(usable) < 2 * AROUND:
+    if len(usable) < 2 * BACKGROUND_LINES:
         return None
-    mean = averaged(usable, LINES)
-    beside = np.pad(mean, 2 * LINES, mode="edge")
-    sides = np.maximum(beside[: -4 * LINES], beside[4 * LINES :])
-    sides[: 2 * LINES] = np.maximum(sides[: 2 * LINES], mean[2 * LINES : 4 * LINES])
+    mean = averaged(usable, VIBRATION_LINES)
+    beside = np.pad(mean, 2 * VIBRATION_LINES, mode="edge")
+    sides = np.maximum(beside[: -4 * VIBRATION_LINES], beside[4 * VIBRATION_LINES :])
+    sides[: 2 * VIBRATION_LINES] = np.maximum(
+        sides[: 2 * VIBRATION_LINES], mean[2 * VIBRATION_LINES : 4 * VIBRATION_LINES]
+    )
     out = (mean > STANDS_OUT * np.maximum(_floor(usable), 1e-300)) & (mean > STANDS_OUT * sides)
     at = int(np.argmax(np.where(out, mean, 0.0)))
     if not out[at]:
         return None
-    lines = np.arange(max(at - LINES // 2, 0), min(at + LINES // 2 + 1, len(usable)))
+    lines = np.arange(max(at - VIBRATION_LINES // 2, 0), min(at + VIBRATION_LINES // 2 + 1, len(usable)))
     orders = np.arange(lines[0], lines[-1] + FINE, FINE) + FIRST_ORDER
     power = [abs(np.exp(-1j * order * angle[free]) @ off[free]) for order in orders]
     order = float(orders[int(np.argmax(power))])
     amplitude, noise = _swing(angle[free], off[free], order)
     half = quantile * noise * math.sqrt(2 / max(int(free.sum()), 1))
     frequency = order * circle.speed / (2 * math.pi * circle.radius)
-    return Vibration(frequency, amplitude, half, axis) if amplitude > FLOOR else None
+    return Vibration(frequency, amplitude, half, axis) if amplitude > AMPLITUDE_FLOOR else None
 
 
 def averaged(values: Array, count: int) -> Array:
@@ -109,14 +114,17 @@ def averaged(values: Array, count: int) -> Array:
 
 def _floor(power: Array) -> Array:
     """Mean power of the lines around each, if they are noise: their median is ln 2 of it."""
-    edges = np.arange(0, len(power), AROUND // 2)
-    middle = [float(np.median(power[max(edge - AROUND // 2, 0) : edge + AROUND // 2 + 1])) for edge in edges]
+    edges = np.arange(0, len(power), BACKGROUND_LINES // 2)
+    middle = [
+        float(np.median(power[max(edge - BACKGROUND_LINES // 2, 0) : edge + BACKGROUND_LINES // 2 + 1]))
+        for edge in edges
+    ]
     return np.asarray(np.interp(np.arange(len(power)), edges, middle)) / math.log(2)
 
 
 def _swing(angle: Array, off: Array, order: float) -> tuple[float, float]:
     """Amplitude of the orders about one, which holds what comes and goes: of the mean power; and what else there is."""
-    beside = order + np.arange(-(LINES // 2), LINES // 2 + 1)
+    beside = order + np.arange(-(VIBRATION_LINES // 2), VIBRATION_LINES // 2 + 1)
     matrix = np.column_stack([wave(n * angle) for n in beside for wave in (np.cos, np.sin)])
     swings = matrix @ np.linalg.lstsq(matrix, off, rcond=None)[0]
     return math.sqrt(2 * float(np.mean(swings**2))), float(np.std(off - swings))

@@ -7,13 +7,13 @@ import math
 from feedsim.analysis.circle.diagnosis import Diagnosis, Term
 
 # Of a cause that makes less of G, and of the largest deviation, there is no sentence.
-WORTH = 0.05
+SHARE_NAMED = 0.05
 # Noise that is this share of G leaves little to diagnose.
 NOISY = 0.3
 # An angle of the written angles [rad], and what they make uncertain [m], of which there is a word.
 ANGLE, UNCERTAIN = math.radians(0.5), 0.2e-6
 # Rate of a turn [rad/s] at which peaks of friction die away well within a quarter turn.
-SLOW = 2.0
+SLOW_TURN_RATE = 2.0
 # Of a cause that lies elsewhere than where G is measured there is, if it alone makes so much of it.
 BESIDES = 0.25
 # Turns of one direction that differ by more than this share of G are not turns of one circle.
@@ -45,7 +45,7 @@ def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
 def worth_telling(diagnosis: Diagnosis) -> list[Term]:
     """Causes that somebody can act on, the largest first."""
     able = [term for term in diagnosis.terms if term.shows and term.key not in ("rest", "radius")]
-    found = [term for term in able if term.share >= WORTH and term.size >= WORTH * diagnosis.G]
+    found = [term for term in able if term.share >= SHARE_NAMED and term.size >= SHARE_NAMED * diagnosis.G]
     besides = [
         term for term in able if term not in found and term.key != "offset" and term.size >= BESIDES * diagnosis.G
     ]
@@ -144,7 +144,7 @@ def further(diagnosis: Diagnosis) -> list[str]:
             f"fully separated: a slower circle of a smaller radius shows reversals ({circle.radius * 500:.3g} mm, "
             f"{circle.speed * 3e4:.3g} mm/min)"
         )
-    slow = SLOW * circle.radius
+    slow = SLOW_TURN_RATE * circle.radius
     if circle.speed > 2 * slow:
         found.append(
             "the circle is fast: peaks of friction may take a quarter turn, and are then not separated from lost "

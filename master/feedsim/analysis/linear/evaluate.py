@@ -26,11 +26,11 @@ from feedsim.linear.plant import TOOL_DIRECTIONS, Complexes, Floats
 from feedsim.linear.stability import unstable_poles
 from feedsim.linear.system import LinearSystem
 
-LOWEST = 1.0  # [Hz]
+LOWEST_FREQUENCY = 1.0  # [Hz]
 LOW_BAND = 5.0  # [Hz] up to here the axis is its inertia
 DELAY_AT = 0.1  # [Hz] low against every mode and loop; the phase's curvature is removed anyway
 RISE = 1.0  # [dB] least rise from anti-resonance to resonance that is reported
-BEYOND = 1.05  # resonances are looked for up to this multiple of the highest mode's frequency
+RESONANCE_MARGIN = 1.05  # resonances are looked for up to this multiple of the highest mode's frequency
 BELOW_MIRROR = 0.999  # of 1/(2 T): at the mirror frequency itself a sampled loop gain is real, whatever the loop
 
 
@@ -76,7 +76,7 @@ class AxisResult:
 
     Attributes:
         J_tot: inertia that a slow torque accelerates [kg.m2].
-        low_deviation: largest deviation of |n/M| J_tot omega from 1, LOWEST to LOW_BAND [1].
+        low_deviation: largest deviation of |n/M| J_tot omega from 1, LOWEST_FREQUENCY to LOW_BAND [1].
         pairs: of |n/M| J_tot omega [dB], speed-controlled system as measured: other loops as they are.
         structure_pairs: the same of the structure alone, other motors without torque.
         speed: None where the axis has no control.
@@ -114,8 +114,8 @@ def evaluate(system: LinearSystem, axes: Sequence[str] | None = None) -> LinearR
         InputError: a pole lies on the limit of stability.
     """
     highest = 0.5 / system.machine.cycles.T_c * BELOW_MIRROR
-    modal = system.modes.frequency.max() * BEYOND
-    frequency = grid(system.modes, LOWEST, min(modal, highest) if modal > LOWEST else highest)
+    modal = system.modes.frequency.max() * RESONANCE_MARGIN
+    frequency = grid(system.modes, LOWEST_FREQUENCY, min(modal, highest) if modal > LOWEST_FREQUENCY else highest)
     structure = system.closing("none")
     return LinearResult(
         axes={axis: _axis(system, axis, frequency) for axis in (system.axes if axes is None else axes)},
@@ -139,7 +139,7 @@ def _axis(system: LinearSystem, axis: str, frequency: Floats) -> AxisResult:
             response = loops.speed_controlled_system(system, axis, f)
         return _decibels(response * 2 * np.pi * f * J_tot)
 
-    low = measured(np.geomspace(LOWEST, LOW_BAND, 200))
+    low = measured(np.geomspace(LOWEST_FREQUENCY, LOW_BAND, 200))
     return AxisResult(
         J_tot=J_tot,
         low_deviation=float(np.max(np.abs(10 ** (low / 20) - 1))),
@@ -151,7 +151,7 @@ def _axis(system: LinearSystem, axis: str, frequency: Floats) -> AxisResult:
 
 
 def _speed(system: LinearSystem, axis: str) -> SpeedLoop:
-    frequency = grid(system.modes, LOWEST, 0.5 / system.machine.cycles.T_c * BELOW_MIRROR)
+    frequency = grid(system.modes, LOWEST_FREQUENCY, 0.5 / system.machine.cycles.T_c * BELOW_MIRROR)
 
     def reference(f: Floats) -> Complexes:
         return loops.speed_reference(system, axis, f)
@@ -166,7 +166,7 @@ def _speed(system: LinearSystem, axis: str) -> SpeedLoop:
 
 
 def _position(system: LinearSystem, axis: str) -> PositionLoop:
-    frequency = grid(system.modes, LOWEST, 0.5 / system.machine.cycles.T_pos * BELOW_MIRROR)
+    frequency = grid(system.modes, LOWEST_FREQUENCY, 0.5 / system.machine.cycles.T_pos * BELOW_MIRROR)
 
     def reference(f: Floats) -> Complexes:
         return loops.position_reference(system, axis, f)
@@ -224,7 +224,7 @@ def _axis_figures(result: AxisResult) -> dict[str, Figure]:
         "n_M.low_deviation": Figure(
             100 * result.low_deviation,
             "%",
-            f"largest deviation of |n/M| J_tot omega from 1, {LOWEST:g} to {LOW_BAND:g} Hz",
+            f"largest deviation of |n/M| J_tot omega from 1, {LOWEST_FREQUENCY:g} to {LOW_BAND:g} Hz",
         ),
     }
     for prefix, found_pairs, system in (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import QUIET, Command, Option, out
+from feedsim.cli.options import QUIET_OPTION, Command, Option, out
 from feedsim.cli.terminal import finish, watching
 
 IMPORT_DESCRIPTION = """Drive, limits, filters and compensations of a machine file from the files of a control. A value
@@ -93,7 +93,7 @@ IMPORT = Command(
                type=Path),
         DRIVES, ASSUME, CHECKED,
         Option("--name", "NAME", "of the machine in a draft (default: name of the file)"),
-        out("machine_<name of the file>"), QUIET,
+        out("machine_<name of the file>"), QUIET_OPTION,
     ),
     IMPORT_DESCRIPTION,
     IMPORT_EPILOG,
@@ -106,7 +106,7 @@ EXPORT = Command(
     (
         Option("machine", "MACHINE", "machine file, or a folder with a machine.yaml", type=Path),
         Option("--like", "FILE", "files of the control as it is now", nargs="+", type=Path, required=True),
-        AXES, DRIVES, ASSUME, CHECKED, out("export_<name of the machine's folder>"), QUIET,
+        AXES, DRIVES, ASSUME, CHECKED, out("export_<name of the machine's folder>"), QUIET_OPTION,
     ),
     EXPORT_DESCRIPTION,
     EXPORT_EPILOG,

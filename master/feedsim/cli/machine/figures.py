@@ -13,7 +13,7 @@ POSITION = "AXIS=POSITION is needed, e.g. X=800mm"
 
 def build(options: Namespace) -> None:
     """feedsim machine build: write modes.csv and build.json."""
-    from feedsim.jobs.machine import MODES, machine_build
+    from feedsim.jobs.machine import TABLE_FILE, machine_build
 
     with watching(options.quiet) as watch:
         result = machine_build(
@@ -24,7 +24,7 @@ def build(options: Namespace) -> None:
             static_correction=options.static_correction,
             watch=watch,
         )
-    finish(options.quiet, result.findings, f"{result.lines[0]} -> {options.out / MODES}")
+    finish(options.quiet, result.findings, f"{result.lines[0]} -> {options.out / TABLE_FILE}")
 
 
 def info(options: Namespace) -> None:
@@ -64,13 +64,13 @@ SOURCE = (
     Option("--static-correction", "",
            "append pseudo-modes that make up for the static compliance of the dropped modes"),
 )  # fmt: skip
-STEP = Option("--step", "TIME", "exchange step h of the coupling limit (default: the machine's control cycle)")
-QUIET = Option("--quiet", "", "no progress and no summary")
+STEP_OPTION = Option("--step", "TIME", "exchange step h of the coupling limit (default: the machine's control cycle)")
+QUIET_OPTION = Option("--quiet", "", "no progress and no summary")
 BUILD = Command(
     "build",
     "compute the machine's modes from its structure; write modes.csv and build.json",
     build,
-    (*SOURCE, Option("--out", "DIR", "where modes.csv and build.json go", type=Path, required=True), QUIET),
+    (*SOURCE, Option("--out", "DIR", "where modes.csv and build.json go", type=Path, required=True), QUIET_OPTION),
     "Compute the modes of a machine from its structure file: geometry, or matrices of a finite-element program "
     "(docs/structure.md).",
     job="machine_build",
@@ -81,7 +81,7 @@ INFO = Command(
     info,
     (
         *SOURCE,
-        STEP,
+        STEP_OPTION,
         Option("--modes", "N", "modes to list: number or all (default: 20)", default="20"),
         Option("--json", "", "print JSON in SI units, with all modes"),
     ),

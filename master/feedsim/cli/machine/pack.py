@@ -12,14 +12,14 @@ from feedsim.cli.terminal import finish, watching
 
 def pack(options: Namespace) -> None:
     """feedsim machine pack."""
-    from feedsim.jobs.machine_pack import EXAMPLE, machine_pack
+    from feedsim.jobs.machine_pack import POSITIONS_EXAMPLE, machine_pack
 
     with watching(False, " poses") as watch:
         made = machine_pack(
             options.machine,
             options.out,
             at=pairs("at", options.at, POSITION),
-            poses=pairs("poses", options.poses, f"{EXAMPLE} is the form"),
+            poses=pairs("poses", options.poses, f"{POSITIONS_EXAMPLE} is the form"),
             name=options.name,
             note=options.note,
             base=options.base,

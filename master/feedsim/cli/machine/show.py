@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.machine.figures import POSITION, QUIET, SOURCE, STEP
+from feedsim.cli.machine.figures import POSITION, QUIET_OPTION, SOURCE, STEP_OPTION
 from feedsim.cli.options import Command, Option, pairs
 from feedsim.cli.terminal import finish, watching
 
@@ -38,7 +38,7 @@ SHOW = Command(
     show,
     (
         *SOURCE,
-        STEP,
+        STEP_OPTION,
         Option("--mode", "MODE",
                "mode to draw: its number, or a frequency such as 21Hz for the nearest one; may be given several times",
                many=True),
@@ -47,7 +47,7 @@ SHOW = Command(
                "deflections are drawn this many times as large as usual, e.g. 2 (default: auto, a tenth of the "
                "machine)", default="auto"),
         Option("--out", "DIR", "where the pictures go", type=Path, required=True),
-        QUIET,
+        QUIET_OPTION,
     ),
     "Draw the structure of a machine and its first modes, or chosen ones: PNG and SVG in DIR/figures, with "
     "report.html around them. MACHINE may be a scenario too.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET, Command, Option, names, out, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, Command, Option, names, out, settings
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Find the values of a friction compensation: a pulse on the speed setpoint, constant or with a
@@ -49,7 +49,7 @@ COMPENSATION = Command(
                default="pulse_characteristic"),
         Option("--axes", "NAMES", "axes of the plane that are compensated (default: both)", type=names),
         Option("--objective", "NAME", "what is minimised: ratio, worst or largest (default: ratio)", default="ratio"),
-        out("tune_<name of the file>"), FIGURES, settings(), FMUS, QUIET,
+        out("tune_<name of the file>"), FIGURES, settings(), FMUS, QUIET_OPTION,
     ),
     DESCRIPTION,
     EPILOG,

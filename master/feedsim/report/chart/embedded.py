@@ -1,7 +1,7 @@
 """The charts of a page as one text of JSON, with the numbers of their curves in 32 bits each.
 
-Along a linear axis every BLOCK rows have a middle and a step of their own, and a value is a whole number of steps from
-that middle: of an axis of 2 m far less than 1 nm, wherever one zooms in; a 32-bit float has 0.1 um there. Along a
+Along a linear axis every BLOCK_ROWS rows have a middle and a step of their own, and a value is a whole number of steps
+from that middle: of an axis of 2 m far less than 1 nm, wherever one zooms in; a 32-bit float has 0.1 um there. Along a
 logarithmic axis they are floats.
 """
 
@@ -17,8 +17,8 @@ import numpy as np
 from feedsim.report.chart.model import Axis, Band, Chart, Curve, Grid, Level, Mark, Panel, Part, Polar
 from feedsim.report.style import PALETTE, Array, named
 
-STEPS = 2**31 - 1  # to either side of the middle; one more is no number
-BLOCK = 256  # rows; chart_use.js knows it, too
+QUANTISATION_STEPS = 2**31 - 1  # to either side of the middle; one more is no number
+BLOCK_ROWS = 256  # rows; chart_use.js knows it, too
 
 
 def embedded(charts: Mapping[str, Chart]) -> str:
@@ -44,7 +44,7 @@ class _Pool:
     def __call__(self, values: Array, axis: Axis | None = None, *, cells: bool = False) -> int:
         """The number of an array; axis: along which it is shown; cells: numbers of a table, of any sizes."""
         whole = not cells and (axis is None or not (axis.log or axis.symlog))
-        content = (BLOCK, steps(values)) if whole else (0, np.asarray(values).astype("<f4").tobytes())
+        content = (BLOCK_ROWS, steps(values)) if whole else (0, np.asarray(values).astype("<f4").tobytes())
         found = self._known.setdefault(content, len(self.arrays))
         if found == len(self.arrays):
             self.arrays.append((content[0], base64.b64encode(content[1]).decode("ascii")))
@@ -57,19 +57,23 @@ def steps(values: Array) -> bytes:
     What is not finite has the least k.
     """
     values = np.asarray(values, dtype=np.float64)
-    blocks = -(-len(values) // BLOCK)
-    padded = np.full(blocks * BLOCK, np.nan)
+    blocks = -(-len(values) // BLOCK_ROWS)
+    padded = np.full(blocks * BLOCK_ROWS, np.nan)
     padded[: len(values)] = np.where(np.isfinite(values), values, np.nan)
-    rows = padded.reshape(blocks, BLOCK)
+    rows = padded.reshape(blocks, BLOCK_ROWS)
     finite = np.isfinite(rows)
     low = np.where(finite, rows, np.inf).min(axis=1, initial=np.inf)
     high = np.where(finite, rows, -np.inf).max(axis=1, initial=-np.inf)
     empty = low > high
     low, high = np.where(empty, 0.0, low), np.where(empty, 0.0, high)
     middle, half = low / 2 + high / 2, high / 2 - low / 2
-    step = half / STEPS
+    step = half / QUANTISATION_STEPS
     step[step == 0] = 1.0
-    whole = np.where(finite, np.clip(np.rint((rows - middle[:, None]) / step[:, None]), -STEPS, STEPS), -STEPS - 1)
+    whole = np.where(
+        finite,
+        np.clip(np.rint((rows - middle[:, None]) / step[:, None]), -QUANTISATION_STEPS, QUANTISATION_STEPS),
+        -QUANTISATION_STEPS - 1,
+    )
     return (
         np.column_stack([middle, step]).astype("<f8").tobytes() + whole.ravel()[: len(values)].astype("<i4").tobytes()
     )

@@ -14,11 +14,15 @@ if TYPE_CHECKING:
     from matplotlib.text import Text
 
 CELL = 2.0  # points: how finely a panel is looked at
-NEAR, LED = 3.5, 9.0  # points between a point and its label; from which on a line leads to it
-FAR = 12.0  # points, of a label from its line
+LABEL_DISTANCE, LED_DISTANCE = 3.5, 9.0  # points between a point and its label; from which on a line leads to it
+MAX_LABEL_DISTANCE = 12.0  # points, of a label from its line
 WORD_GAP = 2  # cells between words
 COVERED = 1e4  # what it costs to stand on a curve, against points of distance
-SMALL, LEAST, NOTE = 8.5, 6.5, 5.0  # points: of words, of those that need to be smaller, about a note
+LABEL_POINTS, MIN_LABEL_POINTS, NOTE_POINTS = (
+    8.5,
+    6.5,
+    5.0,
+)  # points: of words, of those that need to be smaller, about a note
 
 
 def fit(axes: Axes, title: Text) -> None:
@@ -29,7 +33,7 @@ def fit(axes: Axes, title: Text) -> None:
         extent = text.get_window_extent()
         size = extent.height if text is up else extent.width
         if size > most:
-            text.set_fontsize(max(LEAST, float(text.get_fontsize()) * most / size))
+            text.set_fontsize(max(MIN_LABEL_POINTS, float(text.get_fontsize()) * most / size))
 
 
 class Ground:
@@ -79,12 +83,12 @@ class Ground:
             gap = np.hypot(np.maximum(0, np.maximum(left - a, a - left - wide)),
                            np.maximum(0, np.maximum(low - b, b - low - tall)))  # fmt: skip
             middle = np.hypot(left + wide / 2 - a, low + tall / 2 - b)
-            near = NEAR * self.per
+            near = LABEL_DISTANCE * self.per
             return np.where(gap < near, COVERED, gap - near) + 0.05 * middle - 0.1 * np.clip(low - b, 0, near)
 
         left, low, wide, tall = self._put(label, far)
         to = (np.clip(a, left, left + wide), np.clip(b, low, low + tall))
-        if np.hypot(to[0] - a, to[1] - b) > LED * self.per:
+        if np.hypot(to[0] - a, to[1] - b) > LED_DISTANCE * self.per:
             ends = self.axes.transData.inverted().transform([(a, b), to])
             self.axes.plot(*ends.T, color=MUTED, linewidth=0.7, zorder=5)
 
@@ -108,7 +112,9 @@ class Ground:
 
         def far(left: Array, low: Array, wide: float, tall: float) -> Array:
             gap = np.maximum(left - a, a - left - wide)
-            off = np.where((gap < 2 * self.per) | (gap > FAR * self.per), 3 * COVERED, 4 * gap)  # else it is another's
+            off = np.where(
+                (gap < 2 * self.per) | (gap > MAX_LABEL_DISTANCE * self.per), 3 * COVERED, 4 * gap
+            )  # else it is another's
             return np.asarray(off + 0.1 * (self.room.y1 - low - tall) + (left < a))
 
         self._put(self._label(text, colour), far)
@@ -120,7 +126,7 @@ class Ground:
             aside = np.minimum(left - self.room.x0, 40 + self.room.x1 - left - wide)
             return np.asarray(aside + np.minimum(low - self.room.y0, 20 + self.room.y1 - low - tall))
 
-        self._put(self._label(text, colour), far, NOTE * self.per)
+        self._put(self._label(text, colour), far, NOTE_POINTS * self.per)
 
     def _pixels(self, x: float, y: float) -> tuple[float, float]:
         a, b = self.axes.transData.transform((x, y))
@@ -128,7 +134,13 @@ class Ground:
 
     def _label(self, text: str, colour: str) -> Text:
         ground = {"facecolor": PAPER, "edgecolor": "none", "pad": 1.0, "alpha": 0.7}
-        look: dict[str, Any] = {"fontsize": SMALL, "color": colour, "linespacing": 1.3, "zorder": 8, "bbox": ground}
+        look: dict[str, Any] = {
+            "fontsize": LABEL_POINTS,
+            "color": colour,
+            "linespacing": 1.3,
+            "zorder": 8,
+            "bbox": ground,
+        }
         label = self.axes.text(0, 0, text, ha="left", va="bottom", transform=None, **look)
         label.set_in_layout(False)
         return label

@@ -25,18 +25,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 Place = Callable[[], None]  # what is done when the layout is known
-WIDTH, WIDEST, COLUMN = 10.0, 12.0, 3.6  # inches of a figure, and that a column takes at least
-PANEL, ENDS, ROUND, NAMED, CELL = 2.3, 0.5, 6.0, 0.27, (0.62, 0.31)  # inches: see _height
-SIDE, HEAD = 0.85, 0.35  # inches beside a panel's curves and above them
-FEW = 2  # marks with words that need no room of their own
+FIGURE_WIDTH, MAX_FIGURE_WIDTH, MIN_COLUMN_WIDTH = (
+    10.0,
+    12.0,
+    3.6,
+)  # inches of a figure, and that a column takes at least
+PANEL, ENDS, ROUND, NAME_HEIGHT, CELL = 2.3, 0.5, 6.0, 0.27, (0.62, 0.31)  # inches: see _height
+SIDE, TITLE_HEIGHT = 0.85, 0.35  # inches beside a panel's curves and above them
+MAX_PLAIN_MARKS = 2  # marks with words that need no room of their own
 DASHES: dict[str, Any] = {"": "-", "dashed": (0, (5, 1.5)), "dotted": (0, (2, 1.3))}
 DOT = 2.0  # points, of a dot whose width is 1
 SHAPES = ("^", "v", "o", "s")  # of large dots of several names
 LINES: dict[str, Any] = {"": "-", "dashed": (0, (4, 2)), "dotted": (0, (1, 2))}  # of levels
 THICK = 3.0  # wider curves are bars, as wide as pixels of a page are
 CLOSED = 0.02  # of what a loop spans: ends as close as this are one
-MANY = 500  # points from which they are an image within an SVG
-SMALL = 8.5  # points, of what stands within panels
+IMAGE_POINTS = 500  # points from which they are an image within an SVG
+PANEL_POINTS = 8.5  # points, of what stands within panels
 GREEK = "alpha|beta|gamma|delta|zeta|eta|kappa|lambda|mu|rho|sigma|tau|psi|omega"
 SYMBOL = re.compile(rf"(?<![\w.$])([A-Za-z]|{GREEK})_([A-Za-z0-9]{{1,4}})(?!\w|\.\w)")
 
@@ -57,7 +61,7 @@ def printed(chart: Chart, stem: str, title: str, caption: str = "", *, worded: b
                 if isinstance(part, Panel):
                     same = j > 0 and isinstance(left := row[j - 1], Panel) and left.y == part.y
                     bare = _hides(chart, i, j)
-                    size = (shares[j] - SIDE, heights[i] - HEAD - (0.0 if bare else ENDS))
+                    size = (shares[j] - SIDE, heights[i] - TITLE_HEIGHT - (0.0 if bare else ENDS))
                     places.append(_panel(axes, part, shapes, size, bare=bare, unnamed=same))
                 elif isinstance(part, Polar):
                     places.append(_polar(axes, part))
@@ -83,8 +87,8 @@ def _width(chart: Chart) -> float:
     if all(isinstance(part, Grid) for part in chart.panels):
         needed = max(0.6 + 0.085 * max(map(len, part.rows)) + CELL[0] * len(part.columns)
                      for part in chart.panels if isinstance(part, Grid))  # fmt: skip
-        return min(max(6.0, needed), WIDEST)
-    return min(max(WIDTH, COLUMN * len(chart.widths)), WIDEST)
+        return min(max(6.0, needed), MAX_FIGURE_WIDTH)
+    return min(max(FIGURE_WIDTH, MIN_COLUMN_WIDTH * len(chart.widths)), MAX_FIGURE_WIDTH)
 
 
 def _height(chart: Chart, part: Panel | Polar | Grid, bare: bool) -> float:
@@ -94,7 +98,7 @@ def _height(chart: Chart, part: Panel | Polar | Grid, bare: bool) -> float:
         few = max(CELL[1] * len(part.rows), min(0.6 * len(part.rows), 1.8))
         return 0.5 + 0.06 * max(map(len, part.columns)) + few
     if part.y.names:
-        return 0.9 + NAMED * len(part.y.names)
+        return 0.9 + NAME_HEIGHT * len(part.y.names)
     more = 0.35 * (part.x.also is not None)
     room = PANEL * part.height * (1.2 if len(chart.panels) == 1 or len(chart.widths) > 1 else 1.0)
     return room + (0.0 if bare else ENDS) + more
@@ -121,7 +125,7 @@ def _panel(
     """
     across, up = ranges(panel)
     up = _with_bands(panel, up)
-    if sum(bool(mark.text) for mark in panel.marks) > FEW and not panel.y.log:
+    if sum(bool(mark.text) for mark in panel.marks) > MAX_PLAIN_MARKS and not panel.y.log:
         up = (up[0], up[1] + 0.25 * (up[1] - up[0]))  # room for what is said of them
     if panel.x.span is None:
         across = _wider(across, panel.x.log)
@@ -152,7 +156,7 @@ def _panel(
         room = axes.get_window_extent().transformed(axes.figure.dpi_scale_trans.inverted())  # inches
         fit(axes, title)
         for line in axes.lines if panel.y.names else ():  # bars are as wide as their rows allow
-            line.set_linewidth(line.get_linewidth() * min(2.0, room.height / (up[1] - up[0]) / NAMED))
+            line.set_linewidth(line.get_linewidth() * min(2.0, room.height / (up[1] - up[0]) / NAME_HEIGHT))
         _words(axes, panel, across, up)
 
     _marked(axes.xaxis, panel.x, across, size[0] / (1.05 if panel.x.names else 0.75), bare)
@@ -208,7 +212,7 @@ def _curve(axes: Axes, curve: Curve, shape: str, *, bars: bool) -> None:
         axes.fill_between(curve.x, curve.y, color=curve.colour, alpha=0.5, linewidth=0, zorder=2)
     elif curve.dots:
         look |= {
-            "rasterized": len(curve.x) > MANY,
+            "rasterized": len(curve.x) > IMAGE_POINTS,
             "zorder": 2.5 if curve.width < THICK else 4,
         }  # clouds lie below curves
         axes.plot(curve.x, curve.y, shape, linestyle="none", markersize=DOT * curve.width, markeredgewidth=0, **look)
@@ -335,10 +339,12 @@ def _polar(axes: Axes, panel: Polar) -> Place:
     for k in range(-panel.rings, panel.rings + 1):
         away = 1 + k * gap if k else _beside_the_curves(panel, gap)
         at, text = away * math.sqrt(0.5), minus(f"{k * panel.ring:+g} µm") if k else "0"
-        axes.text(at, at, text, color=MUTED, fontsize=SMALL, ha="center", va="center", rotation=-45, bbox=_plain())
+        axes.text(
+            at, at, text, color=MUTED, fontsize=PANEL_POINTS, ha="center", va="center", rotation=-45, bbox=_plain()
+        )
     for mark in panel.marks:
         _glitch(axes, mark, gap, panel.ring)
-    axes.text(0, 0.22, _text(panel.note), color=MUTED, ha="center", va="center", fontsize=SMALL)
+    axes.text(0, 0.22, _text(panel.note), color=MUTED, ha="center", va="center", fontsize=PANEL_POINTS)
     if panel.sense:
         _sense(axes, panel.sense)
     axes.set_title(_text(panel.title))
@@ -400,7 +406,7 @@ def _grid(axes: Axes, grid: Grid) -> None:
             share, negative = share_of(value, grid)
             cells[i, j] = to_rgba(VERMILLION if negative else BLUE, share)
     lines: dict[str, Any] = (
-        {"edgecolors": GRID, "linewidth": 0.6} if cells[..., 0].size <= MANY else {"rasterized": True}
+        {"edgecolors": GRID, "linewidth": 0.6} if cells[..., 0].size <= IMAGE_POINTS else {"rasterized": True}
     )
     axes.pcolormesh(np.arange(columns + 1), np.arange(rows + 1), cells, **lines)
     axes.invert_yaxis()
@@ -426,7 +432,7 @@ def _grid(axes: Axes, grid: Grid) -> None:
     for i, j in np.ndindex(rows, columns):
         if math.isfinite(value := float(grid.values[i, j])):
             weight = "bold" if grid.bold is not None and grid.bold[i, j] else "normal"
-            axes.text(j + 0.5, i + 0.5, cell_text(value, grid), ha="center", va="center", fontsize=SMALL,
+            axes.text(j + 0.5, i + 0.5, cell_text(value, grid), ha="center", va="center", fontsize=PANEL_POINTS,
                       fontweight=weight)  # fmt: skip
 
 

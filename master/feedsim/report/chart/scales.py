@@ -13,7 +13,7 @@ from feedsim.report.style import Array
 
 Range = tuple[float, float]
 ROOM = 0.07  # of their range, above and below the curves
-FEW = 3  # ticks
+MIN_TICKS = 3  # ticks
 PHASES = (15, 30, 45, 90, 180, 360, 720, 1440)
 
 
@@ -86,7 +86,7 @@ def ticks(axis: Axis, span: Range, most: float) -> Iterator[tuple[float, str]]:
     else:
         decade = 10.0 ** math.floor(math.log10(rough)) if rough > 0 else 1.0
         step = decade * next((each for each in (1, 2, 5, 10) if each * decade >= 0.999 * rough), 10)
-    while (fewer := _marked(span, step)) < FEW:  # one or two ticks are no scale
+    while (fewer := _marked(span, step)) < MIN_TICKS:  # one or two ticks are no scale
         finer = _finer(axis, step)
         if not finer or (fewer > 1 and _marked(span, finer) > most + 2):
             break

@@ -13,7 +13,7 @@ from feedsim.report.chart.scales import bent, ranges, ticks
 from feedsim.report.formatting import minus, three
 from feedsim.report.style import INK, MUTED, Array, named
 
-WIDTH, HEIGHT, ROUND = 960.0, 250.0, 430.0
+STILL_WIDTH, STILL_HEIGHT, ROUND = 960.0, 250.0, 430.0
 LEFT, RIGHT, TOP, BOTTOM = 62.0, 12.0, 26.0, 42.0
 MOST_ROWS = 400  # of a curve: two for a pixel or so
 SLANTED = 4.8  # that a letter of a slanted name takes across
@@ -29,13 +29,14 @@ def still(chart: Chart, stem: str, title: str) -> str:
         height = max(_height(part) for part in row)
         x = 0.0
         for k, (part, share) in enumerate(zip(row, chart.widths, strict=False)):
-            width = WIDTH * share / total
+            width = STILL_WIDTH * share / total
             parts.append(
                 f'<g transform="translate({x:g} {y:g})">{_part(part, width, height, f"{stem}-still-{n}-{k}")}</g>'
             )
             x += width
         y += height + 10
-    head = f'<svg role="img" aria-label="{escape(title)}" class="plot" viewBox="0 0 {WIDTH:g} {y:g}" font-size="12">'
+    box = f"0 0 {STILL_WIDTH:g} {y:g}"
+    head = f'<svg role="img" aria-label="{escape(title)}" class="plot" viewBox="{box}" font-size="12">'
     return head + "".join(parts) + "</svg>"
 
 
@@ -44,14 +45,14 @@ def _height(part: Panel | Polar | Grid) -> float:
         return ROUND
     if isinstance(part, Grid):
         return _over(part) + 24.0 * len(part.rows) + 10
-    return TOP + BOTTOM + (26.0 * len(part.y.names) if part.y.names else (HEIGHT - TOP - BOTTOM) * part.height)
+    return TOP + BOTTOM + (26.0 * len(part.y.names) if part.y.names else (STILL_HEIGHT - TOP - BOTTOM) * part.height)
 
 
 def _legend(chart: Chart) -> tuple[list[str], float]:
     parts, x, y = [], 4.0, 14.0
     for name, curve in chart.legend.items():
         room = 36 + 6.8 * len(name)
-        if x + room > WIDTH and x > 4:
+        if x + room > STILL_WIDTH and x > 4:
             x, y = 4.0, y + 18
         parts.append(f'<path d="M{x:g} {y - 4:g}h22" {_stroke(curve)}/>{_text(x + 27, y, name)}')
         x += room
@@ -203,12 +204,12 @@ def _polar(panel: Polar, width: float, height: float) -> str:
     return "".join(parts)
 
 
-WIDEST = 150.0  # of a cell
+MAX_CELL_WIDTH = 150.0  # of a cell
 
 
 def _grid(grid: Grid, width: float) -> str:
     left, top = min(260.0, 16 + 6.4 * max(map(len, grid.rows))), _over(grid)
-    cell = min(WIDEST, (width - left - 8 - SLANTED * len(grid.columns[-1])) / (len(grid.columns) - 0.5))
+    cell = min(MAX_CELL_WIDTH, (width - left - 8 - SLANTED * len(grid.columns[-1])) / (len(grid.columns) - 0.5))
     parts = [_text(4, 15, grid.title, "font-weight='600'")]
     for j, name in enumerate(grid.columns):
         parts.append(

@@ -14,7 +14,7 @@ from feedsim.analysis.circle import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.records import RecordedCircle
 from feedsim.analysis.circle_figures import about, both_directions, cause_figures
 from feedsim.analysis.circularity import axis_letters
-from feedsim.motions.circular import DIRECTIONS
+from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report import sections
 from feedsim.report.changes import changes_section
 from feedsim.report.chart import Dash
@@ -130,7 +130,7 @@ def picture(circle: CircleUnderTest, recorded: RecordedCircle, diagnosis: Diagno
         f"circle{', about its fitted centre' if recorded.centred else ''}. Dotted: the fitted model without peaks."
     )
     curves = [
-        circle_plots.turned(DIRECTIONS[turn.sense], RECORDED, turn.angle, turn.deviation, DASHES[turn.sense])
+        circle_plots.turned(SENSE_WORDS[turn.sense], RECORDED, turn.angle, turn.deviation, DASHES[turn.sense])
         for turn in turns
     ]
     curves += [

@@ -8,11 +8,11 @@ from feedsim.compare import Comparison, Curves, Variable, along, seconds
 from feedsim.report.chart import Axis, Band, Chart, Curve, Level, Mark, Panel
 from feedsim.report.formatting import display_unit, minus, powers
 from feedsim.report.picture import Picture
-from feedsim.report.style import ALLOWED, LEFT, MUTED, RECORDED, SIMULATED, Array
+from feedsim.report.style import ALLOWED, MUTED, RECORDED, RESIDUAL_COLOUR, SIMULATED, Array
 
-MOST = 4  # variables in a picture
-AROUND = 60  # rows of the result to either side of the worst one
-FAR = 1e30  # beyond every panel
+MAX_VARIABLES = 4  # variables in a picture
+ROWS_AROUND_WORST = 60  # rows of the result to either side of the worst one
+OFF_PANEL = 1e30  # beyond every panel
 
 
 def drawn(comparison: Comparison) -> list[Variable]:
@@ -20,7 +20,7 @@ def drawn(comparison: Comparison) -> list[Variable]:
     kept = [each for each in comparison.variables if each.curves is not None]
     outside = [each for each in kept if each.verdict == "different"]
     ranked = sorted(outside or kept, key=lambda each: (-each.ratio, -each.deviation))
-    return ranked[: MOST if outside else 1]
+    return ranked[: MAX_VARIABLES if outside else 1]
 
 
 def picture_of(comparison: Comparison, number: int) -> Picture | None:
@@ -47,7 +47,7 @@ def _panels(variable: Variable) -> list[Panel]:
     unit = display_unit(variable.unit)
     time = Axis("time", "s")
     reference = Curve("reference", *_held(curves), RECORDED, width=1.2)
-    colour = LEFT if variable.outside else MUTED
+    colour = RESIDUAL_COLOUR if variable.outside else MUTED
     whole = Panel(
         variable.name, time, Axis(variable.name, unit),
         [reference, Curve("result", curves.time, curves.values, SIMULATED)],
@@ -77,14 +77,14 @@ def _held(curves: Curves) -> tuple[Array, Array]:
 
 
 def _shaded(curves: Curves, part: slice) -> list[Band]:
-    return [Band("outside", -FAR, FAR, np.array(ends), LEFT) for ends in _spans(curves, part)]
+    return [Band("outside", -OFF_PANEL, OFF_PANEL, np.array(ends), RESIDUAL_COLOUR) for ends in _spans(curves, part)]
 
 
 def _around(variable: Variable, curves: Curves) -> slice:
     """Rows about the worst instant: some tolerances in time wide, so that the tube can be read."""
     worst = int(np.argmin(np.abs(curves.time - variable.time)))
     step = float(np.ptp(curves.time)) / max(1, len(curves.time) - 1)
-    rows = AROUND + int(min(3 * variable.reach / step, 2000)) if step > 0 else AROUND
+    rows = ROWS_AROUND_WORST + int(min(3 * variable.reach / step, 2000)) if step > 0 else ROWS_AROUND_WORST
     return slice(max(0, worst - rows), worst + rows + 1)
 
 

@@ -17,7 +17,7 @@ from feedsim.report.run.axis_plots import TIME, reversed_note, torque_axis
 from feedsim.report.run.circle_plots import circle, circle_chart, turned
 from feedsim.report.style import AFTER, BEFORE, FRICTION, OTHERWISE, Array
 
-AROUND = 0.03  # s to either side of a reversal
+TIME_AROUND_REVERSAL = 0.03  # s to either side of a reversal
 
 
 def pictures_of(compensation: Compensation) -> list[Picture]:
@@ -100,7 +100,7 @@ def _torque_picture(compensation: Compensation) -> Picture | None:
             Curve("friction M_fr", real.time, signs[axis] * real[f"{axis}.M_fr"], FRICTION, "dashed"),
         ]
         reversal = _reversal(real.time, real[f"{axis}.n_a"])
-        near = Axis("time", "s", span=(reversal - AROUND, reversal + AROUND))
+        near = Axis("time", "s", span=(reversal - TIME_AROUND_REVERSAL, reversal + TIME_AROUND_REVERSAL))
         ordinate = torque_axis(signs[axis])
         zero = [Level(0.0, dash="")]
         panels += [

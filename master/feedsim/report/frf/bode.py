@@ -25,7 +25,7 @@ HIGH_COHERENCE = 0.99
 COLOURS = {"closed form": SIMULATED, "measured": OTHERWISE}
 OTHERS = (RECORDED, GREEN, PURPLE)  # of several overlaid curves
 LOWEST_DB = -400.0  # what is exactly zero
-ALIKE = 1.01  # crossings closer than this ratio are one
+CROSSING_RATIO = 1.01  # crossings closer than this ratio are one
 EDGE = 1e-9  # of a frequency: quotients of times carry rounding
 
 
@@ -145,7 +145,7 @@ def told_of_bandwidth(bandwidth: Bandwidth | None) -> Told:
     if not math.isfinite(bandwidth.first):
         return Told([line], note="stays above −3 dB")
     first = Mark(bandwidth.first, -3.0, "", INK)
-    if bandwidth.last < bandwidth.first * ALIKE:
+    if bandwidth.last < bandwidth.first * CROSSING_RATIO:
         return Told([line], [first], note=f"−3 dB at {hertz(bandwidth.first)}")
     marks = [first, Mark(bandwidth.last, -3.0, "", INK, hollow=True)]
     return Told([line], marks, note=f"−3 dB, first {hertz(bandwidth.first)}\n−3 dB, last {hertz(bandwidth.last)}")

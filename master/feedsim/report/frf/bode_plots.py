@@ -15,7 +15,7 @@ import numpy as np
 
 from feedsim.analysis import linear
 from feedsim.analysis.responses import Responses
-from feedsim.linear.loops import COMPLIANCE, QUANTITIES
+from feedsim.linear.loops import COMPLIANCE, LOOP_QUANTITIES
 from feedsim.linear.margins import Bandwidth, Margins, Pair
 from feedsim.linear.plant import TOOL_DIRECTIONS
 from feedsim.report.frf.bode import (
@@ -37,7 +37,7 @@ MOST_COLUMNS = 3
 LOWEST_GAIN_DB = -40.0  # of a loop: what is below says nothing about it
 LOWEST_CLOSED_DB = -45.0  # of a closed loop
 
-KINDS = {
+RESPONSE_KINDS = {
     "closed form": "Lines: closed form. ",
     "measured": "Points: measured on the units, faded where the coherence is below 0.99. ",
     "overlaid": "Dashed curves: laid over. ",
@@ -189,7 +189,7 @@ def _axes(part: Mapping[str, object]) -> str:
 def _kinds(part: Columns) -> str:
     """What the styles mean, where there is more than one."""
     there = {curve.kind for curves in part.values() for curve in curves}
-    return "".join(KINDS[kind] for kind in KINDS if kind in there) if len(there) > 1 else ""
+    return "".join(RESPONSE_KINDS[kind] for kind in RESPONSE_KINDS if kind in there) if len(there) > 1 else ""
 
 
 def pictures_of(responses: Responses) -> list[Picture]:
@@ -199,7 +199,7 @@ def pictures_of(responses: Responses) -> list[Picture]:
     slow = 0.5 / machine.cycles.T_pos  # the position controller knows no frequencies above
 
     def columns(quantity: str) -> dict[str, list[Curve]]:
-        return {axis: curves_of(responses, QUANTITIES[quantity][0].format(axis)) for axis in axes}
+        return {axis: curves_of(responses, LOOP_QUANTITIES[quantity][0].format(axis)) for axis in axes}
 
     def loops(name: str) -> dict[str, list[Curve]]:
         return {axis: curves_of(responses, f"{axis}.{name}") for axis in axes}

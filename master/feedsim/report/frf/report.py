@@ -34,12 +34,12 @@ TILES = {  # figure of an axis -> label
     "position.bandwidth_first": "position loop, −3 dB",
     "position.gain_margin": "position loop, gain margin",
 }
-LEAST = {"gain_margin": "gain margin", "phase_margin": "phase margin", "bandwidth_first": "bandwidth"}
+WORST_MARGINS = {"gain_margin": "gain margin", "phase_margin": "phase margin", "bandwidth_first": "bandwidth"}
 AS_DECIBEL = ("gain_margin",)
 MEASURED_PARTS = ("magnitude", "phase", "share")
 
 OPEN_LOOP = "position-loop"  # stem of the picture that has the margins
-FORMAT = 1
+FRF_FORMAT = 1
 
 
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
@@ -98,7 +98,7 @@ def _tiles(responses: Responses) -> list[Tile]:
     named = {f"{axis}.{key}": f"{axis}: {label}" for axis in responses.axes for key, label in TILES.items()}
     named = {name: label for name, label in named.items() if name in responses.figures}
     least = []
-    for ending in LEAST:
+    for ending in WORST_MARGINS:
         own = [name for name in named if name.endswith(ending) and math.isfinite(responses.figures[name].value)]
         least += [min(own, key=lambda name: responses.figures[name].value)] if own else []
     tiles = []
@@ -107,7 +107,7 @@ def _tiles(responses: Responses) -> list[Tile]:
         if name.rpartition(".")[2] in AS_DECIBEL and math.isfinite(figure.value) and figure.value > 0:
             shown = Figure(20 * math.log10(figure.value), "dB", figure.meaning)
         axis, loop, key = name.split(".")
-        label = f"least {LEAST[key]}, {loop} loop of {axis}" if name in least else named[name]
+        label = f"least {WORST_MARGINS[key]}, {loop} loop of {axis}" if name in least else named[name]
         tiles.append(Tile(_value(shown), label, typeset(figure.meaning)))
     return tiles
 
@@ -197,7 +197,7 @@ def input_files(subject: Subject, responses: Responses) -> list[InputFile]:
 def summary(subject: Subject, responses: Responses, files: Sequence[str]) -> dict[str, Any]:
     """Content of summary.json; a figure that could not be determined has the value null."""
     return {
-        "format": FORMAT,
+        "format": FRF_FORMAT,
         "warnings": list(responses.warnings),
         "answer": answers(responses),
         "figures": figures_part(responses.figures),

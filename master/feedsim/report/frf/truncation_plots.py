@@ -25,7 +25,7 @@ TABLES: tuple[tuple[str, Dash], ...] = (
 MOST_COLUMNS = 3
 FINEST, COARSEST = 1e-4, 100.0  # dB, of the axis of deviations
 AGREED = 0.1  # dB
-QUANTITIES = (  # stem, title, what is drawn per axis, ordinate
+PLOTTED_QUANTITIES = (  # stem, title, what is drawn per axis, ordinate
     ("truncation-n_M", "n/M", "{0}.n_a/{0}.M_a", Ordinate("|n_a/M_a|", "dB re 1 (rad/s)/(N·m)")),
     ("truncation-x_M", "x/M", "{0}.x_a/{0}.M_a", Ordinate("|x_a/M_a|", "µm/(N·m)", decibel=False, scale=1e6)),
     ("truncation-tool", "compliance at the tool", "tool.x_{0}/tool.F_{0}",
@@ -54,7 +54,7 @@ def truncation_pictures(
     """
     responses = {name: structure_responses(modes, axes, frequency) for name, modes in tables.items()}
     pictures = []
-    for stem, what, response, ordinate in QUANTITIES:
+    for stem, what, response, ordinate in PLOTTED_QUANTITIES:
         at_tool = response.startswith("tool")
         if at_tool and not tool:
             continue

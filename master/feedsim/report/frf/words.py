@@ -12,7 +12,7 @@ from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN
 
 # Below these a difference of two responses means nothing to anybody.
 LEAST_DB, LEAST_DEG = 0.001, 0.01
-USUAL = f"the usual {20 * math.log10(GAIN_MARGIN):.0f} dB and {PHASE_MARGIN:g} deg"
+MARGIN_WORDS = f"the usual {20 * math.log10(GAIN_MARGIN):.0f} dB and {PHASE_MARGIN:g} deg"
 
 
 def answers(responses: Responses) -> list[str]:
@@ -53,9 +53,9 @@ def verdict(responses: Responses) -> str:
         found.append(f"least phase margin {phase:.0f} deg ({loop}, {frequency:.3g} Hz)")
         thin |= phase < PHASE_MARGIN
     meaning = (
-        f"Less than {USUAL}: motions ring there. Lower that loop's gain, or damp what resonates there."
+        f"Less than {MARGIN_WORDS}: motions ring there. Lower that loop's gain, or damp what resonates there."
         if thin
-        else f"At least {USUAL}: while the axes move, no gain need be lowered."
+        else f"At least {MARGIN_WORDS}: while the axes move, no gain need be lowered."
     )
     return f"The control loops are stable; {', '.join(found) or 'nothing limits their gains'}. {meaning}"
 

@@ -13,7 +13,14 @@ from feedsim.identify import Identified
 from feedsim.identify.result import Balance, Correlation, Dynamic, Identification, Stretch
 from feedsim.report.chart import Axis, Chart, Curve, Grid, Level, Panel
 from feedsim.report.formatting import counted
-from feedsim.report.identify.stribeck_plots import FRICTION, SPEED, TIME, ZERO, plateaus_picture, stribeck_picture
+from feedsim.report.identify.stribeck_plots import (
+    SPEED_AXIS,
+    TIME_AXIS,
+    TORQUE_AXIS,
+    ZERO,
+    plateaus_picture,
+    stribeck_picture,
+)
 from feedsim.report.picture import Picture
 from feedsim.report.style import (
     BLUE,
@@ -30,7 +37,7 @@ from feedsim.report.style import (
 
 MOST_LOOPS = 6
 COLUMNS = 3
-LONG = 2e-3  # [m] of travel from which positions are shown in mm
+LONG_TRAVEL = 2e-3  # [m] of travel from which positions are shown in mm
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, MUTED)
 ZEROS = (ZERO, Level(0.0, upright=True, dash=""))
 MOST_RECORDS = 3  # in open loop, side by side
@@ -73,14 +80,14 @@ def loops_picture(found: Identification, stage: Dynamic, over: Over) -> Picture 
             Curve("measured", x, stretch.measured, RECORDED, width=1.9, dots=True, most=2000),
             Curve("model", x, stretch.model, SIMULATED, width=1.2, most=2000),
         ]
-        panels.append(Panel(describe(stretch, found.I_P), axis, FRICTION, curves, ZEROS))
+        panels.append(Panel(describe(stretch, found.I_P), axis, TORQUE_AXIS, curves, ZEROS))
     chart = Chart(panels, (1.0,) * columns)
     return Picture(f"loops-{over}", f"Friction torque over {over}", caption, chart)
 
 
 def _abscissa(stretch: Stretch, I_P: float, over: Over) -> tuple[Array, Axis]:
     if over == "speed":
-        return stretch.speed, SPEED
+        return stretch.speed, SPEED_AXIS
     scale, unit = _length([stretch], I_P)
     return _position(stretch, scale), Axis("position", unit)
 
@@ -113,7 +120,7 @@ def residuals_picture(found: Identification, stage: Dynamic) -> Picture | None:
     time_axis = Axis("time, stretches one after another", "s")
     chart = Chart([
         Panel(f"Measured less model, {stage.rms:.2g} N·m rms", time_axis, residual, over_time, levels),
-        Panel("Over speed", SPEED, residual, over_speed, [ZERO]),
+        Panel("Over speed", SPEED_AXIS, residual, over_speed, [ZERO]),
         Panel("Over position", Axis("position about the middle of the move", unit), residual, over_position, [ZERO]),
     ])  # fmt: skip
     return Picture("residuals", "Residuals", caption, chart)
@@ -146,8 +153,10 @@ def open_loop_picture(found: Identification, balance: Balance) -> Picture | None
             Curve("open loop, before", drift.time, mm * drift.before, OTHERWISE, "dashed", 1.1),
             Curve(after, drift.time, mm * drift.after, SIMULATED, width=1.1),
         ]
-        above.append(Panel(drift.record, TIME, Axis("position", "mm"), position, linked=f"t{k}"))
-        below.append(Panel("", TIME, Axis("recorded less open loop", "mm"), error, [ZERO], linked=f"t{k}", height=0.8))
+        above.append(Panel(drift.record, TIME_AXIS, Axis("position", "mm"), position, linked=f"t{k}"))
+        below.append(
+            Panel("", TIME_AXIS, Axis("recorded less open loop", "mm"), error, [ZERO], linked=f"t{k}", height=0.8)
+        )
     return Picture("open-loop", "Position in open loop", caption, Chart([*above, *below], (1.0,) * len(drifts)))
 
 
@@ -195,4 +204,4 @@ def _position(stretch: Stretch, scale: float) -> Array:
 def _length(stretches: Sequence[Stretch], I_P: float) -> tuple[float, str]:
     """Display unit of positions per radian, and its name: um, or mm for long moves."""
     longest = max(float(np.ptp(stretch.angle)) for stretch in stretches) * I_P
-    return (1e6 * I_P, "µm") if longest < LONG else (1e3 * I_P, "mm")
+    return (1e6 * I_P, "µm") if longest < LONG_TRAVEL else (1e3 * I_P, "mm")

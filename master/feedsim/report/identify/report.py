@@ -7,7 +7,7 @@ from pathlib import Path
 
 from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Identified, friction_file
-from feedsim.identify.friction_file import FRICTION
+from feedsim.identify.friction_file import FRICTION_FILE
 from feedsim.identify.result import Estimate, Identification
 from feedsim.report.content import Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import counted, display_unit, minus, powers, typeset
@@ -41,13 +41,13 @@ def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
 
     inputs: files that are read. Leaves nothing behind.
     """
-    check_place(directory, (FRICTION, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs, kind="identify")
+    check_place(directory, (FRICTION_FILE, PLATEAUS, RESIDUALS, OPEN_LOOP, REPORT, SUMMARY), inputs, kind="identify")
 
 
 def files_of(identified: Identified) -> dict[str, Content]:
     """friction.yaml, plateaus.csv, residuals.csv and open_loop.csv, where there are any."""
     found = identified.found
-    files: dict[str, Content] = {FRICTION: friction_file.friction_yaml(identified, software())}
+    files: dict[str, Content] = {FRICTION_FILE: friction_file.friction_yaml(identified, software())}
     if found.stationary is not None:
         files[PLATEAUS] = plateaus_csv(found)
     if found.dynamic is not None:
@@ -78,7 +78,7 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
         tiles=_tiles(identified),
         next_step=(
             "Run the machine with this friction:\n",
-            code(f"feedsim run SCENARIO.yaml --set machine.axes.{found.axis}.friction={FRICTION}"),
+            code(f"feedsim run SCENARIO.yaml --set machine.axes.{found.axis}.friction={FRICTION_FILE}"),
             " (with the file's path)",
         ),
         main=[
@@ -92,7 +92,7 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
             _stretches(found),
         ],
         provenance=_provenance(identified),
-        footer=f"{METHOD} Values in full precision: summary.json; the parameters as files take them: {FRICTION}; "
+        footer=f"{METHOD} Values in full precision: summary.json; the parameters as files take them: {FRICTION_FILE}; "
         f"what the figures show: {tables}.",
     )
 

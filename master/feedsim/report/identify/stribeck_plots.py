@@ -17,10 +17,10 @@ from feedsim.report.identify.quantities import MM_PER_MIN, curve_error, is_curve
 from feedsim.report.picture import Picture
 from feedsim.report.style import ORANGE, OTHERWISE, RECORDED, SIMULATED, Array
 
-SPEED, TIME = Axis("motor speed", "rad/s"), Axis("time", "s")
-FRICTION = Axis("friction torque", "N·m")
+SPEED_AXIS, TIME_AXIS = Axis("motor speed", "rad/s"), Axis("time", "s")
+TORQUE_AXIS = Axis("friction torque", "N·m")
 ZERO = Level(0.0, dash="")
-DIRECTIONS = ((1, "positive"), (-1, "negative"))  # the second one paler
+SPEED_DIRECTIONS = ((1, "positive"), (-1, "negative"))  # the second one paler
 FEW_DECADES = 20  # ratio of speeds below which they are shown on a linear axis
 MOST_RECORDS = 3  # with plateaus, that are shown over time
 
@@ -67,7 +67,7 @@ def _curves(found: Identification, stage: Stationary) -> Chart:
         below_bands = [Band("95 % band", -share, share, stage.speeds, SIMULATED)]
     curves = [Curve("curve" if found.prior else "stage 1 alone", stage.speeds, stage.torque, SIMULATED, width=1.8)]
     below = []
-    for sign, word in DIRECTIONS:
+    for sign, word in SPEED_DIRECTIONS:
         chosen = sorted((p for p in stage.plateaus if p.speed * sign > 0), key=lambda p: abs(p.speed))
         if not chosen:
             continue
@@ -84,10 +84,10 @@ def _curves(found: Identification, stage: Stationary) -> Chart:
             curves.append(Curve(f"curve, {word} direction", stage.speeds, shown, SIMULATED, dash, 0.9))
     if not found.prior:
         curves += _delivered(found, stage)
-    axis = Axis(SPEED.label, SPEED.unit, log=True)
+    axis = Axis(SPEED_AXIS.label, SPEED_AXIS.unit, log=True)
     above = replace(axis, also=("axis speed", "mm/min", found.I_P * MM_PER_MIN))
     top = max(float(np.nanmax(each.y)) for each in curves)
-    ordinate = replace(FRICTION, span=(0.0, 1.08 * top), also=("at the slide", "N", 1 / found.I_P))
+    ordinate = replace(TORQUE_AXIS, span=(0.0, 1.08 * top), also=("at the slide", "N", 1 / found.I_P))
     return Chart([
         Panel(stribeck_title(found, stage), above, ordinate, curves, bands=bands, linked="n", height=1.5),
         Panel("Deviation from the curve", axis, Axis("deviation", "%"), below, [Level(0.0, colour=SIMULATED, dash="")],
@@ -154,8 +154,8 @@ def _over_time(shown: Sequence[tuple[Record, Sequence[Plateau]]], I_P: float) ->
         speed = Curve("speed", record.time, _speed(record) * I_P * MM_PER_MIN, RECORDED, width=0.9)
         title = f"{record.name}: {counted(len(own), 'plateau')}"
         panels += [
-            Panel(title, TIME, Axis("torque", "N·m"), torques, [ZERO], zones, linked=f"t{k}"),
-            Panel("", TIME, _speeds(speed.y, own, I_P), [speed], [ZERO], zones, linked=f"t{k}", height=0.8),
+            Panel(title, TIME_AXIS, Axis("torque", "N·m"), torques, [ZERO], zones, linked=f"t{k}"),
+            Panel("", TIME_AXIS, _speeds(speed.y, own, I_P), [speed], [ZERO], zones, linked=f"t{k}", height=0.8),
         ]  # fmt: skip
     return Chart(panels)
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from feedsim.identify import Identified, friction_file
-from feedsim.identify.friction_file import FRICTION
+from feedsim.identify.friction_file import FRICTION_FILE
 from feedsim.identify.result import Balance, Estimate, Identification
 from feedsim.report.formatting import counted
 from feedsim.report.identify import quantities
@@ -22,7 +22,7 @@ from feedsim.report.style import Array
 from feedsim.trace.csv import quoted, shortest
 
 FORMAT = 1
-WIDTH = 118  # columns of the terminal's table
+TABLE_COLUMNS = 118  # columns of the terminal's table
 
 
 def summary(identified: Identified, files: Sequence[str]) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def terminal_lines(identified: Identified, directory: Path | None = None) -> lis
         lines.append(f"  {hint}")
     if directory is None:
         return lines
-    setting = shlex.quote(f"machine.axes.{found.axis}.friction={directory / FRICTION}")
+    setting = shlex.quote(f"machine.axes.{found.axis}.friction={directory / FRICTION_FILE}")
     return [*lines, f"  use: feedsim run SCENARIO.yaml --set {setting}"]
 
 
@@ -95,7 +95,7 @@ def table_lines(identified: Identified) -> list[str]:
         interval, relative = friction_file.interval_text(estimate, factor), friction_file.relative_text(estimate)
         rows.append((estimate.name, value, interval, relative, friction_file.remark_text(estimate)))
     widths = [max(len(row[i]) for row in rows) for i in range(4)]
-    room = max(20, WIDTH - sum(widths) - 10)
+    room = max(20, TABLE_COLUMNS - sum(widths) - 10)
     lines = []
     for name, value, interval, relative, note in rows:
         note = textwrap.shorten(note, room, placeholder=" ...")

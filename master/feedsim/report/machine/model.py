@@ -22,8 +22,8 @@ SOFT = 0.18  # of white in a body's colour
 CORNERS = 10  # of a round section
 PIECE = 1 / 45  # longest straight piece of a bent beam, of the machine's size
 MOST_PIECES = 8
-LARGEST = 0.09  # deflection that is drawn for a mode that moves bodies, of the machine's size
-TURN = 1.1  # rad, drawn for a rotor that has all of a mode's energy
+MODE_DEFLECTION = 0.09  # deflection that is drawn for a mode that moves bodies, of the machine's size
+ROTOR_TURN = 1.1  # rad, drawn for a rotor that has all of a mode's energy
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class Motion:
 
 
 def motion(built: Built, of: Model, k: int, scale: float = 1.0) -> Motion:
-    """Mode k, exaggerated to LARGEST of the machine's size times `scale`.
+    """Mode k, exaggerated to MODE_DEFLECTION of the machine's size times `scale`.
 
     Where most of the energy is in parts that turn (a rotor, a screw), deflections are less: the root of the share of
     the energy that is in translations, so that a mode of torsion does not look like one of the bed.
@@ -104,12 +104,12 @@ def motion(built: Built, of: Model, k: int, scale: float = 1.0) -> Motion:
     largest = float(np.max(np.linalg.norm(displacements, axis=1)))
     dofs = of.geometry.dofs[:, :3]
     moving = max(0.0, min(1.0, float(energy[dofs[dofs >= 0]].sum()) / whole))
-    factor = scale * LARGEST * of.size * np.sqrt(moving) / largest if largest > 0 else 0.0
+    factor = scale * MODE_DEFLECTION * of.size * np.sqrt(moving) / largest if largest > 0 else 0.0
     rotors = {}
     for i, body in enumerate(of.geometry.bodies):
         if body.startswith("rotor "):
             dof = int(of.geometry.dofs[i].max())
-            rotors[body] = scale * TURN * float(np.sign(shape[dof]) * np.sqrt(max(0.0, energy[dof] / whole)))
+            rotors[body] = scale * ROTOR_TURN * float(np.sign(shape[dof]) * np.sqrt(max(0.0, energy[dof] / whole)))
     return Motion(shape * factor, rotors)
 
 

@@ -27,7 +27,7 @@ from feedsim.structure.modes import write_modes
 from feedsim.trace.response import Complexes, FrequencyResponse
 from feedsim.trace.response_files import write_response
 
-MODES, CURVES = "modes.csv", "response.csv"
+MODES_FILE, RESPONSE_FILE = "modes.csv", "response.csv"
 KIND = "identify-modes"
 
 
@@ -83,7 +83,7 @@ class ModesReport:
 
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
     """OutputError unless the results can be written to a directory without an input being lost."""
-    check_place(directory, (MODES, CURVES, REPORT, SUMMARY), inputs, kind=KIND)
+    check_place(directory, (MODES_FILE, RESPONSE_FILE, REPORT, SUMMARY), inputs, kind=KIND)
 
 
 def files_of(report: ModesReport) -> dict[str, Content]:
@@ -96,7 +96,10 @@ def files_of(report: ModesReport) -> dict[str, Content]:
         columns |= {f"{name}": values, f"{name} fit": found.fit.response(name, found.measured.frequency)}
         units |= {f"{name}": unit, f"{name} fit": unit}
     response = FrequencyResponse(found.measured.frequency, columns, units)
-    return {MODES: partial(write_modes, modes=found.table), CURVES: partial(write_response, response=response)}
+    return {
+        MODES_FILE: partial(write_modes, modes=found.table),
+        RESPONSE_FILE: partial(write_response, response=response),
+    }
 
 
 def report_of(report: ModesReport) -> Report:
@@ -135,7 +138,7 @@ def report_of(report: ModesReport) -> Report:
         main=[*pictures, *tables, figures_section(report.figures)],
         provenance=provenance_section([("Response", report.file.name), ("Estimate", found.measured.method)],
                                       hashed(_files(report))),
-        footer=figures_footer(f"Values in full precision: summary.json; what machines take: {MODES}.",
+        footer=figures_footer(f"Values in full precision: summary.json; what machines take: {MODES_FILE}.",
                               "docs/identification.md"),
     )  # fmt: skip
 
@@ -209,7 +212,8 @@ def answers(report: ModesReport) -> list[str]:
     return [
         f"{found.axis}: rigid body with {modes} of damping. 90 % of the lines are met within {left}.",
         f"Estimate: {found.measured.method}, {len(found.measured.frequency)} lines.",
-        f"{MODES} is the machine's table with these modes in place of its elastic ones; other axes are rigid in it.",
+        f"{MODES_FILE} is the machine's table with these modes in place of its elastic ones; other axes are rigid in "
+        "it.",
     ]
 
 

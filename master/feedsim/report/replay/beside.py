@@ -19,7 +19,7 @@ NOTE = (
     "A value differs where the 95 % interval leaves out that of the machine file, and where both are more than 1 % "
     "apart. Then one of the two is not that of the machine: look at the control before you change it."
 )
-LEAST = 0.01  # share by which a value differs
+MIN_DIFFERENCE_SHARE = 0.01  # share by which a value differs
 OF_THE_AXIS = {"M_0": "constant_load"}
 
 
@@ -36,7 +36,7 @@ class Beside:
     def differs(self) -> bool:
         """Whether the record speaks against the machine file."""
         low, high = self.found.interval
-        apart = abs(self.found.value - self.present) > LEAST * abs(self.present)
+        apart = abs(self.found.value - self.present) > MIN_DIFFERENCE_SHARE * abs(self.present)
         return self.found.status == "estimated" and apart and not low <= self.present <= high
 
 

@@ -29,9 +29,9 @@ from feedsim.report.style import remarked
 from feedsim.scenario import Machine, Subject
 from feedsim.trace import Mark
 
-MACHINE, MODES = "machine.yaml", "modes.csv"
+MACHINE, MODES_FILE = "machine.yaml", "modes.csv"
 LEADING = {"position_rms": "position error, rms", "torque_rms": "torque error, rms"}
-PARTS = (
+FRICTION_PARTS = (
     "A part is taken where the record predicts stretches and kinds of its motion better with it that the fit has not "
     "seen (cross-validation): gain of the logarithm of the likelihood."
 )
@@ -96,7 +96,7 @@ class DriveReport:
 def check_writable(axes: Sequence[str], directory: Path, inputs: Sequence[Path] = ()) -> None:
     """Raise OutputError unless results of the axes can be written to a directory without an input being lost."""
     own = [file for axis in axes for file in (drive_file(axis), friction_file(axis))]
-    check_place(directory, (MACHINE, MODES, *own, REPORT, SUMMARY), inputs, kind="identify-drive")
+    check_place(directory, (MACHINE, MODES_FILE, *own, REPORT, SUMMARY), inputs, kind="identify-drive")
 
 
 def head(record: Path, window: tuple[float, float] | None, day: str) -> list[str]:
@@ -189,7 +189,7 @@ def _parts(axis: str, one: DriveFound) -> Section:
         for part, gain in one.parts.items()
     ]
     table = Table("lrl", ("Part of the friction law", "Gain", ""), rows)
-    return Section(f"What the friction of {axis} needs", [Paragraph(PARTS), table])
+    return Section(f"What the friction of {axis} needs", [Paragraph(FRICTION_PARTS), table])
 
 
 def _modes(axis: str, one: DriveFound) -> Section:

@@ -10,12 +10,12 @@ import numpy as np
 from feedsim.replay.compare import TO_RPM, Comparison
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
 from feedsim.report.picture import Picture
-from feedsim.report.style import LEFT, RECORDED, SIMULATED, Array
+from feedsim.report.style import RECORDED, RESIDUAL_COLOUR, SIMULATED, Array
 from feedsim.trace import Mark
 
-SHOWN = {"m": (1e6, "µm"), "rad/s": (TO_RPM, "rpm"), "N.m": (1.0, "N·m")}
+SHOWN_UNITS = {"m": (1e6, "µm"), "rad/s": (TO_RPM, "rpm"), "N.m": (1.0, "N·m")}
 MOST_MARKS = 25  # lines in a picture that can still be told apart
-MOST_NAMES, LONGEST_NAME = 9, 16  # names of them side by side in a panel, and their characters
+MOST_NAMES, MAX_NAME_CHARACTERS = 9, 16  # names of them side by side in a panel, and their characters
 
 
 def pictures_of(comparison: Comparison, marks: Sequence[Mark]) -> list[Picture]:
@@ -49,7 +49,7 @@ def _over_time(found: Comparison, marks: Sequence[Mark]) -> Picture:
         simulated = lag - 1e6 * channels["position"].error[rows]
         panels.append(_panel(what, ordinate, "µm", time, simulated=simulated, recorded=lag))
     for name, channel in channels.items():
-        factor, unit = SHOWN[channel.unit]
+        factor, unit = SHOWN_UNITS[channel.unit]
         curves = {"what is left": factor * channel.error[rows]}
         if name == "torque":
             both = {"simulated": factor * channel.simulated[rows], "recorded": factor * channel.recorded[rows]}
@@ -67,14 +67,16 @@ def names_of(marks: Sequence[Mark], time: Array) -> list[str]:
     found: list[str] = []
     free = -np.inf
     for mark in marks:
-        text = mark.text if len(mark.text) <= LONGEST_NAME else mark.text[: LONGEST_NAME - 1].rstrip() + "…"
+        text = (
+            mark.text if len(mark.text) <= MAX_NAME_CHARACTERS else mark.text[: MAX_NAME_CHARACTERS - 1].rstrip() + "…"
+        )
         found.append(text if mark.time >= free else "")
         free = mark.time + np.ptp(time) / MOST_NAMES if found[-1] else free
     return found
 
 
 # Colour and width: the record lies on the simulation, which is wider.
-LOOKS = {"recorded": (RECORDED, 1.0), "simulated": (SIMULATED, 2.2), "what is left": (LEFT, 1.2)}
+LOOKS = {"recorded": (RECORDED, 1.0), "simulated": (SIMULATED, 2.2), "what is left": (RESIDUAL_COLOUR, 1.2)}
 
 
 def _panel(title: str, ordinate: str, unit: str, time: Array, **curves: Array) -> Panel:
@@ -93,20 +95,22 @@ def _left(found: Comparison) -> Picture:
     )
     panels = []
     for name in names:
-        factor, unit = SHOWN[found.channels[name].unit]
+        factor, unit = SHOWN_UNITS[found.channels[name].unit]
         frequency, amplitude = found.spectrum(name)
         centre, forwards, backwards = found.over_position(name)
         panels.append(
             Panel(f"What is left of the {name}: spectrum", Axis("frequency", "Hz", log=True),
                   Axis("amplitude", unit, log=True),
-                  [Curve("amplitude", frequency[1:], factor * amplitude[1:], LEFT)])
+                  [Curve("amplitude", frequency[1:], factor * amplitude[1:], RESIDUAL_COLOUR)])
         )  # fmt: skip
         over_both: tuple[tuple[str, Array, Dash], ...] = (
             ("forwards", forwards, ""),
             ("backwards", backwards, "dashed"),
         )
         seen = np.isfinite(forwards) | np.isfinite(backwards)
-        over = [Curve(word, 1e3 * centre[seen], factor * y[seen], LEFT, dash, 1.4) for word, y, dash in over_both]
+        over = [
+            Curve(word, 1e3 * centre[seen], factor * y[seen], RESIDUAL_COLOUR, dash, 1.4) for word, y, dash in over_both
+        ]
         panels.append(
             Panel(
                 f"What is left of the {name}: mean over the position",

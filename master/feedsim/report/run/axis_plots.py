@@ -17,9 +17,9 @@ from feedsim.report.style import (
     FRICTION,
     GREEN,
     INK,
-    LEFT,
     ORANGE,
     PURPLE,
+    RESIDUAL_COLOUR,
     SETPOINT,
     SIMULATED,
     SKY,
@@ -28,12 +28,12 @@ from feedsim.report.style import (
 from feedsim.trace import Trace, release
 
 TIME = Axis("time", "s")
-TOOL, SCALE = "tool point", "linear scale x_a"
-BEYOND = "Distance beyond the target"
+TOOL_TITLE, SCALE = "tool point", "linear scale x_a"
+OVERSHOOT_TITLE = "Distance beyond the target"
 ZOOM_BEFORE, ZOOM_AFTER = 0.030, 0.400  # s about the end of the NC motion
 OF_AXES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 # What the whole run is shown by: signal, title, quantity, unit, factor from SI, whether a display sign turns it over.
-SIGNALS = (
+RUN_SIGNALS = (
     ("x_a", "Position, from where the run begins", "position", "mm", 1e3, False),
     ("x_e", "Following error", "following error", "µm", 1e6, False),
     ("n_a", "Motor speed", "speed", "rad/s", 1.0, False),
@@ -94,7 +94,7 @@ def _beyond(trace: Trace, approach: Approach, figures: Figures, band: float) -> 
     curves = []
     reach = [2.2 * band * 1e6]
     looks: tuple[tuple[str, str, str, Dash], ...] = (
-        (TOOL, f"tcp.x_{approach.axis}", AT_TOOL, "dashed"),
+        (TOOL_TITLE, f"tcp.x_{approach.axis}", AT_TOOL, "dashed"),
         (SCALE, f"{approach.axis}.x_a", SIMULATED, ""),
     )
     for name, signal, colour, dash in looks:
@@ -113,11 +113,11 @@ def _beyond(trace: Trace, approach: Approach, figures: Figures, band: float) -> 
         after = min(int(x.searchsorted(settled)), len(y) - 1)
         side = math.copysign(band * 1e6, y[after] or 1.0)
         if settled <= last:
-            marks.append(Mark(settled, side, f"last outside ±{band * 1e6:g} µm: {settled:.1f} ms", LEFT))
+            marks.append(Mark(settled, side, f"last outside ±{band * 1e6:g} µm: {settled:.1f} ms", RESIDUAL_COLOUR))
         else:
             note = f"still outside ±{band * 1e6:g} µm until {settled:.1f} ms"
     return Panel(
-        BEYOND,
+        OVERSHOOT_TITLE,
         Axis("time after the end of the NC motion", "ms", span=(-ZOOM_BEFORE * 1e3, last)),
         Axis("beyond the target" if approach.sense > 0 else "beyond the target, to minus", "µm",
              span=(-1.45 * max(reach), 1.45 * max(reach))),
@@ -135,7 +135,7 @@ def overview_picture(trace: Trace, axes: Iterable[str], signs: Mapping[str, int]
 
     signs: axis -> +-1, display sign of its torques.
     """
-    shown = [axis for axis in axes if any(f"{axis}.{name}" in trace.columns for name, *_ in SIGNALS)]
+    shown = [axis for axis in axes if any(f"{axis}.{name}" in trace.columns for name, *_ in RUN_SIGNALS)]
     chart = _whole_run(trace, shown, signs)
     if chart is None:
         return None
@@ -150,7 +150,7 @@ def overview_picture(trace: Trace, axes: Iterable[str], signs: Mapping[str, int]
 def _whole_run(trace: Trace, axes: Sequence[str], signs: Mapping[str, int]) -> Chart | None:
     """Position, following error, speed, torque and current of every axis over the whole run; None without any."""
     panels = []
-    for signal, title, label, unit, factor, turns in SIGNALS:
+    for signal, title, label, unit, factor, turns in RUN_SIGNALS:
         curves = []
         for k, axis in enumerate(axes):
             if f"{axis}.{signal}" in trace.columns:

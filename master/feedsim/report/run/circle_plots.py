@@ -9,12 +9,12 @@ from typing import Protocol
 import numpy as np
 
 from feedsim.analysis import Diagnosis, Turn, contour
-from feedsim.motions.circular import DIRECTIONS
+from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Mark, Panel, Polar
 from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture
-from feedsim.report.run.axis_plots import TIME, TOOL, reversed_note, torque_axis
-from feedsim.report.style import AT_TOOL, FRICTION, LEFT, SIMULATED, Array
+from feedsim.report.run.axis_plots import TIME, TOOL_TITLE, reversed_note, torque_axis
+from feedsim.report.style import AT_TOOL, FRICTION, RESIDUAL_COLOUR, SIMULATED, Array
 from feedsim.trace import Trace
 
 RING = 10.0  # um; kept as long as the contour error is neither much smaller nor larger
@@ -43,18 +43,19 @@ def contour_picture(
     tool = (f"tcp.x_{turn.axes[0]}", f"tcp.x_{turn.axes[1]}")
     if all(name in trace.columns for name in tool):
         by_tool = contour(trace, turn, tool)
-        curves.append(turned(TOOL, AT_TOOL, by_tool.angle, by_tool.deviation, "dashed", 1.2))
+        curves.append(turned(TOOL_TITLE, AT_TOOL, by_tool.angle, by_tool.deviation, "dashed", 1.2))
     curves.append(turned("linear scales", SIMULATED, by_scale.angle, by_scale.deviation, width=1.6))
     over = ""
     if back is not None:
         other = contour(trace, back)
         curves.append(
-            turned(f"linear scales, {DIRECTIONS[back.sense]}", SIMULATED, other.angle, other.deviation, "dashed", 1.2)
+            turned(f"linear scales, {SENSE_WORDS[back.sense]}", SIMULATED, other.angle, other.deviation, "dashed", 1.2)
         )
-        over = f" Dashed: {DIRECTIONS[back.sense]}, from {back.begin:.4f} to {back.end:.4f} s."
+        over = f" Dashed: {SENSE_WORDS[back.sense]}, from {back.begin:.4f} to {back.end:.4f} s."
     title = f"Circular test in the plane {turn.axes[0]}-{turn.axes[1]}: contour error"
     caption = (
-        f"Radius {turn.radius * 1e3:.6g} mm, {DIRECTIONS[turn.sense]} from {turn.axes[0]} to {turn.axes[1]}, turn from "
+        f"Radius {turn.radius * 1e3:.6g} mm, {SENSE_WORDS[turn.sense]} from {turn.axes[0]} to {turn.axes[1]}, turn "
+        "from "
         f"{turn.begin:.4f} to {turn.end:.4f} s.{over} Radius deviation magnified {on.magnification:,.0f} times; rings "
         f"at ±{on.ring:g} µm about the programmed circle. "
     )
@@ -66,7 +67,7 @@ def contour_picture(
         "median of the turn."
     )
     marks = [
-        Mark(glitch.angle, glitch.deviation * 1e6, f"{minus(glitch.name)}: {height * 1e6:.2f} µm", LEFT)
+        Mark(glitch.angle, glitch.deviation * 1e6, f"{minus(glitch.name)}: {height * 1e6:.2f} µm", RESIDUAL_COLOUR)
         for glitch in by_scale.glitches
         if (height := heights.get(glitch.name, 0.0 if heights else glitch.height))
     ]

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from feedsim.analysis.circle import Diagnosis, Peak, Term, answer, further, name, sentence, swinging
-from feedsim.analysis.circle_figures import UNITS
-from feedsim.motions.circular import DIRECTIONS
+from feedsim.analysis.circle_figures import FIGURE_UNITS
+from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.content import Section, Table
 from feedsim.report.formatting import minus, number, typeset
 from feedsim.report.provenance import finite, quantity
@@ -37,7 +37,7 @@ def diagnosis_section(prefix: str, diagnosis: Diagnosis) -> Section:
         note += f"\n{typeset(words)}"
     note += "".join(f"\n{typeset(words)}" for words in further(diagnosis))
     heads = ("Cause", "Amount", "Alone [µm]", "Share of G [%]", "What it means, where to look")
-    peaks = [(minus(peak.name), DIRECTIONS[peak.sense], *_peak(peak)) for peak in diagnosis.peaks]
+    peaks = [(minus(peak.name), SENSE_WORDS[peak.sense], *_peak(peak)) for peak in diagnosis.peaks]
     peak_heads = ("Reversal at", "Direction", "Peak [µm]", "±", "Width at half the height [ms]", "Falls to 1/e in [ms]")
     peak_note = "Peaks stand over the fitted rest of the circle; 0: nothing stands out of the noise."
     return Section(
@@ -50,7 +50,7 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
     """The diagnosis in summary.json, in SI."""
     return {
         "answer": answer(diagnosis),
-        "directions": [DIRECTIONS[sense] for sense in diagnosis.senses],
+        "directions": [SENSE_WORDS[sense] for sense in diagnosis.senses],
         "G": quantity(diagnosis.G, "m"),
         "causes": [
             {
@@ -67,7 +67,7 @@ def diagnosis_part(diagnosis: Diagnosis) -> dict[str, Any]:
         "peaks": [
             {
                 "at": peak.name,
-                "direction": DIRECTIONS[peak.sense],
+                "direction": SENSE_WORDS[peak.sense],
                 "height": quantity(peak.height, "m"),
                 "half_interval": finite(peak.half),
                 "width": quantity(peak.width, "s"),
@@ -107,7 +107,7 @@ def _of_records(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _value(term: Term) -> str:
     """To the digits that its interval leaves it."""
-    factor, unit = UNITS[term.unit]
+    factor, unit = FIGURE_UNITS[term.unit]
     value, half = factor * term.value, factor * term.half
     if not math.isfinite(half) or half <= 0:
         return f"{minus(number(value, 3))} {typeset(unit)}"

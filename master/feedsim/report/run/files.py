@@ -19,7 +19,7 @@ from feedsim.analysis import (
     tasks,
 )
 from feedsim.cosim import Run
-from feedsim.motions.circular import DIRECTIONS
+from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.changes import changes_part
 from feedsim.report.content import Report
 from feedsim.report.page import sheet_html
@@ -224,7 +224,7 @@ def _circles(run: Run, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
                 "axes": list(turn.axes),
                 "centre": quantity(list(turn.centre), "m"),
                 "radius": quantity(turn.radius, "m"),
-                "direction": DIRECTIONS[turn.sense],
+                "direction": SENSE_WORDS[turn.sense],
                 "begin": quantity(turn.begin, "s"),
                 "end": quantity(turn.end, "s"),
             }

@@ -10,7 +10,15 @@ from feedsim.report.content import Paragraph, Part, Section, Table
 from feedsim.report.formatting import counted, minus
 from feedsim.report.provenance import quantity
 from feedsim.report.sections import pairs_table
-from feedsim.structure.pose_change import LOOKED_AT, NEAR, SEEN, AxisChange, Compliance, ModeChange, PoseChange
+from feedsim.structure.pose_change import (
+    COMPLIANCE_SHARE,
+    MAX_MODE_FREQUENCY,
+    MIN_POSE_DISTANCE,
+    AxisChange,
+    Compliance,
+    ModeChange,
+    PoseChange,
+)
 
 
 def pose_section(pose: PoseUse | None) -> Section | None:
@@ -108,9 +116,10 @@ def _followed(pose: PoseUse) -> list[Part]:
 def _distances(change: PoseChange) -> list[Part]:
     if not change.axes:
         return []
-    if change.distance <= NEAR:
+    if change.distance <= MIN_POSE_DISTANCE:
         text = (
-            f"No axis that the plant does not follow moves more than {NEAR * 1e3:.3g} mm away from the pose that the "
+            f"No axis that the plant does not follow moves more than {MIN_POSE_DISTANCE * 1e3:.3g} mm away from the "
+            "pose that the "
             "modes belong to."
         )
         return [Paragraph(text)]
@@ -129,7 +138,7 @@ def _distances(change: PoseChange) -> list[Part]:
 
 def _largest(axis: AxisChange) -> str:
     if axis.largest is None:
-        return "below 0.1 %" if axis.distance <= NEAR else "not known"
+        return "below 0.1 %" if axis.distance <= MIN_POSE_DISTANCE else "not known"
     return f"{_percent(axis.largest.change)} %"
 
 
@@ -156,7 +165,8 @@ def _axis(axis: AxisChange) -> Section:
     ]  # fmt: skip
     heads = ("At the pose [Hz]", f"{lowest} [Hz]", f"{highest} [Hz]", "Change [%]", "MAC", "What moves, at the pose")
     note = (
-        f"Modes up to {LOOKED_AT:g} Hz that hold {100 * SEEN:g} % or more of the static compliance of a drive, a scale "
+        f"Modes up to {MAX_MODE_FREQUENCY:g} Hz that hold {100 * COMPLIANCE_SHARE:g} % or more of the static "
+        "compliance of a drive, a scale "
         "or the tool; matched by MAC, which falls early where modes lie close to one another and mix."
     )
     compliances = [

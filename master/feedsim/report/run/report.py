@@ -31,7 +31,7 @@ from feedsim.report.provenance import (
 )
 from feedsim.report.run import sheet
 from feedsim.report.run.accuracy import accuracy_picture, accuracy_section
-from feedsim.report.run.axis_plots import BEYOND, overview_picture, positioning_picture
+from feedsim.report.run.axis_plots import OVERSHOOT_TITLE, overview_picture, positioning_picture
 from feedsim.report.run.circle_plots import contour_picture, torque_picture
 from feedsim.report.run.diagnosis import diagnosis_section
 from feedsim.report.run.pose import pose_section
@@ -63,7 +63,7 @@ TILES = {
 OF_REVERSALS = {"peak": "reversal peak", "glitch": "quadrant glitch"}  # of an axis: peak_X
 MOST_MOTIONS = 200
 LINE = ("overshoot", "settling_time", "peak_torque", "G", "A", "R", "B")
-FIRST = ("overshoot", "settling_time", "ringing_frequency", "G", "peak", "A", "R", "B")
+FIRST_FIGURES = ("overshoot", "settling_time", "ringing_frequency", "G", "peak", "A", "R", "B")
 HEADER = (*LINE, "duration", "ringing_frequency", "plateau_torque", "rest_torque", "F_max", "F_min", "mean", "E", "M")
 COUPLING = {
     "residual": "interface energy residual: what the plant gave to the friction bond less what friction took from it",
@@ -156,7 +156,9 @@ def tiles(figures: Mapping[str, Figure]) -> list[Tile]:
     def place(name: str) -> tuple[int, int]:
         key = re.sub("^(peak|glitch)_.*", "peak", name.partition(".")[2])
         size = abs(figures[name].value) if key == "peak" else 0
-        return FIRST.index(key) if key in FIRST else len(FIRST), -round(1e3 * size) if math.isfinite(size) else 0
+        return FIRST_FIGURES.index(key) if key in FIRST_FIGURES else len(FIRST_FIGURES), -round(
+            1e3 * size
+        ) if math.isfinite(size) else 0
 
     return [tile(name, figures[name]) for name in sorted(named, key=place)]
 
@@ -170,7 +172,9 @@ def lead(run: Run, pictures: Sequence[Picture]) -> Picture | None:
     """The picture of the first screen, where it is not the first one: a stop without the way to it."""
     for task in tasks(run.scenario, run.program)[:1]:
         if isinstance(task, PositioningTask) and pictures and (chart := pictures[0].chart) is not None:
-            panel = next((each for each in chart.panels if isinstance(each, Panel) and each.title == BEYOND), None)
+            panel = next(
+                (each for each in chart.panels if isinstance(each, Panel) and each.title == OVERSHOOT_TITLE), None
+            )
             if panel is not None:
                 title = f"Axis {task.approach.axis} about its target"
                 shown = Chart([replace(panel, title="", height=1.9)])

@@ -18,7 +18,7 @@ import numpy as np
 from feedsim.analysis import AccuracyTask, CircleTask, Figure, contour, tasks
 from feedsim.analysis.circularity import Turn
 from feedsim.cosim import Run
-from feedsim.motions.circular import DIRECTIONS
+from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.formatting import minus
 from feedsim.report.picture import Picture
 from feedsim.report.run.accuracy import accuracy_picture
@@ -34,11 +34,11 @@ RULE = (
     "it exceeds the limit by more than U; between these it is not decided (ISO 14253-1)."
 )
 # As the standard writes them: letter, place of the arrow.
-SYMBOLS = {
+STANDARD_SYMBOLS = {
     "A": "A", "A_up": "A↑", "A_down": "A↓", "R": "R", "R_up": "R↑", "R_down": "R↓", "B": "B", "B_mean": "B\u0305",
     "E": "E", "E_up": "E↑", "E_down": "E↓", "M": "M",
 }  # fmt: skip
-PASSES, FAILS, OPEN, NO_LIMIT = "pass", "fail", "not decided", "–"
+PASSES, FAILS, OPEN, NO_LIMIT_TEXT = "pass", "fail", "not decided", "–"
 HEADS = ("Sheet", "Part", "Item", "Target [mm]", "Angle [deg]", "Approach", "Run", "Value", "Unit", "Limit", "Verdict")
 EVERY, PRINTED = 1.0, 15.0  # [deg] between the readings of a circle: in the files, in print
 
@@ -95,7 +95,7 @@ class Filled:
     @property
     def verdict(self) -> str:
         """Of all figures with a limit: fail if one fails, else not decided if one is, else pass; "" without limits."""
-        found = {result.verdict for result in self.results} - {NO_LIMIT}
+        found = {result.verdict for result in self.results} - {NO_LIMIT_TEXT}
         return next((each for each in (FAILS, OPEN, PASSES) if each in found), "")
 
 
@@ -121,7 +121,7 @@ def verdict_line(sheet: Filled) -> str:
     if not sheet.verdict:
         return ""
     words = {PASSES: "passes", FAILS: "FAILS", OPEN: "is not decided"}[sheet.verdict]
-    judged = [result for result in sheet.results if result.verdict != NO_LIMIT]
+    judged = [result for result in sheet.results if result.verdict != NO_LIMIT_TEXT]
     telling = [result for result in judged if result.verdict == sheet.verdict] if sheet.verdict != PASSES else judged
     parts = [f"{result.symbol} {result.value:.2f} um (limit {result.limit:g} um)" for result in telling]
     return f"{sheet.title} {words} ({sheet.standard}): {', '.join(parts)}."
@@ -130,7 +130,7 @@ def verdict_line(sheet: Filled) -> str:
 def judged(value: float, limit: float, uncertainty: float) -> str:
     """Verdict on a figure; all in one unit. A figure that could not be determined is not decided."""
     if math.isnan(limit):
-        return NO_LIMIT
+        return NO_LIMIT_TEXT
     if not math.isfinite(value):
         return OPEN
     if abs(value) + uncertainty <= limit:
@@ -177,7 +177,7 @@ def _positioning(run: Run, task: AccuracyTask, sheet: Sheet) -> Filled:
                             float(1e6 * found.s[side, i]), B))  # fmt: skip
             csv_rows += [("deviation", f"{1e3 * target:.9g}", "", arrow, str(k + 1), f"{value:.6f}", "um")
                      for k, value in enumerate(own)]  # fmt: skip
-    results = _results(found.figures, SYMBOLS, sheet, OF_POSITIONING)
+    results = _results(found.figures, STANDARD_SYMBOLS, sheet, OF_POSITIONING)
     picture = accuracy_picture(prefix, found, f"sheet-{prefix.replace('#', '-')}")
     return Filled(f"Positioning of {prefix}", "ISO 230-2", conditions, 1e6 * sheet.uncertainty, heads, numbers, results,
                   picture, csv_rows)  # fmt: skip
@@ -195,11 +195,11 @@ def _circle(run: Run, task: CircleTask, sheet: Sheet) -> Filled:
         ("Plane", f"{first}-{second}"),
         ("Nominal path", f"diameter {2e3 * turn.radius:.6g} mm, feed {feed:.5g} mm/min"),
         ("Centre", ", ".join(f"{axis} {1e3 * at:.6g} mm" for axis, at in zip(turn.axes, turn.centre, strict=True))),
-        ("Direction", " and ".join(DIRECTIONS[each.sense] for each in task.turns)),
+        ("Direction", " and ".join(SENSE_WORDS[each.sense] for each in task.turns)),
         ("Position by", "linear scales"),
         *_given(sheet),
     ]
-    names = [DIRECTIONS[each.sense] for each in task.turns]
+    names = [SENSE_WORDS[each.sense] for each in task.turns]
     grid = np.arange(0.0, 360.0, EVERY)
     curves = [_deviation(run.trace, each, grid) for each in task.turns]
     numbers = [(float(angle), *(float(curve[k]) for curve in curves)) for k, angle in enumerate(grid)]
@@ -244,6 +244,6 @@ def table(sheets: Sequence[Filled]) -> str:
         writer.writerows([name, "reading", *row, "", ""] for row in sheet.readings)
         for each in sheet.results:
             limit = "" if math.isnan(each.limit) else f"{each.limit:.9g}"
-            verdict = "" if each.verdict == NO_LIMIT else each.verdict
+            verdict = "" if each.verdict == NO_LIMIT_TEXT else each.verdict
             writer.writerow([name, "figure", each.symbol, "", "", "", "", f"{each.value:.6f}", "um", limit, verdict])
     return text.getvalue()

@@ -9,13 +9,13 @@ from feedsim.report.picture import Picture
 from feedsim.report.run.axis_plots import OF_AXES, TIME
 from feedsim.trace import Trace
 
-MOST = 12  # signals in a picture
+MAX_SIGNALS = 12  # signals in a picture
 
 
 def signals_picture(trace: Trace, title: str) -> Picture:
     """All columns of a trace, those of one unit together. Raises InputError for more than can be distinguished."""
-    if not 0 < len(trace.names) <= MOST:
-        raise InputError(f"{len(trace.names)} signals in one picture; from 1 to {MOST} can be distinguished")
+    if not 0 < len(trace.names) <= MAX_SIGNALS:
+        raise InputError(f"{len(trace.names)} signals in one picture; from 1 to {MAX_SIGNALS} can be distinguished")
     curves = {
         name: Curve(name, trace.time, trace[name], OF_AXES[k % len(OF_AXES)], "" if k < len(OF_AXES) else "dashed")
         for k, name in enumerate(trace.names)

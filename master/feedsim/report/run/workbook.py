@@ -17,7 +17,7 @@ from feedsim.extras import ask
 if TYPE_CHECKING:
     from feedsim.report.run.sheet import Filled
 
-LONGEST_NAME = 31  # of a worksheet, which Excel also forbids these characters in
+MAX_SHEET_NAME = 31  # of a worksheet, which Excel also forbids these characters in
 FORBIDDEN = re.compile(r"[\[\]:*?/\\']")
 CREATED = datetime(1980, 1, 1, tzinfo=UTC)  # the same result has the same bytes
 WIDTHS = (24, 44, 14, 14, 14, 14)  # of the first columns, in characters
@@ -48,11 +48,11 @@ def workbook(sheets: Sequence[Filled], rule: str) -> bytes:
 def _name(title: str, taken: set[str]) -> str:
     """Name of a worksheet, and no second one of that name; Excel ignores upper and lower case."""
     plain = FORBIDDEN.sub(" ", title).strip() or "sheet"
-    name, count = plain[:LONGEST_NAME], 1
+    name, count = plain[:MAX_SHEET_NAME], 1
     while name.casefold() in taken:
         count += 1
         end = f" ({count})"
-        name = plain[: LONGEST_NAME - len(end)] + end
+        name = plain[: MAX_SHEET_NAME - len(end)] + end
     taken.add(name.casefold())
     return name
 

@@ -10,7 +10,7 @@ import numpy as np
 from feedsim.analysis import Approach, deviation
 from feedsim.analysis.alignment import stops
 from feedsim.analysis.circularity import Turn, contour
-from feedsim.analysis.side_by_side import SIGNALS, Source
+from feedsim.analysis.side_by_side import COMPARED_SIGNALS, Source
 from feedsim.analysis.spectrum import amplitude_spectrum
 from feedsim.errors import InputError
 from feedsim.report.chart import Axis, Chart, Curve, Dash, Level, Panel
@@ -30,7 +30,7 @@ from feedsim.report.style import (
 )
 from feedsim.trace import Trace
 
-MORE = (SKY, GREEN, PURPLE, ORANGE, VERMILLION)  # of further results
+FURTHER_COLOURS = (SKY, GREEN, PURPLE, ORANGE, VERMILLION)  # of further results
 ABSCISSA = Axis("time from the first row", "s")
 AFTER = Axis("time after the end of the motion", "ms", span=(-1e3 * ZOOM_BEFORE, 1e3 * ZOOM_AFTER))
 FREQUENCY = Axis("frequency", "Hz", log=True)
@@ -47,7 +47,7 @@ QUESTIONS = (
 MOST_STOPS, LEAST_REACH = 6, 2.2
 # Spectra: signal, title, factor from SI, unit; stretch [s], rows of it at least, and how far down they are drawn.
 SPECTRA = (("x_e", "following error", 1e6, "µm"), ("M_a", "motor torque", 1.0, "N·m"))
-STRETCH, LEAST_ROWS, DOWN = 1.0, 64, 1e-4
+STRETCH, MIN_SPECTRUM_ROWS, DOWN = 1.0, 64, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def looks_of(sources: Sequence[Source]) -> list[tuple[str, Dash]]:
     """Colour and dash of every source: records as records; of results alone the first is what was before."""
     kinds: tuple[Dash, ...] = ("", "dashed", "dotted")
     records = [not source.figures and not source.parameters for source in sources]
-    names = [SIMULATED, *MORE] if any(records) else [BEFORE, SIMULATED, *MORE]
+    names = [SIMULATED, *FURTHER_COLOURS] if any(records) else [BEFORE, SIMULATED, *FURTHER_COLOURS]
     found: list[tuple[str, Dash]] = []
     for k, recorded in enumerate(records):
         number = sum(each == recorded for each in records[:k])
@@ -141,7 +141,9 @@ def _over_time(
 ) -> Picture | None:
     found: dict[str, list[_Own]] = {}
     for axis in dict.fromkeys(axis for source in sources for axis in source.axes):
-        curves = ((k, source, source.curve(f"{axis}.{signal}", SIGNALS[signal])) for k, source in enumerate(sources))
+        curves = (
+            (k, source, source.curve(f"{axis}.{signal}", COMPARED_SIGNALS[signal])) for k, source in enumerate(sources)
+        )
         found[axis] = [(k, source.t, factor * y) for k, source, y in curves if y is not None]
     sizes = {axis: max((float(np.ptp(y)) for *_, y in curves), default=0.0) for axis, curves in found.items()}
     panels = [
@@ -220,12 +222,12 @@ def spectrum_picture(sources: Sequence[Source]) -> Picture | None:
 
 
 def _spectrum(source: Source, name: str, factor: float) -> tuple[Array, Array] | None:
-    values = source.curve(name, SIGNALS[name.partition(".")[2]])
-    if values is None or len(values) < LEAST_ROWS or not np.ptp(values):
+    values = source.curve(name, COMPARED_SIGNALS[name.partition(".")[2]])
+    if values is None or len(values) < MIN_SPECTRUM_ROWS or not np.ptp(values):
         return None
     interval = float(np.median(np.diff(source.time)))
     even = np.arange(source.time[0], source.time[-1], interval)
-    rows = max(LEAST_ROWS, round(STRETCH / interval))
+    rows = max(MIN_SPECTRUM_ROWS, round(STRETCH / interval))
     f, a = amplitude_spectrum(factor * np.interp(even, source.time, values), interval, rows)
     return f[2:], a[2:]  # what is below holds the mean
 

@@ -27,7 +27,7 @@ MOST_LEADING = 5  # figures that are told first
 LEAST_CHANGE = 0.05  # [%] of a figure, below which it has not changed
 BAND = 1e-6  # [m] about the target, within which an axis has settled
 # Figures whose change is told first, by what stands behind the last dot.
-FIRST = ("G", "G_b", "peak_", "servo_mismatch", "overshoot", "settling_time")
+LEADING_FIGURES = ("G", "G_b", "peak_", "servo_mismatch", "overshoot", "settling_time")
 
 
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
@@ -95,7 +95,7 @@ def _readable(value: str) -> str:
 
 def _leading(sources: Sequence[Source]) -> list[str]:
     names = dict.fromkeys(name for source in sources for name in source.figures)
-    return [name for name in names if name.count(".") == 1 and name.partition(".")[2].startswith(FIRST)
+    return [name for name in names if name.count(".") == 1 and name.partition(".")[2].startswith(LEADING_FIGURES)
             and name.partition(".")[2].rstrip("+-") == name.partition(".")[2]]  # fmt: skip
 
 

@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 
 QUANTILES = (5, 50, 95)
 TOTAL = "total Sobol index"
-SHARE = "share of the scatter"
+SHARE_HEADING = "share of the scatter"
 RANK = "rank correlation"
 CAPTIONS = {
     TOTAL: "Total Sobol index: the share of a figure's scatter that stays when everything but this parameter is known. "
     "Bold: its 95 % interval keeps clear of 0.02. Empty: below 0.005.",
-    SHARE: "Share of a figure's scatter over the grid that lies between the values of this parameter, the others taken "
-    "together; what is missing to 1 are joint effects.",
+    SHARE_HEADING: "Share of a figure's scatter over the grid that lies between the values of this parameter, the "
+    "others taken together; what is missing to 1 are joint effects.",
     RANK: "Spearman's rank correlation: +1 where a figure always rises with the parameter (blue), −1 where it always "
     "falls (vermillion). Bold: more than chance gives in one case of twenty. A figure with its minimum in the middle "
     "of a parameter's range shows 0; words cannot be ranked and stay empty.",
 }
-LEAST = 4
+MIN_INDEX_RUNS = 4
 NOTHING = 0.005  # share below which two digits say 0.00
-CLEAR = 0.02  # a total index below which a parameter may be held where it is
+NEGLIGIBLE_INDEX = 0.02  # a total index below which a parameter may be held where it is
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -310,7 +310,7 @@ class Measure:
     def told(self, k: int) -> bool:
         """Whether the value of parameter k is beyond chance."""
         if self.interval is not None:
-            return bool(self.interval[k, 0] > CLEAR)
+            return bool(self.interval[k, 0] > NEGLIGIBLE_INDEX)
         return bool(abs(self.values[k]) > self.noise) if self.kind == RANK else False
 
     def ranked(self) -> list[int]:
@@ -318,13 +318,13 @@ class Measure:
         return sorted(range(len(self.values)), key=lambda k: (-self.size(k), k))
 
     def telling(self) -> list[int]:
-        """The same without those that do nothing, but LEAST of them at the least; none where nothing is known."""
+        """The same without those that do nothing, but MIN_INDEX_RUNS of them at least; none where nothing is known."""
         if not self.known:
             return []
         ranked = self.ranked()
         if self.kind == RANK:  # 0 may hide a minimum in the middle
             return ranked
-        return [k for place, k in enumerate(ranked) if place < LEAST or self.size(k) >= NOTHING]
+        return [k for place, k in enumerate(ranked) if place < MIN_INDEX_RUNS or self.size(k) >= NOTHING]
 
 
 def measures(account: Account) -> Mapping[str, Measure]:
@@ -337,7 +337,7 @@ def measures(account: Account) -> Mapping[str, Measure]:
         if sobol is not None and not sobol.reason:
             result[name] = Measure(name, TOTAL, sobol.total, sobol.total_interval, sobol.first, sobol.first_interval)
         elif grid:
-            result[name] = Measure(name, SHARE, trend.share)
+            result[name] = Measure(name, SHARE_HEADING, trend.share)
         else:
             result[name] = Measure(name, RANK, trend.rank_correlation, noise=trend.noise)
     return result

@@ -16,7 +16,7 @@ from feedsim.report.picture import Picture
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
 from feedsim.report.sections import parameters_section, provenance_section
 from feedsim.report.style import Array, remarked
-from feedsim.report.sweep.account import QUANTILES, SHARE, Account, Input, Measure, measures
+from feedsim.report.sweep.account import QUANTILES, SHARE_HEADING, Account, Input, Measure, measures
 from feedsim.report.sweep.plots import drawn, pictures_of, varying
 from feedsim.report.sweep.summary import study_files, summary
 from feedsim.sweep.sensitivity import Indices, Trends
@@ -36,7 +36,7 @@ METHODS = {
 }
 MOST_FAILURES = 50  # kinds
 MOST_ANSWERS = 4  # figures that are told first
-WORTH = 0.05  # share of the scatter, from which a parameter is told to move a figure
+MIN_NAMED_SHARE = 0.05  # share of the scatter, from which a parameter is told to move a figure
 EDGE = 0.01  # share of a parameter's range, up to which a value lies at its end
 MOST_RUNS = 12  # numbers of a kind
 SOBOL_NOTE = (
@@ -218,7 +218,11 @@ def answers(account: Account) -> list[str]:
 
 def _strongest(account: Account, measure: Measure) -> str:
     """The parameters that move a figure most, with their measure."""
-    leading = [k for k in measure.ranked() if measure.told(k) or (measure.kind == SHARE and measure.size(k) > WORTH)]
+    leading = [
+        k
+        for k in measure.ranked()
+        if measure.told(k) or (measure.kind == SHARE_HEADING and measure.size(k) > MIN_NAMED_SHARE)
+    ]
     if not leading:
         return "no parameter moves it by more than chance"
     first, *further = (f"{account.inputs[k].name} ({_two(float(measure.values[k]))})" for k in leading[:3])

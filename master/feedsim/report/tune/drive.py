@@ -20,14 +20,14 @@ from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
-from feedsim.report.style import AFTER, ALLOWED, BEFORE, LEFT, MUTED
+from feedsim.report.style import AFTER, ALLOWED, BEFORE, MUTED, RESIDUAL_COLOUR
 from feedsim.report.tune.drive_files import SETTINGS, SHEET, drive_file, names_for, rows
 from feedsim.tune.drive import NOISE, TORQUE
 from feedsim.tune.drive_result import WORSE, Case, Margins, Point, Tuned, decibels
 
 KIND = "tune-drive"
 BINDS = 0.06  # of a limit: a margin that is as near to it binds
-RIGID = (
+RIGID_WARNING = (
     "the machine has no elastic modes: the margins are those of rigid axes, and a real one resonates. Measure the "
     "frequency response of the speed loop, and take its modes in (feedsim identify-modes), before you type a value"
 )
@@ -103,7 +103,7 @@ def findings(tuned: Tuned) -> list[str]:
         found.append(Wrong(f"worse than before on motions that were not used for tuning: {'; '.join(bad)}"))
     found += present_misses(tuned)
     if not tuned.elastic:
-        found.append(Wrong(RIGID) if tuned.changes else Note(RIGID))
+        found.append(Wrong(RIGID_WARNING) if tuned.changes else Note(RIGID_WARNING))
     drive = tuned.machine.shipped_drive(tuned.axis, "a report")
     if tuned.changes and (getattr(drive, "friction_pulse", None) or getattr(drive, "friction_table", None)):
         found.append(f"{tuned.axis}: {COMPENSATED}")
@@ -319,7 +319,7 @@ def picture(tuned: Tuned) -> Picture:
             Curve(name, *_xy(chosen, of), colour, dots=True, faint=faint)
             for name, chosen, colour, faint in (
                 ("within all limits", [p for p in points if p.allowed], ALLOWED, False),
-                ("outside of a limit, or worse somewhere", [p for p in points if not p.allowed], LEFT, True),
+                ("outside of a limit, or worse somewhere", [p for p in points if not p.allowed], RESIDUAL_COLOUR, True),
             )
             if chosen
         ]

@@ -28,7 +28,7 @@ from feedsim.variables import parameters
 DASHES: tuple[Dash, ...] = ("", "dashed", "dotted")  # of axes in one panel
 SETTINGS, SHEET = "settings.yaml", "sheet.csv"
 GROUPS = {"pulse": "friction_pulse", "pulse_characteristic": "friction_pulse", "table": "friction_table"}
-CONTROLS = {"pulse": "sinumerik", "pulse_characteristic": "sinumerik", "table": "twincat"}
+CONTROL_OF_KIND = {"pulse": "sinumerik", "pulse_characteristic": "sinumerik", "table": "twincat"}
 WORDS = {
     "pulse": "a constant pulse on the speed setpoint",
     "pulse_characteristic": "a pulse on the speed setpoint with a characteristic over the acceleration",
@@ -40,7 +40,7 @@ OBJECTIVES = {
     "worst": "the largest ratio of errors with and without",
     "largest": "the largest error, in um: slow circles then count little",
 }
-UNKNOWN = (
+LIMITS_UNKNOWN = (
     "Of the real control the instant of the pulse, its exact shape and the order within a cycle are not public; here "
     "the pulse begins where the axis reverses. Try the values with one circle, and vary the amplitude first"
 )
@@ -83,7 +83,7 @@ def findings(judged: Judged) -> list[str]:
     if judged.found.kind == "model":
         found.append(Note("the compensation has the friction of the machine itself; a real one is never known so well"))
     else:
-        found.append(Note(UNKNOWN))
+        found.append(Note(LIMITS_UNKNOWN))
     return found
 
 
@@ -102,7 +102,7 @@ def rows(judged: Judged) -> Iterator[tuple[str, str, Name | None, Any, Any]]:
     """Axis, parameter, its name in a control, old and new value in SI."""
     if judged.found.kind not in GROUPS:
         return
-    group, names = GROUPS[judged.found.kind], names_of(CONTROLS[judged.found.kind])
+    group, names = GROUPS[judged.found.kind], names_of(CONTROL_OF_KIND[judged.found.kind])
     table = parameters("controller")
     for axis, values in judged.found.values.items():
         present = getattr(judged.scenario.machine.axes[axis].drive, group, None)
@@ -191,7 +191,7 @@ def _values(judged: Judged) -> Section | None:
     if not lines:
         return None
     heads = ("Axis", "Number", "Name in the control", "Old", "New", "Unit", "Unit confirmed", "Parameter")
-    return Section("Values to type", [Table("lllrrlll", heads, lines), Paragraph(UNKNOWN + ".", "muted")])
+    return Section("Values to type", [Table("lllrrlll", heads, lines), Paragraph(LIMITS_UNKNOWN + ".", "muted")])
 
 
 def _errors(title: str, pairs: Sequence[Pair], before: Any, after: Any, judged: Judged) -> Section:

@@ -20,7 +20,7 @@ ALIGNED = 1e-6
 # A nut this far off its screw [m] is a slip of the pen, not rounding.
 OFF_AXIS = 1e-6
 # A beam shorter than this [m] joins two nodes at one place.
-SHORTEST = 1e-9
+MIN_BEAM_LENGTH = 1e-9
 # `up` this near to the beam's own direction turns nothing.
 PARALLEL = 1e-6
 
@@ -157,14 +157,14 @@ def _known(
 
 
 def _length(structure: GeometryStructure, place: Place, first: Node, second: Node) -> Faults:
-    if dist(position(structure, first), position(structure, second)) < SHORTEST:
+    if dist(position(structure, first), position(structure, second)) < MIN_BEAM_LENGTH:
         what = "the same node" if first == second else "at the same point"
         yield place, f"a beam from {first} to {second}, which are {what}; a beam has a length"
 
 
 def _up(place: Place, up: tuple[float, float, float] | None, start: Sequence[float], end: Sequence[float]) -> Faults:
     length = dist(start, end)
-    if up is None or length < SHORTEST:
+    if up is None or length < MIN_BEAM_LENGTH:
         return
     along = [(b - a) / length for a, b in zip(start, end, strict=True)]
     if hypot(*_cross(along, up)) < PARALLEL:
@@ -273,7 +273,7 @@ def _along_screw(structure: GeometryStructure, name: str) -> Faults:
     screw, nut = axis.drive.screw, axis.drive.nut
     length = dist(screw.start, screw.end)
     place = ("axes", name, "drive")
-    if length < SHORTEST:
+    if length < MIN_BEAM_LENGTH:
         yield (*place, "screw"), "start and end are the same point; a screw has a length"
         return
     along = [(b - a) / length for a, b in zip(screw.start, screw.end, strict=True)]

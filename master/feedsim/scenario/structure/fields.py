@@ -11,9 +11,9 @@ from pydantic import PlainValidator, WithJsonSchema
 
 from feedsim.fields import Quantity, brief, fault
 
-NAME = r"[A-Za-z][A-Za-z0-9_]*"
-NODE = rf"{NAME}(?:\.[0-9]+)?"
-NODES = rf"{NAME}(?:\.[0-9]+(?:\.\.[0-9]+)?)?"
+NAME_PATTERN = r"[A-Za-z][A-Za-z0-9_]*"
+NODE = rf"{NAME_PATTERN}(?:\.[0-9]+)?"
+NODES = rf"{NAME_PATTERN}(?:\.[0-9]+(?:\.\.[0-9]+)?)?"
 FRAME = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
 Length = Annotated[float, Quantity("m")]
@@ -73,23 +73,23 @@ def _direction(value: Any) -> tuple[float, float, float]:
 
 
 # A direction in the machine's frame: X, -X, ... or a list of three numbers; kept as a unit vector.
-_LETTERS = {"type": "string", "enum": [sign + letter for sign in ("", "-", "+") for letter in FRAME]}
+_DIRECTION_LETTERS = {"type": "string", "enum": [sign + letter for sign in ("", "-", "+") for letter in FRAME]}
 _VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
 Direction = Annotated[
-    tuple[float, float, float], PlainValidator(_direction), WithJsonSchema({"anyOf": [_LETTERS, _VECTOR]})
+    tuple[float, float, float], PlainValidator(_direction), WithJsonSchema({"anyOf": [_DIRECTION_LETTERS, _VECTOR]})
 ]
-Name = Annotated[str, *_text(NAME, "name: a letter, then letters, digits and _")]
+Name = Annotated[str, *_text(NAME_PATTERN, "name: a letter, then letters, digits and _")]
 # Inside a body: one node; a node, a node of a line, some of its nodes, all of them.
 OwnNode = Annotated[str, *_text(NODE, "node of this body, such as top or post.3")]
 Nodes = Annotated[tuple[str, ...], *_texts(NODES, "node of this body, such as top, post.3, post.2..6 or post (all)")]
 NodeList = tuple[Annotated[str, *_text(NODES, "node of this body, such as top, post.3, post.2..6 or post (all)")], ...]
 # Anywhere: the body first.
-BodyNode = Annotated[str, *_text(rf"{NAME}\.{NODE}", "node, such as column.top or bed.rail.3")]
-Rail = Annotated[str, *_text(rf"{NAME}\.{NAME}", "line of nodes, such as bed.rail")]
+BodyNode = Annotated[str, *_text(rf"{NAME_PATTERN}\.{NODE}", "node, such as column.top or bed.rail.3")]
+Rail = Annotated[str, *_text(rf"{NAME_PATTERN}\.{NAME_PATTERN}", "line of nodes, such as bed.rail")]
 Hold = Annotated[
     tuple[str, ...],
     *_texts(
-        rf"{NAME}\.{NODE}|rail {NAME}\.{NAME}",
+        rf"{NAME_PATTERN}\.{NODE}|rail {NAME_PATTERN}\.{NAME_PATTERN}",
         "place to hold on to: a node such as column.top or bed.rail.3, a list of nodes, or 'rail bed.rail'",
     ),
 ]

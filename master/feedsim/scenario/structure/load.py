@@ -16,7 +16,7 @@ from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.scenario.structure.matrices import AnsysStructure, CalculixStructure, MatrixMarketStructure
 
 STRUCTURE_FILE = "structure.yaml"
-KINDS: dict[str, type[Structure]] = {
+STRUCTURE_KINDS: dict[str, type[Structure]] = {
     "geometry": GeometryStructure,
     "matrices": MatrixMarketStructure,
     "ansys": AnsysStructure,
@@ -40,7 +40,9 @@ def load_structure(path: str | Path) -> Structure:
     source = read_group(path)
     kind = source.data.get("kind")
     if kind is None:
-        raise InputError(describe(source, ("kind",), f"missing key 'kind'; allowed: {', '.join(KINDS)}"))
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise InputError(describe(source, ("kind",), f"unknown kind {brief(kind)}{did_you_mean(str(kind), [*KINDS])}"))
-    return checked(source, KINDS[kind], path, contradictions_of)
+        raise InputError(describe(source, ("kind",), f"missing key 'kind'; allowed: {', '.join(STRUCTURE_KINDS)}"))
+    if not isinstance(kind, str) or kind not in STRUCTURE_KINDS:
+        raise InputError(
+            describe(source, ("kind",), f"unknown kind {brief(kind)}{did_you_mean(str(kind), [*STRUCTURE_KINDS])}")
+        )
+    return checked(source, STRUCTURE_KINDS[kind], path, contradictions_of)

@@ -15,7 +15,7 @@ Kind = Literal["uniform", "loguniform", "triangular", "normal", "lognormal"]
 
 # What a study can look for in a figure.
 WAYS = ("smallest", "largest")
-LONGEST_NAME = 60  # characters of a parameter's name, which heads a column
+MAX_PARAMETER_NAME = 60  # characters of a parameter's name, which heads a column
 MOST_RUNS = 1_000_000
 # Columns of the table that every study has.
 TAKEN = ("run", "status", "message", "warnings", "seconds")
@@ -126,9 +126,9 @@ class StudyFile(Model):
         for name in parameters:
             if name in TAKEN:
                 raise fault(f"{name!r} is a column of every table; call the parameter otherwise")
-            if not name or len(name) > LONGEST_NAME or not name.isprintable() or set(name) & set(" ,;[]\"'="):
+            if not name or len(name) > MAX_PARAMETER_NAME or not name.isprintable() or set(name) & set(" ,;[]\"'="):
                 raise fault(
-                    f"{brief(name)} cannot be the name of a column: 1 to {LONGEST_NAME} characters, "
+                    f"{brief(name)} cannot be the name of a column: 1 to {MAX_PARAMETER_NAME} characters, "
                     "no blank, comma, semicolon, quote, = or bracket"
                 )
         return parameters

@@ -15,13 +15,13 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.scenario.structure.matrices import AnsysStructure
 from feedsim.structure.assembly import DEGREES, counted
-from feedsim.structure.matrices.raw import DIRECTIONS, Raw, from_triangle
+from feedsim.structure.matrices.raw import FREEDOM_NAMES, Raw, from_triangle
 from feedsim.structure.matrices.tables import read_points
 
 READER = "ansys.mapdl.reader"
 INSTALL = "make ansys (outside a checkout: pip install --no-deps ansys-mapdl-reader)"
 # ANSYS numbers its degrees of freedom UX, UY, UZ, ROTX, ROTY, ROTZ from 1.
-MECHANICAL = range(1, len(DIRECTIONS) + 1)
+MECHANICAL = range(1, len(FREEDOM_NAMES) + 1)
 
 
 def read(structure: AnsysStructure) -> Raw:

@@ -23,7 +23,7 @@ from feedsim.scenario.structure.matrices import (
 )
 from feedsim.structure.assembly import Assembly, Floats, Geometry, Integers, few
 from feedsim.structure.matrices import ansys, calculix, market
-from feedsim.structure.matrices.raw import DIRECTIONS, Points, Raw, without_zeros
+from feedsim.structure.matrices.raw import FREEDOM_NAMES, Points, Raw, without_zeros
 from feedsim.structure.matrices.tables import read_ports
 from feedsim.structure.modes import TOOL_PORTS
 
@@ -106,7 +106,7 @@ def _dropped(vectors: dict[str, Floats], raw: Raw, labels: tuple[str, ...]) -> l
 def _geometry(points: Points, raw: Raw, kept: Integers, length: float) -> Geometry:
     new = np.full(raw.size, -1, dtype=np.int64)
     new[kept] = np.arange(len(kept))
-    dofs = np.full((len(points.ids), len(DIRECTIONS)), -1, dtype=np.int64)
+    dofs = np.full((len(points.ids), len(FREEDOM_NAMES)), -1, dtype=np.int64)
     row = {node: k for k, node in enumerate(points.ids)}
     for i, node in enumerate(raw.nodes or ()):
         k = row.get(node)

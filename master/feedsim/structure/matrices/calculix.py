@@ -17,7 +17,7 @@ from feedsim.files import regular
 from feedsim.files.references import referred
 from feedsim.scenario.structure.matrices import CalculixStructure
 from feedsim.structure.assembly import Integers
-from feedsim.structure.matrices.raw import DIRECTIONS, Points, Raw, from_triangle
+from feedsim.structure.matrices.raw import FREEDOM_NAMES, Points, Raw, from_triangle
 from feedsim.structure.matrices.tables import read_points
 
 ABSENT = (
@@ -57,7 +57,7 @@ def _dofs(file: Path) -> tuple[tuple[str, ...], Integers]:
         if not (node.isdecimal() and point and direction in ("1", "2", "3", "4", "5", "6")):
             raise InputError(f"{file}:{line}: {text.strip()!r}; node.direction is expected, such as 12.3")
         if (node, direction) in seen:
-            raise InputError(f"{file}:{line}: node {node} {DIRECTIONS[int(direction) - 1]} occurs twice")
+            raise InputError(f"{file}:{line}: node {node} {FREEDOM_NAMES[int(direction) - 1]} occurs twice")
         seen.add((node, direction))
         nodes.append(node)
         directions.append(int(direction) - 1)
@@ -106,7 +106,7 @@ ELEMENTS = {
     "SPRINGA": (2, _LINE), "SPRING2": (2, _LINE), "DASHPOTA": (2, _LINE),
     "SPRING1": (1, ()), "MASS": (1, ()),
 }  # fmt: skip
-DEEPEST = 8  # files that include files
+MAX_INCLUDE_DEPTH = 8  # files that include files
 
 
 def read_mesh(file: Path) -> Points:
@@ -211,8 +211,8 @@ def _cards(file: Path, depth: int = 0) -> Iterator[tuple[str, str]]:
         if text.startswith("*"):
             keyword, options = _options(text)
             if keyword == "INCLUDE":
-                if depth == DEEPEST:
-                    raise InputError(f"{file}:{number}: files include one another more than {DEEPEST} deep")
+                if depth == MAX_INCLUDE_DEPTH:
+                    raise InputError(f"{file}:{number}: files include one another more than {MAX_INCLUDE_DEPTH} deep")
                 yield from _cards(referred(file.parent, options.get("INPUT", "")), depth + 1)
                 continue
         yield f"{file}:{number}", text

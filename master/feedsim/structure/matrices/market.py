@@ -15,7 +15,7 @@ from feedsim.structure.assembly import DEGREES, Floats, counted
 from feedsim.structure.matrices.raw import Raw, from_both, from_triangle
 from feedsim.structure.matrices.tables import NodeTable, read_nodes
 
-LARGEST = 50_000_000  # rows
+MAX_MATRIX_ROWS = 50_000_000  # rows
 
 
 def read(structure: MatrixMarketStructure) -> Raw:
@@ -78,8 +78,10 @@ def _content(file: Path, what: str) -> tuple[int, str, str, Floats]:
         if not rest:
             raise ValueError("it has no line with its size")
     sizes = [int(word) for word in line.split()]
-    if len(sizes) != (3 if form == "coordinate" else 2) or min(sizes) < 0 or max(sizes[:2]) > LARGEST:
-        raise ValueError(f"its size is {line.decode('ascii', 'replace')[:60]!r}; at most {LARGEST} rows are read")
+    if len(sizes) != (3 if form == "coordinate" else 2) or min(sizes) < 0 or max(sizes[:2]) > MAX_MATRIX_ROWS:
+        raise ValueError(
+            f"its size is {line.decode('ascii', 'replace')[:60]!r}; at most {MAX_MATRIX_ROWS} rows are read"
+        )
     rows, columns = sizes[:2]
     if rows != columns:
         raise InputError(f"{file}: {what} matrix has {rows} rows and {columns} columns; it must be square")

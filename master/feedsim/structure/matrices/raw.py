@@ -16,7 +16,7 @@ from feedsim.structure.assembly import Floats, Integers
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
+FREEDOM_NAMES = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,14 +72,14 @@ class Raw:
             return tuple(f"dof {i}" for i in range(self.size))
         names = dict(zip(self.points.ids, self.points.names, strict=True)) if self.points else {}
         return tuple(
-            f"{names.get(node) or f'node {node}'} {DIRECTIONS[d]}" if node else f"dof {i}"
+            f"{names.get(node) or f'node {node}'} {FREEDOM_NAMES[d]}" if node else f"dof {i}"
             for i, (node, d) in enumerate(zip(self.nodes, self.directions.tolist(), strict=True))
         )
 
 
 # Programs that write both triangles add up in another order above the diagonal than below; the difference stays far
 # under this share of an entry's scale, the geometric mean of its diagonal entries.
-ROUNDING = 1e-9
+SYMMETRY_ROUNDING = 1e-9
 
 
 def from_triangle(rows: Integers, columns: Integers, values: Floats, size: int, file: Path) -> sparse.csc_array:
@@ -114,7 +114,7 @@ def from_both(rows: Integers, columns: Integers, values: Floats, size: int, file
     difference = (matrix - matrix.T).tocoo()
     if difference.nnz and np.all(np.isfinite(difference.data)):
         scale = np.sqrt(np.abs(matrix.diagonal()))
-        if np.all(np.abs(difference.data) <= ROUNDING * scale[difference.row] * scale[difference.col]):
+        if np.all(np.abs(difference.data) <= SYMMETRY_ROUNDING * scale[difference.row] * scale[difference.col]):
             matrix = ((matrix + matrix.T) / 2).tocsc()
     return without_zeros(matrix)
 

@@ -16,7 +16,7 @@ import numpy as np
 from feedsim.errors import InputError
 from feedsim.fields import did_you_mean
 from feedsim.structure.assembly import Floats, Integers, few
-from feedsim.structure.matrices.raw import DIRECTIONS, Points, Raw
+from feedsim.structure.matrices.raw import FREEDOM_NAMES, Points, Raw
 from feedsim.structure.modes import TOOL_PORTS
 
 MOST_PROBLEMS = 20
@@ -115,21 +115,22 @@ def read_nodes(file: Path, lines: Path | None, size: int) -> NodeTable:
     Raises:
         InputError: with file and line; a degree of freedom that is not there or is given twice.
     """
-    rows = read_table(file, "a table of nodes", [NODE_COLUMNS], ("name", "body", *DIRECTIONS))
-    if not any(row[direction] for row in rows for direction in DIRECTIONS):
+    rows = read_table(file, "a table of nodes", [NODE_COLUMNS], ("name", "body", *FREEDOM_NAMES))
+    if not any(row[direction] for row in rows for direction in FREEDOM_NAMES):
         raise InputError(
-            f"{file}:1: a table of nodes for Matrix Market files needs columns {', '.join(DIRECTIONS)} (those that "
+            f"{file}:1: a table of nodes for Matrix Market files needs columns {', '.join(FREEDOM_NAMES)} (those that "
             "there are) with the numbers of the degrees of freedom, from 0"
         )
     nodes, directions = [""] * size, np.full(size, -1, dtype=np.int64)
     for row in rows:
-        for d, direction in enumerate(DIRECTIONS):
+        for d, direction in enumerate(FREEDOM_NAMES):
             if row[direction] in ("", "-1"):
                 continue
             i = index(file, row, direction, size)
             if nodes[i]:
                 raise InputError(
-                    f"{file}:{row.line}: degree of freedom {i} belongs to node {nodes[i]} {DIRECTIONS[directions[i]]} "
+                    f"{file}:{row.line}: degree of freedom {i} belongs to node {nodes[i]} "
+                    f"{FREEDOM_NAMES[directions[i]]} "
                     f"already"
                 )
             nodes[i], directions[i] = row["node"], d
@@ -170,7 +171,7 @@ BY_DOF = ("port", "dof", "coefficient")
 BY_NODE = ("port", "node", "direction", "coefficient")
 # Spellings of the programs that tables come from.
 SPELLINGS = {
-    **{word: d for d, direction in enumerate(DIRECTIONS) for word in (direction, str(d + 1))},
+    **{word: d for d, direction in enumerate(FREEDOM_NAMES) for word in (direction, str(d + 1))},
     **{"x": 0, "y": 1, "z": 2, "rotx": 3, "roty": 4, "rotz": 5},
 }
 
@@ -233,18 +234,18 @@ class _Finder:
             raise InputError(f"{where}: the table names nodes; without a table of nodes (nodes: ...) only dof counts")
         node, word = row["node"], row["direction"].lower()
         if word not in SPELLINGS:
-            raise InputError(f"{where}: column 'direction': {row['direction']!r} is none of {', '.join(DIRECTIONS)}")
+            raise InputError(f"{where}: column 'direction': {row['direction']!r} is none of {', '.join(FREEDOM_NAMES)}")
         direction = SPELLINGS[word]
         found = self.index.get((node, direction))
         if found is not None:
             return found
-        known = [DIRECTIONS[d] for d in range(len(DIRECTIONS)) if (node, d) in self.index]
+        known = [FREEDOM_NAMES[d] for d in range(len(FREEDOM_NAMES)) if (node, d) in self.index]
         has = f"it has {', '.join(known)}; " if known else ""
         in_mesh = self.raw.points is not None and node in self.raw.points.ids
         if node not in self.nodes and not in_mesh:
             raise InputError(f"{where}: there is no node {node!r} with degrees of freedom")
         raise InputError(
-            f"{where}: node {node} has no degree of freedom {DIRECTIONS[direction]}; {has}{self.raw.absent}"
+            f"{where}: node {node} has no degree of freedom {FREEDOM_NAMES[direction]}; {has}{self.raw.absent}"
         )
 
 

@@ -19,7 +19,7 @@ from feedsim.analysis.circle.words import worth_telling
 from feedsim.analysis.circle_figures import FIGURE_UNITS, diagnosed
 from feedsim.analysis.circularity import contour
 from feedsim.analysis.evaluate import CircleTask, tasks
-from feedsim.report.style import BLUE, VERMILLION
+from feedsim.report.style import SIMULATED
 
 HERE = Path(__file__).resolve().parent
 CIRCLE = HERE.parent / "scenarios" / "xz_circle.yaml"
@@ -157,10 +157,10 @@ def picture(shown: dict[str, list[tuple[np.ndarray, np.ndarray]]], file: Path) -
         largest = max(float(np.abs(deviation).max()) for _, deviation in turns)
         circle = np.linspace(0, 2 * np.pi, 400)
         place.plot(np.cos(circle), np.sin(circle), color="#b0b0b0", linewidth=0.7)
-        for (angle, deviation), colour in zip(turns, (BLUE, VERMILLION), strict=True):
+        for (angle, deviation), line in zip(turns, ("-", "--"), strict=True):  # directions, as in reports
             r = 1 + 0.35 * deviation / largest
             order = np.argsort(angle)[:: max(1, len(angle) // POINTS)]
-            place.plot((r * np.cos(angle))[order], (r * np.sin(angle))[order], color=colour, linewidth=1)
+            place.plot((r * np.cos(angle))[order], (r * np.sin(angle))[order], line, color=SIMULATED, linewidth=1)
         place.set_title(f"{textwrap.fill(title, 34)}\nlargest deviation {1e6 * largest:.3g} um")
         place.set_aspect("equal")
     figure.tight_layout()

@@ -1,7 +1,8 @@
 """Draw the block diagrams and sketches of the docs, in one style: `python docs/diagrams.py`, part of `make pictures`.
 
 Start reading at DRAWINGS: a file of docs/images and the function that draws it. An SVG holds both palettes: it follows
-the reader's light or dark page, and is dark on white in print. Nothing here is simulated; circles are sketches.
+the reader's light or dark page, and is dark on white in print. Nothing here is simulated: circles are sketches, and the
+figures of the report are those that the first tutorial prints.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ STYLE = """
 text { font: 14px system-ui, "Segoe UI", "DejaVu Sans", sans-serif; fill: #1b1f23; }
 .small { font-size: 12px; } .note { fill: #57606a; font-size: 12px; } .head { font-weight: 600; }
 .block { fill: #eaf3fa; stroke: #0060a0; stroke-width: 1.5; }
+.frame { fill: none; stroke: #8c959f; stroke-width: 1.5; }
 .group { fill: none; stroke: #8c959f; stroke-dasharray: 5 4; }
 .sum { fill: #ffffff; stroke: #0060a0; stroke-width: 1.5; }
 .wire { fill: none; stroke: #1b1f23; stroke-width: 1.5; } .tip, .dot { fill: #1b1f23; stroke: none; }
@@ -311,6 +313,65 @@ def shapes() -> Drawing:
     return it
 
 
+ANSWER = ("XZ: circular deviation G 8.19 µm, mostly: Z stays behind for a moment",
+          "where it reverses, 7.97 µm, 40.3 ms wide: friction, which friction",
+          "compensation takes away.")  # fmt: skip
+TILES = (("8.19 µm", "circular deviation G"), ("7.97 µm", "reversal peak of Z"), ("4.96 µm", "reversal peak of X"))
+NOTES = (
+    (66, ("The answer: how large, the largest", "cause, and what takes it away.", "Doubts stand ahead of it, in red.")),
+    (142, ("Whose numbers these are.",)),
+    (206, ("One picture: drag to zoom, point at", "a curve to read its values.")),
+    (270, ("A peak stands where an axis reverses.", "The clockwise direction is dashed.")),
+    (334, ("Three figures; the others stand", "in tables below.")),
+    (398, ("The next step, a command to copy.",)),
+    (470, ("All else is folded: a click, Enter", "or a link opens it; paper has it all.")),
+)  # where in height, and the lines of each note
+
+
+def report() -> Drawing:
+    """First screen of a run's report, with what each part is for."""
+    it = Drawing(
+        1030, 540, "A report, part by part",
+        "The first screen of the report of a circle, with notes: the answer in words, whose numbers these are, "
+        "the picture of the contour error with its peaks, three figures, the next step as a command, and folded "
+        "sections with everything else.",
+    )  # fmt: skip
+    it.shapes.append('<rect x="16" y="16" width="640" height="508" rx="8" class="frame"/>')
+    it.text((34, 38), "X-Z circle", "head", "start")
+    for number, line in enumerate(ANSWER):
+        it.text((34, 62 + 20 * number), line, "", "start")
+    it.text((34, 142), "Synthetic machine; measured on no machine.", "note", "start")
+    middle, radius = (200.0, 290.0), 84.0
+    deviation = SHAPES[0][2]
+    it.shapes.append(f'<circle cx="{middle[0]:g}" cy="{middle[1]:g}" r="{radius:g}" class="thin"/>')
+    for course, kind in ((deviation, "curve"), (lambda a: deviation(-a), "second")):
+        points = [(middle[0] + (radius + 18 * course(a)) * cos(radians(a)),
+                   middle[1] - (radius + 18 * course(a)) * sin(radians(a))) for a in _angles()]  # fmt: skip
+        it.line([*points, points[0]], kind)
+    for (dx, dy), end in (((0, -130), "Z+"), ((0, 130), "Z−"), ((130, 0), "X+"), ((-130, 0), "X−")):
+        it.text((middle[0] + dx, middle[1] + dy), end, "small")
+    for number, (value, what) in enumerate(TILES):
+        it.box(392, 166 + 62 * number, 248, 52, value, what)
+    it.text((392, 366), "Next", "note", "start")
+    it.box(392, 380, 248, 34)
+    it.shapes.append(
+        '<text x="516" y="402" text-anchor="middle" class="small">feedsim compensate xz_circle.yaml</text>'
+    )
+    for number, title in enumerate(
+        ("Torque and friction torque", "All axes over the whole run", "Why the circle is not round")
+    ):
+        it.line([(34, 446 + 26 * number), (638, 446 + 26 * number)], "thin")
+        it.text((34, 460 + 26 * number), f"▸ {title}", "head", "start")
+    places = ((632, 82), (352, 142), (282, 200), (224, 170), (376, 192), (376, 397), (626, 486))
+    for number, ((height, lines), place) in enumerate(zip(NOTES, places, strict=True), start=1):
+        for x, y in (place, (686, height)):
+            it.shapes.append(f'<circle cx="{x:g}" cy="{y:g}" r="10" class="sum"/>')
+            it.text((x, y), str(number), "small")
+        for row, line in enumerate(lines):
+            it.text((704, height + 18 * (row - (len(lines) - 1) / 2)), line, "small", "start")
+    return it
+
+
 def _angles() -> list[float]:
     return [step / 2 for step in range(720)]
 
@@ -320,6 +381,7 @@ DRAWINGS: dict[str, Callable[[], Drawing]] = {
     "controller.svg": controller,
     "friction.svg": friction,
     "circle-shapes.svg": shapes,
+    "report.svg": report,
 }
 
 

@@ -52,6 +52,16 @@ def test_ellipses_lie_as_their_cause_has_them(shape: int, mirrored: int) -> None
     assert deviation(-30.0) == pytest.approx(mirrored * deviation(30.0))
 
 
+def test_figures_of_the_drawn_report_are_those_that_a_run_prints() -> None:
+    """The tutorial's output is compared with a run's; the peak of X stands in the page on pages."""
+    printed = (ROOT / "docs" / "tutorials" / "first-circle.md").read_text(encoding="utf-8")
+    printed += (ROOT / "docs" / "page.md").read_text(encoding="utf-8")
+    figures = [word for word in " ".join((*diagrams.ANSWER, *(tile for tile, _ in diagrams.TILES))).split()
+               if word[0].isdigit()]  # fmt: skip
+    assert len(figures) == 6
+    assert not [figure for figure in figures if figure not in printed]
+
+
 def test_lost_motion_steps_where_the_vertical_axis_reverses() -> None:
     deviation: Callable[[float], float] = diagrams.SHAPES[5][2]
     assert deviation(90.1) - deviation(89.9) == pytest.approx(1.4, rel=1e-3)

@@ -7,6 +7,7 @@ axes are decoupled, what one of them does cannot depend on how many others there
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -61,3 +62,12 @@ def write_scenario(folder: Path, machine: Path, motions: Sequence[Mapping[str, A
     content = {"name": "Other axes", "machine": str(machine.resolve()), "motions": list(motions), **more}
     path.write_text(yaml.safe_dump({"recording": {"interval": "125 us"}} | content, sort_keys=False), encoding="utf-8")
     return path
+
+
+def rigid_copy(machine: Path, folder: Path) -> Path:
+    """A copy of a machine folder without the elastic modes of its table."""
+    shutil.copytree(machine, folder)
+    head, *rows = (folder / "modes.csv").read_text().splitlines()
+    rigid = [row for row in rows if float(row.split(",")[1]) == 0]
+    (folder / "modes.csv").write_text("\n".join([head, *rigid]) + "\n")
+    return folder

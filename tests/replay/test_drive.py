@@ -22,6 +22,7 @@ from feedsim.scenario import Machine, load, load_machine
 from feedsim.structure import checked_modes
 from feedsim.trace import write_csv
 from feedsim.trace.trace import Array
+from machine_helpers import rigid_copy
 
 ROOT = Path(__file__).resolve().parents[2]
 MACHINES = ROOT / "scenarios" / "machines"
@@ -149,12 +150,16 @@ def test_a_rigid_machine_is_written_whole(tmp_path: Path) -> None:
 def test_the_cycle_of_the_position_loop_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A control that closes its position loop every 2 ms and logs it as the real one does, exact to the digits: taken
     for a drive that closes the loop every 125 us, the record was met to 10 um with T_sym at its bound of 0."""
-    axis = load_machine(MACHINES / "sinumerik_840d").axes["X"]
+    machine = rigid_copy(MACHINES / "sinumerik_840d", tmp_path / "rigid")
+    drive = ["axes.X.drive.K_p=6.5 N.m.s/rad", "axes.X.drive.T_n=4.9 ms"]
+    axis = load_machine(machine, drive).axes["X"]
     true, I_P = axis.drive, axis.I_P
     (tmp_path / "moves.yaml").write_text(
-        SCENARIO.format(machine=MACHINES / "sinumerik_840d", axis="X", noise="M_a: 0.2 N.m, x_a: 0.3 um", seed=1)
+        SCENARIO.format(machine=machine, axis="X", noise="M_a: 0.2 N.m, x_a: 0.3 um", seed=1)
     )
-    log = run(load(tmp_path / "moves.yaml", ["machine.cycles.position=2 ms"])).log
+    log = run(
+        load(tmp_path / "moves.yaml", ["machine.cycles.position=2 ms", *(f"machine.{each}" for each in drive)])
+    ).log
     assert log is not None
     x_s, x = np.asarray(log.columns["X.x_s"]), np.asarray(log.columns["X.x_a"])
 
@@ -233,6 +238,21 @@ def test_a_real_machine(axis: str, position: float, torque: float, gain: str) ->
 
 
 @pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
+def test_the_shipped_machine_on_the_record_that_it_is_of(tmp_path: Path) -> None:
+    """X with its mode: 0.79 um and 0.24 N.m are left (rigid 1.08 um, 0.32 N.m). The line of the tool spindle, 28 Hz,
+    which X has at rest as well, is named."""
+    words = ["replay", os.environ["FEEDSIM_CAPTURE"], "--machine", str(MACHINES / "sinumerik_840d"), "--quiet"]
+    assert main([*words, "--out", str(tmp_path)]) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    figures = {name: each["value"] for name, each in summary["figures"].items()}
+    assert figures["X.position_rms"] < 0.82
+    assert figures["X.torque_rms"] < 0.25
+    assert figures["Y.position_rms"] < 1.36
+    (note,) = [each["text"] for each in summary["findings"] if "vibration from outside" in each["text"]]
+    assert note.startswith("axis X: at rest the record has 28.01 Hz with 0.7 um and 0.087 N.m (amplitudes)")
+
+
+@pytest.mark.skipif("FEEDSIM_CAPTURE" not in os.environ, reason="FEEDSIM_CAPTURE names no capture")
 @pytest.mark.parametrize(
     ("seen", "unseen", "most"), [("0 s..2.6 s", "2.6 s..4.6 s", 8.0), ("2.6 s..4.6 s", "0 s..2.6 s", 2.0)]
 )
@@ -244,6 +264,7 @@ def test_a_real_machine_on_motion_that_it_was_not_identified_from(
     record = os.environ["FEEDSIM_CAPTURE"]
     words = ["--axes", "X", "--quiet"]
     assert main(["identify-drive", record, *words, "--window", seen, "--out", str(tmp_path / "machine")]) == 0
+    assert load_machine(tmp_path / "machine").control == "sinumerik"
     found = json.loads((tmp_path / "machine" / "summary.json").read_text())["axes"]["X"]["parameters"]
     for name, value in (("T_sym", 0.716e-3), ("k_ffw", 1.0001), ("J", 0.0189), ("K_p", 6.5)):
         assert abs(found[name]["value"] - value) <= 2 * found[name]["sigma"], name
@@ -318,9 +339,8 @@ def test_motion_of_a_loaded_axis_in_one_direction(
 
 def test_a_fit_that_leaves_most_of_the_torque_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A torque that is not of this motion: no drive is written, and the status says so."""
-    (tmp_path / "moves.yaml").write_text(
-        SCENARIO.format(machine=MACHINES / "sinumerik_840d", axis="X", noise="M_a: 0.1 N.m", seed=1)
-    )
+    machine = rigid_copy(MACHINES / "sinumerik_840d", tmp_path / "rigid")
+    (tmp_path / "moves.yaml").write_text(SCENARIO.format(machine=machine, axis="X", noise="M_a: 0.1 N.m", seed=1))
     log = run(load(tmp_path / "moves.yaml")).log
     assert log is not None
     torque = np.asarray(log.columns["X.M_a"])

@@ -19,6 +19,7 @@ from feedsim.replay.identified import identify_drives
 from feedsim.scenario import load, load_machine
 from feedsim.structure import checked_modes
 from feedsim.trace import write_csv
+from machine_helpers import rigid_copy
 
 MACHINES = Path(__file__).resolve().parents[2] / "scenarios" / "machines"
 SCENARIO = """
@@ -57,7 +58,7 @@ def test_modes_of_a_simulated_axis_come_back(tmp_path: Path) -> None:
     """Two modes, a log of 2 ms, 5 % noise on the torque and 0.1 um on the position: two modes are found, no more, and
     their frequencies within 2 %. The position is met nearly to its noise (a rigid axis: 0.35 um and more), and what is
     written is a machine with these modes."""
-    shutil.copytree(MACHINES / "sinumerik_840d", tmp_path / "true")
+    rigid_copy(MACHINES / "sinumerik_840d", tmp_path / "true")
     elastic = with_modes(load_machine(tmp_path / "true"), "X", TWO)
     shutil.copy(elastic.modes, tmp_path / "true" / "modes.csv")
     (tmp_path / "moves.yaml").write_text(SCENARIO.format(machine=tmp_path / "true"))

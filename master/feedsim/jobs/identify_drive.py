@@ -153,6 +153,7 @@ def identify_drive(
             archives,
             cycle,
             count,
+            asked.recording.control,
         )
         sources = [each.provenance for each in asked.read.values()]
         done = DriveReport(found, sources, asked.subject, title, asked.settings, asked.marks)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, nan
@@ -14,9 +14,10 @@ from scipy.optimize import minimize_scalar
 from feedsim.analysis import Figure
 from feedsim.analysis.spectrum import amplitude_spectrum
 from feedsim.errors import InputError
-from feedsim.findings import Wrong
+from feedsim.findings import Note, Wrong
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
 from feedsim.replay.closed_loop import AxisRecord, Replay, per_row_of
+from feedsim.replay.outside import Line, in_words, without_outside
 from feedsim.scenario import Drive, Machine
 from feedsim.trace.trace import Array
 
@@ -59,6 +60,7 @@ class Comparison:
             where there is none.
         limit: torque that the simulated drive cannot exceed [N.m]; limited: share of its rows at that limit.
         open_loop: whether the recorded torque drives the axis, in place of a drive.
+        outside: lines of the record that come from outside the axis.
     """
 
     axis: str
@@ -71,10 +73,11 @@ class Comparison:
     limit: float = inf
     limited: float = 0.0
     open_loop: bool = False
+    outside: Sequence[Line] = ()
 
     @property
     def findings(self) -> list[str]:
-        """Why the replay may tell nothing of the record."""
+        """Why the replay may tell nothing of the record, and what is left that is not the axis' own."""
         found: list[str] = []
         torque = self.each.record.torque[self.each.rows] if self.each.record.driven else np.zeros(1)
         recorded = float(np.max(np.abs(torque), initial=0.0))
@@ -90,6 +93,8 @@ class Comparison:
                 f"axis {self.axis}: the simulated position is off by more ({1e6 * off:.4g} um rms) than the recorded "
                 f"one is behind its setpoint ({1e6 * self.lag:.4g} um): this is not the machine of the record"
             ))  # fmt: skip
+        if self.outside:
+            found.append(Note(in_words(self.axis, self.outside)))
         return found
 
     @property
@@ -205,7 +210,10 @@ def compared(each: AxisRecord, simulated: Mapping[str, Array], per_row: int = 1,
     lag = rms((each.setpoint - each.position)[each.moving])
     limited = simulated.get("torque_limited", np.zeros_like(simulated["x_a"]))
     limited = limited[np.repeat(each.rows, per_row)[per_row - 1 :]]
-    return Comparison(each.axis, each, channels, taps, speed, lag, delay, limit, float(np.mean(limited)))
+    return Comparison(
+        each.axis, each, channels, taps, speed, lag, delay, limit, float(np.mean(limited)),
+        outside=without_outside(each)[1],
+    )  # fmt: skip
 
 
 def _delayed(each: AxisRecord, torque: Array, per_row: int) -> tuple[float, Array]:

@@ -15,6 +15,7 @@ that are correlated over stretches of time, as errors of a model do.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import log, nan
 from pathlib import Path
@@ -142,7 +143,7 @@ def identify_drive(
         )
     problem = Problem(
         machine, each, Replay(machine, {each.axis: each}, fmus=fmus), candidates[0], total, J,
-        {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0}, rows,
+        _first_weights(each), rows,
     )  # fmt: skip
     driven = each.record.driven
     free = ["K_p", "K_i", "T_sym", "k_ffw"]
@@ -252,14 +253,25 @@ def _likelier(problem: Problem, found: Tuned, T_pos: float) -> float:
     def likely(found: Tuned) -> float:
         return -independent(problem, len(problem.rows)) * (log(rms(found.position)) + log(rms(found.torque)))
 
-    machine = problem.machine
+    machine, weights = problem.machine, problem.weights
     cycles = machine.cycles.model_copy(update={"position": T_pos})
     problem.machine = machine.model_copy(update={"cycles": cycles})
     try:
         # Such a fit is nearer to its least than two cycles are to one another.
-        return likely(problem.fitted(found.names, found.values, found, FIRST_TOLERANCE)) - likely(found)
+        other = likely(problem.fitted(found.names, found.values, found, FIRST_TOLERANCE))
+        if found.values["T_sym"] <= TABLE["T_sym"].lower:
+            # A wrong cycle has driven the delay to its bound; what it leaves of the position has no weight any more.
+            problem.weights = _first_weights(problem.each)
+            with suppress(InputError):
+                other = max(other, likely(_first(problem, found.names)))
+        return other - likely(found)
     finally:
-        problem.machine = machine
+        problem.machine, problem.weights = machine, weights
+
+
+def _first_weights(each: AxisRecord) -> dict[str, float]:
+    """What a residual is worth ahead of any fit: position [m], torque [N.m]."""
+    return {"position": 1e-6, "torque": 0.05 * rms(each.record.torque) + 1e-9 if each.record.driven else 1.0}
 
 
 def _first(problem: Problem, free: Sequence[str]) -> Tuned:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from feedsim.replay.machine_files import (
     machine_files,
     simple_drive,
 )
+from feedsim.replay.outside import Line, without_outside
 from feedsim.replay.start import Begin, limits, start_values
 from feedsim.scenario import Friction, Machine, load_machine
 
@@ -36,12 +37,14 @@ class DrivesFound:
     """Drives of the axes of a record.
 
     drives: axis -> what was found. comparisons: each axis with it, beside its record. files: name -> text: a whole
-    machine folder where none was known, else drive_A.yaml and friction_A.yaml of every axis.
+    machine folder where none was known, else drive_A.yaml and friction_A.yaml of every axis. outside: axis -> lines
+    from outside the axis, which were taken out of what was fitted.
     """
 
     drives: Mapping[str, DriveFound]
     comparisons: Sequence[Comparison]
     files: Mapping[str, str]
+    outside: Mapping[str, Sequence[Line]] = field(default_factory=dict)
 
 
 def identify_drives(
@@ -55,6 +58,7 @@ def identify_drives(
     fmus: Path | None = None,
     position_cycle: float | None = None,
     modes: int | None = 0,
+    control: str = "",
 ) -> DrivesFound:
     """Identify the drive of every axis.
 
@@ -65,17 +69,21 @@ def identify_drives(
         position_cycle: of rigid axes [s]; None: the control cycle, or that of the record's rows where the record speaks
             for it.
         modes: elastic ones of each rigid axis; None: as many as the record asks for.
+        control: that the record is of, as machine files name it; empty: not known.
 
     Raises InputError: of an axis, what :func:`identify_drive` refuses; neither a torque nor a machine.
     """
     files: dict[str, str] = {}
     rigid: dict[str, RigidAxis] = {}
-    begins = {axis: _begin(each) if machine is None else None for axis, each in records.items()}
+    fitted, outside = {}, {}
+    for axis, each in records.items():
+        fitted[axis], outside[axis] = without_outside(each)
+    begins = {axis: _begin(each) if machine is None else None for axis, each in fitted.items()}
     interval = next(iter(records.values())).record.interval
 
     def drives(cycle: float) -> dict[str, DriveFound]:
         found = {}
-        for axis, each in records.items():
+        for axis, each in fitted.items():
 
             def tell(what: str, done: int, total: int, axis: str = axis) -> None:
                 progress(f"{axis}: {what}", done, total)
@@ -109,11 +117,11 @@ def identify_drives(
                 modes=one.modes,
             )  # fmt: skip
     if rigid:
-        files = machine_files(name, note, rigid, interval, cycle)
+        files = machine_files(name, note, rigid, interval, cycle, control)
     with _folder(files if rigid else {}) as folder:
         made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
         comparisons = [replayed(made[axis], {axis: each}, fmus)[axis] for axis, each in records.items()]
-    return DrivesFound(found, comparisons, files)
+    return DrivesFound(found, comparisons, files, outside)
 
 
 def _begin(each: AxisRecord) -> Begin:

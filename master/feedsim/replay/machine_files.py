@@ -55,10 +55,10 @@ def control_cycle(interval: float) -> float:
 
 
 def machine_files(
-    name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, position_cycle: float
+    name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, position_cycle: float, control: str = ""
 ) -> dict[str, str]:
-    """File name -> text, of the whole folder. interval: of the record's rows [s]."""
-    files = {"machine.yaml": _machine(name, note, axes, interval, position_cycle), "modes.csv": _modes(axes)}
+    """File name -> text, of the whole folder. interval: of the record's rows [s]. control: that the record is of."""
+    files = {"machine.yaml": _machine(name, note, axes, interval, position_cycle, control), "modes.csv": _modes(axes)}
     for axis, each in axes.items():
         files[drive_file(axis)] = drive_text(each.drive, each.estimates, ASSUMED, each.head)
         files[friction_file(axis)] = friction_axis_text(axis, each.values, each.estimates, each.head)
@@ -94,11 +94,14 @@ def _modes(axes: Mapping[str, RigidAxis]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _machine(name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, position_cycle: float) -> str:
+def _machine(
+    name: str, note: str, axes: Mapping[str, RigidAxis], interval: float, position_cycle: float, of: str
+) -> str:
     pose = ", ".join(f"{axis}: {_text(1e3 * each.position)} mm" for axis, each in axes.items())
     control = control_cycle(interval)
     lines = [
-        f"name: {_quoted(name)}", f"note: {_quoted(note)}", "", "modes: modes.csv", f"pose: {{{pose}}}", "",
+        f"name: {_quoted(name)}", f"note: {_quoted(note)}", *([f"control: {of}"] if of else []), "",
+        "modes: modes.csv", f"pose: {{{pose}}}", "",
         f"cycles: {{control: {_text(1e6 * control)} us, position: {_text(1e6 * position_cycle)} us, "
         f"interpolation: {_text(1e6 * interval)} us}}",
         f"path: {{jerk: {_text(max(each.limits['jerk'] for each in axes.values()))} m/s^3, "

@@ -79,6 +79,12 @@ class Recording:
         hint = "; a CSV file has none, write the number itself" if self._table else suggest(name, self.scalars)
         raise InputError(f"{self.path}: no variable {name!r}{hint}")
 
+    @property
+    def control(self) -> str:
+        """The control whose own file it is, by the name that machine files have for it; empty where any program may
+        have written it."""
+        return "sinumerik" if self.axes or self.path.suffix.lower() == sinumerik_xml.SUFFIX else ""
+
     def of_axis(self, axis: CaptureAxis) -> Recording:
         """The signals of one axis of a capture alone, and the time."""
         own = tuple(name for name in self.names if "|" not in name or name.endswith(f"|{axis.number}"))

@@ -17,6 +17,7 @@ from feedsim.replay.compare import Comparison
 from feedsim.replay.drive import DECISIVE, DriveFound
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
+from feedsim.replay.outside import in_words
 from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import display_unit, minus, powers, typeset
@@ -74,6 +75,9 @@ class DriveReport:
     def warnings(self) -> list[str]:
         """What a user should know."""
         told = dict.fromkeys(text for source in self.sources for text in source.warnings)
+        for axis, lines in self.found.outside.items():
+            if lines:
+                told[Note(f"{in_words(axis, lines)}; it was taken out of what was fitted")] = None
         for axis, one in self.found.drives.items():
             open_ones = [name for name, each in one.estimates.items() if each.status == "undetermined"]
             if open_ones:

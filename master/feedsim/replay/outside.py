@@ -1,0 +1,152 @@
+"""Vibration from outside: lines in a record of an axis at rest, which go on while it moves.
+
+A spindle or a pump shakes an axis whether it moves or not. No drive and no mode of the axis explains such a line, and
+a fit takes it for elasticity of its own if one is near. It is found where the axis stands still, ahead of a motion and
+behind it: a sine of one frequency, amplitude and phase over both, so that either side predicts the other. Between them
+it is taken to go on as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.replay.closed_loop import AxisRecord
+from feedsim.trace.trace import Array
+
+Rows = NDArray[np.int64]
+
+BESIDE = 0.5  # [s] at rest on either side of a motion that are looked at
+SHORTEST = 0.1  # [s] at rest that are needed there
+DIES_AWAY = 0.12  # [s] behind a motion in which the axis itself still swings
+PERIODS = 2  # of a line on the shorter side
+BELOW_RATE = 0.4  # of the rows' rate: above it nothing is told apart
+FINER = 8  # frequencies per line width
+EXPLAINED = 0.5  # share of the variance at rest that either side has to predict of the other
+MOST_LINES = 3
+SMALLEST = 1e-8  # [m] amplitude: less is the digits of a record
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line from outside. frequency [Hz], position [m] and torque [N.m] amplitudes; begin, end: between which rows of
+    the record's time [s] it was taken out."""
+
+    frequency: float
+    position: float
+    torque: float
+    begin: float
+    end: float
+
+    @property
+    def text(self) -> str:
+        """In words, without the name of the axis."""
+        torque = f" and {self.torque:.2g} N.m" if self.torque else ""
+        return (
+            f"{self.frequency:.4g} Hz with {1e6 * self.position:.2g} um{torque} (amplitudes), {self.begin:.3g} to "
+            f"{self.end:.3g} s"
+        )
+
+
+def without_outside(each: AxisRecord) -> tuple[AxisRecord, tuple[Line, ...]]:
+    """The record without lines from outside, and those lines; the record itself where there are none."""
+    position, torque = each.position.copy(), each.record.torque.copy()
+    time, lines = each.record.time, []
+    for before, after in _rests(each):
+        whole = np.arange(before[0], after[-1] + 1)
+        for _ in range(MOST_LINES):
+            frequency = _line(time, position, before, after)
+            if frequency is None:
+                break
+            sine = _sine(time, position, frequency, before, after)
+            if np.hypot(*sine) < SMALLEST:
+                break
+            waves = _waves(time[whole], frequency)
+            position[whole] -= waves @ sine
+            beside = _sine(time, torque, frequency, before, after) if each.record.driven else np.zeros(2)
+            torque[whole] -= waves @ beside
+            sizes = float(np.hypot(*sine)), float(np.hypot(*beside))
+            lines.append(Line(frequency, *sizes, float(time[whole[0]]), float(time[whole[-1]])))
+    if not lines:
+        return each, ()
+    record = replace(each.record, angle=position / each.I_P, torque=torque)
+    return replace(each, record=record), tuple(lines)
+
+
+def _rests(each: AxisRecord) -> Iterator[tuple[Rows, Rows]]:
+    """Rows at rest ahead of every motion and behind it, where there are enough of both."""
+    h = each.record.interval
+    moving = replace(each, rows=np.ones_like(each.rows)).moving
+    behind = np.ones(round(DIES_AWAY / h) + 1)
+    moving = np.convolve(moving, behind)[: len(moving)] > 0.5
+    edges = np.flatnonzero(np.diff(moving.astype(int)))
+    stretches = np.split(np.arange(len(moving)), edges + 1)  # at rest and in motion in turns
+    beside, shortest = round(BESIDE / h), round(SHORTEST / h)
+    for k in range(1, len(stretches) - 1):
+        before, after = stretches[k - 1][-beside:], stretches[k + 1][:beside]
+        if moving[stretches[k][0]] and min(len(before), len(after)) >= shortest:
+            yield before, after
+
+
+def _line(time: Array, position: Array, before: Rows, after: Rows) -> float | None:
+    """Frequency [Hz] of the line that explains most of the position at rest; None: neither side predicts the other."""
+    h = float(time[1] - time[0])
+    width = h * (after[-1] - before[0])
+    quiet = np.zeros(after[-1] - before[0] + 1)
+    for rows in (before, after):
+        quiet[rows - before[0]] = _detrended(time, position, rows)
+    size = FINER * len(quiet)
+    power, grid = np.abs(np.fft.rfft(quiet, size)), np.fft.rfftfreq(size, h)
+    power[(grid < PERIODS / (h * min(len(before), len(after)))) | (grid > BELOW_RATE / h)] = 0.0
+    best, step = float(grid[int(np.argmax(power))]), 0.5 / (FINER * width)
+    for _ in range(3):  # the sine that leaves least is near the highest line
+        near = best + step * np.arange(-3, 4)
+        best = float(near[int(np.argmin([_left(time, position, f, before, after) for f in near]))])
+        step /= 3
+    sides = [(before, _detrended(time, position, before)), (after, _detrended(time, position, after))]
+    for (own, y), (other, z) in (sides, sides[::-1]):
+        W, V = (_detrended(time, _waves(time, best), rows) for rows in (own, other))
+        sine = np.linalg.lstsq(W, y, rcond=None)[0]
+        if not np.sum((z - V @ sine) ** 2) < (1 - EXPLAINED) * np.sum(z**2):
+            return None
+    return best
+
+
+def _left(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> float:
+    """Sum of squares that one sine over both sides leaves."""
+    W, y = _both(time, signal, frequency, before, after)
+    return float(np.sum((y - W @ np.linalg.lstsq(W, y, rcond=None)[0]) ** 2))
+
+
+def _sine(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> Array:
+    """(2,) cosine and sine of one line over both sides."""
+    return np.asarray(np.linalg.lstsq(*_both(time, signal, frequency, before, after), rcond=None)[0])
+
+
+def _both(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> tuple[Array, Array]:
+    waves, sides = _waves(time, frequency), (before, after)
+    return tuple(np.concatenate([_detrended(time, of, rows) for rows in sides]) for of in (waves, signal))  # type: ignore[return-value]
+
+
+def _waves(time: Array, frequency: float) -> Array:
+    """(N, 2)"""
+    phase = 2 * np.pi * frequency * time
+    return np.column_stack([np.cos(phase), np.sin(phase)])
+
+
+def _detrended(time: Array, signal: Array, rows: Rows) -> Array:
+    """Rows of a signal (N,) or (N, K) less their parabola: creep at rest is no vibration."""
+    t = np.linspace(-1.0, 1.0, len(rows))
+    trend = np.linalg.qr(np.column_stack([np.ones_like(t), t, t**2]))[0]
+    return np.asarray(signal[rows] - trend @ (trend.T @ signal[rows]))
+
+
+def in_words(axis: str, lines: Sequence[Line]) -> str:
+    """A note on them."""
+    return (
+        f"axis {axis}: at rest the record has {'; '.join(line.text for line in lines)}: vibration from outside the "
+        "axis, which no drive and no mode explains"
+    )

@@ -1,0 +1,72 @@
+"""Lines that come from outside an axis, in records in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from feedsim.identify import Record
+from feedsim.replay.closed_loop import AxisRecord
+from feedsim.replay.outside import without_outside
+from feedsim.trace.trace import Array
+
+H = 2e-3
+TIME = H * np.arange(700)
+MOVE = (0.5, 0.8)  # [s]
+
+
+def record(added: Array, torque: Array | None = None) -> AxisRecord:
+    """A motion of 10 mm between two rests, on which `added` [m] lies. The lead is 1 m/rad."""
+    s = np.clip((TIME - MOVE[0]) / (MOVE[1] - MOVE[0]), 0.0, 1.0)
+    setpoint = 10e-3 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    force = np.full_like(TIME, np.nan) if torque is None else torque
+    made = Record("made", time=TIME, torque=force, angle=setpoint + added, setpoint=setpoint)
+    return AxisRecord("X", made, 1.0, np.ones(len(TIME), dtype=bool))
+
+
+def test_a_line_through_both_rests_is_found_and_taken_out() -> None:
+    """27.3 Hz, 0.6 um and 0.1 N.m, in noise of a fifth: frequency within 0.1 Hz, amplitudes within 10 %. What is taken
+    out is the sine, in the motion between as well: noise is left."""
+    noise = np.random.default_rng(3)
+    line = np.sin(2 * np.pi * 27.3 * TIME + 0.7)
+    scatter = 0.12e-6 * noise.standard_normal(len(TIME))
+    each = record(0.6e-6 * line + scatter, 3.0 + 0.1 * line)
+    clean, lines = without_outside(each)
+    (one,) = lines
+    assert one.frequency == pytest.approx(27.3, abs=0.1)
+    assert (one.position, one.torque) == (pytest.approx(0.6e-6, rel=0.1), pytest.approx(0.1, rel=0.1))
+    within = (one.begin - H / 2 < TIME) & (one.end + H / 2 > TIME)
+    assert within[np.searchsorted(TIME, MOVE[0]) : np.searchsorted(TIME, MOVE[1])].all()
+    left = (clean.position - each.setpoint - scatter)[within]
+    assert np.sqrt(np.mean(left**2)) < 0.06e-6
+    assert clean.record.torque[within] == pytest.approx(np.full(np.count_nonzero(within), 3.0), abs=0.01)
+    assert "27.3 Hz" in one.text
+    assert "0.1 N.m" in one.text
+
+
+def test_two_lines_and_no_torque() -> None:
+    """18 and 41 Hz, 0.5 and 0.3 um, in a record without a torque."""
+    clean, lines = without_outside(
+        record(0.5e-6 * np.sin(2 * np.pi * 18 * TIME) + 0.3e-6 * np.cos(2 * np.pi * 41 * TIME))
+    )
+    assert sorted(one.frequency for one in lines) == pytest.approx([18.0, 41.0], abs=0.2)
+    assert not clean.record.driven
+    assert all(one.torque == 0 for one in lines)
+
+
+@pytest.mark.parametrize(
+    "added",
+    [
+        pytest.param(0.3e-6 * np.random.default_rng(5).standard_normal(len(TIME)), id="noise"),
+        pytest.param(1e-6 * np.where(TIME > 0.8, np.exp(-(TIME - 0.8) / 0.1), 0) * np.sin(150 * TIME), id="ring-down"),
+        pytest.param(1e-6 * np.where(TIME < 0.6, 1.0, 0.0) * np.sin(170 * TIME), id="ends within the motion"),
+        pytest.param(0.3e-6 * np.exp(-TIME), id="creep"),
+        pytest.param(1e-9 * np.sin(170 * TIME), id="digits"),
+    ],
+)
+def test_what_is_no_line_from_outside(added: Array) -> None:
+    """The record stays as it is where either side does not predict the other."""
+    each = record(added)
+    clean, lines = without_outside(each)
+    assert lines == ()
+    assert clean is each

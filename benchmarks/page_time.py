@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 from feedsim import cosim, nc, scenario  # noqa: E402
+from feedsim.judge import judged  # noqa: E402
 from feedsim.page import html  # noqa: E402
 from feedsim.page.content import content  # noqa: E402
 from feedsim.page.scripts import computing  # noqa: E402
@@ -77,7 +78,7 @@ def against_native(given: Any, program: Any, data: Any, folder: Path) -> tuple[l
     server.stdout.readline()
     native, page = [], []
     for _ in range(ROUNDS + 3):
-        native.append(cosim.run(given, program=program, native=True).wall_time)
+        native.append(judged(cosim.run(given, program=program, native=True)).wall_time)
         server.stdin.write("\n")
         server.stdin.flush()
         page.append(float(server.stdout.readline()))
@@ -91,7 +92,7 @@ def in_browser(given: Any, program: Any, folder: Path) -> None:
     from playwright.sync_api import sync_playwright
 
     file = folder / "page.html"
-    html.write(cosim.run(given, program=program), file)
+    html.write(judged(cosim.run(given, program=program)), file)
     with sync_playwright() as api:
         chromium = shutil.which("chromium") or shutil.which("chromium-browser")
         browser = api.chromium.launch(executable_path=chromium, args=["--headless", "--no-sandbox", "--disable-gpu"])

@@ -134,10 +134,11 @@ def main() -> int:
     from feedsim import analysis, cosim, nc, scenario
     from feedsim.cli import main as command
     from feedsim.cosim.system import System
+    from feedsim.judge import judged  # noqa: F401, timed below
     from feedsim.report import run as report
     from feedsim.report.partial import Partial
 
-    of_runs = sys.modules["feedsim.cosim.run"]
+    of_runs = sys.modules["feedsim.judge.run"]
     for home, name, part in (
         (scenario, "load", "read"), (nc, "plan", "plan"), (System, "__init__", "open"),
         (System, "initialise", "initialise"), (of_runs, "pose_use", "pose"), (Partial, "__call__", "rows"),

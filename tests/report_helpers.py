@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from feedsim.cosim import PoseUse
 from feedsim.cosim.loads import Work
+from feedsim.judge import PoseUse
 from feedsim.motions import Circle, Dwell, Move
 from feedsim.nc import Program, plan
 from feedsim.scenario import CircleTest, Positioning, Scenario

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from feedsim import cosim, scenario, ssp
-from feedsim.cosim import Run
+from feedsim.judge import JudgedRun, judged
 
 ROOT = Path(__file__).resolve().parents[1]
 STRUCTURE = "SystemStructure.ssd"
@@ -40,10 +40,10 @@ def export_short(folder: Path, fmus: Path) -> Path:
     return out
 
 
-def run_ssp(file: Path, *overrides: str) -> Run:
+def run_ssp(file: Path, *overrides: str) -> JudgedRun:
     """The scenario that an SSP file holds, run on the archives in it."""
     with ssp.opened(file, overrides) as found:
-        return cosim.run(found.scenario, program=found.program, fmus=found.fmus)
+        return judged(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
 
 
 def contents(path: Path) -> dict[str, bytes]:

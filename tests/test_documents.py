@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from feedsim import analysis, cli, cosim, scenario, ssp
+from feedsim.judge import judged
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = sorted(
@@ -75,10 +76,12 @@ def test_commands_of_the_page_on_ssp_files(fmus: Path, tmp_path: Path, monkeypat
 def test_figures_of_the_readme(fmus: Path) -> None:
     """Every number of the README's table of figures, to the digits it is written with."""
     runs = {
-        "Z, ": cosim.run(scenario.load(ROOT / "scenarios" / "z_positioning.yaml"), fmus=fmus),
-        "X-Z": cosim.run(scenario.load(ROOT / "scenarios" / "xz_circle.yaml"), fmus=fmus),
-        "pure": cosim.run(
-            scenario.load(ROOT / "scenarios" / "xz_circle.yaml", ["machine.axes.*.friction.W=0 rad"]), fmus=fmus
+        "Z, ": judged(cosim.run(scenario.load(ROOT / "scenarios" / "z_positioning.yaml"), fmus=fmus)),
+        "X-Z": judged(cosim.run(scenario.load(ROOT / "scenarios" / "xz_circle.yaml"), fmus=fmus)),
+        "pure": judged(
+            cosim.run(
+                scenario.load(ROOT / "scenarios" / "xz_circle.yaml", ["machine.axes.*.friction.W=0 rad"]), fmus=fmus
+            )
         ),
     }
     found = {name: analysis.evaluate(run) for name, run in runs.items()}

@@ -26,8 +26,9 @@ ORDER = [
     "modal",
     "compare",
     "ssp",
-    "cosim",
+    "judge",
     "linear",
+    "cosim",
     "structure",
     "nc",
     "scenario",
@@ -136,6 +137,15 @@ def test_imports_point_downwards(file: Path) -> None:
         parts = name.split(".")
         if parts[0] == "feedsim" and len(parts) > 1 and parts[1] in ORDER:
             assert ORDER.index(parts[1]) >= ORDER.index(room), f"{file} imports upwards: {name}"
+
+
+def test_a_run_judges_nothing() -> None:
+    """Simulating takes a table of modes, and packs a machine: no structure is solved, no loop is closed."""
+    allowed = {f"feedsim.structure.{file}" for file in ("assembly", "modes", "pack", "poses_file")}
+    for name, file in MODULES.items():
+        if name.startswith("feedsim.cosim"):
+            taken = {module_of(other) for other in imported(file.read_text()) if other.startswith("feedsim.structure")}
+            assert taken <= allowed, f"{file} takes more of a structure than its modes"
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))

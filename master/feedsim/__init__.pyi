@@ -2,7 +2,6 @@
 
 from feedsim.analysis.evaluate import evaluate as evaluate
 from feedsim.analysis.figures import Figure as Figure
-from feedsim.cosim import Run as Run
 from feedsim.errors import FeedsimError as FeedsimError
 from feedsim.errors import InputError as InputError
 from feedsim.errors import OutputError as OutputError
@@ -35,6 +34,7 @@ from feedsim.jobs.tune_compensation import tune_compensation as tune_compensatio
 from feedsim.jobs.tune_drive import tune_drive as tune_drive
 from feedsim.jobs.write_page import write_page as write_page
 from feedsim.jobs.write_ssp import write_ssp as write_ssp
+from feedsim.judge import JudgedRun as Run
 from feedsim.scenario import Machine as Machine
 from feedsim.scenario import Scenario as Scenario
 from feedsim.scenario import load_machine as load_machine

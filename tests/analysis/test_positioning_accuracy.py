@@ -12,6 +12,7 @@ from feedsim.analysis import Accuracy, evaluate, tasks
 from feedsim.cosim import run
 from feedsim.cosim.loads import _random
 from feedsim.errors import InputError
+from feedsim.judge import judged
 from feedsim.motions.positioning_cycle import Visits
 from feedsim.nc import plan
 from feedsim.report.run.report import draw, report_of
@@ -101,7 +102,7 @@ def test_a_cycle_meets_every_target_from_both_sides(tmp_path: Path) -> None:
 def test_without_noise_an_axis_repeats_itself(tmp_path: Path, fmus: Path) -> None:
     """The first run has another past than the others, no more; friction leaves little after 0.2 s.
     Noise of the measuring system is what makes R, then, and it is the same again with the same seed."""
-    still = run(scenario(tmp_path), fmus=fmus)
+    still = judged(run(scenario(tmp_path), fmus=fmus))
     figures = evaluate(still)
     assert figures["Z.R_up"].value < 0.05
     assert figures["Z.R_down"].value < 0.05
@@ -154,7 +155,7 @@ def test_a_load_at_random_has_its_size_and_its_corner() -> None:
 
 def test_the_report_has_the_sheet(tmp_path: Path, fmus: Path) -> None:
     """Every target has its row, the picture every reading, within what is shown at first."""
-    found = run(scenario(tmp_path), fmus=fmus)
+    found = judged(run(scenario(tmp_path), fmus=fmus))
     figures = evaluate(found)
     report = report_of(found, figures, draw(found, figures))
     (sheet_of_scale, sheet_of_tool) = (

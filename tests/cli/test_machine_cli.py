@@ -14,6 +14,7 @@ import yaml
 
 from feedsim import cli, cosim, scenario
 from feedsim.analysis import evaluate
+from feedsim.judge import judged
 from feedsim.structure import read_modes
 from feedsim.structure.table_check import table_mismatch
 
@@ -274,7 +275,7 @@ def test_info_tells_of_a_table_that_is_not_the_structures(machine: Path, capsys:
 
 def test_one_axis_machine_runs(fmus: Path) -> None:
     """Stable, without warnings, and with an overshoot that a positioning table may have."""
-    result = cosim.run(scenario.load(ROOT / "scenarios" / "one_axis.yaml"), fmus=fmus)
+    result = judged(cosim.run(scenario.load(ROOT / "scenarios" / "one_axis.yaml"), fmus=fmus))
     figures = evaluate(result)
     assert result.warnings == ()
     assert figures["X.overshoot"].unit == "um"

@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp
 
-from feedsim import cosim, nc, scenario
+from feedsim import cosim, judge, nc, scenario
 from feedsim.cli import main
-from feedsim.cosim import Run
 from feedsim.cosim.loads import Acting
 from feedsim.cosim.loop import REPORTED_EVERY
 from feedsim.errors import InputError
+from feedsim.judge import JudgedRun, judged
 from feedsim.scenario import Base, load_machine
 from feedsim.scenario.loads import ForceTable, ToolLoad
 
@@ -42,13 +42,13 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def run(file: Path, fmus: Path, *overrides: str, native: bool | None = None) -> Run:
-    return cosim.run(scenario.load(file, list(overrides)), fmus=fmus, native=native)
+def run(file: Path, fmus: Path, *overrides: str, native: bool | None = None) -> JudgedRun:
+    return judged(cosim.run(scenario.load(file, list(overrides)), fmus=fmus, native=native))
 
 
 def warnings_ahead(file: Path, fmus: Path, *overrides: str) -> tuple[str, ...]:
     loaded = scenario.load(file, list(overrides))
-    return cosim.check(loaded, nc.plan(loaded), fmus=fmus)
+    return judge.check(loaded, nc.plan(loaded), fmus=fmus)
 
 
 # --- means over control cycles

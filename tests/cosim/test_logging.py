@@ -13,6 +13,7 @@ from feedsim import cosim, scenario
 from feedsim.cosim import logged
 from feedsim.cosim.recording import recorded_columns
 from feedsim.errors import InputError
+from feedsim.judge import judged
 from feedsim.motions import Move
 from feedsim.motions.constant_speed import Strokes
 from feedsim.report import run as report
@@ -246,7 +247,7 @@ def test_every_recorded_signal_of_an_axis_can_be_logged() -> None:
 def test_a_run_leaves_its_log_and_can_be_logged_again(tmp_path: Path, fmus: Path) -> None:
     settings = "logging: {noise: {i_q: 1 %}, delay: {i_q: 0.3 ms}, quantisation: {x_a: 1 nm}, seed: 5}\n"
     loaded = load(tmp_path, SHORT + settings + "recording: {interval: 125 us}\n")
-    run = cosim.run(loaded, fmus=fmus)
+    run = judged(cosim.run(loaded, fmus=fmus))
     assert run.log is not None
     assert run.fine is not None
     assert run.log.names == ("Z.x_s", "Z.x_a", "Z.n_a", "Z.i_q")
@@ -282,10 +283,10 @@ def test_a_run_leaves_its_log_and_can_be_logged_again(tmp_path: Path, fmus: Path
 
 
 def test_without_logging_nothing_is_logged_and_an_older_log_goes(tmp_path: Path, fmus: Path) -> None:
-    first = cosim.run(load(tmp_path, SHORT + "logging: {}"), fmus=fmus)
+    first = judged(cosim.run(load(tmp_path, SHORT + "logging: {}"), fmus=fmus))
     report.write(first, {}, tmp_path / "out")
     assert (tmp_path / "out" / "log.csv").is_file()
-    run = cosim.run(load(tmp_path, SHORT), fmus=fmus)
+    run = judged(cosim.run(load(tmp_path, SHORT), fmus=fmus))
     assert (run.log, run.fine) == (None, None)
     for name in run.trace:
         np.testing.assert_array_equal(run.trace[name], first.trace[name])
@@ -302,7 +303,7 @@ def test_strokes_through_the_whole_system_show_the_stationary_friction_in_the_lo
         f"name: s\nmachine: {MACHINE}\nmotions:\n  - {{kind: constant_speed, axis: Z, jerk: 10 m/s^3,"
         " speeds: [500 mm/min, 5 m/min]}\nlogging: {}\nrecording: {variables: [Z.x_a]}\n",
     )
-    run = cosim.run(loaded, fmus=fmus)
+    run = judged(cosim.run(loaded, fmus=fmus))
     geometry = run.program.segments[0].geometry
     assert isinstance(geometry, Strokes)
     assert run.log is not None

@@ -15,6 +15,7 @@ from feedsim import cosim, nc, scenario
 from feedsim.cosim import loop, recording
 from feedsim.cosim.unit import Log
 from feedsim.errors import InputError, OutputError, SimulationError
+from feedsim.judge import judged
 from feedsim.motions import circular
 from feedsim.motions.points import Held, Joined
 from feedsim.nc import program, spline
@@ -127,10 +128,10 @@ def test_same_run_stretch_by_stretch(fmus: Path, everything_is_long: None, monke
     )  # fmt: skip
     loaded = scenario.load(CIRCLE, [*SHORT, *settings])
     found: list[Trace] = []
-    runs = [cosim.run(loaded, fmus=fmus, sink=found.append), cosim.run(loaded, fmus=fmus, native=False)]
+    runs = [judged(cosim.run(loaded, fmus=fmus, sink=found.append)), judged(cosim.run(loaded, fmus=fmus, native=False))]
     long_setpoints = nc.plan(loaded)
     monkeypatch.undo()
-    short = cosim.run(loaded, fmus=fmus)
+    short = judged(cosim.run(loaded, fmus=fmus))
     for axis in loaded.machine.axes:
         np.testing.assert_array_equal(long_setpoints.x_s[axis], short.program.x_s[axis])
         np.testing.assert_array_equal(long_setpoints.n_ffw[axis], short.program.n_ffw[axis])
@@ -168,7 +169,7 @@ def test_units_are_asked_for_what_is_recorded_alone(fmus: Path, monkeypatch: pyt
 
 
 def test_residual_is_recorded_where_it_is_asked_for(fmus: Path) -> None:
-    run = cosim.run(scenario.load(CIRCLE, [*SHORT, "recording.variables=['?.residual']"]), fmus=fmus)
+    run = judged(cosim.run(scenario.load(CIRCLE, [*SHORT, "recording.variables=['?.residual']"]), fmus=fmus))
     assert list(run.trace) == ["X.residual", "Y.residual", "Z.residual"]
     assert run.trace.unit("X.residual") == "J"
     assert run.trace["X.residual"][0] == 0.0
@@ -221,7 +222,7 @@ def test_finished_run_has_no_partial_file(fmus: Path, tmp_path: Path) -> None:
     (tmp_path / "result.partial.csv").write_text("of another run")
     loaded = scenario.load(CIRCLE, [*SHORT])
     with report.growing(tmp_path) as partial:
-        run = cosim.run(loaded, fmus=fmus, sink=partial)
+        run = judged(cosim.run(loaded, fmus=fmus, sink=partial))
         report.write(run, {}, tmp_path, partial)
     assert not partial.path.exists()
     write_csv(tmp_path / "afterwards.csv", run.trace)
@@ -253,7 +254,7 @@ def test_rows_stay_where_results_cannot_be_written(
     for earlier in ("result.csv", "report.html"):
         (tmp_path / earlier).write_text(f"old {earlier}")
     partial = report.growing(tmp_path)
-    run = cosim.run(loaded, fmus=fmus, sink=partial)
+    run = judged(cosim.run(loaded, fmus=fmus, sink=partial))
     _failing(monkeypatch, name, tmp_path, away=away)
     with replacing(), pytest.raises(OutputError, match="Permission denied"), partial:
         report.write(run, {}, tmp_path, partial)

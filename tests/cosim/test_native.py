@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from feedsim import cosim, nc, scenario
-from feedsim.cosim import Run, exchange
+from feedsim.cosim import exchange
 from feedsim.cosim.excite import measure, usual_rms
 from feedsim.cosim.loop import REPORTED_EVERY, Loop, Progress
 from feedsim.cosim.operations import set_real
@@ -26,6 +26,7 @@ from feedsim.cosim.system import System
 from feedsim.cosim.unit import Port
 from feedsim.errors import InputError, SimulationError
 from feedsim.findings import severity
+from feedsim.judge import JudgedRun, judged
 from feedsim.nc.excitation import multisine
 from feedsim.scenario.coupling import SCHEMES
 from feedsim_packager import toolchain
@@ -54,16 +55,16 @@ def folder(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def both(folder: Path, name: str, *overrides: str, **options: Any) -> tuple[Run, Run]:
+def both(folder: Path, name: str, *overrides: str, **options: Any) -> tuple[JudgedRun, JudgedRun]:
     loaded = scenario.load(SCENARIOS / f"{name}.yaml", list(overrides))
-    native = cosim.run(loaded, fmus=folder, native=True, **options)
-    python = cosim.run(loaded, fmus=folder, native=False, **options)
+    native = judged(cosim.run(loaded, fmus=folder, native=True, **options))
+    python = judged(cosim.run(loaded, fmus=folder, native=False, **options))
     assert native.native
     assert not python.native
     return native, python
 
 
-def assert_same(native: Run, python: Run) -> None:
+def assert_same(native: JudgedRun, python: JudgedRun) -> None:
     for one, other in ((native.trace, python.trace), (native.fine, python.fine), (native.log, python.log)):
         assert (one is None) == (other is None)
         if one is None or other is None:
@@ -166,7 +167,7 @@ def test_failed_step_is_told_alike(substeps: int, folder: Path) -> None:
     overrides = [f"machine.axes.Z.drive.{e}" for e in ("K_p=1e300 N.m.s/rad", "M_max=1e308 N.m", "u_max=1e308 V")]
     overrides += [*SHORT["z_positioning"], "machine.axes.Z.drive.ideal_current_loop=true"]
     loaded = scenario.load(SCENARIOS / "z_positioning.yaml", [*overrides, f"coupling.substeps={substeps}"])
-    native, python = messages(lambda native: cosim.run(loaded, fmus=folder, native=native), SimulationError)
+    native, python = messages(lambda native: judged(cosim.run(loaded, fmus=folder, native=native)), SimulationError)
     assert native == python
     assert "s failed: " in native
 
@@ -245,13 +246,13 @@ def with_library(folder: Path, tmp_path: Path, content: bytes | None) -> Path:
     return tmp_path
 
 
-def run_short(folder: Path, **options: Any) -> Run:
+def run_short(folder: Path, **options: Any) -> JudgedRun:
     """With the archives of `folder`, which is the folder of the built ones as well."""
     loaded = scenario.load(
         SCENARIOS / "z_positioning.yaml", ["motions=[{kind: dwell, duration: 20 ms}]", "evaluate=[]"]
     )
     with patch.dict(os.environ, FEEDSIM_FMUS=str(folder)):
-        return cosim.run(loaded, **options)
+        return judged(cosim.run(loaded, **options))
 
 
 def test_archives_from_elsewhere_use_the_built_loop(folder: Path, tmp_path: Path) -> None:
@@ -263,7 +264,7 @@ def test_archives_from_elsewhere_use_the_built_loop(folder: Path, tmp_path: Path
         assert cosim.run(loaded, fmus=with_library(folder, tmp_path, None)).native
 
 
-def told_of_loop(run: Run) -> list[str]:
+def told_of_loop(run: JudgedRun) -> list[str]:
     return [each for each in run.warnings if "cycle loop ran in Python" in each]
 
 

@@ -10,8 +10,9 @@ import pytest
 
 from feedsim import load_scenario, nc
 from feedsim.cli import main
-from feedsim.cosim import Run, check, executed, run
+from feedsim.cosim import executed, run
 from feedsim.errors import InputError
+from feedsim.judge import JudgedRun, check, judged
 from feedsim.scenario.coupling import SCHEMES
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
@@ -27,15 +28,15 @@ CASES = {
 }
 
 
-def both(scenario: str, *changes: str, native: bool | None = None) -> tuple[Run, Run]:
+def both(scenario: str, *changes: str, native: bool | None = None) -> tuple[JudgedRun, JudgedRun]:
     file = SCENARIOS / f"{scenario}.yaml"
     apart = load_scenario(file, changes)
     program = nc.plan(apart)
     one = load_scenario(file, [*changes, ONE])
-    return run(apart, program=program, native=native), run(one, program=program, native=native)
+    return judged(run(apart, program=program, native=native)), judged(run(one, program=program, native=native))
 
 
-def assert_same(apart: Run, one: Run) -> None:
+def assert_same(apart: JudgedRun, one: JudgedRun) -> None:
     assert [*one.trace.columns] == [*apart.trace.columns]
     for name in apart.trace.columns:
         np.testing.assert_array_equal(one.trace[name], apart.trace[name], err_msg=name)
@@ -76,7 +77,7 @@ def test_loads_logs_and_feedforward() -> None:
     apart, one = (load_scenario(SCENARIOS / "z_positioning.yaml", [*changes, *more]) for more in ((), (ONE,)))
     program = nc.plan(apart)
     torque = {"Z": np.sin(np.arange((len(program.time) - 1) * 8 + 1) * 0.01)}
-    found = [run(each, program=program, torque_feedforward=torque) for each in (apart, one)]
+    found = [judged(run(each, program=program, torque_feedforward=torque)) for each in (apart, one)]
     assert_same(*found)
     assert found[1].loads[0].given > 0
     for log in ("fine", "log"):
@@ -104,9 +105,9 @@ def test_a_plant_that_follows_its_axes(tmp_path: Path) -> None:
 )
 def test_what_cannot_be_followed_from_outside_is_refused(changes: tuple[str, ...], told: str) -> None:
     plan = load_scenario(SCENARIOS / "z_positioning.yaml", [*SHORT, *changes, ONE])
-    for judged in (run, lambda each: check(each, nc.plan(each))):
+    for refused in (run, lambda each: check(each, nc.plan(each))):
         with pytest.raises(InputError, match=told):
-            judged(plan)
+            refused(plan)
 
 
 def test_what_the_unit_says_is_told_with_the_part() -> None:

@@ -23,10 +23,10 @@ from fmpy.fmi2 import (
 from fmpy.model_description import ModelDescription
 
 from feedsim import load_scenario
-from feedsim.cosim import Run
 from feedsim.cosim.one_unit import pack_whole
 from feedsim.cosim.run import run
 from feedsim.errors import InputError
+from feedsim.judge import JudgedRun, judged
 from feedsim.nc import Program, plan
 from feedsim.scenario import Scenario
 from feedsim.scenario.coupling import SCHEMES
@@ -42,7 +42,7 @@ class Packed:
     """A scenario, its run by the master at the control cycle, and the same as one unit."""
 
     scenario: Scenario
-    result: Run
+    result: JudgedRun
     archive: Path
 
     @property
@@ -61,7 +61,7 @@ def packed(folder: Path, fmus: Path, name: str, *changes: str) -> Packed:
     program = plan(scenario)
     archive = folder / "machine.fmu"
     pack_whole(fmus / "machine.fmu", archive, scenario.machine, coupling=scenario.coupling, program=program)
-    return Packed(scenario, run(scenario, program=program, fmus=fmus), archive)
+    return Packed(scenario, judged(run(scenario, program=program, fmus=fmus)), archive)
 
 
 def callbacks(said: list[str]) -> fmi2CallbackFunctions:

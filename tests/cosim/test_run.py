@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim, nc, scenario
-from feedsim.cosim import Run, unpacked
+from feedsim import cosim, judge, nc, scenario
+from feedsim.cosim import unpacked
 from feedsim.cosim.operations import Interpreter, do_step
 from feedsim.cosim.system import System
 from feedsim.cosim.unpacked import STORE
 from feedsim.errors import InputError, SimulationError
+from feedsim.judge import JudgedRun, judged
 from feedsim.scenario.coupling import SCHEMES
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
@@ -36,8 +37,8 @@ def short(tmp_path: Path) -> Path:
     return file
 
 
-def run(file: Path, fmus: Path, *overrides: str) -> Run:
-    return cosim.run(scenario.load(file, list(overrides)), fmus=fmus)
+def run(file: Path, fmus: Path, *overrides: str) -> JudgedRun:
+    return judged(cosim.run(scenario.load(file, list(overrides)), fmus=fmus))
 
 
 def test_two_runs_are_bit_identical(short: Path, fmus: Path) -> None:
@@ -113,7 +114,7 @@ def test_unit_that_refuses_its_parameters_is_named(short: Path, fmus: Path) -> N
     with pytest.raises(InputError, match=r"unit controller_Z refuses its parameters: filter_1\.f = 5000 Hz"):
         cosim.run(with_filter_beyond_nyquist(short), fmus=fmus)
     with pytest.raises(InputError, match=r"unit controller_Z refuses its parameters: filter_1\.f = 5000 Hz"):
-        cosim.check(with_filter_beyond_nyquist(short), nc.plan(scenario.load(short)), fmus=fmus)
+        judge.check(with_filter_beyond_nyquist(short), nc.plan(scenario.load(short)), fmus=fmus)
 
 
 def test_failed_step_names_unit_time_and_reason(short: Path, fmus: Path) -> None:
@@ -205,7 +206,7 @@ def test_what_stays_behind_is_used_again_and_goes_when_told(
 def test_warnings_that_need_no_run_come_before_it(short: Path, fmus: Path) -> None:
     def foreseen(*overrides: str) -> tuple[str, ...]:
         loaded = scenario.load(short, list(overrides))
-        return cosim.check(loaded, nc.plan(loaded), fmus=fmus)
+        return judge.check(loaded, nc.plan(loaded), fmus=fmus)
 
     assert foreseen() == ()
     (stability,) = foreseen("machine.axes.Z.friction.sigma_1=60 N.m.s/rad")

@@ -20,6 +20,7 @@ from command_helpers import feedsim, feedsim_process
 from feedsim import cosim, scenario
 from feedsim.cosim import worker
 from feedsim.errors import SimulationError
+from feedsim.judge import judged
 from feedsim.report import run as report
 from feedsim.trace import read_csv
 from feedsim_packager import toolchain
@@ -174,7 +175,7 @@ with open(sys.argv[3], "wb") as file:
 
 def test_healthy_units_give_the_same_bits_here_and_in_a_worker(place: Callable[[str], Path], fmus: Path) -> None:
     folder, healthy = place("crash"), "machine.axes.X.friction.parameters.At=1000"
-    watched = cosim.run(scenario.load(folder / "s.yaml", [healthy]), fmus=fmus)
+    watched = judged(cosim.run(scenario.load(folder / "s.yaml", [healthy]), fmus=fmus))
     environment = {**os.environ, "FEEDSIM_FMUS": str(fmus), "PYTHONPATH": str(ROOT / "master")}
     command = [sys.executable, "-c", HERE, str(folder / "s.yaml"), healthy, str(folder / "here.pickle")]
     subprocess.run(command, env=environment, check=True)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from feedsim import cosim, scenario, ssp
-from feedsim.cosim import Run
 from feedsim.errors import InputError
+from feedsim.judge import JudgedRun, judged
 from foreign import acme
 from foreign.conftest import Libraries
 from foreign.test_foreign_units import MOTION, mapped, other_name, renamed, settings_of
@@ -43,7 +43,7 @@ def warnings_of(file: Path) -> str:
         return "\n".join(found.warnings)
 
 
-def same(one: Run, other: Run) -> bool:
+def same(one: JudgedRun, other: JudgedRun) -> bool:
     assert list(one.trace) == list(other.trace)
     return all(np.array_equal(one.trace[name], other.trace[name]) for name in one.trace)
 
@@ -63,7 +63,7 @@ def test_another_makers_units_travel_along(acme_ssp: Path, fmus: Path) -> None:
     assert 'endConnector="PosActual"' in text
     assert '<ssd:Connector name="PosActual" kind="input">' in text
     assert 'name="Coulomb"' in files["resources/friction_X.ssv"].decode()
-    assert same(run_ssp(acme_ssp), cosim.run(scenario.load(acme_ssp.with_name("s.yaml")), fmus=fmus))
+    assert same(run_ssp(acme_ssp), judged(cosim.run(scenario.load(acme_ssp.with_name("s.yaml")), fmus=fmus)))
 
 
 def test_a_plain_file_whose_drive_is_not_ours(acme_ssp: Path, tmp_path: Path) -> None:
@@ -220,4 +220,4 @@ def test_units_that_declare_no_units_of_measurement(libraries: Libraries, fmus: 
         content for name, content in contents(tmp_path / "s.ssp").items() if name.endswith((".ssd", ".ssv"))
     )
     assert b'unit="1"' not in written
-    assert same(run_ssp(tmp_path / "s.ssp"), cosim.run(plan, fmus=fmus))
+    assert same(run_ssp(tmp_path / "s.ssp"), judged(cosim.run(plan, fmus=fmus)))

@@ -12,11 +12,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from feedsim import cosim, scenario
-from feedsim.cosim import Run
+from feedsim import cosim, judge, scenario
 from feedsim.cosim.archive import Archive
 from feedsim.cosim.roles import start_value
 from feedsim.errors import InputError, SimulationError
+from feedsim.judge import JudgedRun, judged
 from feedsim.scenario.study import load_study
 from foreign import acme
 from foreign.conftest import Libraries
@@ -75,7 +75,7 @@ def friction(n: Floats | float) -> Any:
     return 0.0085 * np.tanh(n / (25 * RPM)) + 0.003 * NMM / RPM * n
 
 
-def held(run: Run, substeps: int) -> dict[str, Floats]:
+def held(run: JudgedRun, substeps: int) -> dict[str, Floats]:
     """The motion where friction is held over an exchange step: a rigid axis under a constant torque, in closed form."""
     machine = run.scenario.machine
     axis, T_c = machine.axes["X"], machine.cycles.T_c
@@ -96,7 +96,7 @@ def held(run: Run, substeps: int) -> dict[str, Floats]:
     return dict(zip(("X.x_a", "X.n_a", "X.M_a", "X.M_fr"), columns, strict=True))
 
 
-def exact(run: Run) -> Floats:
+def exact(run: JudgedRun) -> Floats:
     """The position where friction acts at every instant, by an adaptive integration."""
     machine = run.scenario.machine
     axis, T_c, J = machine.axes["X"], machine.cycles.T_c, 1 / 257.70868327312286**2
@@ -117,7 +117,9 @@ def exact(run: Run) -> Floats:
 def test_the_motion_is_that_of_the_two_laws(units: Path, fmus: Path, substeps: int, native: bool) -> None:
     """Rounding alone is between the two: 500 cycles of some 30 operations, each within 1.1e-16, in a loop that forgets
     within 50 ms, leave below 1e-12 of the largest value."""
-    done = cosim.run(scenario.load(units / "s.yaml", mapped(units, substeps=substeps)), fmus=fmus, native=native)
+    done = judged(
+        cosim.run(scenario.load(units / "s.yaml", mapped(units, substeps=substeps)), fmus=fmus, native=native)
+    )
     for name, wanted in held(done, substeps).items():
         assert np.max(np.abs(wanted)) > 0
         assert np.allclose(done.trace[name], wanted, rtol=0, atol=1e-12 * np.max(np.abs(wanted))), name
@@ -127,7 +129,7 @@ def test_the_exchange_is_of_first_order(units: Path, fmus: Path) -> None:
     """Against friction that acts at every instant: halving the exchange step halves the error."""
     errors = []
     for substeps in (4, 8, 16):
-        done = cosim.run(scenario.load(units / "s.yaml", mapped(units, substeps=substeps)), fmus=fmus)
+        done = judged(cosim.run(scenario.load(units / "s.yaml", mapped(units, substeps=substeps)), fmus=fmus))
         errors.append(float(np.max(np.abs(done.trace["X.x_a"] - exact(done)))))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - 1) < 0.1), (errors, orders)
@@ -136,7 +138,7 @@ def test_the_exchange_is_of_first_order(units: Path, fmus: Path) -> None:
 def test_what_is_recorded_and_told(units: Path, fmus: Path) -> None:
     """Columns are in SI units; what stands for no variable is no column; a run says what it cannot know, once."""
     loaded = scenario.load(units / "s.yaml", [*mapped(units), "recording.variables=null"])
-    done = cosim.run(loaded, fmus=fmus)
+    done = judged(cosim.run(loaded, fmus=fmus))
     own = [name for name in done.trace if name.startswith("X.")]
     assert own == [f"X.{each}" for each in ("x_s", "n_ffw", "x_a", "n_a", "M_a", "n_s", "torque_limited", "M_fr")]
     assert [done.trace.unit(f"X.{name}") for name in ("M_a", "n_s", "M_fr")] == ["N.m", "rad/s", "N.m"]
@@ -154,7 +156,7 @@ def test_what_is_recorded_and_told(units: Path, fmus: Path) -> None:
 
 def test_a_limit_of_another_drive_is_told(units: Path, fmus: Path) -> None:
     settings = [*mapped(units), "machine.axes.X.drive.parameters.Limit=30", "recording.variables=[X.x_a]"]
-    done = cosim.run(scenario.load(units / "s.yaml", settings), fmus=fmus)
+    done = judged(cosim.run(scenario.load(units / "s.yaml", settings), fmus=fmus))
     assert any("axis X: torque limited in" in warning for warning in done.warnings)
 
 
@@ -170,11 +172,12 @@ def test_an_input_that_no_signal_is_given_to_can_be_held(units: Path, fmus: Path
     by = {}
     for value in ("50", "'0.5'", "'50 %'"):
         settings = [*mapped(units), f"machine.axes.X.drive.parameters.Override={value}"]
-        by[value] = cosim.run(scenario.load(units / "s.yaml", settings), fmus=fmus)
+        by[value] = judged(cosim.run(scenario.load(units / "s.yaml", settings), fmus=fmus))
         assert not any("Override" in warning for warning in by[value].warnings)
     assert all(np.array_equal(by["50"].trace["X.x_a"], other.trace["X.x_a"]) for other in by.values())
     assert not np.array_equal(
-        by["50"].trace["X.n_a"], cosim.run(scenario.load(units / "s.yaml", mapped(units)), fmus=fmus).trace["X.n_a"]
+        by["50"].trace["X.n_a"],
+        cosim.run(scenario.load(units / "s.yaml", mapped(units)), fmus=fmus).trace["X.n_a"],
     )
 
 
@@ -238,7 +241,7 @@ def test_a_shipped_unit_under_other_names_gives_the_same_bits(
     plain = scenario.load(file)
     copies = {kind: renamed(fmus, tmp_path, kind) for kind in kinds}
     settings = settings_of(plain, "Z", copies.get("controller"), copies.get("friction"))
-    one, other = cosim.run(plain, fmus=fmus), cosim.run(scenario.load(file, settings), fmus=fmus)
+    one, other = judged(cosim.run(plain, fmus=fmus)), judged(cosim.run(scenario.load(file, settings), fmus=fmus))
     assert list(one.trace) == list(other.trace)
     for name in one.trace:
         assert one.trace.unit(name) == other.trace.unit(name)
@@ -251,8 +254,8 @@ def test_every_scheme_serves_a_unit_that_can_do_all(fmus: Path, tmp_path: Path, 
     file = short_scenario(tmp_path, text=SHORT)
     settings = settings_of(scenario.load(file), "Z", None, renamed(fmus, tmp_path, "friction"))
     chosen = f"coupling.scheme={scheme}"
-    one = cosim.run(scenario.load(file, [chosen]), fmus=fmus)
-    other = cosim.run(scenario.load(file, [chosen, *settings]), fmus=fmus)
+    one = judged(cosim.run(scenario.load(file, [chosen]), fmus=fmus))
+    other = judged(cosim.run(scenario.load(file, [chosen, *settings]), fmus=fmus))
     assert all(np.array_equal(one.trace[name], other.trace[name]) for name in one.trace)
 
 
@@ -260,7 +263,7 @@ def test_every_scheme_serves_a_unit_that_can_do_all(fmus: Path, tmp_path: Path, 
 def test_a_scheme_that_does_not_serve_is_refused_with_those_that_do(units: Path, fmus: Path, scheme: str) -> None:
     loaded = scenario.load(units / "s.yaml", [*mapped(units), f"coupling.scheme={scheme}"])
     with pytest.raises(InputError) as caught:
-        cosim.check(loaded, cosim_program(loaded), fmus=fmus)
+        judge.check(loaded, cosim_program(loaded), fmus=fmus)
     assert f"axis X: friction acme_friction.fmu: coupling scheme {scheme} does not work with it" in str(caught.value)
     assert "extrapolated, gauss_seidel, gauss_seidel_friction_first, jacobi, parallel" in str(caught.value)
 

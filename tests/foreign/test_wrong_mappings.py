@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from feedsim import cosim, nc, scenario
+from feedsim import judge, nc, scenario
 from feedsim.errors import InputError
 from foreign import acme
 from foreign.conftest import Libraries
@@ -44,7 +44,7 @@ def refusal(folder: Path, fmus: Path, drive: Mapping[str, Any], friction: Mappin
     file.write_text(file.read_text(encoding="utf-8") + f"set:\n{named}", encoding="utf-8")
     try:
         loaded = scenario.load(file)
-        cosim.check(loaded, nc.plan(loaded), fmus=fmus)
+        judge.check(loaded, nc.plan(loaded), fmus=fmus)
     except InputError as error:
         return str(error)
     pytest.fail("nothing was refused")
@@ -145,7 +145,7 @@ def test_an_archive_that_allows_one_instance(fmus: Path, libraries: Libraries, t
     with pytest.raises(
         InputError, match="allows one instance in a process; it is named as friction of X, friction of Z"
     ):
-        cosim.check(loaded, nc.plan(loaded), fmus=fmus)
+        judge.check(loaded, nc.plan(loaded), fmus=fmus)
 
 
 def test_a_unit_without_units_is_taken_to_be_in_si(fmus: Path, libraries: Libraries, tmp_path: Path) -> None:
@@ -155,7 +155,7 @@ def test_a_unit_without_units_is_taken_to_be_in_si(fmus: Path, libraries: Librar
         ROOT / "scenarios" / "z_positioning.yaml",
         [f"machine.axes.Z.friction={ {**acme.MAPPED_FRICTION, 'fmu': str(fmu)} }"],
     )
-    told = cosim.check(loaded, nc.plan(loaded), fmus=fmus)
+    told = judge.check(loaded, nc.plan(loaded), fmus=fmus)
     assert any("bare.fmu: modelDescription.xml gives no unit for Speed (rad/s), Torque (N.m)" in each for each in told)
 
 

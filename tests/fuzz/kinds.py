@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from feedsim import cosim, scenario, ssp, trace
+from feedsim import judge, scenario, ssp, trace
 from feedsim.analysis import check as check_evaluation
 from feedsim.cosim.archive import Archive, folders
 from feedsim.cosim.roles import foreign
@@ -80,7 +80,7 @@ class _Names:
 def _judge(path: Path) -> None:
     with ssp.opened(path) as found:
         check_evaluation(found.scenario, found.program)
-        cosim.check(found.scenario, found.program, fmus=found.fmus)
+        judge.check(found.scenario, found.program, fmus=found.fmus)
 
 
 def _poses(path: Path) -> None:

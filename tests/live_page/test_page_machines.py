@@ -11,6 +11,7 @@ import pytest
 from feedsim import cli, cosim, nc, scenario
 from feedsim.cosim import fmus_directory
 from feedsim.errors import InputError
+from feedsim.judge import judged
 from feedsim.page import module, write
 from feedsim.page.content import content
 from live_page.test_page_numbers import SAME, settings
@@ -47,7 +48,7 @@ def test_machines_of_other_axes_compute_a_run(name: str, tmp_path: Path) -> None
     state = [knob["value"] for knob in data["knobs"]]
     page = answers(data, [{"state": state, "keep": keep}], tmp_path)[0]
     assert "problem" not in page
-    run = cosim.run(given, program=program)
+    run = judged(cosim.run(given, program=program))
     for column in keep:
         assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= SAME
         assert np.ptp(run.trace[column]) >= 0
@@ -77,7 +78,7 @@ def test_a_plant_that_follows_its_pose_is_computed_and_its_end_is_said(tmp_path:
     data = content(given, program).data
     state = [knob["value"] for knob in data["knobs"]]
     page = answers(data, [{"state": state, "keep": ["Z.x_a"]}], tmp_path)[0]
-    run = cosim.run(given, program=program)
+    run = judged(cosim.run(given, program=program))
     assert np.abs(np.array(page["trace"]["Z.x_a"]) - run.trace["Z.x_a"]).max() <= SAME
     assert any("leaves the plant's grid of poses" in warning for warning in run.warnings)
     assert sorted(page["warnings"]) == sorted(map(str, run.warnings))
@@ -88,7 +89,7 @@ def test_a_page_that_is_too_large_is_refused_with_its_size(tmp_path: Path, monke
     out = tmp_path / "page.html"
     given = scenario.load(SCENARIOS / "one_axis.yaml")
     with pytest.raises(InputError, match=r"its page takes 0\.\d+ MB; allowed are 0\.2 MB"):
-        write(cosim.run(given), out)
+        write(judged(cosim.run(given)), out)
     assert not out.exists()
 
 
@@ -109,7 +110,7 @@ def test_effects_are_knobs_whether_the_machine_has_them_or_not(tmp_path: Path) -
     assert len(state) == len(wanted)
     keep = ["X.x_a", "tcp.x_X"]
     page = answers(data, [{"state": state, "keep": keep}], tmp_path)[0]
-    run = cosim.run(scenario.load(file, [*indirect, *settings(data, state)]))
+    run = judged(cosim.run(scenario.load(file, [*indirect, *settings(data, state)])))
     for column in keep:
         assert np.abs(np.array(page["trace"][column]) - run.trace[column]).max() <= SAME
     assert sorted(page["warnings"]) == sorted(map(str, run.warnings))

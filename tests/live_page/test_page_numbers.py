@@ -19,6 +19,7 @@ from feedsim.analysis.circle import answer, swinging
 from feedsim.analysis.evaluate import diagnoses, doubts
 from feedsim.cosim import fmus_directory
 from feedsim.errors import FeedsimError
+from feedsim.judge import judged
 from feedsim.linear.loops import position_gain
 from feedsim.linear.margins import grid, margins
 from feedsim.linear.system import LinearSystem
@@ -101,7 +102,7 @@ def expected(name: str) -> tuple[dict[str, Any], list[Expected]]:
         try:
             asked = scenario.load(SCENARIOS / f"{name}.yaml", changes)
             program = nc.plan(asked)
-            run = cosim.run(asked, program=program)
+            run = judged(cosim.run(asked, program=program))
             moved = [axis for axis in asked.machine.axes if any(axis in motion.axes for motion in asked.motions)]
             positions = {f"{axis}.x_a": np.array(run.trace[f"{axis}.x_a"]) for axis in moved}
             warnings = tuple(sorted(map(str, run.warnings)))
@@ -181,7 +182,7 @@ def test_random_states_in_a_browser(browser: Any, name: str, tmp_path: Path) -> 
 def test_a_page_in_firefox_is_a_run(firefox: Firefox, files: dict[str, Path]) -> None:
     for name, file in files.items():
         firefox.open(file)
-        run = cosim.run(scenario.load(SCENARIOS / f"{name}.yaml"))
+        run = judged(cosim.run(scenario.load(SCENARIOS / f"{name}.yaml")))
         figures = evaluate(run)
         for key, text in firefox.run(FIGURES):
             if text == "not determined":

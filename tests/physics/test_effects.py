@@ -15,8 +15,8 @@ from plant_unit import write_modes
 from feedsim import cosim, scenario
 from feedsim.analysis.compensation import compensate
 from feedsim.analysis.evaluate import evaluate
-from feedsim.cosim import Run
 from feedsim.errors import InputError
+from feedsim.judge import JudgedRun, judged
 from feedsim.nc import plan
 from fmi_helpers import Archive
 
@@ -26,7 +26,7 @@ Z = "machine.axes.Z.drive"
 PITCH, AXES = 0.020, ("X", "Z")
 T_C = 125e-6
 
-Driven = Callable[..., Run]
+Driven = Callable[..., JudgedRun]
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +34,9 @@ def moved(fmus: Path) -> Driven:
     """Z over 100 mm at 5000 mm/min, recorded at every control cycle."""
 
     @cache
-    def run(*overrides: str) -> Run:
+    def run(*overrides: str) -> JudgedRun:
         path = SCENARIOS / "z_positioning.yaml"
-        return cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus)
+        return judged(cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus))
 
     return run
 
@@ -48,7 +48,7 @@ def order_of(values: Array, angle: Array, order: float) -> complex:
     return complex(a, b)
 
 
-def turned(run: Run, axis: str) -> Array:
+def turned(run: JudgedRun, axis: str) -> Array:
     """Angle of the motor since the start [rad], speed linear between the rows."""
     n = run.trace[f"{axis}.n_a"]
     return np.concatenate([[0.0], np.cumsum(np.diff(run.trace.time) * (n[1:] + n[:-1]) / 2)])
@@ -168,14 +168,14 @@ def circle(fmus: Path) -> Driven:
     """A circle of X and Z, recorded at every control cycle."""
 
     @cache
-    def run(*overrides: str) -> Run:
+    def run(*overrides: str) -> JudgedRun:
         path = SCENARIOS / "xz_circle.yaml"
-        return cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus)
+        return judged(cosim.run(scenario.load(path, ["recording.interval=125 us", *overrides]), fmus=fmus))
 
     return run
 
 
-def ways(run: Run) -> dict[str, Array]:
+def ways(run: JudgedRun) -> dict[str, Array]:
     """Ways of the slides since the start [m]."""
     return {axis: run.trace[f"{axis}.x_a"] - run.trace[f"{axis}.x_a"][0] for axis in ("X", "Y", "Z")}
 

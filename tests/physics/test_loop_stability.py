@@ -11,6 +11,7 @@ import pytest
 from feedsim import cosim, nc, scenario
 from feedsim.analysis.linear import LinearSystem, unstable_poles
 from feedsim.errors import InputError
+from feedsim.judge import check, judged
 from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.scenario import Friction, Scenario, load_subject
 from feedsim.structure import Modes, checked_modes
@@ -157,8 +158,8 @@ SAID = {
 @pytest.mark.parametrize("gain", SAID)
 def test_runs_say_so_and_blame_no_coupling(gain: str, tmp_path: Path) -> None:
     plan = scenario.load(MACHINES.parent / "z_positioning.yaml", [f"machine.axes.Z.drive.K_v={gain}"])
-    ahead = cosim.check(plan, nc.plan(plan))
-    told = cosim.run(plan).warnings
+    ahead = check(plan, nc.plan(plan))
+    told = judged(cosim.run(plan)).warnings
     expected = SAID[gain]
     if expected is None:
         assert told == ahead == ()
@@ -174,7 +175,7 @@ def test_axes_that_rest_are_judged_at_rest(tmp_path: Path) -> None:
     gain = "machine.axes.Z.drive.K_v=29 (m/min)/mm"
     for state, severity in (("moving", "Wrong"), ("at rest", "str")):
         plan = planned(tmp_path, "Z", state, gain)
-        assert type(cosim.check(plan, nc.plan(plan))[0]).__name__ == severity
+        assert type(check(plan, nc.plan(plan))[0]).__name__ == severity
 
 
 def test_loops_that_are_kept_know_all_that_they_depend_on() -> None:

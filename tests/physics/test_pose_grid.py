@@ -16,7 +16,7 @@ import pose_reference
 import pytest
 from numpy.typing import NDArray
 
-from feedsim import cosim
+from feedsim import judge
 from feedsim.scenario import Machine
 from feedsim.scenario.structure.geometry import GeometryStructure
 from feedsim.scenario.structure.load import load_structure
@@ -35,7 +35,7 @@ class Case:
     machine: Machine
     plants: Mapping[int, Path]
     recorded: study.Recorded
-    run: cosim.Run
+    run: judge.JudgedRun
     errors: Mapping[int, Mapping[str, float]]
     driven: Mapping[int, study.Driven]
     check: Mapping[str, float]

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feedsim import cosim
+from feedsim import cosim, judge
 from feedsim.cli import main
 from feedsim.errors import InputError
+from feedsim.judge import judged
 from feedsim.motions import Dwell, Move
 from feedsim.report import run as report
 from feedsim.report.page import html
@@ -123,7 +124,7 @@ def test_poses_that_are_not_known_are_said_to_be_so(structure: Path | None, reas
     assert change.axes[0].distance == pytest.approx(0.585)
     assert not change.axes[0].modes
     assert not warnings(change)
-    text = html(report_of(replace(positioning_run(), pose=cosim.PoseUse(change)), {}, []))
+    text = html(report_of(replace(positioning_run(), pose=judge.PoseUse(change)), {}, []))
     assert "How much the modes change is not known" in text
     assert "key structure of the machine file" in text
 
@@ -131,7 +132,7 @@ def test_poses_that_are_not_known_are_said_to_be_so(structure: Path | None, reas
 # --- what is said -----------------------------------------------------------------------------------------------------
 
 
-def part_of(run: cosim.Run) -> Mapping[str, object]:
+def part_of(run: judge.JudgedRun) -> Mapping[str, object]:
     part = json.loads(json.dumps(summary(run, {}, ())))["pose"]
     assert isinstance(part, dict)
     return part
@@ -139,10 +140,10 @@ def part_of(run: cosim.Run) -> Mapping[str, object]:
 
 def test_a_run_with_one_pose(units: Path, tmp_path: Path) -> None:
     plan = scenario(Move(to={"Z": 0.3}, feed=0.5), Dwell(duration=0.05))
-    run = cosim.run(plan)
+    run = judged(cosim.run(plan))
     assert run.pose.crossings is None
     assert sum("axis Z moves 200 mm away" in warning for warning in run.warnings) == 1
-    assert cosim.check(plan, run.program)[-1] in run.warnings
+    assert judge.check(plan, run.program)[-1] in run.warnings
     report.write(run, {}, tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert 'id="pose"' in text
@@ -163,7 +164,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     assert main(arguments) == 0
     assert "follows the pose, 3 cells (3 in Z)" in capsys.readouterr().out
     machine = default_machine().model_copy(update={"plant": plant})
-    run = cosim.run(scenario(Move(to={"Z": 0.23}, feed=0.5), Dwell(duration=0.05), machine=machine))
+    run = judged(cosim.run(scenario(Move(to={"Z": 0.23}, feed=0.5), Dwell(duration=0.05), machine=machine)))
     crossings = run.pose.crossings
     assert crossings is not None
     assert crossings.count == 2
@@ -185,7 +186,7 @@ def test_a_run_that_follows_the_pose(units: Path, tmp_path: Path, capsys: pytest
     ]
     assert isinstance(part["crossings"], dict)
     assert part["crossings"]["count"] == 2
-    far = cosim.run(scenario(Move(to={"Z": 0.4}, feed=0.5), machine=machine))
+    far = judged(cosim.run(scenario(Move(to={"Z": 0.4}, feed=0.5), machine=machine)))
     assert "axis Z leaves the plant's grid of poses (60 mm to 240 mm) by 160 mm" in "\n".join(far.warnings)
 
 

@@ -10,18 +10,18 @@ import pytest
 
 import ssp_helpers
 from feedsim import analysis, cosim, nc, scenario, ssp
-from feedsim.cosim import Run
 from feedsim.findings import Wrong
+from feedsim.judge import JudgedRun, judged
 from feedsim.scenario.structure.load import load_structure
 from feedsim.ssp.opened import Opened
 from ssp_helpers import ROOT, STRUCTURE, edited, run_ssp, short_scenario
 
 
-def run_scenario(file: Path, fmus: Path, *overrides: str) -> Run:
-    return cosim.run(scenario.load(file, overrides), fmus=fmus)
+def run_scenario(file: Path, fmus: Path, *overrides: str) -> JudgedRun:
+    return judged(cosim.run(scenario.load(file, overrides), fmus=fmus))
 
 
-def assert_same(one: Run, other: Run) -> None:
+def assert_same(one: JudgedRun, other: JudgedRun) -> None:
     """To the last bit."""
     assert list(one.trace.columns) == list(other.trace.columns)
     assert np.array_equal(one.trace.time, other.trace.time)

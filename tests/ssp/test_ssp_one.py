@@ -12,6 +12,7 @@ import pytest
 from feedsim import analysis, cosim, scenario, ssp
 from feedsim.cli import main
 from feedsim.errors import InputError
+from feedsim.judge import judged
 from ssp_helpers import STRUCTURE, altered, contents, edited, short_scenario
 
 MACHINE = "resources/machine.fmu"
@@ -26,9 +27,9 @@ def one(short: Path, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 @pytest.mark.parametrize("overrides", [(), ("machine.axes.Z.drive.K_v=50 1/s", "recording.interval=250 us")], ids=str)
 def test_it_runs_as_the_scenario_does(short: Path, one: Path, fmus: Path, overrides: tuple[str, ...]) -> None:
-    here = cosim.run(scenario.load(short, overrides), fmus=fmus)
+    here = judged(cosim.run(scenario.load(short, overrides), fmus=fmus))
     with ssp.opened(one, overrides) as found:
-        there = cosim.run(found.scenario, program=found.program, fmus=found.fmus)
+        there = judged(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
         assert found.told(there.warnings) == here.warnings
     assert [*there.units] == ["machine"]
     assert [*there.trace.columns] == [*here.trace.columns]
@@ -71,13 +72,13 @@ def test_another_machine(tmp_path: Path, fmus: Path) -> None:
     ssp.export(scenario.load(file), out, fmus=fmus)
     annotation = re.compile(r"(?s)<ssc:Annotation type=.feedsim.*?</ssc:Annotation>")
     bare = altered(out, tmp_path / "bare.ssp", STRUCTURE, lambda text: annotation.sub("", text))
-    here = cosim.run(scenario.load(file, ["coupling.units=separate"]), fmus=fmus)
+    here = judged(cosim.run(scenario.load(file, ["coupling.units=separate"]), fmus=fmus))
     for path in (out, bare):
         with ssp.opened(path) as found:
             assert found.scenario.coupling.model_dump() == {
                 "scheme": "gauss_seidel", "substeps": 1, "call_limit": 60.0, "units": "one",
             }  # fmt: skip
-            there = cosim.run(found.scenario, program=found.program, fmus=found.fmus)
+            there = judged(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
         for name in here.trace.columns:
             assert list(there.trace[name]) == list(here.trace[name]), name
 
@@ -118,9 +119,9 @@ def given(one: Path, out: Path, name: str, value: str) -> Path:
 
 def test_parameters_of_the_file_count_over_the_archives(one: Path, short: Path, fmus: Path, tmp_path: Path) -> None:
     changed = given(one, tmp_path / "changed.ssp", "Z.drive.K_v", '<ssv:Real value="50" unit="1/s"/>')
-    here = cosim.run(scenario.load(short, ["machine.axes.Z.drive.K_v=50 1/s"]), fmus=fmus)
+    here = judged(cosim.run(scenario.load(short, ["machine.axes.Z.drive.K_v=50 1/s"]), fmus=fmus))
     with ssp.opened(changed) as found:
-        there = cosim.run(found.scenario, program=found.program, fmus=found.fmus)
+        there = judged(cosim.run(found.scenario, program=found.program, fmus=found.fmus))
     assert list(there.trace["Z.x_a"]) == list(here.trace["Z.x_a"])
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from feedsim import cosim, scenario
+from feedsim.judge import judged
 from feedsim.structure import checked_modes
 
 
@@ -22,7 +23,7 @@ def test_every_size_runs(axes: int, count: int, tmp_path: Path, fmus: Path) -> N
         # The elastic motion is shared out among the modes, none of it lost: exact but for rounding.
         assert modes.J_tot(axis) == pytest.approx(machines.J_1 + machines.J_2, rel=1e-12)
         assert modes.J_inf(axis) == pytest.approx(machines.J_1, rel=1e-12)
-    run = cosim.run(loaded, fmus=fmus)
+    run = judged(cosim.run(loaded, fmus=fmus))
     # They are made to measure time: that their position loops are tight is told, and nothing else.
     assert not [text for text in run.warnings if "has thin margins" not in text]
     assert list(loaded.machine.axes) == list(machines.NAMES[:axes])

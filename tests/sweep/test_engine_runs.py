@@ -12,6 +12,7 @@ import pytest
 
 from cluster_helpers import scheduler
 from feedsim import analysis, cosim, units
+from feedsim.judge import judged
 from feedsim.scenario import Base, Change, load
 from feedsim.sweep.bundle import Bundle
 from feedsim.sweep.design import Outcome, Task
@@ -79,7 +80,7 @@ def reference(bundle: Bundle) -> dict[int, tuple[str, str, tuple[str, ...]]]:
 def test_figures_are_those_of_a_run_alone(fmus: Path, reference: dict[int, tuple[str, str, tuple[str, ...]]]) -> None:
     run = 12
     (change,) = next(task for task in tasks() if task.run == run).changes
-    result = cosim.run(load(SCENARIOS / "z_positioning.yaml", [*SHORT, change.option]), fmus=fmus)
+    result = judged(cosim.run(load(SCENARIOS / "z_positioning.yaml", [*SHORT, change.option]), fmus=fmus))
     figures = analysis.evaluate(result)
     expected = {
         name: (units.convert(figure.value, figure.unit, unit), unit)

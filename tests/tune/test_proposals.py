@@ -12,6 +12,7 @@ import pytest
 
 from command_helpers import feedsim
 from feedsim import analysis, cosim
+from feedsim.judge import judged
 from feedsim.linear.system import LinearSystem
 from feedsim.scenario import Machine, Scenario, load
 from feedsim.structure import checked_modes
@@ -25,7 +26,7 @@ DRIVE = "machine.axes.{}.drive.{}"
 
 
 def proposals(settings: Sequence[str], fmus: Path, *, searched: bool = False) -> list[Proposal]:
-    result = cosim.run(load(CIRCLE, settings), fmus=fmus)
+    result = judged(cosim.run(load(CIRCLE, settings), fmus=fmus))
     return of_run(result, analysis.diagnoses(result), searched=searched)
 
 
@@ -105,7 +106,7 @@ def test_a_slow_integral_part(fmus: Path) -> None:
 
 
 def test_a_circle_alone_gives_directions(fmus: Path) -> None:
-    result = cosim.run(load(CIRCLE, [DRIVE.format("Z", "T_sym=4.158 ms")]), fmus=fmus)
+    result = judged(cosim.run(load(CIRCLE, [DRIVE.format("Z", "T_sym=4.158 ms")]), fmus=fmus))
     (diagnosis,) = analysis.diagnoses(result).values()
     found = of_circle(diagnosis, None, None)
     assert [(each.axis, each.parameter, each.direction) for each in found[:2]] == [
@@ -118,7 +119,7 @@ def test_a_circle_alone_gives_directions(fmus: Path) -> None:
 
 def test_nothing_is_proposed_for_what_another_maker_drives(fmus: Path) -> None:
     scenario: Scenario = load(CIRCLE)
-    result = cosim.run(scenario, fmus=fmus)
+    result = judged(cosim.run(scenario, fmus=fmus))
     causes = analysis.diagnoses(result)
     gone = scenario.machine.model_copy(update={"modes": Path("gone.csv")})
     assert of_run(replace(result, scenario=scenario.model_copy(update={"machine": gone})), causes) == []

@@ -13,9 +13,10 @@ from feedsim.analysis.evaluate import CircleTask, tasks
 from feedsim.analysis.figures import Array, Figure
 from feedsim.cosim.feedforward import Lag, Law, friction_feedforward, lag_of
 from feedsim.cosim.friction_law import FrictionLaw
-from feedsim.cosim.run import Run, run
+from feedsim.cosim.run import run
 from feedsim.errors import InputError
 from feedsim.findings import Note, Wrong
+from feedsim.judge import JudgedRun, judged
 from feedsim.nc import Program
 from feedsim.scenario import CircleTest, Friction, Machine, Recording, Scenario
 from feedsim.trace import Trace
@@ -78,8 +79,8 @@ class Compensation:
     lags: Mapping[str, Lag]
     delays: Mapping[str, float]
     feedforward: Trace
-    before: Run
-    after: Run
+    before: JudgedRun
+    after: JudgedRun
     left_before: Quality
     left_after: Quality
     figures: Mapping[str, Figure]
@@ -172,8 +173,10 @@ def compensate(
 
     with FrictionLaw(fmus) as law:
         torque = friction_feedforward(machine, program, used, applied, law)
-        before = run(plain, program=program, fmus=fmus, progress=told("without compensation"))
-        after = run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
+        before = judged(run(plain, program=program, fmus=fmus, progress=told("without compensation")))
+        after = judged(
+            run(plain, program=program, fmus=fmus, progress=told("with compensation"), torque_feedforward=torque)
+        )
         variations = _table(scenario, program, turn, used, applied, law, fmus=fmus, progress=tell) if table else ()
     left_before, left_after = (quality(result.trace, turn) for result in (before, after))
     figures = circle_figures(turn, before.trace, after.trace)

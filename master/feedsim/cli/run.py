@@ -61,7 +61,7 @@ def _check_trial(scenario: Path, out: Path) -> None:
 
 def validate(options: Namespace) -> None:
     """feedsim validate."""
-    from feedsim import analysis, cosim
+    from feedsim import analysis, judge
     from feedsim.cli import sweep
     from feedsim.files.source import is_study
     from feedsim.jobs.subject import opened
@@ -72,7 +72,7 @@ def validate(options: Namespace) -> None:
     with opened(options.scenario, options.overrides, options.fmus) as subject:
         plan, program = subject.plan, subject.program
         analysis.check(plan, program)
-        warnings = subject.warnings(cosim.check(plan, program, fmus=subject.fmus))
+        warnings = subject.warnings(judge.check(plan, program, fmus=subject.fmus))
     motions = f"{len(plan.motions)} motion{'s'[: len(plan.motions) != 1]}"
     apart = (
         " as far as no other maker's program has a say" if any(": not checked: " in each for each in warnings) else ""

@@ -18,11 +18,11 @@ import numpy as np
 from feedsim.cosim import wiring, worker
 from feedsim.cosim.binaries import any_foreign, fmus_directory
 from feedsim.cosim.exchange import chosen
+from feedsim.cosim.loads import LOAD_TAKEN_UP
 from feedsim.cosim.loop import Loop, Progress, Setpoints
 from feedsim.cosim.operations import Operation, When, copy, get_row, set_real, set_slopes
 from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.system import System
-from feedsim.cosim.trust import LOAD_TAKEN_UP
 from feedsim.cosim.unit import Floats, Log, Port
 from feedsim.errors import InputError
 from feedsim.motions.kind import Peaks
@@ -32,7 +32,7 @@ from feedsim.nc.excitation import Excitation
 from feedsim.nc.program import violations
 from feedsim.scenario import Coupling, Machine
 from feedsim.scenario.coupling import SCHEMES
-from feedsim.structure import checked_modes
+from feedsim.structure.modes import checked_modes
 from feedsim.trace import Trace
 from feedsim.trace.trace import suggest
 

@@ -4,30 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from feedsim.cosim import trust, worker
+from feedsim.cosim import worker
 from feedsim.cosim.binaries import any_foreign, fmus_directory
+from feedsim.cosim.departure import first_departure
 from feedsim.cosim.exchange import chosen
 from feedsim.cosim.feedforward import TorqueFeedforward, feeders
 from feedsim.cosim.loads import Acting, Loads, Work, acting
 from feedsim.cosim.logging import full_rate_columns, ideal_axes, log
 from feedsim.cosim.loop import Loop, Progress, Setpoints
+from feedsim.cosim.poses import Crossings, crossings_of, grid_of
 from feedsim.cosim.recording import Recording, Sink, loaded_inputs, recorded_columns
-from feedsim.cosim.trust import PoseUse, pose_use
+from feedsim.cosim.schedule import Cycle
 from feedsim.cosim.whole import cycle_of, system_of
 from feedsim.errors import InputError, SimulationError
-from feedsim.linear.judgement import judge
 from feedsim.nc import Program, plan
 from feedsim.scenario import Coupling, Logging, Machine, Scenario
-from feedsim.structure import checked_modes
+from feedsim.structure.modes import checked_modes
+from feedsim.structure.poses_file import GridAxis
 from feedsim.trace import Trace
 
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """What a run leaves behind.
+    """What a run leaves behind; nothing of it is judged (:func:`feedsim.judge.judged` does).
 
     Long traces and programs are in files without names, and read page by page: they vanish, and give back the disk,
     with the last array that looks into them; nothing is to be closed or removed. A copy (``numpy.array(column)``) is in
@@ -39,17 +41,16 @@ class Run:
         wall_time: duration of the cycle loop [s], without what a `sink` has taken.
         native: whether the native loop has executed it.
         units: per instance, GUID and version of its archive.
-        pose: how far the motion leaves the plant's pose, or how the plant followed it.
-        loads: what each of the scenario's loads has done.
-        warnings: what a user should know before believing the result, a sentence each.
+        notes: what the units and their exchange say of themselves, a sentence each.
+        executor_notes: why the native loop has not executed it, where it was not asked to stand aside.
+        limited: axis and limit of its drive, "X.torque_limited" -> share of the recorded instants at which it was met.
+        grid: the axes whose pose the plant follows; none where it has one pose.
+        crossings: what happened where that plant changed cells; None where it has one pose.
+        acting: the scenario's loads over time, as read.
+        loads: what each of them has done.
         fine: the log's signals, and the setpoints of its axes, at the control cycle; None without a log. Other logs can
             be made of it: :func:`feedsim.cosim.logged`.
         log: the log as the scenario asks for it; None without one.
-
-    >>> import feedsim as fs
-    >>> run: fs.Run = fs.run("z_positioning.yaml")  # what that returns is one, with figures
-    >>> run.trace.unit("Z.M_fr"), run.log
-    ('N.m', None)
     """
 
     scenario: Scenario
@@ -58,8 +59,12 @@ class Run:
     coupling: Mapping[str, float]
     wall_time: float
     units: Mapping[str, Mapping[str, str]]
-    pose: PoseUse
-    warnings: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    executor_notes: tuple[str, ...] = ()
+    limited: Mapping[str, float] = field(default_factory=dict)
+    grid: tuple[GridAxis, ...] = ()
+    crossings: Crossings | None = None
+    acting: tuple[Acting, ...] = ()
     loads: tuple[Work, ...] = ()
     fine: Trace | None = None
     log: Trace | None = None
@@ -129,12 +134,12 @@ def _run(
     """A run in this process."""
     recorded = recorded_columns(scenario)
     loads, loaded = acting(scenario, program), loaded_inputs(scenario)
-    modes = checked_modes(scenario.machine)
+    checked_modes(scenario.machine)  # refused ahead of the units, with file and line
     cycles = scenario.machine.cycles
     ratio = round(cycles.T_pos / cycles.T_c)
     every = round(scenario.recording.interval / cycles.T_c)
     total = (len(program.time) - 1) * ratio
-    library, told = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
+    library, executor_notes = chosen(native, fmus, fmus_directory())  # archives out of an SSP file bring none along
     with system_of(scenario.machine, scenario.coupling, fmus) as system:
         cycle = cycle_of(system, scenario.coupling)
         recording = Recording(cycle, loaded, program, total, ratio, every, recorded, scratch=scratch, sink=sink)
@@ -155,7 +160,7 @@ def _run(
             loop.run(total, progress)
         except SimulationError as error:
             recording.collect(loop.done)
-            first = trust.left_first(recording.trace(), program, scenario.machine)
+            first = first_departure(recording.trace(), program, scenario.machine)
             raise SimulationError(f"{error}{first}") from error
         except BaseException:
             recording.collect(loop.done)
@@ -165,25 +170,21 @@ def _run(
             each.collect(total + 1)
         loading.count(total)
         wall_time = time.perf_counter() - begun - recording.sinking
-        loops = judge(scenario.machine, modes)
-        pose = pose_use(scenario.machine, program, system)
+        grid = grid_of(system)
         fine = None if at_full_rate is None else at_full_rate.trace()
         return Run(
             scenario=scenario,
             program=program,
             trace=recording.trace(),
-            coupling=trust.energies(cycle),
+            coupling=_energies(cycle),
             wall_time=wall_time,
             units=system.archives,
-            pose=pose,
-            warnings=(
-                *system.warnings,
-                *cycle.warnings,
-                *trust.foreseen(scenario, modes, program, loops, loads),
-                *pose.warnings,
-                *trust.found(scenario, cycle, recording, loops, loading.work),
-                *told,
-            ),
+            notes=(*system.warnings, *cycle.warnings),
+            executor_notes=executor_notes,
+            limited={limit: recording.share(limit) for limit in recording.limited},
+            grid=grid,
+            crossings=crossings_of(system) if grid else None,
+            acting=tuple(loads),
             loads=loading.work,
             fine=fine,
             log=None
@@ -191,6 +192,13 @@ def _run(
             else log(fine, scenario.logging, ideal_axes(scenario), scratch),
             native=library is not None,
         )
+
+
+def _energies(cycle: Cycle) -> dict[str, float]:
+    """Per axis "A.residual", "A.residual_peak" and "A.friction_work" [J]; see feedsim.cosim.operations.Bond."""
+    bond = cycle.bond
+    kinds = {"residual": bond.residual, "residual_peak": bond.residual_peak, "friction_work": bond.dissipated}
+    return {f"{axis}.{kind}": float(kinds[kind][i]) for i, axis in enumerate(cycle.system.axes) for kind in kinds}
 
 
 def follow(
@@ -242,25 +250,32 @@ def _follow(
         return recording.trace()
 
 
-def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> tuple[str, ...]:
-    """Judge a scenario without a step; return the warnings that can be given before a run.
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """What is known of a scenario ahead of its first step; notes, grid and acting as of a :class:`Run`."""
+
+    notes: tuple[str, ...]
+    grid: tuple[GridAxis, ...]
+    acting: tuple[Acting, ...]
+
+
+def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> Ready:
+    """Build and initialise the units of a scenario, without a step.
 
     The shipped units judge their parameters. No other program is executed: of another maker's unit counts what its
-    archive says of itself, and a warning says what is not checked.
+    archive says of itself, and a note says what is not checked.
 
     Raises:
         InputError: what :func:`run` would refuse before its first step.
     """
     recorded_columns(scenario)
     loads = acting(scenario, program)
-    modes = checked_modes(scenario.machine)
+    checked_modes(scenario.machine)
     fmus = fmus or fmus_directory()
     with system_of(scenario.machine, scenario.coupling, fmus, only_shipped=True) as system:
         system.initialise(program, stop=float(program.time[-1]))
-        pose = pose_use(scenario.machine, program, system)
         cycle = cycle_of(system, scenario.coupling)
-        told = trust.foreseen(scenario, modes, program, judge(scenario.machine, modes), loads)
-        return (*system.warnings, *cycle.warnings, *told, *pose.warnings)
+        return Ready((*system.warnings, *cycle.warnings), grid_of(system), tuple(loads))
 
 
 def logged(source: Run | Trace, logging: Logging | None = None, *, ideal: Sequence[str] = ()) -> Trace:

@@ -13,12 +13,12 @@ from feedsim.analysis.responses import Overlay, Responses, highest_frequency, re
 from feedsim.analysis.truncation import Truncation
 from feedsim.arguments import Band, Changes, Value, between, listed, quantity, settings, spelt
 from feedsim.cosim.plant import plant_modes
-from feedsim.cosim.trust import control as control_findings
 from feedsim.errors import FeedsimError, InputError
 from feedsim.findings import severity
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
 from feedsim.jobs.watch import NO_WATCH, Watch, announce
+from feedsim.judge.loops import control as control_findings
 from feedsim.linear.judgement import judge
 from feedsim.report import frf as page
 from feedsim.report.content import Report

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from feedsim import cosim, nc, scenario
+from feedsim import cosim, judge, nc, scenario
 from feedsim.arguments import Changes, settings
 from feedsim.cosim.one_unit import UNIT, pack_whole
 from feedsim.errors import InputError
@@ -64,7 +64,7 @@ def pack(
             _check_loads(plan)
         findings: tuple[str, ...] = ()
         if plan is not None and program is not None:
-            findings = cosim.check(plan, program, fmus=archives)  # what a run would refuse should not be packed
+            findings = judge.check(plan, program, fmus=archives)  # what a run would refuse should not be packed
         else:
             checked_modes(machine)
         moving = plan if program is not None else None

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 from feedsim import analysis, cosim
 from feedsim.analysis import Figure
 from feedsim.arguments import Changes
-from feedsim.cosim import Run
 from feedsim.findings import ranked, severity
 from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result, in_words_of
 from feedsim.jobs.subject import Opened, opened
 from feedsim.jobs.watch import NO_WATCH, Watch
+from feedsim.judge import JudgedRun, judged
 from feedsim.outputs import forced, replacing
 from feedsim.report import run as report
 from feedsim.report.content import Report
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class RunResult(Run, Result):
+class RunResult(JudgedRun, Result):
     """What a run leaves behind, with its figures, pictures and files.
 
     page: the machine as a page that computes, where the job was asked for it. uncertainty: intervals of the figures by
@@ -60,9 +60,10 @@ class RunResult(Run, Result):
     kind = "run"
 
     @classmethod
-    def of(cls, run: Run, page: str = "", uncertainty: Uncertainty | None = None) -> RunResult:
+    def of(cls, run: JudgedRun, page: str = "", uncertainty: Uncertainty | None = None) -> RunResult:
         """A run, as it is."""
-        return cls(**{each.name: getattr(run, each.name) for each in fields(Run)}, page=page, uncertainty=uncertainty)
+        judged_run = {each.name: getattr(run, each.name) for each in fields(JudgedRun)}
+        return cls(**judged_run, page=page, uncertainty=uncertainty)
 
     @cached_property
     def figures(self) -> Mapping[str, Figure]:
@@ -264,7 +265,7 @@ def run(
 
 
 def _run(subject: Opened, recorded: Partial | None, page: bool, watch: Watch) -> RunResult:
-    done = cosim.run(
+    raw = cosim.run(
         subject.plan,
         program=subject.program,
         fmus=subject.fmus,
@@ -272,6 +273,7 @@ def _run(subject: Opened, recorded: Partial | None, page: bool, watch: Watch) ->
         scratch=recorded.scratch if recorded is not None else None,
         sink=recorded,
     )
+    done = judged(raw)
     done = replace(done, warnings=subject.warnings(done.warnings))
     if not page:
         return RunResult.of(done)

@@ -18,6 +18,7 @@ from feedsim.jobs.folder import File, kept
 from feedsim.jobs.result import Result
 from feedsim.jobs.run import RunResult
 from feedsim.jobs.watch import NO_WATCH, Watch
+from feedsim.judge import judged
 from feedsim.owned import TemporaryFolder
 from feedsim.report.content import Report
 from feedsim.report.show import report as page
@@ -165,7 +166,7 @@ def _at(each: Shown, folder: Path) -> Path:
         if chosen is None:
             return Path(each)
         scenario, fmus = scenario_of(chosen)
-        each = RunResult.of(cosim.run(scenario, fmus=fmus))
+        each = RunResult.of(judged(cosim.run(scenario, fmus=fmus)))
     each.save(folder)
     return folder
 

@@ -9,6 +9,7 @@ from feedsim import cosim
 from feedsim.jobs.run import RunResult
 from feedsim.jobs.show import show
 from feedsim.jobs.watch import NO_WATCH, Watch
+from feedsim.judge import judged
 from feedsim.report import run as report
 from feedsim.report.changes import change_lines
 from feedsim.report.show import report as show_report
@@ -46,7 +47,7 @@ def tried(run: RunResult, directory: Path, *, fmus: Path | None = None, watch: W
         return Tried(proposals, (), ("nothing to try: no proposal has a value",))
     scenario = run.scenario
     changed = load(scenario.file, [*scenario.overrides, *settings])
-    again = RunResult.of(cosim.run(changed, fmus=fmus, progress=watch.of(f"{scenario.name}, tried")))
+    again = RunResult.of(judged(cosim.run(changed, fmus=fmus, progress=watch.of(f"{scenario.name}, tried"))))
     again.save(_second(directory))
     show(directory, _second(directory)).save(_overlaid(directory))
     changed_figures = [

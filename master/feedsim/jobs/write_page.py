@@ -11,6 +11,7 @@ from feedsim.arguments import Changes, listed, settings
 from feedsim.jobs.folder import File
 from feedsim.jobs.made import Kind, Made
 from feedsim.jobs.watch import NO_WATCH, Watch
+from feedsim.judge import judged
 from feedsim.outputs import begins_with
 from feedsim.page.content import content
 from feedsim.page.html import MARK, page
@@ -59,7 +60,7 @@ def write_page(
         program = nc.plan(asked)
         content(asked, program, wanted, archives)  # what cannot be shown should not be run
         check(asked, program)
-        run = cosim.run(asked, program=program, fmus=archives, progress=watch.of("simulation"))
+        run = judged(cosim.run(asked, program=program, fmus=archives, progress=watch.of("simulation")))
         page_of_run = page(run, wanted, archives)
         line = f"{len(page_of_run) / 1000:.0f} kB; axes {', '.join(asked.machine.axes)}; open it in a browser"
         made = Made(KIND, f"{file.stem}.html", page_of_run, [line], run.warnings, inputs=read)

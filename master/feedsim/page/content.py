@@ -23,12 +23,13 @@ from feedsim.cosim.archive import Archive
 from feedsim.cosim.one_unit import parameters
 from feedsim.cosim.plant import plant_modes
 from feedsim.cosim.recording import LIMITS
-from feedsim.cosim.run import check as run_check
 from feedsim.cosim.system import plant_parameters
-from feedsim.cosim.trust import control, exchange_stability
 from feedsim.cosim.whole import open_whole
 from feedsim.errors import InputError
 from feedsim.estimation.interval import student
+from feedsim.judge import check as judged_ahead
+from feedsim.judge.exchange import exchange_stability
+from feedsim.judge.loops import control
 from feedsim.linear.judgement import SHOWS, judge, locked_modes
 from feedsim.motions.circular import Circle, Circular
 from feedsim.motions.dwell import Dwell
@@ -149,7 +150,7 @@ def _judged(scenario: Scenario, program: Program, folder: Path, resources: Path)
         *control(machine, judge(machine, modes), program), *exchange_stability(scenario, modes),
         *reach.sentences(machine, program, resources),
     }  # fmt: skip
-    ahead = [warning for warning in run_check(scenario, program, fmus=folder) if warning not in said]
+    ahead = [warning for warning in judged_ahead(scenario, program, fmus=folder) if warning not in said]
     own = machine.plant is not None or machine.transmitted  # not the modes that the unit holds
     tables = {} if not own else {"table": _table(modes, machine), "pose": _table(here, machine)}
     scheme = SCHEMES[coupling.scheme]

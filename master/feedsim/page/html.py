@@ -18,8 +18,8 @@ from typing import Any
 
 from feedsim.analysis import CircleTask, Diagnosis, Figure, PositioningTask, evaluate, tasks
 from feedsim.analysis.circle import answer, swinging
-from feedsim.cosim import Run
 from feedsim.errors import InputError
+from feedsim.judge import JudgedRun
 from feedsim.page.content import Content, content, packed
 from feedsim.page.scripts import showing, styles, text, worker
 from feedsim.report.chart.still import still
@@ -37,7 +37,7 @@ MAX_PAGE_BYTES = 1_500_000  # bytes
 MARK = b'content="feedsim page"'
 
 
-def write(run: Run, out: Path, wanted: Sequence[str] = (), fmus: Path | None = None) -> int:
+def write(run: JudgedRun, out: Path, wanted: Sequence[str] = (), fmus: Path | None = None) -> int:
     """Write the page of a run's scenario, whole or not at all; returns its size [bytes].
 
     wanted, fmus: as for :func:`page`. Raises InputError as that, and OutputError: `out` cannot be written.
@@ -48,7 +48,7 @@ def write(run: Run, out: Path, wanted: Sequence[str] = (), fmus: Path | None = N
     return len(content)
 
 
-def page(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> bytes:
+def page(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -> bytes:
     """The page of a run's scenario.
 
     wanted: patterns of the knobs, see :func:`feedsim.page.knobs.chosen`. fmus: folder of archives and module.
@@ -65,7 +65,7 @@ def page(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> byte
     return content
 
 
-def html(run: Run, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
+def html(run: JudgedRun, wanted: Sequence[str] = (), fmus: Path | None = None) -> str:
     """The text of the page; arguments and errors as for :func:`page`."""
     held = content(run.scenario, run.program, wanted, fmus)
     scenario, machine = run.scenario, run.scenario.machine
@@ -109,7 +109,7 @@ def _json(data: Mapping[str, Any]) -> str:
     return written.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _notes(run: Run, held: Content) -> Iterable[str]:
+def _notes(run: JudgedRun, held: Content) -> Iterable[str]:
     yield from filter(None, [run.scenario.machine.note, run.scenario.note])
     if held.left_out:
         yield "Not in this page: " + "; ".join(held.left_out) + "."
@@ -140,7 +140,7 @@ def _row(k: int, knob: Mapping[str, Any]) -> str:
     return f'<div class="knob" id="knob-{k}"><label for="value-{k}"><b>{name}</b> {about}</label>{control}{back}</div>'
 
 
-def _pictures(run: Run, shown: Sequence[CircleTask | PositioningTask]) -> Iterable[str]:
+def _pictures(run: JudgedRun, shown: Sequence[CircleTask | PositioningTask]) -> Iterable[str]:
     signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
     for task in shown:
         end = _slug(task.prefix)

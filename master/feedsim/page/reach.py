@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from feedsim.cosim.trust import left_grid
+from feedsim.judge.pose import left_grid
 from feedsim.nc import Program
 from feedsim.page.knobs import REACH
 from feedsim.scenario import Machine

@@ -8,7 +8,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from feedsim.cosim import check, fmus_directory, wiring
+from feedsim import judge
+from feedsim.cosim import fmus_directory, wiring
 from feedsim.cosim.archive import Archive, UnitDefinition
 from feedsim.cosim.one_unit import UNIT
 from feedsim.cosim.roles import RoleUnit, archive_path, filled
@@ -64,7 +65,7 @@ def export(scenario: Scenario, out: Path, *, fmus: Path | None = None) -> Export
         )
     program = plan(scenario)
     fmus = fmus or fmus_directory()
-    warnings = check(scenario, program, fmus=fmus)
+    warnings = judge.check(scenario, program, fmus=fmus)
     with TemporaryFolder() as folder, ExitStack() as stack:
         if scenario.coupling.units == "one":
             one.pack(scenario, program, fmus, folder / f"{UNIT}.fmu")

@@ -25,6 +25,7 @@ from feedsim.cosim.exchange import LIBRARY_NAME as NATIVE
 from feedsim.cosim.unpacked import check_there
 from feedsim.errors import FeedsimError
 from feedsim.findings import WRONG, ranked, severity
+from feedsim.judge import judged
 from feedsim.nc import Program, plan
 from feedsim.owned import PREFIX, TemporaryFolder
 from feedsim.scenario import Base, Scenario
@@ -160,7 +161,7 @@ class Workplace:
     def _figures(self, task: Task) -> tuple[dict[str, tuple[float, str]], Sequence[str]]:
         scenario = self._base.with_changes(task.changes)
         program = self._program(scenario)
-        result = cosim.run(scenario, program=program, fmus=self._fmus)
+        result = judged(cosim.run(scenario, program=program, fmus=self._fmus))
         found = {name: _si(figure) for name, figure in analysis.evaluate(result).items()}
         return found, result.warnings
 

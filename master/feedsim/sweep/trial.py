@@ -8,7 +8,7 @@ from itertools import islice
 from pathlib import Path
 from time import perf_counter
 
-from feedsim import analysis, cosim, nc
+from feedsim import analysis, judge, nc
 from feedsim.errors import InputError, SimulationError
 from feedsim.scenario import Scenario
 from feedsim.scenario.study import Study
@@ -104,7 +104,7 @@ def check(study: Study, design: Design, fmus: Path | None = None) -> tuple[int, 
     for run in islice(spread(design.runs), TRIES):
         try:
             subject, program = _checked(study, design, run)
-            return run, tuple(cosim.check(subject, program, fmus=fmus)), failed
+            return run, tuple(judge.check(subject, program, fmus=fmus)), failed
         except InputError as error:
             failed[run] = str(error)
     raise InputError(_none_works(failed))

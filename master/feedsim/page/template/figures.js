@@ -248,7 +248,7 @@ function causes_of(trace, tasks, figures, known) {
   return found;
 }
 
-// What a run's own limits tell a reader to doubt, in the words of feedsim run (feedsim.cosim.trust).
+// What a run's own limits tell a reader to doubt, in the words of feedsim run (feedsim.judge).
 function limit_warnings(machine, trace) {
   const found = [], percent = value => general(value, 2);
   for (const axis of machine.axes) for (const limit of machine.flags) {

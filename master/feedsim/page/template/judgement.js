@@ -1,5 +1,5 @@
 // Whether the loops of a machine are stable, with what margins, and at which gains they would be: feedsim.linear.judgement once more,
-// and what feedsim.cosim.trust says of it. Method and numbers stand there; a test holds both to the same words.
+// and what feedsim.judge says of it. Method and numbers stand there; a test holds both to the same words.
 const JUDGED = { GAIN_MARGIN: 10 ** (6 / 20), PHASE_MARGIN: 30, STEP: 0.05, ABOUT: [-5, -2.4, -1.3, -0.7, -0.3, 0, 0.3, 0.7, 1.3, 2.4, 5], SHOWS: 0.03, WITHIN: [1e-2, 1e2], IMAGES: 1, SECTOR: 1, COUNTS: 8, CHANGE: 0.2, TURN: 0.6, ROUNDS: 12, GROWTH: 1e-2, REAL: 1e-3, TINY: 2.2250738585072014e-308 };
 const GAINS = Array.from({ length: 2401 }, (_, k) => 10 ** (-6 + k / 200)), STATES = ["moving", "at rest"];
 const far = factor => Math.abs(Math.log(factor));
@@ -197,7 +197,7 @@ function exchange_warnings({ axes, cycles, scheme }, of, { rotor }) {
   });
 }
 
-// --- how far a motion leaves the plant's pose: feedsim.structure.pose_change, feedsim.cosim.trust ----------------------
+// --- how far a motion leaves the plant's pose: feedsim.structure.pose_change, feedsim.judge ----------------------
 
 // rows: setpoints, those of the axes at every second place.
 function reach_warnings({ axes, pose, limits, reach }, rows) {

@@ -18,7 +18,7 @@ from feedsim.analysis import (
     doubts,
     tasks,
 )
-from feedsim.cosim import Run
+from feedsim.judge import JudgedRun
 from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report.changes import changes_part
 from feedsim.report.content import Report
@@ -78,7 +78,7 @@ def growing(directory: Path | str) -> Partial:
 
 
 def write(
-    run: Run,
+    run: JudgedRun,
     figures: Mapping[str, Figure],
     directory: Path | str,
     recorded: Partial | None = None,
@@ -104,7 +104,7 @@ def write(
 
 
 def page_of(
-    run: Run,
+    run: JudgedRun,
     figures: Mapping[str, Figure],
     causes: Mapping[str, Diagnosis],
     *,
@@ -117,7 +117,7 @@ def page_of(
 
 
 def files_of(
-    run: Run, page: str = "", recorded: Partial | None = None, uncertainty: Uncertainty | None = None
+    run: JudgedRun, page: str = "", recorded: Partial | None = None, uncertainty: Uncertainty | None = None
 ) -> dict[str, Content]:
     """Name -> content of all files besides the report; arguments as of :func:`write`."""
 
@@ -144,7 +144,7 @@ def files_of(
 
 
 def summary(
-    run: Run,
+    run: JudgedRun,
     figures: Mapping[str, Figure],
     files: Sequence[str],
     causes: Mapping[str, Diagnosis] | None = None,
@@ -215,7 +215,7 @@ def summary(
     }
 
 
-def _circles(run: Run, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
+def _circles(run: JudgedRun, causes: Mapping[str, Diagnosis]) -> dict[str, Any]:
     """The turns that figures are of: who lays them over others needs no scenario."""
     found = [task for task in tasks(run.scenario, run.program) if task.prefix in causes] if causes else []
     return {

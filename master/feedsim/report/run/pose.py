@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from feedsim.cosim import PoseUse
+from feedsim.judge import PoseUse
 from feedsim.report.content import Paragraph, Part, Section, Table
 from feedsim.report.formatting import counted, minus
 from feedsim.report.provenance import quantity

@@ -17,7 +17,7 @@ from feedsim.analysis import (
     doubts,
     tasks,
 )
-from feedsim.cosim import Run
+from feedsim.judge import JudgedRun
 from feedsim.report import sections
 from feedsim.report.changes import changes_section, first_change
 from feedsim.report.chart import Chart, Panel
@@ -81,7 +81,7 @@ SHEETS = Paragraph((Span("Acceptance sheet for print", "file", sheet.HTML), ": r
 
 
 def report_of(
-    run: Run,
+    run: JudgedRun,
     figures: Mapping[str, Figure],
     pictures: Sequence[Picture],
     causes: Mapping[str, Diagnosis] | None = None,
@@ -125,7 +125,7 @@ def report_of(
     )
 
 
-def accuracy_sections(run: Run) -> list[Section]:
+def accuracy_sections(run: JudgedRun) -> list[Section]:
     """Every positioning cycle, by the scale and by the tool point."""
     asked = [task for task in tasks(run.scenario, run.program) if isinstance(task, AccuracyTask)]
     return [
@@ -135,7 +135,7 @@ def accuracy_sections(run: Run) -> list[Section]:
     ]
 
 
-def answers(run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[str]:
+def answers(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis]) -> list[str]:
     """What circles, stops and positioning cycles are, why, and what to do: a line each."""
     found = [f"{prefix}: {answer(diagnosis)}" for prefix, diagnosis in causes.items()]
     for task in tasks(run.scenario, run.program):
@@ -168,7 +168,7 @@ def _has_peak(name: str, figures: Mapping[str, Figure]) -> bool:
     return ".glitch_" in name and name.replace(".glitch_", ".peak_") in figures
 
 
-def lead(run: Run, pictures: Sequence[Picture]) -> Picture | None:
+def lead(run: JudgedRun, pictures: Sequence[Picture]) -> Picture | None:
     """The picture of the first screen, where it is not the first one: a stop without the way to it."""
     for task in tasks(run.scenario, run.program)[:1]:
         if isinstance(task, PositioningTask) and pictures and (chart := pictures[0].chart) is not None:
@@ -190,7 +190,7 @@ def tile(name: str, figure: Figure) -> Tile:
     return Tile(tile_value(figure), f"{prefix.replace('#', ' no. ')}: {label}", typeset(figure.meaning))
 
 
-def draw(run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis] | None = None) -> list[Picture]:
+def draw(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis] | None = None) -> list[Picture]:
     """The figures of a report: those of every evaluation, and an overview of all axes. causes: as of report_of()."""
     signs = {name: axis.display_sign for name, axis in run.scenario.machine.axes.items()}
     pictures: list[Picture] = []
@@ -220,7 +220,7 @@ def draw(run: Run, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis
     return [*pictures, overview] if overview is not None else pictures
 
 
-def motions_section(run: Run) -> Section:
+def motions_section(run: JudgedRun) -> Section:
     """Every motion with its path, its start and its exact end."""
     segments = run.program.segments
     rows = [
@@ -236,7 +236,7 @@ def motions_section(run: Run) -> Section:
     return Section("Motions", [Table("rllrr", ("No.", "Motion", "Path", "Start [s]", "End [s]"), rows, note)])
 
 
-def loads_section(run: Run) -> Section | None:
+def loads_section(run: JudgedRun) -> Section | None:
     """What every load has done; None without one."""
     rows = [
         (str(work.load), work.words, work.input, f"{number(work.peak, 4)} {typeset(work.unit)}",
@@ -248,7 +248,7 @@ def loads_section(run: Run) -> Section | None:
     return Section("Loads", [Table("rllrrr", heads, rows, note)]) if rows else None
 
 
-def provenance(run: Run) -> Section:
+def provenance(run: JudgedRun) -> Section:
     """Inputs, units, coupling, and the parameters of every axis."""
     scenario, machine = run.scenario, run.scenario.machine
     cycles, coupling = machine.cycles, scenario.coupling
@@ -282,12 +282,12 @@ def _coupling(coupling: Mapping[str, float]) -> Section | None:
     return Section("Coupling", [Table("lrrr", heads, rows, note)]) if rows else None
 
 
-def real_time_factor(run: Run) -> float | None:
+def real_time_factor(run: JudgedRun) -> float | None:
     """Simulated time over the time that it took; above 1 is faster than real time."""
     return run.program.duration / run.wall_time if run.wall_time > 0 else None
 
 
-def summary_line(run: Run, figures: Mapping[str, Figure]) -> str:
+def summary_line(run: JudgedRun, figures: Mapping[str, Figure]) -> str:
     """The run in one line: its leading figures, and how fast it was."""
     found = [f"{name} {figures[name]}" for name in leading(figures)]
     factor = real_time_factor(run)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from feedsim import cosim, scenario
-from feedsim.cosim.trust import left_first
+from feedsim.cosim.departure import first_departure
 from feedsim.errors import SimulationError
 from feedsim.trace import Trace
 from scenario_helpers import default_machine
@@ -24,7 +24,7 @@ def said(**off: Any) -> str:
     machine: Any = default_machine()
     program: Any = SimpleNamespace(time=np.array([0.0, 0.1]), x_s={axis: np.array([0.1, 0.2]) for axis in "XYZ"})
     columns = {f"{axis}.x_a": 0.1 + TIME + off.get(axis, 0 * TIME) for axis in "XYZ"}
-    return left_first(Trace(TIME, columns, dict.fromkeys(columns, "m")), program, machine)
+    return first_departure(Trace(TIME, columns, dict.fromkeys(columns, "m")), program, machine)
 
 
 def test_the_first_to_leave_is_named() -> None:

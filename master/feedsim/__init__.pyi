@@ -9,6 +9,7 @@ from feedsim.errors import SimulationError as SimulationError
 from feedsim.jobs.circle import circle as circle
 from feedsim.jobs.compare import compare as compare
 from feedsim.jobs.compensate import compensate as compensate
+from feedsim.jobs.convert import convert as convert
 from feedsim.jobs.example import example as example
 from feedsim.jobs.frf import frf as frf
 from feedsim.jobs.identify import identify as identify
@@ -26,12 +27,14 @@ from feedsim.jobs.replay import replay as replay
 from feedsim.jobs.result import Result as Result
 from feedsim.jobs.run import RunResult as RunResult
 from feedsim.jobs.run import run as run
+from feedsim.jobs.schema import schema as schema
 from feedsim.jobs.show import Overlay as Overlay
 from feedsim.jobs.show import show as show
 from feedsim.jobs.subject import load as load
 from feedsim.jobs.sweep import sweep as sweep
 from feedsim.jobs.tune_compensation import tune_compensation as tune_compensation
 from feedsim.jobs.tune_drive import tune_drive as tune_drive
+from feedsim.jobs.validate import validate as validate
 from feedsim.jobs.write_page import write_page as write_page
 from feedsim.jobs.write_ssp import write_ssp as write_ssp
 from feedsim.judge import JudgedRun as Run

@@ -41,4 +41,5 @@ COMMAND = Command(
     "overwritten.",
     epilog="example:\n  feedsim example xz_circle && feedsim run xz_circle.yaml",
     needs=(),
+    job="example",
 )

@@ -61,25 +61,10 @@ def _check_trial(scenario: Path, out: Path) -> None:
 
 def validate(options: Namespace) -> None:
     """feedsim validate."""
-    from feedsim import analysis, judge
-    from feedsim.cli import sweep
-    from feedsim.files.source import is_study
-    from feedsim.jobs.subject import opened
+    from feedsim.jobs.validate import validate
 
-    if is_study(options.scenario):
-        sweep.validate(options)
-        return
-    with opened(options.scenario, options.overrides, options.fmus) as subject:
-        plan, program = subject.plan, subject.program
-        analysis.check(plan, program)
-        warnings = subject.warnings(judge.check(plan, program, fmus=subject.fmus))
-    motions = f"{len(plan.motions)} motion{'s'[: len(plan.motions) != 1]}"
-    apart = (
-        " as far as no other maker's program has a say" if any(": not checked: " in each for each in warnings) else ""
-    )
-    finish(
-        False, warnings, f"{options.scenario}: valid{apart}; {motions}, {program.time[-1]:.4g} s on {plan.machine.name}"
-    )
+    done = validate(options.scenario, set=options.overrides, fmus=options.fmus)
+    finish(False, done.findings, *done.answers)
 
 
 def write_ssp(options: Namespace) -> None:
@@ -121,7 +106,7 @@ RUN = Command(
 )
 VALIDATE = Command(
     "validate", "check a scenario, an SSP or a study, its machine and its motion without running it", validate, SUBJECT,
-    epilog=TRUST,
+    epilog=TRUST, job="validate",
 )  # fmt: skip
 SSP = Command(
     "ssp",

@@ -132,20 +132,6 @@ def _range(least: float, most: float, shown: Callable[[float], str]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def validate(options: Namespace) -> None:
-    """feedsim validate of a study: it, its scenario, and a run from the middle, without a step."""
-    from feedsim.scenario.study import load_study
-    from feedsim.sweep import design
-    from feedsim.sweep.trial import check
-
-    study = load_study(options.scenario, options.overrides)
-    planned = design(study)
-    run, warnings, failed = check(study, planned, options.fmus)
-    refused = [f"run {other} is refused, run {run} is not: {why}" for other, why in failed.items()]
-    warn([*study.warnings, *refused, *warnings])
-    print(f"{options.scenario}: valid; {planned.runs} runs of {study.scenario}")
-
-
 def _duration(seconds: float) -> str:
     for unit, size in (("h", 3600), ("min", 60)):
         if seconds >= 2 * size:

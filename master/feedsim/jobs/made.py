@@ -6,12 +6,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from feedsim.analysis import Figure, Named
 from feedsim.errors import OutputError
 from feedsim.jobs.folder import File
 from feedsim.outputs import check_file, forced, replacing
 from feedsim.trace.files import written_whole
+
+if TYPE_CHECKING:
+    from feedsim.analysis import Figure
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,7 @@ class Made:
     content: bytes
     answers: Sequence[str]
     findings: Sequence[str] = ()
-    figures: Mapping[str, Figure] = field(default_factory=Named)
+    figures: Mapping[str, Figure] = field(default_factory=dict)
     inputs: Sequence[Path] = ()
 
     @property

@@ -167,8 +167,9 @@ def _read_mat(path: Path) -> Recording:
 def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str | Path) -> Trace:
     """Write columns of a recording as a CSV trace and return the trace.
 
-    columns  (variable, new name, unit of the values); the first must be the time (name "time", any unit of time). A
-             variable inside a structure of a MAT file is "structure.field". Empty: all columns, as the file calls them.
+    columns  (variable, new name, unit); the first must be the time (name "time", any unit of time). Values whose unit
+             the file tells are converted to that unit; others are taken to be in it. A variable inside a structure of
+             a MAT file is "structure.field". Empty: all columns, as the file calls them.
 
     Raises InputError: what read_recording() refuses, a variable that is missing (with those there are), no vector of
     real finite numbers, or of another length than the time. OutputError: `out` cannot be written.
@@ -188,6 +189,8 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
         columns = [("time", "time", "s")]
         columns += [(name, name, recording.units[name]) for name in recording.names if name != "time"]
     read = recording.read(variable for variable, _, _ in columns)
+    scales = {variable: _scale(recording, variable, unit) for variable, _, unit in columns}
+    read = {name: values if scales[name] == 1 else values * scales[name] for name, values in read.items()}
     time = read[columns[0][0]] * float(factor)
     try:
         trace = Trace(time, {name: read[variable] for variable, name, _ in columns[1:]},
@@ -196,6 +199,21 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
         raise InputError(f"{path}: {error}") from None
     write_csv(out, trace)
     return trace
+
+
+def _scale(recording: Recording, variable: str, unit: str) -> float:
+    """From the file's unit to `unit`; 1 where the file has none that is known. InputError: of another dimension."""
+    known = recording.units.get(variable, "")
+    if not known or known == unit:
+        return 1.0
+    try:
+        units.unit(known)
+    except InputError:
+        return 1.0
+    try:
+        return float(units.factor(known, unit))
+    except InputError as error:
+        raise InputError(f"{recording.path}: column {variable!r}: {error}") from None
 
 
 def _load(path: Path) -> dict[str, Value]:

@@ -1,0 +1,56 @@
+"""A recording as a CSV trace with units in its header."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from feedsim import trace
+from feedsim.arguments import listed, spelt
+from feedsim.errors import InputError
+from feedsim.jobs.folder import File
+from feedsim.jobs.made import Kind, Made
+from feedsim.outputs import check_file, unchanged
+from feedsim.owned import TemporaryFolder
+
+
+def convert(file: File, out: File | None = None, *, column: str | Sequence[str] = (), force: bool = False) -> Made:
+    """Turn a recording into a CSV trace: all signals of a control's capture, or variables of a MAT or CSV file.
+
+    Args:
+        file: MAT, CSV, or a capture of a SINUMERIK (.json).
+        out: the CSV file to write; None: :meth:`Made.save` does it.
+        column: texts "VARIABLE=NAME:UNIT", one a column, the time first; none: all of a capture.
+        force: `out` may be a file of other content.
+
+    Raises:
+        InputError: a faulty file, a text of another form, a variable that is not there, a value that is not finite.
+        OutputError: `out` cannot be written.
+
+    >>> import feedsim as fs
+    >>> made = fs.convert("recordings/z_setpoint.csv", column="time=time:s, Z.x_s=Z.x_a:m")
+    >>> made.content.splitlines()[0]
+    b'time [s],Z.x_a [m]'
+    """
+    path = Path(file)
+    columns = [_column(text) for text in listed(column)]
+    if out is not None:
+        check_file(Path(out), [path], ours=lambda there: True)  # an input is refused before it is read
+    with TemporaryFolder() as folder:
+        written = trace.convert(path, columns, folder / "converted.csv")
+        content = (folder / "converted.csv").read_bytes()
+    kind = Kind("convert", "table", unchanged(content))
+    answer = f"{len(written.columns) + 1} columns from {path}"
+    made = Made(kind, f"{path.stem}.csv", content, [answer], inputs=[path])
+    if out is not None:
+        made.save(out, force=force)
+    return made
+
+
+def _column(text: str) -> tuple[str, str, str]:
+    """VARIABLE=NAME:UNIT in its parts."""
+    variable, equals, rest = text.partition("=")
+    name, colon, unit = rest.rpartition(":")
+    if not (equals and colon and variable and name and unit):
+        raise InputError(f"{spelt('column')} {text}: VARIABLE=NAME:UNIT is needed, e.g. qg=Z.x_s:m")
+    return variable, name, unit

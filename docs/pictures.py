@@ -15,15 +15,26 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from diagrams import Drawing
 from PIL import Image
 
 import feedsim as fs
 from feedsim import cli
+from feedsim.analysis.circularity import contour as course_of
+from feedsim.analysis.evaluate import CircleTask, tasks
 from feedsim.report.compare.plots import picture_of
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES, SCENARIOS = ROOT / "docs" / "images", ROOT / "scenarios"
 MACHINE = SCENARIOS / "machines" / "test_centre"
+# Once, in less than 5 s, and not for readers who ask for less motion; else the whole curve stands.
+MOVES = """
+@media screen and (prefers-reduced-motion: no-preference) {
+  .run { stroke-dasharray: 1; animation: run 4.8s linear; } .go { animation: go 4.8s linear; }
+}
+@keyframes run { from { stroke-dashoffset: 1; } to { stroke-dashoffset: 0; } }
+@keyframes go { from { offset-distance: 0%; } to { offset-distance: 100%; } }
+"""
 
 
 def command(*words: str | Path) -> None:
@@ -41,6 +52,33 @@ def contour(place: Path) -> None:
     """Of the README: the circle with its quadrant glitches."""
     command("run", SCENARIOS / "xz_circle.yaml", "--figures", "png", "--out", place)
     taken(place, "contour-XZ.png", "contour-XZ.png")
+
+
+def moving(place: Path) -> None:
+    """Of the first page: the same circle, counterclockwise, that draws itself once where the reader allows motion."""
+    place.mkdir(parents=True)
+    run = fs.run(SCENARIOS / "xz_circle.yaml")
+    (task,) = (each for each in tasks(run.scenario, run.program) if isinstance(each, CircleTask))
+    turn = course_of(run.trace, task.turns[0])
+    middle, radius, magnified = (250.0, 215.0), 120.0, 7.5  # pixels, pixels, pixels per um
+    drawing = Drawing(
+        500, 430, "A circle with its quadrant glitches",
+        "The programmed circle, and around it the simulated one, its deviation magnified: it is round but for a peak "
+        "behind each of the four places where an axis reverses. The default machine is synthetic.",
+    )  # fmt: skip
+    r = radius + magnified * 1e6 * turn.deviation
+    points = np.column_stack((middle[0] + r * np.cos(turn.angle), middle[1] - r * np.sin(turn.angle)))[::3]
+    course = "M" + " L".join(f"{x:.1f},{y:.1f}" for x, y in (*points, points[0]))
+    drawing.shapes += [
+        f"<style>{MOVES}</style>",
+        f'<circle cx="{middle[0]:g}" cy="{middle[1]:g}" r="{radius:g}" class="thin"/>',
+        f'<path d="{course}" pathLength="1" class="curve run"/>',
+        f'<circle r="6" class="dot go" style="offset-path: path(\'{course}\')"/>',
+    ]
+    for (dx, dy), end in (((0, -200), "Z+"), ((0, 200), "Z−"), ((205, 0), "X+"), ((-205, 0), "X−")):
+        drawing.text((middle[0] + dx, middle[1] + dy), end, "head")
+    drawing.text(middle, f"G {run.figures['XZ.G'].value:.2f} µm, at 3000 mm/min", "")
+    (IMAGES / "circle-moves.svg").write_text(drawing.svg(), encoding="utf-8")
 
 
 def stribeck(place: Path) -> None:
@@ -102,7 +140,7 @@ def small(picture: Path, target: Path) -> None:
     shrunk.quantize(64, dither=Image.Dither.NONE).save(target, optimize=True)
 
 
-DRAWN: tuple[Callable[[Path], None], ...] = (contour, stribeck, structure, bode, tube, gallery)
+DRAWN: tuple[Callable[[Path], None], ...] = (contour, moving, stribeck, structure, bode, tube, gallery)
 
 
 def main() -> None:

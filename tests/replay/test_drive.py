@@ -193,6 +193,18 @@ def test_the_cycle_of_the_position_loop_is_told(tmp_path: Path, capsys: pytest.C
     assert found["k_ffw"]["value"] == pytest.approx(true.k_ffw, abs=1e-4)
 
 
+def test_a_setpoint_that_is_the_position_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without a distance between them nothing shows the drive: a load came out 2 N.m too large, within 0.3 N.m."""
+    path = logged(tmp_path, "X", machine=MACHINES / "one_axis")
+    (tmp_path / "columns.yaml").write_text(COLUMNS.replace("setpoint: {column: X.x_s}", "setpoint: {column: X.x_a}"))
+    words = [str(path), "--axes", "X", "--columns", str(tmp_path / "columns.yaml"), "--out", str(tmp_path / "out")]
+    for more in ([], ["--machine", str(MACHINES / "one_axis")]):
+        assert main(["identify-drive", *words, *more]) == 2
+        said = capsys.readouterr().err
+        assert "axis X: the position setpoint is the recorded position (largest difference 0 nm of a way" in said
+        assert not (tmp_path / "out").exists()
+
+
 def test_a_log_without_torque(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Position, setpoint and speed setpoint tell the position loop, and the position the speed controller, with the
     machine's friction. The replay has no torque to compare. What needs one says so."""

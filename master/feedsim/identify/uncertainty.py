@@ -109,7 +109,8 @@ def _rough(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorqu
     sources = sorted({"position" if model.motion.source == "angle" else "speed" for model in fine})
     return (
         f"noise or steps of the recorded {' and '.join(sources)} limit {', '.join(rough)}, more than the torque's; "
-        "the intervals hold them, and what smoothing them takes off the reversals as far as more smoothing shows it",
+        "the intervals include that as far as repeated noise and more smoothing show it, and may be too narrow: a "
+        "recorded motor speed, or a position in finer steps, determines them better",
     )
 
 

@@ -36,11 +36,25 @@ RINGS = 0.2  # [s] behind the motion in which an axis still swings
 
 
 @dataclass(frozen=True)
+class Beside:
+    """What a mode of one axis does at the scale of another one.
+
+    axis: the other one. shape: mode shape at its scale over the rigid motion of the mode's own axis [1]. sigma: its
+    standard deviation.
+    """
+
+    axis: str
+    shape: float
+    sigma: float
+
+
+@dataclass(frozen=True)
 class ElasticMode:
     """A mode of an axis.
 
     frequency [Hz], damping [1]; motor, scale: mode shape at rotor and scale over that of the rigid motion [1].
-    sigma: standard deviations of the four, in this order; nan where they are not known.
+    sigma: standard deviations of the four, in this order; nan where they are not known. beside: other axes that it
+    moves.
     """
 
     frequency: float
@@ -48,6 +62,7 @@ class ElasticMode:
     motor: float
     scale: float
     sigma: tuple[float, ...] = (np.nan,) * 4
+    beside: tuple[Beside, ...] = ()
 
 
 @dataclass(frozen=True)

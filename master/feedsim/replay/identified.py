@@ -8,13 +8,17 @@ from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
 
+import numpy as np
+
 from feedsim.errors import InputError
 from feedsim.identify import Recorded
 from feedsim.identify.parameters import EXCESS
 from feedsim.owned import TemporaryFolder
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.compare import Comparison, replayed
+from feedsim.replay.coupling import coupled
 from feedsim.replay.drive import DECISIVE, DriveFound, identify_drive
+from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.machine_files import (
     RigidAxis,
     control_cycle,
@@ -30,6 +34,7 @@ from feedsim.replay.start import Begin, limits, start_values
 from feedsim.scenario import Friction, Machine, load_machine
 
 OF_MACHINE = "of the machine"
+SAME = 1e-7  # of the way: a setpoint and a position that differ by rounding alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +82,7 @@ def identify_drives(
     rigid: dict[str, RigidAxis] = {}
     fitted, outside = {}, {}
     for axis, each in records.items():
+        _refuse_own_setpoint(each)
         fitted[axis], outside[axis] = without_outside(each)
     begins = {axis: _begin(each) if machine is None else None for axis, each in fitted.items()}
     interval = next(iter(records.values())).record.interval
@@ -118,10 +124,34 @@ def identify_drives(
             )  # fmt: skip
     if rigid:
         files = machine_files(name, note, rigid, interval, cycle, control)
+        beside = _beside(files, {axis: one.modes for axis, one in found.items()}, fitted, fmus)
+        if any(modes != found[axis].modes for axis, modes in beside.items()):
+            found = {axis: replace(one, modes=beside[axis]) for axis, one in found.items()}
+            rigid = {axis: replace(each, modes=beside[axis]) for axis, each in rigid.items()}
+            files = machine_files(name, note, rigid, interval, cycle, control)
     with _folder(files if rigid else {}) as folder:
         made = {axis: load_machine(folder) if rigid else one.machine for axis, one in found.items()}
         comparisons = [replayed(made[axis], {axis: each}, fmus)[axis] for axis, each in records.items()]
     return DrivesFound(found, comparisons, files, outside)
+
+
+def _beside(
+    files: Mapping[str, str], modes: Mapping[str, Sequence[ElasticMode]], records: Mapping[str, AxisRecord],
+    fmus: Path | None,
+) -> dict[str, tuple[ElasticMode, ...]]:  # fmt: skip
+    """The modes of all axes with what they do at the scales of others. files: of the machine with these modes."""
+    shapes = {}
+    if len(records) > 1 and any(modes.values()):
+        with _folder(files) as folder:
+            shapes = coupled(load_machine(folder), records, fmus)
+    found, k = {}, len(modes)  # the table begins with a rigid mode of every axis
+    for axis, own in modes.items():
+        found[axis] = tuple(
+            replace(mode, beside=tuple(shape for (row, _), shape in shapes.items() if row == k + i))
+            for i, mode in enumerate(own)
+        )
+        k += len(own)
+    return found
 
 
 def _begin(each: AxisRecord) -> Begin:
@@ -132,6 +162,19 @@ def _begin(each: AxisRecord) -> Begin:
             "inertia nor friction is known: give a machine that has them (--machine)"
         )
     return start_values(each)
+
+
+def _refuse_own_setpoint(each: AxisRecord) -> None:
+    """Raises InputError: the setpoint is the position itself, in which no lag shows a drive."""
+    way = float(np.ptp(each.position[each.rows]))
+    off = float(np.max(np.abs(each.setpoint - each.position)[each.rows]))
+    if off <= SAME * way:
+        raise InputError(
+            f"{each.record.name}, axis {each.axis}: the position setpoint is the recorded position (largest difference "
+            f"{1e9 * off:.3g} nm of a way of {1e3 * way:.4g} mm). The distance between them shows the drive, and a fit "
+            "without it gives a wrong load and friction. Name the column of the setpoint, or identify inertia and "
+            "friction alone: feedsim identify"
+        )
 
 
 def _other(position_cycle: float, interval: float) -> float:

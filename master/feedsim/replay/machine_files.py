@@ -1,7 +1,7 @@
 """A machine folder out of what was identified: machine.yaml, modes.csv, and per axis drive_A.yaml and friction_A.yaml.
 
-The axes move independently: one mode of frequency 0 each, with the inertia that was found, and the elastic modes of
-each.
+The axes move independently: one mode of frequency 0 each, with the inertia that was found. The elastic modes of each
+may move the scales of others.
 """
 
 from __future__ import annotations
@@ -87,6 +87,8 @@ def _modes(axes: Mapping[str, RigidAxis]) -> str:
         x = n * each.pitch / (2 * pi)
         for mode in each.modes:
             moved = {f"n_{axis}": mode.motor * n, f"x_{axis}": mode.scale * x, f"tcp_{axis}": mode.scale * x}
+            for other in mode.beside:
+                moved |= {f"x_{other.axis}": other.shape * x, f"tcp_{other.axis}": other.shape * x}
             rows.append((mode.frequency, mode.damping, moved))
     for k, (frequency, damping, moved) in enumerate(rows):
         numbers = (frequency, damping, *(moved.get(port, 0.0) for port in ports))

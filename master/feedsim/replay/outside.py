@@ -97,7 +97,7 @@ def _line(time: Array, position: Array, before: Rows, after: Rows) -> float | No
     width = h * (after[-1] - before[0])
     quiet = np.zeros(after[-1] - before[0] + 1)
     for rows in (before, after):
-        quiet[rows - before[0]] = _detrended(time, position, rows)
+        quiet[rows - before[0]] = detrended(position, rows)
     size = FINER * len(quiet)
     power, grid = np.abs(np.fft.rfft(quiet, size)), np.fft.rfftfreq(size, h)
     power[(grid < PERIODS / (h * min(len(before), len(after)))) | (grid > BELOW_RATE / h)] = 0.0
@@ -106,9 +106,9 @@ def _line(time: Array, position: Array, before: Rows, after: Rows) -> float | No
         near = best + step * np.arange(-3, 4)
         best = float(near[int(np.argmin([_left(time, position, f, before, after) for f in near]))])
         step /= 3
-    sides = [(before, _detrended(time, position, before)), (after, _detrended(time, position, after))]
+    sides = [(before, detrended(position, before)), (after, detrended(position, after))]
     for (own, y), (other, z) in (sides, sides[::-1]):
-        W, V = (_detrended(time, _waves(time, best), rows) for rows in (own, other))
+        W, V = (detrended(_waves(time, best), rows) for rows in (own, other))
         sine = np.linalg.lstsq(W, y, rcond=None)[0]
         if not np.sum((z - V @ sine) ** 2) < (1 - EXPLAINED) * np.sum(z**2):
             return None
@@ -128,7 +128,7 @@ def _sine(time: Array, signal: Array, frequency: float, before: Rows, after: Row
 
 def _both(time: Array, signal: Array, frequency: float, before: Rows, after: Rows) -> tuple[Array, Array]:
     waves, sides = _waves(time, frequency), (before, after)
-    return tuple(np.concatenate([_detrended(time, of, rows) for rows in sides]) for of in (waves, signal))  # type: ignore[return-value]
+    return tuple(np.concatenate([detrended(of, rows) for rows in sides]) for of in (waves, signal))  # type: ignore[return-value]
 
 
 def _waves(time: Array, frequency: float) -> Array:
@@ -137,7 +137,7 @@ def _waves(time: Array, frequency: float) -> Array:
     return np.column_stack([np.cos(phase), np.sin(phase)])
 
 
-def _detrended(time: Array, signal: Array, rows: Rows) -> Array:
+def detrended(signal: Array, rows: Rows) -> Array:
     """Rows of a signal (N,) or (N, K) less their parabola: creep at rest is no vibration."""
     t = np.linspace(-1.0, 1.0, len(rows))
     trend = np.linalg.qr(np.column_stack([np.ones_like(t), t, t**2]))[0]

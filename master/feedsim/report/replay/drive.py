@@ -15,6 +15,7 @@ from feedsim.identify import Provenance
 from feedsim.identify.friction_file import interval_text, value_text
 from feedsim.replay.compare import Comparison
 from feedsim.replay.drive import DECISIVE, DriveFound
+from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
 from feedsim.replay.outside import in_words
@@ -196,6 +197,11 @@ def _parts(axis: str, one: DriveFound) -> Section:
     return Section(f"What the friction of {axis} needs", [Paragraph(FRICTION_PARTS), table])
 
 
+def _at_others(mode: ElasticMode) -> list[str]:
+    """What a mode does at the scales of other axes, over the rigid motion of its own."""
+    return [f"{each.axis} {each.shape:.2g} (+-{NORMAL_95 * each.sigma:.2g})" for each in mode.beside]
+
+
 def _modes(axis: str, one: DriveFound) -> Section:
     half = [tuple(NORMAL_95 * sigma for sigma in mode.sigma) for mode in one.modes]
     rows = [
@@ -207,6 +213,11 @@ def _modes(axis: str, one: DriveFound) -> Section:
     parts: list[Paragraph | Table] = [Paragraph(MODES_TEXT)]
     if rows:
         parts.append(Table("rrrr", heads, rows))
+    parts += [
+        Paragraph(minus(f"The mode at {mode.frequency:.4g} Hz moves the scale of {', '.join(_at_others(mode))}."))
+        for mode in one.modes
+        if mode.beside
+    ]
     if one.modes_predicted:
         left = [(str(count), f"{1e6 * value:.3g}") for count, value in one.modes_predicted.items()]
         parts.append(Table("rr", ("Modes", "Position left of unseen quarters [µm]"), left))
@@ -242,7 +253,9 @@ def summary(report: DriveReport, files: Sequence[str]) -> dict[str, Any]:
                 "position_cycle": {"value": one.machine.cycles.T_pos, "unit": "s"},
                 "modes": [
                     {"frequency": mode.frequency, "damping": mode.damping, "motor": mode.motor, "scale": mode.scale,
-                     "sigma": [finite(sigma) for sigma in mode.sigma]}
+                     "sigma": [finite(sigma) for sigma in mode.sigma],
+                     **({"other_axes": {other.axis: {"shape": other.shape, "sigma": other.sigma}
+                                        for other in mode.beside}} if mode.beside else {})}
                     for mode in one.modes
                 ],
                 "modes_predicted": {str(count): value for count, value in one.modes_predicted.items()},
@@ -291,6 +304,7 @@ def summary_lines(report: DriveReport) -> list[str]:
         lines += [
             f"    mode at {mode.frequency:.4g} Hz (+-{NORMAL_95 * mode.sigma[0]:.2g}), "
             f"damping {100 * mode.damping:.2g} %, motor {mode.motor:.2g}, scale {mode.scale:.2g} of the rigid motion"
+            f"{''.join(f', scale of {each}' for each in _at_others(mode))}"
             for mode in one.modes
         ]
         lines.append(

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from feedsim.control import opened, read
+from feedsim.control.formats import opened
+from feedsim.control.reading import read
 from feedsim.control.view import Value
 from feedsim.control.writing import changed, number
 from feedsim.errors import InputError

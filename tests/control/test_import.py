@@ -9,8 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from feedsim.control import Reading, opened, read, table
+from feedsim.control import table
 from feedsim.control.archive import scalar
+from feedsim.control.formats import opened
+from feedsim.control.reading import Reading, read
 from feedsim.control.usual import usual_ranges
 from feedsim.errors import InputError
 

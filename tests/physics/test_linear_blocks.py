@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.linalg import expm
 from scipy.signal import bilinear, cont2discrete, freqz
 
-from feedsim.linear.drive import LinearDrive, OperatingPoint
+from feedsim.linear.drive import LinearDrive, OperatingPoint, zero_order_hold
 from feedsim.linear.plant import ModalPlant
 from feedsim.scenario import Filter
 from physics import controller_reference
@@ -51,6 +52,20 @@ def test_modes_are_hold_equivalents(frequency: float, damping: float, hold: Any,
     # scipy's way loses 1e-16 over (omega T)^2 = 6e-8 at the lowest frequency, and as much again in the numerator
     np.testing.assert_allclose(q[:, 0], expected_q, rtol=3e-8)
     np.testing.assert_allclose(v[:, 0], expected_v, rtol=3e-8)
+
+
+@pytest.mark.parametrize("step", [1e-6, 125e-6, 2e-3, 20e-3])
+@pytest.mark.parametrize("omega", [0.0, 30.0, 3000.0])
+@pytest.mark.parametrize("inductances", [(5e-3, 5e-3), (0.8e-3, 20e-3)])
+def test_the_held_motor_is_the_matrix_exponential(step: float, omega: float, inductances: tuple[float, float]) -> None:
+    """Of a norm up to 1500. Doubling loses a bit a time, so that 1e-12 is left of what both begin with."""
+    L_d, L_q = inductances
+    A = np.array([[-2.0 / L_d, omega * L_q / L_d], [-omega * L_d / L_q, -2.0 / L_q]])
+    both = expm(np.block([[A, np.eye(2)], [np.zeros((2, 4))]]) * step)
+    Phi, Gamma = zero_order_hold(A, step)
+    assert np.abs(Phi - both[:2, :2]).max() <= 1e-12
+    assert np.abs(Gamma - both[:2, 2:]).max() <= 1e-12 * step
+    assert np.array_equal(zero_order_hold(np.zeros((2, 2)), step)[1], step * np.eye(2))
 
 
 def images(frequency: float, damping: float) -> NDArray[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -103,8 +103,15 @@ class CircleTask:
         return found | (cause_figures(diagnosis) if diagnosis is not None else {})
 
     def diagnosis(self, trace: Trace) -> Diagnosis | None:
-        """Why the circle is not round; None where it has too few samples to tell."""
-        return diagnosed(trace, self.turns, self.pitch, self.gain, self.drag)
+        """Why the circle is not round; None where it has too few samples to tell.
+
+        Found once for the same trace: figures and causes of a run both rest on it.
+        """
+        last: tuple[Trace, Diagnosis | None] | None = self.__dict__.get("_last")
+        if last is None or last[0] is not trace:
+            last = trace, diagnosed(trace, self.turns, self.pitch, self.gain, self.drag)
+            self.__dict__["_last"] = last
+        return last[1]
 
     @property
     def pitch(self) -> dict[str, float]:
@@ -219,9 +226,10 @@ def check(scenario: Scenario, program: Program) -> None:
         raise InputError.of(f"{scenario.file}: the evaluation is not possible", problems)
 
 
-def diagnoses(result: Result) -> dict[str, Diagnosis]:
-    """Why its circles are not round: prefix of a circle's figures -> what it is made of."""
-    circles = [task for task in tasks(result.scenario, result.program) if isinstance(task, CircleTask)]
+def diagnoses(result: Result, asked: Sequence[Task] | None = None) -> dict[str, Diagnosis]:
+    """Why its circles are not round: prefix of a circle's figures -> what it is made of. asked: as of evaluate()."""
+    asked = tasks(result.scenario, result.program) if asked is None else asked
+    circles = [task for task in asked if isinstance(task, CircleTask)]
     found = {task.prefix: task.diagnosis(result.trace) for task in circles}
     return {prefix: diagnosis for prefix, diagnosis in found.items() if diagnosis is not None}
 
@@ -235,8 +243,10 @@ def doubts(figures: Mapping[str, Figure], diagnoses: Mapping[str, Diagnosis]) ->
     return tuple(found)
 
 
-def evaluate(result: Result) -> dict[str, Figure]:
+def evaluate(result: Result, asked: Sequence[Task] | None = None) -> dict[str, Figure]:
     """Every figure that the scenario of ``result`` asks for, e.g. "Z.overshoot", "XZ.G", "XZ.tool.glitch_X".
+
+    asked: the scenario's tasks, where they are at hand already.
 
     >>> import feedsim as fs
     >>> figures = fs.evaluate(fs.run("z_positioning.yaml"))
@@ -245,7 +255,7 @@ def evaluate(result: Result) -> dict[str, Figure]:
     """
     return {
         f"{task.prefix}.{name}": figure
-        for task in tasks(result.scenario, result.program)
+        for task in (tasks(result.scenario, result.program) if asked is None else asked)
         for name, figure in task.figures(result.trace).items()
     }
 

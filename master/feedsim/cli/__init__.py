@@ -18,7 +18,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 from feedsim.cli import (
     circle,
@@ -93,7 +93,7 @@ def parser() -> Parser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    top.add_argument("--version", action="version", version=f"feedsim {_version()}")
+    top.add_argument("--version", action=_Version, help="show program's version number and exit")
     top.set_defaults(known=COMMANDS)
     commands = top.add_subparsers(dest="command", metavar="COMMAND")
     for command in COMMANDS:
@@ -101,7 +101,20 @@ def parser() -> Parser:
     return top
 
 
+class _Version(argparse.Action):
+    """Prints the version; only then it is asked for, which takes a fiftieth of a short run."""
+
+    def __init__(self, **words: Any) -> None:
+        super().__init__(nargs=0, **words)
+
+    def __call__(self, parser: argparse.ArgumentParser, *given: object) -> None:
+        print(f"feedsim {_version()}")
+        parser.exit()
+
+
 def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return version("feedsim")
     except PackageNotFoundError:

@@ -6,23 +6,6 @@ Start with names.py; the table is names.csv. Files are read by archive.py, and r
 of what they hold.
 """
 
-from feedsim.control.archive import Archive, Entry, Odd
-from feedsim.control.formats import opened
 from feedsim.control.names import CONTROLS, Name, known, names_of, table
-from feedsim.control.reading import Reading, Refused, Taken, read
 
-__all__ = [
-    "CONTROLS",
-    "Archive",
-    "Entry",
-    "Name",
-    "Odd",
-    "Reading",
-    "Refused",
-    "Taken",
-    "known",
-    "names_of",
-    "opened",
-    "read",
-    "table",
-]
+__all__ = ["CONTROLS", "Name", "known", "names_of", "table"]

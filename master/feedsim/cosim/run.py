@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from feedsim.cosim import worker
 from feedsim.cosim.binaries import any_foreign, fmus_directory
 from feedsim.cosim.departure import first_departure
 from feedsim.cosim.exchange import chosen
@@ -110,6 +109,8 @@ def run(
     fmus = fmus or fmus_directory()
     limit = scenario.coupling.call_limit
     if any_foreign(scenario.machine, fmus, scenario.coupling):
+        from feedsim.cosim import worker  # where all programs are the shipped ones there is none
+
         return worker.call(
             _run, scenario, program, fmus, limit=limit, progress=progress, torque_feedforward=torque_feedforward,
             native=native, scratch=scratch, sink=sink,
@@ -224,6 +225,8 @@ def follow(
     coupling, fmus = coupling or Coupling(), fmus or fmus_directory()
     given = (machine, program, columns, interval, loads, coupling, fmus, native)
     if any_foreign(machine, fmus, coupling):
+        from feedsim.cosim import worker
+
         return worker.call(_follow, *given, limit=coupling.call_limit)
     return _follow(*given)
 

@@ -10,7 +10,8 @@ from typing import Any
 
 from feedsim.analysis import Figure, Named
 from feedsim.arguments import listed, spelt
-from feedsim.control import Archive, names_of
+from feedsim.control import names_of
+from feedsim.control.archive import Archive
 from feedsim.control.view import Value
 from feedsim.control.writing import Written, changed
 from feedsim.errors import InputError

@@ -9,8 +9,9 @@ from typing import Any
 
 from feedsim.analysis import Figure, Named
 from feedsim.arguments import listed, spelt
-from feedsim.control import Archive, Reading, opened, read
-from feedsim.control.archive import MAX_FILE_BYTES, scalar
+from feedsim.control.archive import MAX_FILE_BYTES, Archive, scalar
+from feedsim.control.formats import opened
+from feedsim.control.reading import Reading, read
 from feedsim.errors import InputError, no_such_file
 from feedsim.files.regular import content
 from feedsim.jobs.folder import File, kept

@@ -33,10 +33,11 @@ from feedsim.report.run.signals import signals_picture
 from feedsim.report.uncertainty import answers
 from feedsim.scenario import Scenario
 from feedsim.trace import Array
-from feedsim.uncertainty import Cloud, Uncertainty, check_count, cloud_of, of_run
 
 if TYPE_CHECKING:
     import pandas
+
+    from feedsim.uncertainty import Cloud, Uncertainty
 
 
 @dataclass(frozen=True, repr=False)
@@ -68,12 +69,16 @@ class RunResult(JudgedRun, Result):
     @cached_property
     def figures(self) -> Mapping[str, Figure]:
         """Name -> figure, such as "XZ.G", as the scenario's `evaluate` asks for them."""
-        return analysis.Named(analysis.evaluate(self))
+        return analysis.Named(analysis.evaluate(self, self._tasks))
 
     @cached_property
     def causes(self) -> Mapping[str, analysis.Diagnosis]:
         """Prefix of a circle's figures -> why it is not round."""
-        return analysis.diagnoses(self)
+        return analysis.diagnoses(self, self._tasks)
+
+    @cached_property
+    def _tasks(self) -> Sequence[analysis.Task]:
+        return analysis.tasks(self.scenario, self.program)
 
     @property
     def time(self) -> Array:
@@ -246,6 +251,8 @@ def run(
             report.workbook_needed()
         cloud = None
         if uncertain:
+            from feedsim.uncertainty import check_count, cloud_of
+
             check_count(uncertain)
             cloud = cloud_of(subject.plan.machine)
         if page:
@@ -286,6 +293,8 @@ def _with_draws(result: RunResult, subject: Opened, cloud: Cloud | None, count: 
     """The run with what identification leaves open, where that is asked for."""
     if cloud is None:
         return result
+    from feedsim.uncertainty import of_run
+
     return replace(result, uncertainty=of_run(result, cloud, count, fmus=subject.fmus, progress=watch.progress))
 
 

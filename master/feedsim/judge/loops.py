@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
-from feedsim import units
+from feedsim import linear, units
+from feedsim.cache import cached
 from feedsim.findings import Wrong
-from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop
+from feedsim.linear.judgement import GAIN_MARGIN, PHASE_MARGIN, Loop, judge
 from feedsim.nc import Program
 from feedsim.scenario import ForeignUnit, Machine
+from feedsim.structure import Modes
 
 GAIN = {"speed": ("K_p", "N.m.s/rad", "N.m.s/rad"), "position": ("K_v", "1/s", "(m/min)/mm")}
 STATE = {"moving": "while the axis slides", "at rest": "at rest, where friction holds it like a spring"}
+
+CODE = (Path(linear.__file__).parent, Path(__file__))
+
+
+def loops_of(machine: Machine, modes: Modes) -> tuple[Loop, ...]:
+    """The loops as :func:`feedsim.linear.judgement.judge` has them, kept from one process to the next."""
+    state = hashlib.sha256(repr((list(modes.ports), modes.frequency.shape)).encode())
+    for column in (modes.frequency, modes.damping, *modes.ports.values()):
+        state.update(column.tobytes())
+    described = repr(machine.model_dump(include={"axes", "cycles"}))
+
+    def find() -> list[dict[str, Any]]:
+        return [asdict(loop) | {"growing": int(loop.growing)} for loop in judge(machine, modes)]
+
+    return tuple(Loop(**loop) for loop in cached("loops", [described, state.hexdigest()], CODE, find))
 
 
 def control(machine: Machine, loops: Sequence[Loop], program: Program | None = None) -> list[str]:

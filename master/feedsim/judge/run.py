@@ -10,7 +10,7 @@ from feedsim import cosim
 from feedsim.cosim import Run
 from feedsim.cosim.loads import Acting
 from feedsim.judge import exchange, loads
-from feedsim.judge.loops import control
+from feedsim.judge.loops import control, loops_of
 from feedsim.judge.pose import PoseUse, pose_use
 from feedsim.linear.judgement import Loop, judge
 from feedsim.nc import Program
@@ -36,15 +36,17 @@ class JudgedRun(Run):
     warnings: tuple[str, ...]
 
 
-def judged(run: Run) -> JudgedRun:
+def judged(run: Run, *, keep: bool = True) -> JudgedRun:
     """The run with its doubts: those of its units, of the parameters, of the pose, and what the run itself shows.
+
+    keep: whether the judged loops are kept on disk for the next process; a study has thousands of machines.
 
     Raises:
         InputError: the machine's table of modes or its structure cannot be read.
     """
     scenario, program = run.scenario, run.program
     modes = checked_modes(scenario.machine)
-    loops = judge(scenario.machine, modes)
+    loops = loops_of(scenario.machine, modes) if keep else judge(scenario.machine, modes)
     pose = pose_use(scenario.machine, program, run.grid, run.crossings)
     warnings = (
         *run.notes,
@@ -70,7 +72,7 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
     """
     ready = cosim.check(scenario, program, fmus=fmus)
     modes = checked_modes(scenario.machine)
-    loops = judge(scenario.machine, modes)
+    loops = loops_of(scenario.machine, modes)
     pose = pose_use(scenario.machine, program, ready.grid)
     return (*ready.notes, *_foreseen(scenario, modes, program, loops, ready.acting), *pose.warnings)
 

@@ -11,7 +11,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_banded
 
 from feedsim.motions.kind import Array, Points
 
@@ -59,18 +58,37 @@ class RestSpline:
 def _clamped(y: Array) -> Array:
     """(4, N - 1): powers 0 to 3 of the pieces of a C2 cubic spline through `y` (N,) at distances 1, clamped to slope 0.
 
-    The slopes at the knots have s_(i-1) + 4 s_i + s_(i+1) = 3 (y_(i+1) - y_(i-1)). scipy.interpolate has the same, with
-    the same bits, and takes longer to load than a short program to plan.
+    The slopes at the knots have s_(i-1) + 4 s_i + s_(i+1) = 3 (y_(i+1) - y_(i-1)).
     """
     rise = np.diff(y)
-    bands = np.ones((3, len(y)))
-    bands[1, 1:-1] = 4.0
-    bands[0, 1] = bands[2, -2] = 0.0
-    right = np.zeros(len(y))
-    right[1:-1] = 3 * (rise[1:] + rise[:-1])
-    slope = solve_banded((1, 1), bands, right)
+    slope = np.array(_slopes((3 * (rise[1:] + rise[:-1])).tolist()))
     bend = slope[:-1] + slope[1:] - 2 * rise
     return np.stack([y[:-1], slope[:-1], rise - slope[:-1] - bend, bend])
+
+
+def _slopes(right: list[float]) -> list[float]:
+    """The slopes at all knots, 0 at the first and the last one; right: (N - 2,) right sides of those between.
+
+    Gauss elimination of the tridiagonal system (LAPACK's gtsv, which exchanges no rows here). scipy.linalg and
+    scipy.interpolate have the same, with the same bits, and take longer to load than a short program to plan.
+    """
+    pivots, reduced = [1.0], [0.0]
+    pivot = 1.0
+    above, value = 0.0, 0.0  # the first row has nothing right of its diagonal
+    for side in right:
+        factor = 1.0 / pivot
+        value = side - factor * value
+        pivot = 4.0 - factor * above
+        above = 1.0
+        pivots.append(pivot)
+        reduced.append(value)
+    slope = 0.0
+    found = [slope]
+    for value, pivot in zip(reduced[:0:-1], pivots[:0:-1], strict=True):
+        slope = (value - slope) / pivot
+        found.append(slope)
+    found.append(0.0)
+    return found[::-1]
 
 
 class LongSpline:

@@ -7,7 +7,7 @@ import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,9 +19,10 @@ from feedsim.report.formatting import display_unit, minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import quantity
 from feedsim.report.style import SIMULATED
-from feedsim.uncertainty import Band as Spread
-from feedsim.uncertainty import Uncertainty
-from feedsim.uncertainty.draws import unit_of
+
+if TYPE_CHECKING:
+    from feedsim.uncertainty import Band as Spread
+    from feedsim.uncertainty import Uncertainty
 
 BANDS = "bands.csv"
 
@@ -45,6 +46,8 @@ def intervals_section(uncertainty: Uncertainty, figures: Mapping[str, Figure]) -
 
 
 def _drawn(uncertainty: Uncertainty) -> Table:
+    from feedsim.uncertainty.draws import unit_of  # a run without draws does not load them
+
     rows: list[tuple[Text, ...]] = []
     known_ones = [
         *uncertainty.cloud.known.items(),
@@ -113,6 +116,8 @@ def bands_csv(uncertainty: Uncertainty) -> str:
 
 def summary_part(uncertainty: Uncertainty, figures: Mapping[str, Figure]) -> dict[str, Any]:
     """Of summary.json."""
+    from feedsim.uncertainty.draws import unit_of
+
     return {
         "draws": uncertainty.count,
         "share": uncertainty.share,

@@ -13,7 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from feedsim.control import Reading, Refused, Taken
+from feedsim.control.reading import Reading, Refused, Taken
 from feedsim.errors import InputError
 from feedsim.fields import Quantity
 from feedsim.files.checked import check, fetch, read_group

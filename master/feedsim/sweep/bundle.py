@@ -161,7 +161,7 @@ class Workplace:
     def _figures(self, task: Task) -> tuple[dict[str, tuple[float, str]], Sequence[str]]:
         scenario = self._base.with_changes(task.changes)
         program = self._program(scenario)
-        result = judged(cosim.run(scenario, program=program, fmus=self._fmus))
+        result = judged(cosim.run(scenario, program=program, fmus=self._fmus), keep=False)
         found = {name: _si(figure) for name, figure in analysis.evaluate(result).items()}
         return found, result.warnings
 

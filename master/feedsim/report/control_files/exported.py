@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from feedsim.analysis import Figure
-from feedsim.control import Archive
+from feedsim.control.archive import Archive
 from feedsim.control.writing import Written
 from feedsim.findings import Note
 from feedsim.report.content import Report, Section, Table, Text, Tile, code

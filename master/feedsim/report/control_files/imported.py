@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from feedsim.analysis import Figure
-from feedsim.control import Archive, Reading, Refused, Taken
+from feedsim.control.archive import Archive
+from feedsim.control.reading import Reading, Refused, Taken
 from feedsim.findings import Note
 from feedsim.report.content import Bullets, Report, Section, Table, Text, Tile, code
 from feedsim.report.control_files.sources import sources_section

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from feedsim.analysis import (
     CircleTask,
@@ -53,7 +53,9 @@ from feedsim.report.uncertainty import BANDS, bands_csv, summary_part, with_inte
 from feedsim.scenario import Logging
 from feedsim.trace import Trace, write_csv
 from feedsim.tune import of_run
-from feedsim.uncertainty import Uncertainty
+
+if TYPE_CHECKING:
+    from feedsim.uncertainty import Uncertainty
 
 FORMAT = 1
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ import pytest
 from feedsim import cli
 from feedsim.analysis import diagnoses, evaluate
 from feedsim.report import run as report
+from feedsim.report.show.report import _beside
 from report_helpers import circle_run
 
 
@@ -85,3 +88,45 @@ def test_a_result_is_not_written_over(results: tuple[Path, Path], capsys: pytest
     assert show(results[0], *results) == 4
     assert "is an input" in capsys.readouterr().err
     assert (results[0] / "summary.json").read_bytes() == before
+
+
+def test_the_first_line_says_what_has_changed(results: tuple[Path, Path], tmp_path: Path, capsys: Any) -> None:
+    """G has grown by 1 um in the second summary, the peaks have not; a plain number has no unit behind it."""
+    told = json.loads((results[1] / "summary.json").read_text())
+    told["machine"]["axes"]["Z"]["drive"]["k_ffw"]["value"] = 0.5
+    (tmp_path / "slow").mkdir()
+    for file in results[1].iterdir():
+        if file.is_file():
+            (tmp_path / "slow" / file.name).write_bytes(file.read_bytes())
+    (tmp_path / "slow" / "summary.json").write_text(json.dumps(told))
+    before = json.loads((results[0] / "summary.json").read_text())["figures"]["XZ.G"]["value"]
+    assert show(tmp_path / "out", results[0], tmp_path / "slow") == 0
+    first, *rest = capsys.readouterr().out.splitlines()
+    found = re.match(r"XZ: circular deviation G ([\d.]+) -> ([\d.]+) um; unchanged: ", first)
+    assert found, first
+    assert float(found[1]) == pytest.approx(before, abs=6e-3)
+    assert float(found[2]) == pytest.approx(before + 1, rel=5e-3)
+    assert "reversal peak of X" in first
+    assert any(re.fullmatch(r"differs: machine\.axes\.Z\.drive\.k_ffw: [\d.]+ \| 0\.5", line) for line in rest), rest
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert page.index('class="answer">XZ: circular deviation G') < page.index("machine.axes.Z.drive.k_ffw")
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ([(8.0, "um"), (10.0, "um")], "8.00 -> 10.0 um (+25 %)"),
+        ([(-0.0003, "ms"), (1.5, "ms")], "0.000 -> 1.50 ms"),  # of next to nothing there is no share
+        ([(8.0, "um"), None, (2.0, "um")], "8.00 -> – -> 2.00 um"),
+        ([(math.nan, "ms"), (99.02, "ms")], "not determined -> 99.0 ms"),
+    ],
+)
+def test_figures_beside_one_another(values: list[tuple[float, str] | None], text: str) -> None:
+    assert _beside(values) == text
+
+
+def test_results_that_are_alike_are_said_to_be(results: tuple[Path, Path], tmp_path: Path, capsys: Any) -> None:
+    assert show(tmp_path / "out", results[0], results[0] / "result.csv") == 0
+    capsys.readouterr()
+    assert show(tmp_path / "out2", results[0]) == 0
+    assert capsys.readouterr().out.startswith("XZ: circular deviation G ")

@@ -68,7 +68,10 @@ def test_results_over_each_other(folder: Path, circle: fs.Result, tmp_path: Path
     assert (first.value, second.value) == (circle.figures["XZ.G"].value, stiff.figures["XZ.G"].value)
     assert list(over.parameters) == ["machine.axes.Z.drive.K_v"]
     assert over.pictures
-    assert repr(over).startswith(f"Overlay of {circle.scenario.name}, stiff\ndiffers: machine.axes.Z.drive.K_v")
+    first_line, changed, differs = repr(over).splitlines()
+    assert first_line == f"Overlay of {circle.scenario.name}, stiff"
+    assert changed.startswith("XZ: circular deviation G 8.19 -> ")
+    assert differs.startswith("differs: machine.axes.Z.drive.K_v")
     html = over._repr_html_()
     assert html.startswith("<iframe")
     assert "&lt;html" in html

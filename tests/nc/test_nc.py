@@ -335,3 +335,12 @@ def test_cycles_of_the_machine_count() -> None:
     assert program.duration == pytest.approx(1.248, abs=1e-12)
     profile = rest_to_rest(0.1, 5 / 60, 14.4, JERK)
     assert program.x_s["Z"][::8] == pytest.approx(0.1 + profile.at(program.time[::8])[0], abs=1e-15)
+
+
+def test_messages_on_limits_say_where_these_come_from() -> None:
+    """The travel of a machine that was identified is that of its record; the axis itself may have more."""
+    machine = default_machine()
+    axis = machine.axes["Z"].model_copy(update={"limits_from": "that of the record"})
+    machine = machine.model_copy(update={"axes": {**machine.axes, "Z": axis}})
+    with pytest.raises(InputError, match=r"allowed travel 0 to 685 mm \(that of the record\)$"):
+        plan(scenario(Move(by={"Z": 0.6}, feed=0.1), machine=machine))

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from agreement_helpers import assert_numbers_agree
 from feedsim.cli import main
 from feedsim.cosim import run
 from feedsim.files.columns import Columns, load_columns
@@ -223,6 +224,7 @@ def test_a_log_without_torque(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     said = json.loads((tmp_path / "drive" / "summary.json").read_text())["answer"]
     assert re.match(r"X: the position of the record is met to .* um rms .*The record tells K_v, k_ffw, ", said[0]), said
     assert 'class="answer">X: the position' in (tmp_path / "drive" / "report.html").read_text(encoding="utf-8")
+    assert_numbers_agree(tmp_path / "drive")
     true = load_machine(MACHINES / "one_axis").axes["X"].drive
     found = json.loads((tmp_path / "drive" / "summary.json").read_text())["axes"]["X"]["parameters"]
     for name in ("K_v", "k_ffw", "T_sym", "K_p"):

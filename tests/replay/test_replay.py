@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from agreement_helpers import assert_numbers_agree
 from feedsim.cli import main
 from feedsim.cosim import run
 from feedsim.replay.closed_loop import Replay, read_axes, windowed
@@ -59,6 +60,7 @@ def test_a_log_of_the_machine_itself(log: Path, tmp_path: Path) -> None:
     assert np.max(np.abs(beside["Z.x_a_simulated"] - beside["Z.x_a_recorded"])) < 1e-9
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {"report.html", "summary.json", "replay.csv"}
     assert '<p class="answer">Z: position off by ' in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert_numbers_agree(tmp_path / "out")
 
 
 def test_the_torque_at_standstill_is_a_figure_of_its_own(log: Path, tmp_path: Path) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from feedsim.report.chart import printed
 from feedsim.report.style import finish
+from kinds_helpers import Kinds
 
 
 @pytest.fixture
@@ -25,3 +27,9 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
     monkeypatch.setattr(printed, "finish", looked_at)
     return found
+
+
+@pytest.fixture(scope="session")
+def kinds(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Kinds:
+    """Results of all kinds, each made when it is first asked for."""
+    return Kinds(tmp_path_factory.mktemp("kinds"), fmus)

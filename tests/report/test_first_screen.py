@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from command_helpers import feedsim
 from feedsim.analysis import diagnoses, evaluate
 from feedsim.findings import Wrong
 from feedsim.report import run as report
 from feedsim.report.content import Report, parted
 from feedsim.report.page import html
-from report_helpers import circle_run, positioning_run
-from ssp_helpers import short_scenario
+from kinds_helpers import KINDS, Kinds
+from report_helpers import circle_run
 
 ROOT = Path(__file__).resolve().parents[2]
 MOST_WORDS = 120  # of two letters and more: numbers and units are none
@@ -45,25 +44,6 @@ SEEN = """() => {
 }"""
 
 
-@pytest.fixture(scope="module")
-def files(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A report of each kind that is made in a moment; docs/reports.md shows the others."""
-    folder = tmp_path_factory.mktemp("kinds")
-    for name, run in (("circle", circle_run()), ("stop", positioning_run())):
-        report.write(run, evaluate(run), folder / name)
-    machine = ROOT / "scenarios" / "machines" / "one_axis"
-    short_scenario(folder)
-    for words in (
-        f"frf {machine} --no-measure --out frf", "run short.yaml --out run", f"machine show {machine} --out machine",
-        "compare run/result.csv stop/result.csv --report compare/report.html --common --only *.x_a",
-        "show stop run --out show", "circle circle/result.csv --axes X,Z --out recorded",
-    ):  # fmt: skip
-        (folder / "compare").mkdir(exist_ok=True)
-        done = feedsim(*words.split(), fmus=fmus, cwd=folder)
-        assert done.returncode == 0 or words.startswith("compare"), (words, done.stderr)
-    return {path.parent.name: path for path in folder.glob("*/report.html")}
-
-
 def opened(browser: Any, file: Path, width: int, height: int) -> Any:
     page = browser.new_page(viewport={"width": width, "height": height})
     page.goto(file.as_uri())
@@ -71,14 +51,9 @@ def opened(browser: Any, file: Path, width: int, height: int) -> Any:
     return page
 
 
-NAMES = ("circle", "stop", "frf", "run", "machine", "compare", "show", "recorded")
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_answer_picture_figures_and_next_step_without_scrolling(
-    name: str, browser: Any, files: dict[str, Path]
-) -> None:
-    page = opened(browser, files[name], 1400, 900)
+@pytest.mark.parametrize("name", KINDS)
+def test_answer_picture_figures_and_next_step_without_scrolling(name: str, browser: Any, kinds: Kinds) -> None:
+    page = opened(browser, kinds.page(name), 1400, 900)
     seen = page.evaluate(SEEN)
     page.close()
     assert len(seen["words"]) <= MOST_WORDS, " ".join(seen["words"])
@@ -88,9 +63,9 @@ def test_answer_picture_figures_and_next_step_without_scrolling(
     assert seen["keys"] or seen["next"]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_answer_and_picture_on_a_phone(name: str, browser: Any, files: dict[str, Path]) -> None:
-    page = opened(browser, files[name], 390, 844)
+@pytest.mark.parametrize("name", KINDS)
+def test_answer_and_picture_on_a_phone(name: str, browser: Any, kinds: Kinds) -> None:
+    page = opened(browser, kinds.page(name), 390, 844)
     seen = page.evaluate(SEEN)
     page.close()
     assert seen["wide"] <= 390
@@ -99,8 +74,8 @@ def test_answer_and_picture_on_a_phone(name: str, browser: Any, files: dict[str,
 
 
 @pytest.mark.parametrize("name", ["circle", "frf"])
-def test_what_is_folded_opens_by_keyboard_and_is_drawn(name: str, browser: Any, files: dict[str, Path]) -> None:
-    page = opened(browser, files[name], 1200, 900)
+def test_what_is_folded_opens_by_keyboard_and_is_drawn(name: str, browser: Any, kinds: Kinds) -> None:
+    page = opened(browser, kinds.page(name), 1200, 900)
     folds = page.locator("details.fold")
     assert folds.count() > 3
     for fold in folds.all():
@@ -116,16 +91,16 @@ def test_what_is_folded_opens_by_keyboard_and_is_drawn(name: str, browser: Any, 
     page.close()
 
 
-def test_a_link_opens_what_it_leads_to(browser: Any, files: dict[str, Path]) -> None:
-    page = opened(browser, files["circle"], 1200, 900)
+def test_a_link_opens_what_it_leads_to(browser: Any, kinds: Kinds) -> None:
+    page = opened(browser, kinds.page("circle"), 1200, 900)
     page.locator("footer a").first.click()
     page.wait_for_timeout(100)
     assert page.locator("details.fold:has(#figures)").evaluate("each => each.open")
     page.close()
 
 
-def test_paper_has_all_of_it(browser: Any, files: dict[str, Path], tmp_path: Path) -> None:
-    page = opened(browser, files["circle"], 1200, 900)
+def test_paper_has_all_of_it(browser: Any, kinds: Kinds, tmp_path: Path) -> None:
+    page = opened(browser, kinds.page("circle"), 1200, 900)
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.locator("details:not([open])").count() == 0
     page.evaluate("dispatchEvent(new Event('afterprint'))")
@@ -191,26 +166,13 @@ def facts(text: str) -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("name", ["circle", "recorded"])
-def test_a_fact_has_one_value(name: str, files: dict[str, Path]) -> None:
-    found = facts(files[name].read_text(encoding="utf-8"))
+def test_a_fact_has_one_value(name: str, kinds: Kinds) -> None:
+    found = facts(kinds.page(name).read_text(encoding="utf-8"))
     assert {"G", "peak X", "peak Z"} <= set(found)
     for fact, values in found.items():
         assert len(values) >= 3, fact
         for value in values[1:]:
             assert agree(values[0], value.rstrip(",")), (fact, values)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_tiles_agree_with_the_table_of_figures(name: str, files: dict[str, Path]) -> None:
-    """Of every figure with a tile: tile and table have the same value, by the same meaning."""
-    text = files[name].read_text(encoding="utf-8")
-    rows = re.findall(
-        r'<td><code>[^<]+</code></td><td class="number">([^<]+)</td><td>([^<]*)</td><td[^>]*>([^<]+)</td>', text
-    )
-    table = {(meaning, unit): value for value, unit, meaning in rows}
-    for meaning, value, unit in re.findall(r'<div class="key" title="([^"]+)"><b>([^<]+) <small>([^<]+)</small>', text):
-        if (meaning, unit) in table and NUMBER.fullmatch(value):
-            assert agree(value, table[meaning, unit]), (meaning, value, table[meaning, unit])
 
 
 def test_the_diagnosis_names_the_same_peaks_as_the_figures() -> None:
@@ -225,12 +187,12 @@ def test_the_diagnosis_names_the_same_peaks_as_the_figures() -> None:
 @pytest.mark.skipif(
     "FEEDSIM_AXE" not in os.environ, reason="FEEDSIM_AXE names axe.min.js of axe-core (npm pack axe-core)"
 )
-@pytest.mark.parametrize("name", NAMES)
-def test_axe_core_finds_nothing(name: str, browser: Any, files: dict[str, Path]) -> None:
+@pytest.mark.parametrize("name", KINDS)
+def test_axe_core_finds_nothing(name: str, browser: Any, kinds: Kinds) -> None:
     """Folded and unfolded, on light and dark screens; the page's policy is set aside for the tester's script."""
     context = browser.new_context(bypass_csp=True, viewport={"width": 1400, "height": 900})
     page = context.new_page()
-    page.goto(files[name].as_uri())
+    page.goto(kinds.page(name).as_uri())
     page.wait_for_timeout(300)
     page.evaluate(Path(os.environ["FEEDSIM_AXE"]).read_text(encoding="utf-8"))
     for scheme in ("light", "dark"):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from agreement_helpers import assert_numbers_agree
 from feedsim.errors import OutputError
 from feedsim.identify.friction_file import open_loop_line
 from feedsim.identify.result import Balance, Correlation, Identification
@@ -87,6 +88,7 @@ def test_summary(written: Path) -> None:
 
 
 def test_the_simple_model_stands_beside(written: Path) -> None:
+    assert_numbers_agree(written, pairs=20)
     assert set(told(written)["rigid_axis"]) == {"J", "F_C"}
     text = (written / "report.html").read_text(encoding="utf-8")
     assert "Rigid axis with simple friction" in text

@@ -22,6 +22,10 @@ def test_a_stop_is_told_with_what_it_waits_for() -> None:
     )
     at_once = stop_words(figures(overshoot=0.2, settling_time=0.0, ringing_frequency=20.75), 1e-6)
     assert at_once == "0.20 um past its target, within +-1 um from the end of the NC motion on."
+    never = stop_words(figures(overshoot=107.26, settling_time=math.nan, ringing_frequency=72.41), 1e-6)
+    assert (
+        never == "not yet at rest within +-1 um at the end: it oscillates at 72.4 Hz, up to 107.26 um past its target."
+    )
     assert "add a dwell" in stop_words(figures(overshoot=math.nan, settling_time=math.nan), 1e-6)
 
 

@@ -117,6 +117,7 @@ def test_the_sheet_for_print(fmus: Path, tmp_path: Path) -> None:
     assert not re.search(r"\bnan\b", re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL))
     report = (out / "report.html").read_text(encoding="utf-8")
     assert '<a href="sheet.html">' in report
+    assert "accuracy of positioning A (limit 10 µm)</span>" in report
     assert {"sheet.html", "sheet.csv"} <= set(summary_of(out)["files"])
     ran(tmp_path, CYCLE, "", fmus)  # without the key nothing of it stays
     assert not (out / "sheet.html").exists()
@@ -164,6 +165,9 @@ def test_the_workbook_has_the_numbers_of_the_table(fmus: Path, tmp_path: Path) -
         assert row[6] == pytest.approx(np.std(own, ddof=1), abs=1e-6)
     assert not readings
     assert "sheet.xlsx" in summary_of(out)["files"]
+    report = (out / "report.html").read_text(encoding="utf-8")
+    assert '<a href="sheet.xlsx">as a workbook</a>' in report
+    assert '<a href="sheet.csv">as CSV</a>' in report
     before = (out / "sheet.xlsx").read_bytes()
     again, _ = ran(tmp_path, CYCLE, SHEET.replace("conditions: {", "xlsx: true, conditions: {note: '=1+1', "), fmus)
     assert (again / "sheet.xlsx").read_bytes() == before

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim, summary_of
 from report_helpers import Page
 from ssp_helpers import short_scenario
@@ -54,6 +55,7 @@ def test_the_answer_is_the_run_of_the_table(way: str, choose: Callable[..., Any]
     words = " ".join(page.words)
     assert f"feedsim sweep study.yaml --row {best['run']}" in words
     assert "It lies at the end of what was tried of feed" in answer
+    assert_numbers_agree(folder / "out")
     shown = feedsim("sweep", "study.yaml", "--row", best["run"], fmus=fmus, cwd=folder).stdout
     assert shown.startswith("feedsim run")
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
+from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim
 from feedsim.scenario import load
 from feedsim.tune import circles as circles_module
@@ -121,6 +122,7 @@ def test_the_command_leaves_values_that_a_scenario_takes(fmus: Path, tmp_path: P
     done = feedsim(*command, fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "MD32520 FRICT_COMP_CONST_MAX" in (tmp_path / "r/report.html").read_text() or "MD32520" in done.stdout
+    assert_numbers_agree(tmp_path / "r")
     summary = json.loads((tmp_path / "r/summary.json").read_text())
     assert summary["figures"]["held_out.median"]["value"] > 35
     rows = list(csv.DictReader((tmp_path / "r/sheet.csv").open(newline="")))

@@ -13,6 +13,7 @@ import pytest
 import yaml
 from scipy.linalg import solve_discrete_lyapunov
 
+from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim
 from feedsim.linear.candidates import Candidates
 from feedsim.linear.judgement import judge
@@ -356,6 +357,7 @@ def test_a_result_follows_another_in_its_folder(fmus: Path, tmp_path: Path) -> N
     page = (folder / "report.html").read_text()
     assert "--set r/settings.yaml" in page
     assert "Motions not used for tuning" in page
+    assert_numbers_agree(folder)
     again = (*command, "--gain-margin", "300")
     done = feedsim(*again, fmus=fmus, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

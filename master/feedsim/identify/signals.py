@@ -185,9 +185,11 @@ def _of_capture(recording: Recording, axis: str) -> tuple[Recording, list[str]]:
     against = "against" if found.sign < 0 else "in"
     return recording.of_axis(found), [
         *doubts,
-        f"{where}: by POWER = TORQUE times the motor's speed the pitch is {found.pitch:.6g} mm, and TORQUE and CURRENT "
-        f"count {against} the position's direction; positions are taken as {found.length}, as the file has no "
-        "units",
+        Note(
+            f"{where}: by POWER = TORQUE times the motor's speed the pitch is {found.pitch:.6g} mm, and TORQUE and "
+            f"CURRENT count {against} the position's direction; positions are taken as {found.length}, as the file has "
+            "no units"
+        ),
     ]
 
 

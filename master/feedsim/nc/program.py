@@ -257,7 +257,8 @@ def violations(name: str, axis: Axis, start: float, peaks: Peaks) -> list[str]:
             f"axis {name} reaches an acceleration of {peaks.acceleration:.5g} m/s^2; "
             f"allowed at most {axis.max_acceleration:.5g} m/s^2"
         )
-    return found
+    origin = f" ({axis.limits_from})" if axis.limits_from else ""
+    return [f"{each}{origin}" for each in found]
 
 
 def recording_violations(name: str, axis: Axis, start: float, x_s: Array, v_s: Array, cycle: float) -> list[str]:

@@ -118,6 +118,7 @@ def _machine(
             f"    travel: [{_text(1e3 * own['low'])} mm, {_text(1e3 * own['high'])} mm]",
             f"    max_speed: {_text(own['speed'])} m/s",
             f"    max_acceleration: {_text(own['acceleration'])} m/s^2",
+            "    limits_from: that of the record and a reserve of a half; the axis itself may have more",
             f"    constant_load: {_text(each.values['M_0'])} N.m{_remark(each.estimates.get('M_0'))}",
             f"    drive: {drive_file(axis)}",
             f"    friction: {friction_file(axis)}",

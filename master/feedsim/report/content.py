@@ -5,8 +5,11 @@ No text here knows how it will look: what is to be set apart is a `Span`, what h
 
 from __future__ import annotations
 
+import math
+import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from feedsim.findings import ranked, severity
@@ -18,10 +21,13 @@ if TYPE_CHECKING:
     from feedsim.report.chart import Chart
 
 # Significant digits of a tile; the table has more.
-TILE_DIGITS = 4
+TILE_DIGITS = 3
 # The first screen has this many tiles, this many words of answers and of each finding, and rows of panels; all else is
 # a click away.
 TILES, ANSWER_WORDS, FINDING_WORDS, LEAD_ROWS = 3, 45, 24, 2
+
+
+FOLDER = "THIS_FOLDER"  # in commands of the next step: the folder that the report is written to
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,13 @@ Text = str | Span | tuple[str | Span, ...]
 def code(text: str) -> Span:
     """A name of a variable, a parameter or a figure, a command."""
     return Span(text, "code")
+
+
+def typed(file: Path) -> str:
+    """A file as a command takes it: from the folder where the command is typed where it is below that."""
+    if file.is_absolute() and file.is_relative_to(Path.cwd()):
+        file = file.relative_to(Path.cwd())
+    return shlex.quote(file.as_posix())
 
 
 @dataclass(frozen=True)
@@ -118,12 +131,11 @@ class Tile:
 
 
 def tile_value(figure: Figure) -> str:
-    """Value with unit, to TILE_DIGITS digits at most."""
+    """Value with unit, to TILE_DIGITS digits that count, no place before the point left out."""
     value, unit = shown(figure)
-    if unit and sum(c.isdigit() for c in value.lstrip("−0.")) > TILE_DIGITS:
-        rounded = float(f"{figure.value:.{TILE_DIGITS}g}")
-        whole = len(f"{abs(rounded):.0f}") if abs(rounded) >= 1 else 0
-        value = minus(f"{rounded:.{max(0, TILE_DIGITS - whole)}f}")
+    if unit and figure.value and sum(c.isdigit() for c in value.lstrip("−0.")) > TILE_DIGITS:
+        size = math.floor(math.log10(abs(float(f"{figure.value:.{TILE_DIGITS}g}"))))
+        value = minus(f"{figure.value:.{max(0, TILE_DIGITS - 1 - size)}f}")
     return f"{value} {unit}".strip()
 
 
@@ -159,6 +171,15 @@ class Report:
             return self.lead
         first = next((part for part in self.main if isinstance(part, Picture)), None)
         return first and first.first_rows(LEAD_ROWS)
+
+    def in_folder(self, folder: Path) -> Report:
+        """The report as it stands in a folder: commands of the next step name that one."""
+        parts = self.next_step if isinstance(self.next_step, tuple) else (self.next_step,)
+        name = shlex.quote(folder.as_posix())
+        placed = tuple(
+            replace(part, text=part.text.replace(FOLDER, name)) if isinstance(part, Span) else part for part in parts
+        )
+        return replace(self, next_step=placed if isinstance(self.next_step, tuple) else placed[0])
 
     @property
     def charts(self) -> dict[str, Chart]:

@@ -79,7 +79,7 @@ def counted(number: int, one: str, many: str = "") -> str:
 
 
 def typeset(text: str) -> str:
-    """Words as the analyses write them (ASCII) with the signs of print: 3 µm, ±, −3 dB, N·m, 45°, n², 4.5×10⁻⁷.
+    """Words as the analyses write them (ASCII) with the signs of print: 3 µm, ±, −3 dB, N·m, 45°, n², 4.5×10⁻⁷, →.
 
     What stands in quotation marks is to be typed, and stays as it is.
     """
@@ -88,7 +88,7 @@ def typeset(text: str) -> str:
 
 
 def _signs(text: str) -> str:
-    text = re.sub(r"\bum\b", "µm", text.replace("+-", "±"))
+    text = re.sub(r"\bum\b", "µm", text.replace("+-", "±").replace(" -> ", " → "))
     text = re.sub(r"\bN\.m\b(\.s\b)?", lambda found: found[0].replace(".", "·"), text)
     text = re.sub(r"(?<=\d) deg\b", "°", text)
     text = re.sub(r"(?<=[a-z])\^([23])\b", lambda found: found[1].translate(SUPERSCRIPTS), text)

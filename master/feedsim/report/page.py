@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 # What draws the charts and what a reader does with them, in their order.
 SCRIPTS = ("chart_draw.js", "chart_use.js")
+# The folders of an absolute path to a file: findings on a page name the file, "Where the numbers come from" has paths.
+PATH = re.compile(r"(?<![\w.:/\\])(?:[A-Za-z]:)?(?:[/\\][^/\\:\s'\"]+)*[/\\](?=[^/\\:\s'\"]+\.\w+\b)")
 
 
 def html(report: Report, kind: str = "") -> str:
@@ -35,6 +38,7 @@ def html(report: Report, kind: str = "") -> str:
     environment.filters["kind"] = lambda part: type(part).__name__
     environment.filters["still"] = lambda picture: still(picture.chart, picture.stem, picture.title)
     environment.filters["parted"] = parted
+    environment.filters["named"] = lambda text: PATH.sub("", text)
     charts = report.charts
     return environment.get_template("report.html.j2").render(
         report=report, palette=PALETTE, data=embedded(charts) if charts else "", script=script() if charts else "",

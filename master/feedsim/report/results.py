@@ -155,6 +155,7 @@ def write_report(
     :func:`write_results` does it. Returns the paths. Raises OutputError.
     """
     grown: dict[str, Path] = {}
+    report = report.in_folder(Path(directory))
 
     def fill(fresh: Path, names: Sequence[str]) -> None:
         for name, content in files.items():

@@ -322,6 +322,9 @@ class Axis(Model):
     ] = Field(description="Lowest and highest position")
     max_speed: Annotated[float, Quantity("m/s", above=0, example="30 m/min")] = Field(description="Highest axis speed")
     max_acceleration: Annotated[float, Quantity("m/s^2", above=0)] = Field(description="Highest axis acceleration")
+    limits_from: StrictStr = Field(
+        default="", description="Where travel, speed and acceleration come from; messages on these limits say it"
+    )
     constant_load: Annotated[float, Quantity("N.m", example="0 N.m")] = Field(
         default=0.0,
         description="Constant load torque M_0, counted against the motor torque (weight on a vertical axis)",

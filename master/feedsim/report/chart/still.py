@@ -204,12 +204,10 @@ def _polar(panel: Polar, width: float, height: float) -> str:
     return "".join(parts)
 
 
-MAX_CELL_WIDTH = 150.0  # of a cell
-
-
 def _grid(grid: Grid, width: float) -> str:
     left, top = min(260.0, 16 + 6.4 * max(map(len, grid.rows))), _over(grid)
-    cell = min(MAX_CELL_WIDTH, (width - left - 8 - SLANTED * len(grid.columns[-1])) / (len(grid.columns) - 0.5))
+    wide, count = width - left - 8, len(grid.columns)
+    cell = min(wide / count, (wide - SLANTED * len(grid.columns[-1])) / (count - 0.5))
     parts = [_text(4, 15, grid.title, "font-weight='600'")]
     for j, name in enumerate(grid.columns):
         parts.append(

@@ -18,7 +18,7 @@ from feedsim.motions.circular import SENSE_WORDS
 from feedsim.report import sections
 from feedsim.report.changes import changes_section
 from feedsim.report.chart import Dash
-from feedsim.report.content import Bullets, Report, Section, Tile, code, tile_value
+from feedsim.report.content import Bullets, Report, Section, Tile, code, tile_value, typed
 from feedsim.report.control import control_section
 from feedsim.report.formatting import counted, typeset
 from feedsim.report.picture import Picture
@@ -101,7 +101,7 @@ def report_of(
         answer=answers(diagnosis),
         warnings=list(recorded.doubts),
         tiles=tiles,
-        next_step=("Lay a simulated circle over it:\n", code(f"feedsim show {files[0].name} FOLDER_OF_A_RUN")),
+        next_step=("Lay a simulated circle over it:\n", code(f"feedsim show {typed(files[0])} FOLDER_OF_A_RUN")),
         main=[
             picture(circle, recorded, diagnosis),
             diagnosis_section(prefix, diagnosis),

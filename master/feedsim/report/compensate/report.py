@@ -11,7 +11,7 @@ from typing import Any
 from feedsim.analysis import Figure
 from feedsim.analysis.compensation import Compensation, Quality
 from feedsim.report.compensate.plots import pictures_of
-from feedsim.report.content import Report, Section, Table, Text, Tile, code
+from feedsim.report.content import FOLDER, Report, Section, Table, Text, Tile, code, typed
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.provenance import InputFile, axis_parameters, hashed, inputs_part, quantity
 from feedsim.report.results import REPORT, SUMMARY, check_place
@@ -50,10 +50,10 @@ def report_of(compensation: Compensation, files: Mapping[str, Path]) -> Report:
         tiles=list(_tiles(compensation)),
         next_step=(
             "See what becomes of it as the machine wears or warms:\n",
-            code(f"feedsim compensate {scenario.file.name} --table"),
+            code(f"feedsim compensate {typed(scenario.file)} --table"),
         )
         if not compensation.table
-        else ("Lay it over another run:\n", code("feedsim show THIS_FOLDER OTHER_FOLDER")),
+        else ("Lay it over another run:\n", code(f"feedsim show {FOLDER} OTHER_FOLDER")),
         main=[
             *pictures,
             _errors(compensation) if compensation.table else None,
@@ -94,7 +94,7 @@ def _tiles(compensation: Compensation) -> Iterable[Tile]:
         yield Tile(f"{_um(before)} → {_um(after)} µm", label, typeset(f"without and {after.meaning}"))
     for axis in compensation.frictions:
         delay = figures[f"{axis}.delay"]
-        yield Tile(minus(f"{delay.value:.3f} ms"), f"{axis}: delay of the feedforward", typeset(delay.meaning))
+        yield Tile(minus(f"{delay.value:.3g} ms"), f"{axis}: delay of the feedforward", typeset(delay.meaning))
 
 
 def _um(figure: Figure) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -225,6 +226,24 @@ def pictures_of(responses: Responses) -> list[Picture]:
         *scale_pictures(columns("x_M"), band),
         *compliance_pictures(tool, band),
     ]
+
+
+def nearest_to_its_limit(responses: Responses) -> Picture | None:
+    """The position loop of the axis with the least gain margin, gain above phase; None without any margin."""
+    figures = responses.figures
+    gains = {
+        axis: figures[name].value for axis in responses.axes if (name := f"{axis}.position.gain_margin") in figures
+    }
+    known = [axis for axis in gains if math.isfinite(gains[axis])]
+    if not known:
+        return None
+    axis = min(known, key=gains.__getitem__)
+    loop = responses.result.axes[axis].position
+    band = (responses.band[0], min(responses.band[1], 0.5 / responses.machine.cycles.T_pos))
+    curves = {axis: curves_of(responses, f"{axis}.position_loop")}
+    found = loop_pictures(curves, {} if loop is None else {axis: loop.margins}, "position", band)
+    which = ", which has the least gain margin" if len(known) > 1 else ""
+    return next((replace(each, stem=f"{each.stem}-first", title=each.title + which) for each in found), None)
 
 
 def curves_of(responses: Responses, name: str) -> list[Curve]:

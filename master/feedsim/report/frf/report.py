@@ -13,9 +13,9 @@ from feedsim.analysis.campaign import Campaign
 from feedsim.analysis.responses import Responses
 from feedsim.analysis.truncation import Truncation
 from feedsim.report import sections
-from feedsim.report.content import LEAD_ROWS, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.content import Report, Section, Table, Text, Tile, code, tile_value, typed
 from feedsim.report.formatting import display_unit, minus, number, typeset
-from feedsim.report.frf.bode_plots import pictures_of
+from feedsim.report.frf.bode_plots import nearest_to_its_limit, pictures_of
 from feedsim.report.frf.truncation_plots import truncation_pictures
 from feedsim.report.frf.words import answers
 from feedsim.report.picture import Picture
@@ -38,7 +38,6 @@ WORST_MARGINS = {"gain_margin": "gain margin", "phase_margin": "phase margin", "
 AS_DECIBEL = ("gain_margin",)
 MEASURED_PARTS = ("magnitude", "phase", "share")
 
-OPEN_LOOP = "position-loop"  # stem of the picture that has the margins
 FRF_FORMAT = 1
 
 
@@ -80,10 +79,10 @@ def report_of(subject: Subject, responses: Responses, pictures: Sequence[Picture
         notes=subject.notes,
         answer=answers(responses),
         tiles=_tiles(responses),
-        lead=next((each.first_rows(LEAD_ROWS) for each in pictures if each.stem == OPEN_LOOP), None),
+        lead=nearest_to_its_limit(responses),
         next_step=(
             "Change a gain and look again:\n",
-            code(f"feedsim frf {subject.file.name} --set machine.axes.{responses.axes[0]}.drive.K_v=VALUE"),
+            code(f"feedsim frf {typed(subject.file)} --set machine.axes.{responses.axes[0]}.drive.K_v=VALUE"),
         ),
         main=[*pictures, _resonances(responses), _agreement(responses), sections.figures_section(responses.figures)],
         provenance=_provenance(subject, responses),

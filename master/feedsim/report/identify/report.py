@@ -9,7 +9,7 @@ from feedsim.estimation.interval import NORMAL_95
 from feedsim.identify import Identified, friction_file
 from feedsim.identify.friction_file import FRICTION_FILE
 from feedsim.identify.result import Estimate, Identification
-from feedsim.report.content import Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code
+from feedsim.report.content import FOLDER, Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code
 from feedsim.report.formatting import counted, display_unit, minus, powers, typeset
 from feedsim.report.identify import quantities
 from feedsim.report.identify.plots import describe, pictures_of
@@ -78,8 +78,7 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
         tiles=_tiles(identified),
         next_step=(
             "Run the machine with this friction:\n",
-            code(f"feedsim run SCENARIO.yaml --set machine.axes.{found.axis}.friction={FRICTION_FILE}"),
-            " (with the file's path)",
+            code(f"feedsim run SCENARIO.yaml --set machine.axes.{found.axis}.friction={FOLDER}/{FRICTION_FILE}"),
         ),
         main=[
             _use(found),

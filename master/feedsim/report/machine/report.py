@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feedsim.report.content import Animation, Paragraph, Report, Section, Table, Text, Tile, code
+from feedsim.report.content import Animation, Paragraph, Report, Section, Table, Text, Tile, code, typed
 from feedsim.report.formatting import display_unit, number, typeset
 from feedsim.report.machine.animation import mode_gif
 from feedsim.report.machine.model import model
@@ -69,7 +69,7 @@ def report_of(info: MachineInfo, files: Sequence[tuple[str, Path]], pictures: Se
         warnings=info.warnings,
         notes=[info.note],
         tiles=list(_tiles(info)),
-        next_step=("See how a mode moves:\n", code("feedsim machine show MACHINE --mode 1 --animate")),
+        next_step=("See how a mode moves:\n", code(f"feedsim machine show {typed(files[0][1])} --mode 1 --animate")),
         main=[*pictures, _axes(info), _modes(info)],
         provenance=provenance_section(rows, hashed(list(files))),
         footer="Values in full precision: summary.json. Pictures: figures/.",

@@ -19,7 +19,7 @@ from feedsim.replay.elastic import ElasticMode
 from feedsim.replay.identified import DrivesFound
 from feedsim.replay.machine_files import drive_file, friction_file
 from feedsim.replay.outside import in_words
-from feedsim.report.content import Paragraph, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.content import FOLDER, Paragraph, Report, Section, Table, Text, Tile, code, tile_value
 from feedsim.report.control import control_section
 from feedsim.report.formatting import display_unit, minus, powers, typeset
 from feedsim.report.provenance import figures_part, finite, hashed, inputs_part, software
@@ -141,7 +141,7 @@ def report_of(report: DriveReport) -> Report:
         warnings=report.warnings,
         notes=report.notes,
         answer=answers(report),
-        next_step=("Hold it against another record:\n", code("feedsim replay OTHER_RECORD --machine THIS_FOLDER")),
+        next_step=("Hold it against another record:\n", code(f"feedsim replay OTHER_RECORD --machine {FOLDER}")),
         tiles=[
             Tile(tile_value(figure), f"{name.partition('.')[0]}: {LEADING[key]}", typeset(figure.meaning))
             for name, figure in report.figures.items()

@@ -11,7 +11,7 @@ from feedsim.analysis import Figure
 from feedsim.identify import Provenance
 from feedsim.replay.compare import Comparison
 from feedsim.report.changes import change_lines, changes_part, changes_section
-from feedsim.report.content import Report, Section, Table, Tile, code, tile_value
+from feedsim.report.content import Report, Section, Table, Tile, code, tile_value, typed
 from feedsim.report.control import control_section
 from feedsim.report.formatting import typeset
 from feedsim.report.provenance import figures_part, hashed, inputs_part, machine_part, quantity, software
@@ -90,7 +90,7 @@ def report_of(replayed: Replayed) -> Report:
         tiles=list(_tiles(replayed.figures)),
         next_step=(
             "Identify the drives from the record:\n",
-            code(f"feedsim identify-drive {record} --machine MACHINE"),
+            code(f"feedsim identify-drive {typed(replayed.sources[0].file)} --machine {typed(replayed.subject.file)}"),
         ),
         main=[
             *pictures,

@@ -37,7 +37,10 @@ def accuracy_picture(prefix: str, found: Accuracy, stem: str) -> Picture:
         Band("", middle - 2 * spread, middle + 2 * spread, x, colour)
         for (_, colour), middle, spread in zip(SIDES, mean, s, strict=True)
     ]
-    curves = [Curve(name, x, middle, colour) for (name, colour), middle in zip(SIDES, mean, strict=True)]
+    curves = [
+        Curve(name, x, middle, colour, dash="dashed" if k else "")
+        for k, ((name, colour), middle) in enumerate(zip(SIDES, mean, strict=True))
+    ]
     curves += [
         Curve(name, np.repeat(x, runs), own.ravel(), colour, width=2.4, dots=True)
         for (name, colour), own in zip(SIDES, readings, strict=True)

@@ -77,7 +77,15 @@ TRY_IT = Paragraph(
 )
 
 
-SHEETS = Paragraph((Span("Acceptance sheet for print", "file", sheet.HTML), ": readings, conditions, limits."))
+def sheets_line(run: JudgedRun) -> Paragraph | None:
+    """Links to the acceptance sheets; None where none was asked for."""
+    if not sheet.sheets_of(run):
+        return None
+    files = [("as CSV", sheet.CSV), *([("as a workbook", sheet.XLSX)] if sheet.in_workbook(run.scenario) else [])]
+    others = [part for text, name in files for part in (", ", Span(text, "file", name))]
+    return Paragraph(
+        (Span("Acceptance sheet for print", "file", sheet.HTML), *others, ": readings, conditions, limits.")
+    )
 
 
 def report_of(
@@ -104,12 +112,12 @@ def report_of(
         answer=answers(run, figures, causes) or moved_words(run.trace),
         warnings=(*run.warnings, *doubts(figures, causes)),
         notes=(machine.note, scenario.note),
-        tiles=tiles(figures),
+        tiles=tiles(figures, sheet.limits_of(run)),
         lead=lead(run, pictures),
         next_step=next_step(run, causes, first_change(proposals)),
         main=[
             TRY_IT if page else None,
-            SHEETS if sheet.sheets_of(run) else None,
+            sheets_line(run),
             *pictures,
             *(diagnosis_section(prefix, diagnosis) for prefix, diagnosis in causes.items()),
             changes_section(proposals, machine),
@@ -148,9 +156,11 @@ def answers(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, 
     return [*filter(None, map(sheet.verdict_line, sheet.sheets_of(run))), *found]
 
 
-def tiles(figures: Mapping[str, Figure]) -> list[Tile]:
-    """Leading figures, those first that answer what is asked. A reversal has one height: over the fitted rest of the
-    circle where that is known, else the quadrant glitch."""
+def tiles(figures: Mapping[str, Figure], limits: Mapping[str, float] | None = None) -> list[Tile]:
+    """Leading figures, those first that answer what is asked. limits: of figures by their names [um].
+
+    A reversal has one height: over the fitted rest of the circle where that is known, else the quadrant glitch.
+    """
     named = [name for name in figures if is_leading(name, HEADER) and not _has_peak(name, figures)]
 
     def place(name: str) -> tuple[int, int]:
@@ -160,7 +170,7 @@ def tiles(figures: Mapping[str, Figure]) -> list[Tile]:
             1e3 * size
         ) if math.isfinite(size) else 0
 
-    return [tile(name, figures[name]) for name in sorted(named, key=place)]
+    return [tile(name, figures[name], (limits or {}).get(name)) for name in sorted(named, key=place)]
 
 
 def _has_peak(name: str, figures: Mapping[str, Figure]) -> bool:
@@ -182,12 +192,13 @@ def lead(run: JudgedRun, pictures: Sequence[Picture]) -> Picture | None:
     return None
 
 
-def tile(name: str, figure: Figure) -> Tile:
-    """A figure with its name in words."""
+def tile(name: str, figure: Figure, limit: float | None = None) -> Tile:
+    """A figure with its name in words, and its limit [um] where it has one."""
     prefix, _, key = name.partition(".")
     what, _, axis = key.partition("_")
     label = TILES.get(key, f"{OF_REVERSALS[what]}, {axis} reverses" if what in OF_REVERSALS and axis else key)
-    return Tile(tile_value(figure), f"{prefix.replace('#', ' no. ')}: {label}", typeset(figure.meaning))
+    allowed = "" if limit is None else f" (limit {limit:g} µm)"
+    return Tile(tile_value(figure), f"{prefix.replace('#', ' no. ')}: {label}{allowed}", typeset(figure.meaning))
 
 
 def draw(run: JudgedRun, figures: Mapping[str, Figure], causes: Mapping[str, Diagnosis] | None = None) -> list[Picture]:

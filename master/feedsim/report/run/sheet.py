@@ -116,6 +116,17 @@ def in_workbook(scenario: Scenario) -> bool:
     return any(sheet is not None and sheet.xlsx for sheet in sheets)
 
 
+def limits_of(run: Run) -> dict[str, float]:
+    """Figure -> its limit [um], of all sheets of a run."""
+    asked = zip(run.scenario.evaluate, tasks(run.scenario, run.program), strict=True)
+    return {
+        f"{task.prefix}.{name}": 1e6 * limit
+        for item, task in asked
+        if isinstance(item, PositioningAccuracy | CircleTest) and item.sheet is not None
+        for name, limit in item.sheet.limits.items()
+    }
+
+
 def verdict_line(sheet: Filled) -> str:
     """ "Z: pass after ISO 230-2: A 1.31 um of 6 um"; "" without limits."""
     if not sheet.verdict:

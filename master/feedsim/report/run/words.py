@@ -10,7 +10,7 @@ import numpy as np
 from feedsim.analysis import Diagnosis, Figures, PositioningTask, tasks
 from feedsim.analysis.circle import worth_telling
 from feedsim.cosim import Run
-from feedsim.report.content import Text, code
+from feedsim.report.content import FOLDER, Text, code, typed
 from feedsim.scenario import Drive
 from feedsim.trace import Trace
 
@@ -23,6 +23,13 @@ def stop_words(figures: Figures, band: float) -> str:
     """Of a motion that ends at rest. figures: without prefix; band: about the target [m]."""
     overshoot, settled = figures["overshoot"], figures["settling_time"]
     within = f"+-{band * 1e6:g} um"
+    ringing = figures.get("ringing_frequency")
+    rings = ringing is not None and math.isfinite(ringing.value)
+    if math.isfinite(overshoot.value) and not math.isfinite(settled.value) and ringing is not None and rings:
+        return (
+            f"not yet at rest within {within} at the end: it oscillates at {ringing.value:.1f} Hz, up to "
+            f"{overshoot.value:.2f} um past its target."
+        )
     if not math.isfinite(overshoot.value) or not math.isfinite(settled.value):
         return f"whether it stays within {within} is not known, too little of the rest is recorded: add a dwell."
     said = f"{overshoot.value:.2f} um past its target, "
@@ -31,8 +38,7 @@ def stop_words(figures: Figures, band: float) -> str:
         if settled.value > 0
         else f"within {within} from the end of the NC motion on"
     )
-    ringing = figures.get("ringing_frequency")
-    if settled.value > 0 and ringing is not None and math.isfinite(ringing.value):
+    if settled.value > 0 and ringing is not None and rings:
         said += f"; until then it rings at {ringing.value:.1f} Hz, which less jerk would excite less"
     return f"{said}."
 
@@ -52,7 +58,7 @@ def accuracy_words(figures: Figures) -> str:
 
 def next_step(run: Run, causes: Mapping[str, Diagnosis], change: str = "") -> Text:
     """What to do with a run, by what it has shown first: a command to copy. change: that is proposed, in words."""
-    file = run.scenario.file.name
+    file = typed(run.scenario.file)
     if change:
         return f"Try {change}:\n", code(f"feedsim run {file} --try")
     first_causes = [term.key for diagnosis in causes.values() for term in worth_telling(diagnosis)[:1]]
@@ -64,7 +70,7 @@ def next_step(run: Run, causes: Mapping[str, Diagnosis], change: str = "") -> Te
         axis = task.approach.axis if isinstance(task, PositioningTask) else ""
         if axis and isinstance(run.scenario.machine.axes[axis].drive, Drive):
             return "Find drive values with which it stops better:\n", code(f"feedsim tune drive {file} --axis {axis}")
-    return "Lay another run or a record over it:\n", code("feedsim show THIS_FOLDER OTHER_FOLDER")
+    return "Lay another run or a record over it:\n", code(f"feedsim show {FOLDER} OTHER_FOLDER")
 
 
 def moved_words(trace: Trace) -> list[str]:

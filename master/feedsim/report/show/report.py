@@ -15,19 +15,30 @@ from feedsim.analysis.alignment import stops
 from feedsim.analysis.side_by_side import SUMMARY as OF_RESULT
 from feedsim.analysis.side_by_side import Source, differing
 from feedsim.report import sections
-from feedsim.report.content import Bullets, Report, Section, Table, Text, code
+from feedsim.report.content import Bullets, Report, Section, Table, Text, Tile, code, typed
 from feedsim.report.control import control_section
-from feedsim.report.formatting import counted, display_unit, minus, scale, shown
+from feedsim.report.formatting import counted, display_unit, minus, plain_unit, scale, shown, three
 from feedsim.report.provenance import hashed, inputs_part, quantity, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.show.pictures import Stop, pictures_of, stop_seen, stops_of
 
 FORMAT = 1
-MOST_LEADING = 5  # figures that are told first
+MOST_DIFFERING = 3  # parameters that are named outside of the table
 LEAST_CHANGE = 0.05  # [%] of a figure, below which it has not changed
 BAND = 1e-6  # [m] about the target, within which an axis has settled
-# Figures whose change is told first, by what stands behind the last dot.
-LEADING_FIGURES = ("G", "G_b", "peak_", "servo_mismatch", "overshoot", "settling_time")
+# Figures whose change comes first, by what stands behind the last dot, with their names in words.
+LEADING_FIGURES = {
+    "G": "circular deviation G",
+    "servo_mismatch": "servo mismatch",
+    "peak_": "reversal peak of {}",
+    "overshoot": "overshoot",
+    "settling_time": "settling time",
+    "ringing_frequency": "ringing frequency",
+    "A": "accuracy of positioning A",
+    "R": "repeatability R",
+    "B": "largest reversal value B",
+}
+LARGEST_SHARE = 1000.0  # [%] a change beyond is one from next to nothing, of which a share says nothing
 
 
 def check_writable(directory: Path | str, inputs: Sequence[Path] = ()) -> None:
@@ -46,14 +57,12 @@ def files_of(sources: Sequence[Source]) -> list[Path]:
 
 
 def lines(sources: Sequence[Source]) -> list[str]:
-    """What the command says: parameters that differ, and the leading figures of every source."""
+    """What the command says: what has changed, parameters that differ, how all was aligned."""
     rows = differing(sources)
-    said = [f"differs: {name}: {' | '.join(map(_readable, values))}" for name, values in rows[:10]]
-    if len(rows) > 10:
-        said.append(f"and {len(rows) - 10} parameters more, in the report")
-    for name in _leading(sources):
-        values = [source.figures.get(name) for source in sources]
-        said.append(f"{name}: {' | '.join('–' if v is None else str(Figure(*v, '')) for v in values)}")
+    said = _changes(sources)
+    said += [f"differs: {name}: {' | '.join(map(_readable, values))}" for name, values in rows[:MOST_DIFFERING]]
+    if len(rows) > MOST_DIFFERING:
+        said.append(f"and {len(rows) - MOST_DIFFERING} parameters more, in the report")
     said += [
         f"{source.name} is aligned {source.aligned}" for source in sources if source.aligned and not source.figures
     ]
@@ -61,22 +70,76 @@ def lines(sources: Sequence[Source]) -> list[str]:
 
 
 def answers(sources: Sequence[Source]) -> list[str]:
-    """The same in the words of the page: what differs, and how far the leading figures are from the first source's."""
+    """The same in the words of the page: what has changed, and in what the sources differ."""
     names = [source.name for source in sources]
     rows = differing(sources)
-    said = [f"{name}: {_each(names, map(_readable, values))}." for name, values in rows[:3]]
-    if len(rows) > 3:
-        said.append(f"{counted(len(rows) - 3, 'parameter')} more that differ are listed below.")
-    for name in _leading(sources)[:MOST_LEADING]:
-        values = [source.figures.get(name) for source in sources]
-        text = ["–" if v is None else " ".join(shown(Figure(*v, ""))) for v in values]
-        first, last = values[0], values[-1]
-        change = ""
-        if len(sources) == 2 and first is not None and last is not None and first[1] == last[1] and first[0]:
-            share = 100 * (last[0] / first[0] - 1)
-            change = f" ({share:+.1f} %)" if abs(share) >= LEAST_CHANGE else " (unchanged)"
-        said.append(f"{name}: {_each(names, text)}{minus(change)}.")
+    said = _changes(sources)
+    if len(sources) == 2:
+        said += [f"{name}: {' -> '.join(map(_readable, values))}." for name, values in rows[:MOST_DIFFERING]]
+    else:
+        said += [f"{name}: {_each(names, map(_readable, values))}." for name, values in rows[:MOST_DIFFERING]]
+    if len(rows) > MOST_DIFFERING:
+        said.append(f"{counted(len(rows) - MOST_DIFFERING, 'parameter')} more that differ are listed below.")
     return said or lines(sources)
+
+
+def _changes(sources: Sequence[Source]) -> list[str]:
+    """The leading figures from source to source, a sentence for each prefix; those that are alike are named last."""
+    found = _leading(sources)
+    said = []
+    for prefix in dict.fromkeys(name.partition(".")[0] for name in found):
+        own = {name: values for name, values in found.items() if name.partition(".")[0] == prefix}
+        same = [_words(name) for name, values in own.items() if _alike(values)]
+        changed = [f"{_words(name)} {_beside(values)}" for name, values in own.items() if not _alike(values)]
+        text = ", ".join(changed)
+        if same and len(sources) > 1:
+            text += f"{'; ' * bool(text)}unchanged: {', '.join(same)}"
+        elif same:
+            text = ", ".join(f"{_words(name)} {_beside(values)}" for name, values in own.items())
+        said.append(f"{prefix.replace('#', ' no. ')}: {text}.")
+    return said
+
+
+Values = Sequence[tuple[float, str] | None]
+
+
+def _alike(values: Values) -> bool:
+    """Whether a figure is the same in all sources, to what is shown of it or to LEAST_CHANGE."""
+    if any(value is None for value in values):
+        return False
+    texts = {shown(Figure(*value, "")) for value in values if value is not None}
+    numbers = [value[0] for value in values if value is not None]
+    if len(texts) == 1:
+        return True
+    return len({unit for _, unit in texts}) == 1 and np.ptp(numbers) < LEAST_CHANGE / 100 * max(map(abs, numbers))
+
+
+def _beside(values: Values) -> str:
+    """A figure of all sources: 8.19 -> 7.40 um (-9.7 %)."""
+    texts = [("–", "") if value is None else _three(value) for value in values]
+    units = {unit for _, unit in texts if unit}
+    last = f" {next(iter(units))}" if len(units) == 1 else ""
+    text = " -> ".join(number if last else f"{number} {unit}".strip() for number, unit in texts) + last
+    first, second = values[0], values[-1]
+    if len(values) == 2 and first is not None and second is not None and first[1] == second[1] and first[0]:
+        share = 100 * (second[0] / first[0] - 1)
+        text += f" ({share:+.3g} %)" if abs(share) < LARGEST_SHARE else ""
+    return text
+
+
+def _three(value: tuple[float, str]) -> tuple[str, str]:
+    """Number, three digits of it at most, and unit."""
+    number, unit = value
+    if not math.isfinite(number):
+        return "not determined", ""
+    short, _ = shown(Figure(number, unit, ""))
+    return min(three(number).replace("−", "-"), short.replace("−", "-"), key=len), plain_unit(unit)
+
+
+def _words(name: str) -> str:
+    key = name.partition(".")[2]
+    what = next(each for each in LEADING_FIGURES if key == each or (each.endswith("_") and key.startswith(each)))
+    return LEADING_FIGURES[what].format(key.removeprefix(what))
 
 
 def _each(names: Sequence[str], values: Iterable[str]) -> str:
@@ -89,14 +152,38 @@ def _readable(value: str) -> str:
     with suppress(ValueError):
         amount = float(number)
         best = scale(unit, np.array([amount]))
-        return value if best.factor == 1 else f"{best.factor * amount:.6g} {best.unit}"
+        text = number if best.factor == 1 else f"{best.factor * amount:.6g}"
+        return f"{text} {plain_unit(best.unit)}".rstrip()
     return value or "–"
 
 
-def _leading(sources: Sequence[Source]) -> list[str]:
-    names = dict.fromkeys(name for source in sources for name in source.figures)
-    return [name for name in names if name.count(".") == 1 and name.partition(".")[2].startswith(LEADING_FIGURES)
-            and name.partition(".")[2].rstrip("+-") == name.partition(".")[2]]  # fmt: skip
+def _leading(sources: Sequence[Source]) -> dict[str, Values]:
+    """Leading figure -> its value and unit in every source, in the order of LEADING_FIGURES within each prefix."""
+    places: dict[str, int] = {}
+    for name in dict.fromkeys(name for source in sources for name in source.figures):
+        key = name.partition(".")[2]
+        if "." not in key and not key.endswith(("+", "-")):
+            for k, each in enumerate(LEADING_FIGURES):
+                if key == each or (each.endswith("_") and key.startswith(each)):
+                    places[name] = k
+    order = sorted(places, key=lambda name: (name.partition(".")[0], places[name]))
+    return {name: [source.figures.get(name) for source in sources] for name in order}
+
+
+def _tiles(sources: Sequence[Source]) -> list[Tile]:
+    """The leading figures before and after, those that have changed most first; none but of two sources."""
+    found = _leading(sources)
+    if len(sources) != 2:
+        return []
+    order = sorted(found, key=lambda name: _alike(found[name]))
+    return [
+        Tile(
+            minus(_beside(found[name]).partition(" (")[0].replace("->", "→").replace("um", "µm")),
+            f"{name.partition('.')[0]}: {_words(name)}",
+            f"{name}, {sources[0].name} → {sources[1].name}",
+        )
+        for name in order
+    ]
 
 
 def report_of(sources: Sequence[Source]) -> Report:
@@ -107,9 +194,10 @@ def report_of(sources: Sequence[Source]) -> Report:
         " against ".join(names) if len(names) <= 3 else f"{len(names)} results side by side",
         counted(len(sources), "source"),
         answer=answers(sources),
+        tiles=_tiles(sources),
         next_step=(
             "See whether they are the same within a tolerance:\n",
-            code("feedsim compare RESULT.csv REFERENCE.csv --tol 1e-6"),
+            code(_comparison(sources)),
         )
         if len(sources) > 1
         else "",
@@ -128,6 +216,15 @@ def report_of(sources: Sequence[Source]) -> Report:
         provenance=sections.provenance_section(rows, hashed([("source", file) for file in files_of(sources)])),
         footer="Differences are to the first source that has the figure. Values in full precision: summary.json.",
     )
+
+
+def _comparison(sources: Sequence[Source]) -> str:
+    """The command that compares the first two; results of a prompt are in no folder that stays."""
+    known = all(source.path.name in source.name for source in sources[:2])
+    first, second = (
+        (typed(source.recording.path) for source in sources[:2]) if known else ("REFERENCE.csv", "RESULT.csv")
+    )
+    return f"feedsim compare {second} {first} --tol 1e-6"
 
 
 def _alignment(sources: Sequence[Source]) -> Section | None:

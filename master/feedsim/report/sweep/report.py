@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feedsim.report.content import LEAD_ROWS, Paragraph, Part, Report, Section, Table, Text, Tile, code
+from feedsim.report.content import FOLDER, LEAD_ROWS, Paragraph, Part, Report, Section, Table, Text, Tile, code, typed
 from feedsim.report.formatting import counted, minus, number, three
 from feedsim.report.picture import Picture
 from feedsim.report.results import REPORT, SUMMARY, check_place, write_report
@@ -109,7 +109,7 @@ def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Pictu
         answer=answers(account),
         warnings=account.warnings,
         notes=(scenario.machine.note, scenario.note, study.note),
-        tiles=[*_goal_tiles(account), *_tiles(account)],
+        tiles=[*_goal_tiles(account), *_range_tiles(account), *_tiles(account)],
         lead=lead(account, whole, single),
         next_step=_next(account),
         main=[
@@ -124,6 +124,16 @@ def report_of(account: Account, whole: Sequence[Picture], single: Sequence[Pictu
         footer="Every run is a row of the table beside this page; values here in full precision: summary.json. Figures "
         "are defined in docs/figures.md, sampling and sensitivities in docs/sweeps.md, which come with the software.",
     )
+
+
+def _range_tiles(account: Account) -> Iterator[Tile]:
+    """Of a study without a goal: least and greatest value of the figure that it asks about, or of the first one."""
+    if account.best is not None or not (outputs := drawn(account)):
+        return
+    output = next((each for each in outputs if each.name == account.study.explain), outputs[0])
+    unit = output.scale.shown_unit
+    for key, what in (("min", "smallest"), ("max", "largest")):
+        yield Tile(f"{three(output.statistics[key])} {unit}".rstrip(), f"{what} {output.name}", f"{what} of all runs")
 
 
 def _tiles(account: Account) -> Iterator[Tile]:
@@ -193,12 +203,12 @@ def lead(account: Account, whole: Sequence[Picture], single: Sequence[Picture]) 
 def _next(account: Account) -> Text:
     study = account.study
     if (found := account.best) is not None:
-        return "The command that makes this run by itself:\n", code(f"feedsim sweep {study.file.name} --row "
+        return "The command that makes this run by itself:\n", code(f"feedsim sweep {typed(study.file)} --row "
                                                                     f"{account.runs[found[1]]}")  # fmt: skip
     if not (outputs := drawn(account)):
         return ""
     name = study.explain or outputs[0].name
-    return "Lay the two ends over each other:\n", code(f"feedsim show THIS_FOLDER:min={name} THIS_FOLDER:max={name}")
+    return "Lay the two ends over each other:\n", code(f"feedsim show {FOLDER}:min={name} {FOLDER}:max={name}")
 
 
 def answers(account: Account) -> list[str]:

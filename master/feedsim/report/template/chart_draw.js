@@ -56,7 +56,8 @@ function ticks(axis, low, high, most) {
   if (axis.symlog) {
     const decades = [];
     for (let at = 10 ** Math.ceil(Math.log10(axis.symlog * 2) - 1e-9); at <= Math.max(-low, high); at *= 10) decades.push(at);
-    return [...decades.map(at => -at).reverse(), 0, ...decades].filter(at => at >= low && at <= high).map(at => ({ at, text: number(at) }));
+    const seen = [...decades.map(at => -at).reverse(), 0, ...decades].filter(at => at >= low && at <= high);
+    if (seen.length > 1) return seen.map(at => ({ at, text: number(at) }));
   }
   if (axis.log && high / low > 8) {
     const found = [], decades = Math.log10(high / low), few = decades < 2.2, every = Math.max(1, Math.round(decades / most));
@@ -188,7 +189,10 @@ function range_of(panel, curves, values, span) {
   for (const mark of panel.marks) if (mark.x >= span[0] && mark.x <= span[1]) seen(mark.y);
   if (low > high) return panel.y.span || (panel.y.log ? [0.1, 10] : [-1, 1]);
   if (panel.y.log) return [low / 1.3, high * 1.3];
-  if (panel.y.symlog) return [low * 1.21, high * 1.21];
+  if (panel.y.symlog) { // room in the measure of the axis, on either side of zero
+    const more = (value, sign) => value + sign * (0.21 * Math.abs(value) + (high > low ? 0 : panel.y.symlog));
+    return [more(low, -1), more(high, 1)];
+  }
   if (high > low) [low, high] = wide_enough([low, high], panel.y);
   const room = 0.07 * (high - low) || 0.05 * Math.abs(high) || 1;
   return [low - (low === 0 && curves.some(each => each.filled) ? 0 : room), high + room];
@@ -255,9 +259,8 @@ class Taken {
   }
 }
 
-// One panel into box = {x, y, width, height}; returns its scales and ranges.
-function draw_panel(panel, box, parent, values, hidden, zoom, id) {
-  const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent);
+// What a panel shows of its curves, its ticks upwards, and the room that these need at the left.
+function frame_of(panel, box, values, hidden, zoom) {
   const shown = panel.curves.filter(each => !hidden.has(each.name));
   const span = zoom.x || whole_span(panel, values);
   const height = zoom.y || (!zoom.x && panel.y.span) || range_of(panel, shown, values, span);
@@ -265,7 +268,33 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   const heights = ticks(panel.y, height[0], height[1], panel.y.names.length || Math.max(2, Math.floor(tall / 34)));
   const widest_of = (texts, wide, more) => texts.reduce((most, each) => Math.max(most, wide * each.length + more), 0);
   const beside = panel.y.names.length ? widest_of(panel.y.names, 6.6, 26) : widest_of(heights.map(each => each.text || ""), 6.6, 30);
-  const left = Math.min(Math.max(EDGE.left, beside), box.width * 0.45);
+  return { shown, span, height, above, tall, heights, widest_of, left: Math.min(Math.max(EDGE.left, beside), box.width * 0.45) };
+}
+
+// The frames of all panels; those below one another begin alike.
+function frames_of(panels, boxes, values, hidden, zooms) {
+  const frames = panels.map((panel, k) => panel.kind === "xy" ? frame_of(panel, boxes[k], values, hidden, zooms[k]) : null);
+  frames.forEach((each, k) => {
+    if (each) each.shared = Math.max(...frames.map((other, j) => other && boxes[j].x === boxes[k].x && boxes[j].width === boxes[k].width ? other.left : 0));
+  });
+  return frames;
+}
+
+// What stands upright beside a panel: in two lines where one is longer than the panel, smaller where these are, too.
+// x: of the foot of the outermost line, at the left or (right) at the right.
+function upright(text, x, inner, most, parent, right = false) {
+  const spaces = [...text.matchAll(/ /g)].map(each => each.index), middle = text.length / 2;
+  const cut = 6.4 * text.length > inner.height && spaces.length ? spaces.reduce((best, each) => Math.abs(each - middle) < Math.abs(best - middle) ? each : best) : text.length;
+  const lines = [text.slice(0, cut), text.slice(cut + 1)].filter(Boolean), longest = Math.max(...lines.map(each => each.length));
+  const size = Math.max(8, Math.min(12, 12 * most / (6.4 * longest)));
+  lines.forEach((line, k) => make("text", { transform: `translate(${x + size * (right ? k + 1 - lines.length : k - (lines.length - 1) / 6)} ${inner.y + inner.height / 2}) rotate(-90)`,
+    "text-anchor": "middle", fill: colour("ink"), ...(size < 12 ? { "font-size": size.toFixed(1) } : {}) }, parent, line));
+}
+
+// One panel into box = {x, y, width, height}; returns its scales and ranges.
+function draw_panel(panel, box, parent, values, hidden, frame, id) {
+  const part = make("g", { transform: `translate(${box.x} ${box.y})` }, parent);
+  const { shown, span, height, above, tall, heights, widest_of, shared: left } = frame;
   const inner = { x: left, y: above, width: box.width - left - box.aside, height: tall };
   const across = scale(span[0], span[1], inner.x, inner.x + inner.width, panel.x);
   const up = scale(height[0], height[1], inner.y + inner.height, inner.y, panel.y);
@@ -287,7 +316,7 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
   }
   make("text", { x: Math.min(inner.x + inner.width / 2, box.width - 3.4 * title_of(panel.x, along).length), y: bottom + 34, "text-anchor": "middle", fill: colour("ink") }, part, title_of(panel.x, along));
   if (!panel.y.names.length)
-    make("text", { transform: `translate(13 ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, title_of(panel.y, heights));
+    upright(title_of(panel.y, heights), 13, inner, box.height - 8, part);
   if (panel.x.also) {
     const [label, unit, factor] = panel.x.also, named = { label, unit, log: panel.x.log, names: [] };
     const found = apart(most => ticks(named, span[0] * factor, span[1] * factor, most), at => across(at / factor), Math.max(2, Math.floor(inner.width / 74)));
@@ -300,7 +329,7 @@ function draw_panel(panel, box, parent, values, hidden, zoom, id) {
     const found = ticks(named, height[0] * factor, height[1] * factor, Math.max(2, Math.floor(tall / 34)));
     for (const tick of found)
       if (tick.text) make("text", { x: right + 6, y: up(tick.at / factor) + 4, fill: colour("ink") }, part, tick.text);
-    make("text", { transform: `translate(${box.width - 5} ${inner.y + inner.height / 2}) rotate(-90)`, "text-anchor": "middle", fill: colour("ink") }, part, title_of(named, found));
+    upright(title_of(named, found), box.width - 5, inner, box.height - 8, part, true);
   }
   const clip = make("clipPath", { id }, part);
   make("rect", { x: inner.x, y: inner.y, width: inner.width, height: inner.height }, clip);
@@ -442,7 +471,7 @@ function draw_grid(panel, box, parent, values) {
   headed(panel.title, 4, box.width - 4, part);
   const left = grid_left(panel), top = grid_top(panel), columns = panel.columns.length;
   const slanted = 4.8 * panel.columns[columns - 1].length; // the last name leans over the edge
-  const width = Math.min(150, (box.width - left - 8 - slanted) / (columns - 0.5)), height = 24, numbers = width >= 30;
+  const width = Math.min((box.width - left - 8) / columns, (box.width - left - 8 - slanted) / (columns - 0.5)), height = 24, numbers = width >= 30;
   const [low, high] = panel.span, about_zero = low < 0 && high > 0;
   panel.columns.forEach((name, j) => make("text", { transform: `translate(${left + (j + 0.5) * width} ${top - 6}) rotate(-40)`, fill: colour("ink"), "font-size": 11 }, part, name));
   panel.rows.forEach((name, i) => make("text", { x: left - 8, y: top + (i + 0.5) * height + 4, "text-anchor": "end", fill: colour("ink"), "font-size": 11 }, part, name));

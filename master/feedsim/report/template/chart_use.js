@@ -28,12 +28,14 @@ function values(k) {
   return arrays.get(k);
 }
 
-// Digits of a row that count: as many as its array has, and no more than a share of what is seen needs.
+// Digits of a row that count: no more than its array has, six or as many as a share of what is seen needs; 0: it is none.
 function counting(k, row, seen = 0) {
   const own = values(k), value = Math.abs(own[row]), size = Math.floor(Math.log10(value));
   const step = own.steps && own.steps[Math.floor(row / own.in_one)], known = own instanceof Float32Array ? value * 2 ** -23 : step && step !== 1 ? step : 0;
-  const finest = Math.max(known, value * 1e-13, seen * 1e-5);
-  return Number.isFinite(size) ? Math.min(15, Math.max(seen ? 6 : 1, size - Math.floor(Math.log10(finest)) + 1)) : 6;
+  const finest = Math.max(known, value * 1e-13), down_to = place => size - place + 1;
+  if (!Number.isFinite(size)) return 6;
+  if (!seen) return Math.max(1, Math.min(15, down_to(Math.floor(Math.log10(finest)))));
+  return Math.max(0, Math.min(15, down_to(Math.ceil(Math.log10(finest))), Math.max(6, down_to(Math.floor(Math.log10(seen * 1e-5))))));
 }
 
 function element(name, attributes, parent, text = null) {
@@ -44,7 +46,10 @@ function element(name, attributes, parent, text = null) {
   return found;
 }
 
-const written_at = (k, row, [low, high]) => number(values(k)[row], counting(k, row, high - low));
+const written_at = (k, row, [low, high]) => {
+  const digits = counting(k, row, high - low);
+  return number(digits ? values(k)[row] : 0, digits || 1);
+};
 
 class Live {
   constructor(figure) {
@@ -136,11 +141,12 @@ class Live {
     const { boxes, height } = placed(this.chart, width, tall), title = this.figure.dataset.title;
     const svg = make("svg", { class: "chart", viewBox: `0 0 ${width} ${Math.ceil(height)}`, role: "group", "aria-roledescription": "chart", tabindex: "0",
       "aria-label": `${title}. ${[...this.names.keys()].join(", ")}. ${KEYS}`, "font-family": FONT, "font-size": 12 });
+    const frames = frames_of(this.chart.panels, boxes, values, this.hidden, this.zooms);
     this.drawn = this.chart.panels.map((panel, k) => {
       const id = `${this.stem}-clip-${k}`;
       if (panel.kind === "polar") return draw_polar(panel, boxes[k], svg, values, this.hidden, this.reaches[k], id);
       if (panel.kind === "grid") return draw_grid(panel, boxes[k], svg, values);
-      return draw_panel(panel, boxes[k], svg, values, this.hidden, this.zooms[k], id);
+      return draw_panel(panel, boxes[k], svg, values, this.hidden, frames[k], id);
     });
     this.over = make("g", { "pointer-events": "none" }, svg);
     const focused = this.svg && this.svg === document.activeElement;

@@ -15,7 +15,20 @@ from feedsim.arguments import spelt
 from feedsim.findings import Note, Wrong
 from feedsim.report import sections
 from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
-from feedsim.report.content import Bullets, Paragraph, Part, Report, Section, Table, Text, Tile, code, tile_value
+from feedsim.report.content import (
+    FOLDER,
+    Bullets,
+    Paragraph,
+    Part,
+    Report,
+    Section,
+    Table,
+    Text,
+    Tile,
+    code,
+    tile_value,
+    typed,
+)
 from feedsim.report.formatting import minus, typeset
 from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
@@ -246,7 +259,7 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
         ],
         provenance=sections.provenance_section(facts, input_files(tuned.scenario)),
         footer=sections.figures_footer(f"Values to load: {SETTINGS}; to type: {SHEET}.", "docs/tuning.md"),
-        next_step=("Run with the new values:\n", code(command(tuned, shlex.quote(folder) if folder else "THIS_FOLDER")))
+        next_step=("Run with the new values:\n", code(command(tuned, shlex.quote(folder) if folder else FOLDER)))
         if tuned.changes
         else "",
     )
@@ -254,7 +267,7 @@ def report_of(tuned: Tuned, control: str = "", folder: str = "") -> Report:
 
 def command(tuned: Tuned, folder: str) -> str:
     """The command line that runs the scenario with the new values."""
-    return f"feedsim run {tuned.scenario.file.name} --set {folder}/{SETTINGS}"
+    return f"feedsim run {typed(tuned.scenario.file)} --set {folder}/{SETTINGS}"
 
 
 def values(tuned: Tuned, control: str = "") -> Iterator[Part]:

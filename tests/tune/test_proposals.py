@@ -14,6 +14,7 @@ from command_helpers import feedsim
 from feedsim import analysis, cosim
 from feedsim.judge import judged
 from feedsim.linear.system import LinearSystem
+from feedsim.report.changes import changes_section
 from feedsim.scenario import Machine, Scenario, load
 from feedsim.structure import checked_modes
 from feedsim.tune import Proposal, of_circle, of_run
@@ -144,3 +145,12 @@ def test_try_runs_and_overlays(fmus: Path, tmp_path: Path) -> None:
     changes = json.loads((tmp_path / "r/summary.json").read_text())["changes"]
     assert changes[0]["parameter"] == "drive.T_sym"
     assert changes[0]["proposed"] == pytest.approx(3.528e-3, rel=1e-3)
+
+
+def test_the_section_names_the_commands_that_go_on() -> None:
+    """All values of a drive, and those of a compensation, are found by commands that take the scenario."""
+    page = str(changes_section(
+        [Proposal("reversal peaks of Z", "Z", "drive.T_n", 0.02, 0.005, "s", "", "lower")], None, "my_circle.yaml"
+    ))  # fmt: skip
+    assert "feedsim tune drive my_circle.yaml --axis Z" in page
+    assert "feedsim tune compensation my_circle.yaml" in page

@@ -17,6 +17,8 @@ from feedsim.scenario import load
 from feedsim.tune import circles as circles_module
 from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
 from feedsim.tune.compensators import AMPLITUDE_SHARES, TIME_CONSTANTS, PulseGrid, amplitude, compensated, pulse, score
+from feedsim.tune.effects import effects_of
+from identified_sets import write_set
 
 CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
 PLANE = ("X", "Z")
@@ -158,3 +160,55 @@ def test_bad_input(words: tuple[str, ...], message: str, fmus: Path, tmp_path: P
     assert done.returncode == 2
     assert message in done.stderr
     assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.parametrize("pair", [Pair(0.005, 5 / 60), Pair(0.2, 10 / 60), Pair(0.005, 0.5 / 60)])
+def test_the_turn_that_counts_begins_behind_the_run_in(pair: Pair) -> None:
+    """By the setpoints: 0.2 s before it begins, the path has its speed; both axes reverse twice within it."""
+    scenario = load(CIRCLE)
+    circles = Circles.of(scenario, PLANE, [pair])
+    ((begin, end),) = circles.turns
+    assert end - begin == pytest.approx(pair.duration, rel=1e-3)
+    time = circles.program.time
+    speed = np.hypot(*(np.gradient(circles.program.x_s[axis], time) for axis in PLANE))
+    steady = (time > begin - 0.2 + 2e-3) & (time < end)
+    assert speed[steady] == pytest.approx(np.full(steady.sum(), pair.feed), rel=2e-3)
+
+
+def test_effects_of_other_machines() -> None:
+    """Each changes what its words name, on the axes that are asked for; an axis keeps an effect that it has."""
+    machine = load(CIRCLE).machine
+    found = {effect.name: changed for effect, changed in effects_of(machine, ["Z"])}
+    assert list(found) == ["friction+", "friction-", "worn", "warm", "guide", "cogging"]  # measured directly: no play
+    assert all(changed.axes["X"] is machine.axes["X"] for changed in found.values())
+    before = machine.axes["Z"]
+    assert pytest.approx(1.2 * before.friction.F_S) == found["friction+"].axes["Z"].friction.F_S
+    assert pytest.approx(2 * before.friction.W) == found["worn"].axes["Z"].friction.W
+    assert found["guide"].axes["Z"].guide.share == 0.5  # type: ignore[union-attr]
+    cogging = found["cogging"].axes["Z"].drive.cogging_1  # type: ignore[attr-defined]
+    assert (cogging.order, cogging.amplitude) == (10.0, pytest.approx(0.1 * before.friction.F_C))
+    indirect = load(CIRCLE, ["machine.axes.Z.drive.measuring={indirect: true}"]).machine
+    assert [changed.axes["Z"].play for effect, changed in effects_of(indirect, PLANE) if effect.name == "play"] == [
+        2e-6
+    ]
+    own = load(CIRCLE, ["machine.axes.Z.guide={share: 30 %}"]).machine
+    assert "guide" not in [effect.name for effect, _ in effects_of(own, ["Z"])]
+
+
+@pytest.mark.usefixtures("few_circles")
+def test_a_compensation_is_judged_on_draws(fmus: Path, tmp_path: Path) -> None:
+    """A friction set of 10 % doubt: the model, which takes nearly all off, leaves what the draws differ by."""
+    file = write_set(tmp_path, 0.1)
+    done = feedsim(
+        "tune", "compensation", CIRCLE, "--kind", "model", "--axes", "Z", "--set", f"machine.axes.Z.friction={file}",
+        "--uncertain", "19", "--out", "u", fmus=fmus, cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "With what identification leaves open: median " in done.stdout
+    figures = json.loads((tmp_path / "u/summary.json").read_text())["figures"]
+    low, high = (figures[f"held_out.median_{end}"]["value"] for end in ("from", "to"))
+    assert 50 < low < high <= figures["held_out.median"]["value"] + 0.5
+    assert low < 92
+    page = (tmp_path / "u/report.html").read_text()
+    assert "With other effects of the machine" in page
+    assert "draws of identified values" in page

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from identified_sets import CIRCLE, write_set
 
 from command_helpers import feedsim
 from feedsim import cosim
@@ -16,6 +15,7 @@ from feedsim.analysis import circularity, tasks
 from feedsim.scenario import load
 from feedsim.uncertainty import cloud_of, of_run
 from feedsim.uncertainty.runs import curves_of
+from identified_sets import CIRCLE, write_set
 
 SHORT = ("motions.0.radius=5 mm",)
 

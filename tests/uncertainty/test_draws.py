@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from identified_sets import CIRCLE, write_set
 
 from feedsim.errors import InputError
 from feedsim.scenario import Friction, load
 from feedsim.uncertainty import cloud_of, interval, share_of
+from identified_sets import CIRCLE, write_set
 
 
 def drawn(file: Path, count: int, *more: str) -> list[Friction]:

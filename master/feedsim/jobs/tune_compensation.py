@@ -23,6 +23,7 @@ from feedsim.report.results import Content
 from feedsim.report.tune.report import SETTINGS, SHEET
 from feedsim.tune.compensation import Judged, tune
 from feedsim.tune.compensators import COMPENSATOR_KINDS, OBJECTIVES
+from feedsim.uncertainty import check_count, cloud_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,6 +82,7 @@ def tune_compensation(
     kind: str = "pulse_characteristic",
     axes: str | Sequence[str] | None = None,
     objective: str = "ratio",
+    uncertain: int = 0,
     set: Changes = None,
     fmus: File | None = None,
     out: File | None = None,
@@ -95,6 +97,8 @@ def tune_compensation(
         kind: pulse, pulse_characteristic, table or model.
         axes: of the plane, that are compensated; both where they are not given.
         objective: what is minimised: ratio, worst or largest.
+        uncertain: draws of the machine from the intervals of its identified values, 19 or more, which the values are
+            judged on; they are found on a few other ones. 0: none.
         set: changes of the scenario, as behind ``--set``.
         fmus: folder of the archives.
         out: folder that the result is written to; None: :meth:`Result.save` does it.
@@ -102,7 +106,8 @@ def tune_compensation(
         watch: who hears how far the job is.
 
     Raises:
-        InputError: a faulty file, no circle, units of other makers, an unknown kind or objective.
+        InputError: a faulty file, no circle, units of other makers, an unknown kind or objective, no identified
+            values to draw.
         SimulationError: a unit failed.
         OutputError: `out` cannot be written.
 
@@ -129,10 +134,24 @@ def tune_compensation(
         plan.machine.shipped_drive(axis, "tuning")
     if not wanted or len(dict.fromkeys(wanted)) < len(wanted):
         raise InputError(f"{spelt('axes')} {','.join(wanted)}: names of axes are needed, each once, such as X,Z")
+    cloud = None
+    if uncertain:
+        check_count(uncertain)
+        cloud = cloud_of(plan.machine)
     archives = None if fmus is None else Path(fmus)
     with kept(out, page.check_writable, watch, input_paths(plan), changes, force=force):
         announce(watch, plan.machine, archives, plan.coupling)
-        judged = tune(plan, kind, plane, tuple(wanted), objective, fmus=archives, progress=watch.progress)
+        judged = tune(
+            plan,
+            kind,
+            plane,
+            tuple(wanted),
+            objective,
+            fmus=archives,
+            progress=watch.progress,
+            cloud=cloud,
+            count=uncertain,
+        )
         result = TuneCompensationResult(judged)
         if out is not None:
             result.save(out, figures=figures, force=force)

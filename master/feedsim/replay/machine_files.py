@@ -126,17 +126,22 @@ def _machine(
     return "\n".join(lines) + "\n"
 
 
-def drive_text(drive: Drive, estimates: Mapping[str, Estimate], rest: str, head: Sequence[str] = ()) -> str:
-    """Text of a drive file: what was found with its interval; all else as the drive has it, with the remark `rest`."""
+def drive_text(
+    drive: Drive, estimates: Mapping[str, Estimate], rest: str, head: Sequence[str] = (), *, exact: bool = False
+) -> str:
+    """Text of a drive file: what was found with its interval; all else as the drive has it, with the remark `rest`.
+
+    exact: with the digits that give every value back to the last bit.
+    """
     entries: list[tuple[str, str]] = []
     for key, info in Drive.model_fields.items():
         value = getattr(drive, key)
         remark = _remark(estimates[key]).removeprefix("  # ") if key in estimates else rest
         if isinstance(value, ParameterGroup):
             if not (isinstance(value, Filter) and value.type == "off"):
-                entries.append((f"{key}: {{{_group(value)}}}", remark))
+                entries.append((f"{key}: {{{_group(value, exact)}}}", remark))
         elif value is not None:
-            entries.append((f"{key}: {_shown(value, info)}", remark))
+            entries.append((f"{key}: {_shown(value, info, exact)}", remark))
     column = max(len(entry) for entry, _ in entries) + 3
     lines = [f"# {line}".rstrip() for line in head]
     return (
@@ -144,19 +149,20 @@ def drive_text(drive: Drive, estimates: Mapping[str, Estimate], rest: str, head:
     )
 
 
-def _group(group: ParameterGroup) -> str:
+def _group(group: ParameterGroup, exact: bool) -> str:
     fields = type(group).model_fields
     given = {key: getattr(group, key) for key in fields if getattr(group, key) is not None}
-    return ", ".join(f"{key}: {_shown(value, fields[key])}" for key, value in given.items())
+    return ", ".join(f"{key}: {_shown(value, fields[key], exact)}" for key, value in given.items())
 
 
-def _shown(value: float | int | bool | str, info: FieldInfo) -> str:
+def _shown(value: float | int | bool | str, info: FieldInfo, exact: bool) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     quantity = Quantity.of(info)
     if quantity is None or isinstance(value, str):
         return str(value)
-    return f"{_number(value)} {quantity.unit}".removesuffix(" 1")
+    number = repr(value) if exact else _number(value)
+    return f"{number} {quantity.unit}".removesuffix(" 1")
 
 
 def friction_axis_text(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from feedsim.control import names_of
-from feedsim.report.content import Section, Table, Text, code
+from feedsim.report.content import Bullets, Section, Table, Text, code
 from feedsim.report.control import asked
 from feedsim.report.formatting import minus, typeset
 from feedsim.scenario import Machine
@@ -20,9 +20,14 @@ NOTE = (
     "lays it over this one. A proposal is as good as the machine file."
 )
 
+TUNED = ("K_p", "T_n", "K_v", "T_sym", "T_dyn", "omega_0", "D")  # what feedsim tune drive finds
+REVERSALS = "reversal peaks"
 
-def changes_section(proposals: Sequence[Proposal], machine: Machine | None = None) -> Section | None:
-    """Every proposal; None where there is none."""
+
+def changes_section(
+    proposals: Sequence[Proposal], machine: Machine | None = None, scenario: str = ""
+) -> Section | None:
+    """Every proposal; None where there is none. scenario: name of its file, which commands that go on take."""
     if not proposals:
         return None
     rows: list[tuple[Text, ...]] = [
@@ -33,7 +38,21 @@ def changes_section(proposals: Sequence[Proposal], machine: Machine | None = Non
         for each in proposals
     ]  # fmt: skip
     heads = ("Cause", "Axis", "Parameter", "Present", "Proposed", "In the control", "Why", "Margins")
-    return Section("What to change", [Table("tllrrttt", heads, rows, NOTE)], "changes")
+    further = _further(proposals, scenario) if scenario and not scenario.endswith(".ssp") else None
+    return Section("What to change", [Table("tllrrttt", heads, rows, NOTE), further], "changes")
+
+
+def _further(proposals: Sequence[Proposal], scenario: str) -> Bullets | None:
+    """The commands that find all values of a drive, or of a compensation, on many motions."""
+    axes = dict.fromkeys(each.axis for each in proposals if each.parameter.removeprefix("drive.") in TUNED)
+    found: list[Text] = [
+        (f"All values of the drive of {axis} together, within margins: ",
+         code(f"feedsim tune drive {scenario} --axis {axis}"))
+        for axis in axes
+    ]  # fmt: skip
+    if any(each.cause.startswith(REVERSALS) for each in proposals):
+        found.append(("Values of a friction compensation: ", code(f"feedsim tune compensation {scenario}")))
+    return Bullets(found) if found else None
 
 
 def first_change(proposals: Sequence[Proposal]) -> str:

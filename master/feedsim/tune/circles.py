@@ -1,7 +1,8 @@
 """Circles of many radii and feeds in one run, and how far each axis leaves the circle where it reverses.
 
-Every circle is an arc of 450 deg; what counts is the turn from 60 to 420 deg, in which both axes reverse twice at
-constant speed. All circles stand behind each other in one program, so that a candidate costs one run.
+Every circle is an arc of a turn and a run-in. What counts is the turn behind the run-in, in which both axes reverse
+twice at constant speed, and in which what the start has left has died away. All circles stand behind each other in one
+program, so that a candidate costs one run.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedsim.analysis.circularity import quadrant
+from feedsim.analysis.evaluate import RUN_IN
 from feedsim.analysis.figures import Array
 from feedsim.cosim.feedforward import TorqueFeedforward
 from feedsim.cosim.run import run
@@ -30,7 +32,7 @@ from feedsim.scenario.model import Recording
 ACCELERATIONS = (0.01, 2.0)
 RADII = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 FEEDS = tuple(feed / 60 for feed in (0.5, 1.0, 2.0, 5.0, 10.0))
-SWEEP, BEGIN, END = math.radians(450), math.radians(60), math.radians(420)
+RUN_IN_ANGLE, RUN_OUT_ANGLE = math.radians(60), math.radians(30)  # of an arc, at least
 REST = 0.2  # [s] ahead of a circle
 INTERVAL = 1e-3  # [s] between the rows that are looked at
 COUNT = 8  # of accelerations that are tuned on
@@ -116,7 +118,8 @@ class Circles:
                 Move(to=start, feed=0.9 * min(machine.axes[axis].max_speed for axis in plane)),
                 Dwell(duration=REST),
                 Arc(
-                    plane=plane, feed=each.feed, centre_by={first: -each.radius, second: 0.0}, angle=SWEEP,
+                    plane=plane, feed=each.feed, centre_by={first: -each.radius, second: 0.0},
+                    angle=sweep_of(each, machine),
                 ),
             ]  # fmt: skip
         columns = tuple(f"{axis}.x_a" for axis in plane)
@@ -132,7 +135,10 @@ class Circles:
         program = plan(own)
         centre = (middle[first], middle[second])
         arcs = [segment for segment, motion in zip(program.segments, own.motions, strict=True) if motion.kind == "arc"]
-        turns = tuple(turn_of(program, plane, centre, segment.start, segment.end) for segment in arcs)
+        turns = tuple(
+            turn_of(program, plane, centre, segment.start, segment.end, run_in(each, machine))
+            for segment, each in zip(arcs, pairs, strict=True)
+        )
         return cls(own, program, plane, tuple(pairs), turns, (centre,) * len(pairs))
 
     def with_machine(self, machine: Machine) -> Scenario:
@@ -167,15 +173,27 @@ def _interval(machine: Machine) -> float:
     return max(1, round(INTERVAL / machine.cycles.T_c)) * machine.cycles.T_c
 
 
+def run_in(pair: Pair, machine: Machine) -> float:
+    """Angle [rad] from the start of an arc to the turn that counts: the path's way to its speed, and RUN_IN behind."""
+    path = machine.path
+    rising = pair.feed / path.acceleration + path.acceleration / path.jerk
+    return max(RUN_IN_ANGLE, (RUN_IN + rising) * pair.feed / pair.radius)
+
+
+def sweep_of(pair: Pair, machine: Machine) -> float:
+    """Angle [rad] of an arc with run-in, turn and run-out; whole degrees."""
+    return math.radians(math.ceil(math.degrees(run_in(pair, machine) + 2 * math.pi + RUN_OUT_ANGLE)))
+
+
 def turn_of(
-    program: Program, plane: tuple[str, str], centre: tuple[float, float], start: float, end: float
+    program: Program, plane: tuple[str, str], centre: tuple[float, float], start: float, end: float, begin: float
 ) -> tuple[float, float]:
-    """Begin and end [s] of the turn that counts, by the setpoints."""
+    """Begin and end [s] of the turn that counts, by the setpoints. begin: angle from the start of the arc [rad]."""
     rows: NDArray[np.bool_] = (program.time >= start) & (program.time <= end)
     time = program.time[rows]
     x, z = (np.asarray(program.x_s[axis][rows]) - c for axis, c in zip(plane, centre, strict=True))
     angle = np.unwrap(np.arctan2(z, x))
     angle = np.maximum.accumulate(angle - angle[0])
-    if angle[-1] < END:
+    if angle[-1] < begin + 2 * math.pi:
         raise InputError("a circle has no full turn at constant speed; take larger radii or lower feeds")
-    return float(np.interp(BEGIN, angle, time)), float(np.interp(END, angle, time))
+    return float(np.interp(begin, angle, time)), float(np.interp(begin + 2 * math.pi, angle, time))

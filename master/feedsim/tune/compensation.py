@@ -15,9 +15,11 @@ from feedsim.errors import InputError
 from feedsim.scenario import Machine, Scenario
 from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
 from feedsim.tune.compensators import NEVER_WORSE, Found, Progress, PulseGrid, instant, pulse, table
+from feedsim.tune.effects import Effect, effects_of
+from feedsim.uncertainty import Cloud
 
-FRICTION_CHANGE = 0.2  # of the friction, with which a setting is tried besides
-SCALED = ("F_C", "F_S", "F_log")
+SEARCHED = 4  # draws that values are found on besides the machine as it is
+SEED = 2  # of the draws that the result is judged on: other ones than those it was found on
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +31,8 @@ class Judged:
         found: kind and values.
         tuned, held: pairs that it was found on, and other ones. Errors are (pairs, 2 axes of the plane) [m]:
         tuned_before, tuned_after, held_before, held_after: without and with it.
-        changed: change of the friction [1] -> (2, pairs, 2) errors [m] of the pairs held out, without and with it.
+        changed: effect of the machine -> (2, pairs, 2) errors [m] of the pairs held out, without and with it.
+        drawn: (draws, 2, pairs, 2) the same, of draws of the machine from cloud; None without.
     """
 
     scenario: Scenario
@@ -43,7 +46,9 @@ class Judged:
     tuned_after: Array
     held_before: Array
     held_after: Array
-    changed: Mapping[float, Array]
+    changed: Mapping[Effect, Array]
+    drawn: Array | None = None
+    cloud: Cloud | None = None
 
     @property
     def columns(self) -> list[int]:
@@ -68,11 +73,12 @@ class Judged:
 
 def tune(
     scenario: Scenario, kind: str, plane: tuple[str, str], axes: Sequence[str], objective: str, *,
-    fmus: Path | None, progress: Progress,
+    fmus: Path | None, progress: Progress, cloud: Cloud | None = None, count: int = 0,
 ) -> Judged:  # fmt: skip
     """Find a compensation on short circles and judge it on the practical range of radii and feeds.
 
-    plane: axes of the circles. axes: those that are compensated, of the plane. Raises InputError: no circle of the
+    plane: axes of the circles. axes: those that are compensated, of the plane. cloud: draws of the machine that the
+    values are good for; they are found on a few, and judged on `count` other ones. Raises InputError: no circle of the
     practical range fits the travel, a drive or a friction of another maker; SimulationError as a run.
     """
     machine = scenario.machine
@@ -84,7 +90,8 @@ def tune(
         )
     tuned = tuned_on(held)
     on, off = Circles.of(scenario, plane, tuned), Circles.of(scenario, plane, held)
-    found = _found(on, machine, kind, axes, objective, fmus, progress)
+    machines = [machine, *(cloud.draws(SEARCHED) if cloud is not None and kind != "model" else ())]
+    found = _found(on, machines, kind, axes, objective, fmus, progress)
 
     def errors(circles: Circles, own: Machine, *, compensated: bool) -> Array:
         if not compensated:
@@ -92,33 +99,43 @@ def tune(
         torque = _feedforward(circles, machine, axes) if kind == "model" else None
         return size(circles.errors(found.on(own), fmus=fmus, torque=torque))
 
-    total = 4 + 2 * 2
-    results: list[Array] = []
-    for circles, compensated in ((on, False), (on, True), (off, False), (off, True)):
-        progress("judging", len(results), total)
-        results.append(errors(circles, machine, compensated=compensated))
-    changed: dict[float, Array] = {}
-    for change in (FRICTION_CHANGE, -FRICTION_CHANGE):
-        progress("judging", 4 + 2 * len(changed), total)
-        own = _with_friction(machine, axes, 1 + change)
-        changed[change] = np.array([errors(off, own, compensated=each) for each in (False, True)])
+    names = list(effects_of(machine, axes))
+    total, done = 4 + len(names) + count, 0
+
+    def both(own: Machine) -> Array:
+        nonlocal done
+        progress("judging", done, total)
+        done += 1
+        return np.array([errors(off, own, compensated=each) for each in (False, True)])
+
+    progress("judging", done, total)
+    tuned_before, tuned_after = (errors(on, machine, compensated=each) for each in (False, True))
+    held_before, held_after = both(machine)
+    changed = {effect: both(own) for effect, own in names}
+    drawn = np.array([both(own) for own in cloud.draws(count, seed=SEED)]) if cloud is not None else None
     progress("judging", total, total)
-    tuned_before, tuned_after, held_before, held_after = results
     return Judged(
         scenario, plane, tuple(axes), objective, found, tuple(tuned), tuple(held), tuned_before, tuned_after,
-        held_before, held_after, changed,
+        held_before, held_after, changed, drawn, cloud,
     )  # fmt: skip
 
 
 def _found(
-    on: Circles, machine: Machine, kind: str, axes: Sequence[str], objective: str, fmus: Path | None, progress: Progress
+    on: Circles,
+    machines: Sequence[Machine],
+    kind: str,
+    axes: Sequence[str],
+    objective: str,
+    fmus: Path | None,
+    progress: Progress,
 ) -> Found:
     if kind == "model":
         return Found(kind, {axis: {} for axis in axes}, 0)
+    machine = machines[0]
     if kind == "table":
-        return table(on, machine, objective, fmus=fmus, progress=progress, axes=axes)
-    grid = PulseGrid.measured(on, machine, fmus=fmus, progress=progress, axes=axes)
-    accelerations = np.array([each.acceleration for each in on.pairs])
+        return table(on, machines, objective, fmus=fmus, progress=progress, axes=axes)
+    grid = PulseGrid.measured(on, machines, fmus=fmus, progress=progress, axes=axes)
+    accelerations = np.array([each.acceleration for each in on.pairs] * len(machines))
     values = {
         axis: {
             **pulse(grid, on.plane.index(axis), accelerations, objective, adapted=kind == "pulse_characteristic"),
@@ -126,7 +143,7 @@ def _found(
         }
         for axis in axes
     }
-    return Found(kind, values, int(np.prod(grid.errors.shape[:2])))
+    return Found(kind, values, len(machines) * int(np.prod(grid.errors.shape[:2])))
 
 
 def _feedforward(circles: Circles, machine: Machine, axes: Sequence[str]) -> TorqueFeedforward:
@@ -135,12 +152,3 @@ def _feedforward(circles: Circles, machine: Machine, axes: Sequence[str]) -> Tor
     delays = {axis: lag_of(machine.shipped_drive(axis, "the model"), machine.cycles).delay for axis in axes}
     with FrictionLaw() as law:
         return friction_feedforward(machine, circles.program, frictions, delays, law)
-
-
-def _with_friction(machine: Machine, axes: Sequence[str], factor: float) -> Machine:
-    own = {}
-    for axis in axes:
-        friction = machine.shipped_friction(axis, "a changed friction")
-        scaled = {name: factor * getattr(friction, name) for name in SCALED}
-        own[axis] = machine.axes[axis].model_copy(update={"friction": friction.model_copy(update=scaled)})
-    return machine.model_copy(update={"axes": {**machine.axes, **own}})

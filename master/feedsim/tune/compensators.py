@@ -99,23 +99,26 @@ class PulseGrid:
 
     @classmethod
     def measured(
-        cls, circles: Circles, machine: Machine, *, fmus: Path | None, progress: Progress, axes: Sequence[str]
-    ) -> PulseGrid:
-        """A run for every point of the grid, with both axes at the same share."""
+        cls, circles: Circles, machines: Sequence[Machine], *, fmus: Path | None, progress: Progress,
+        axes: Sequence[str],
+    ) -> PulseGrid:  # fmt: skip
+        """Runs for every point of the grid, with both axes at the same share, on the first machine and on others of the
+        same drives: their pairs stand behind one another."""
+        machine = machines[0]
         scales = tuple(scale_of(machine, axis) if axis in axes else 0.0 for axis in circles.plane)
-        none = circles.errors(machine, fmus=fmus)
+        none = _over(circles, machines, fmus)
         found = np.empty((len(AMPLITUDE_SHARES), len(TIME_CONSTANTS), *none.shape))
         found[0] = none
         total, done = (len(AMPLITUDE_SHARES) - 1) * len(TIME_CONSTANTS), 0
         for i, share in enumerate(AMPLITUDE_SHARES[1:], start=1):
             for j, time in enumerate(TIME_CONSTANTS):
                 progress("pulses", done, total)
-                own = machine
-                for axis, scale in zip(circles.plane, scales, strict=True):
-                    if scale:
-                        values = {"amplitude": share * scale, "time": time, "delay": instant(machine, axis)}
-                        own = compensated(own, axis, "friction_pulse", values)
-                found[i, j] = circles.errors(own, fmus=fmus)
+                groups = {
+                    axis: {"amplitude": share * scale, "time": time, "delay": instant(machine, axis)}
+                    for axis, scale in zip(circles.plane, scales, strict=True)
+                    if scale
+                }
+                found[i, j] = _over(circles, machines, fmus, "friction_pulse", groups)
                 done += 1
         progress("pulses", total, total)
         return cls((scales[0], scales[1]), found)
@@ -132,6 +135,20 @@ class PulseGrid:
         low = (1 - p) * of[i, j, pairs] + p * of[i + 1, j, pairs]
         high = (1 - p) * of[i, j + 1, pairs] + p * of[i + 1, j + 1, pairs]
         return size((1 - q) * low + q * high)
+
+
+def _over(
+    circles: Circles, machines: Sequence[Machine], fmus: Path | None, group: str = "",
+    values: Mapping[str, Mapping[str, float | bool | int]] | None = None,
+) -> Array:  # fmt: skip
+    """(machines x pairs, axes, 2) errors [m] of machines whose axes have a group of their drives with other values."""
+    found = []
+    for machine in machines:
+        own = machine
+        for axis, each in (values or {}).items():
+            own = compensated(own, axis, group, each)
+        found.append(circles.errors(own, fmus=fmus))
+    return np.concatenate(found)
 
 
 def _between(grid: Array, x: Array) -> tuple[NDArray[np.int64], Array]:
@@ -202,15 +219,19 @@ def instant(machine: Machine, axis: str) -> float:
 
 
 def table(
-    circles: Circles, machine: Machine, objective: str, *, fmus: Path | None, progress: Progress, axes: Sequence[str]
-) -> Found:
-    """Torques over the commanded speed, all at least 0, by coordinate steps of both axes in the same runs."""
-    plane = circles.plane
+    circles: Circles, machines: Sequence[Machine], objective: str, *, fmus: Path | None, progress: Progress,
+    axes: Sequence[str],
+) -> Found:  # fmt: skip
+    """Torques over the commanded speed, all at least 0, by coordinate steps of both axes in the same runs.
+
+    machines: the first one, and others of the same drives that the torques are to be good for as well.
+    """
+    plane, machine = circles.plane, machines[0]
     level = {axis: machine.shipped_friction(axis, "tuning of a compensation").F_C for axis in axes}
     delay = {axis: _delay(machine, axis) for axis in axes}
-    before = size(circles.errors(machine, fmus=fmus))
+    before = size(_over(circles, machines, fmus))
     torques = {axis: np.zeros(len(SPEEDS)) for axis in axes}
-    runs = 1
+    runs = len(machines)
 
     def values_of(axis: str, at: Array) -> dict[str, float | bool | int]:
         values: dict[str, float | bool | int] = {"points": len(SPEEDS), "distance": DISTANCE, "delay": delay[axis]}
@@ -219,11 +240,9 @@ def table(
 
     def scores(candidates: Mapping[str, Array]) -> dict[str, float]:
         nonlocal runs
-        own = machine
-        for axis, at in candidates.items():
-            own = compensated(own, axis, "friction_table", values_of(axis, at))
-        errors = size(circles.errors(own, fmus=fmus))
-        runs += 1
+        groups = {axis: values_of(axis, at) for axis, at in candidates.items()}
+        errors = size(_over(circles, machines, fmus, "friction_table", groups))
+        runs += len(machines)
         return {
             axis: float(score(errors[:, k] / before[:, k], errors[:, k], objective))
             for k, axis in enumerate(plane)

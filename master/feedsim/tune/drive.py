@@ -26,13 +26,13 @@ from feedsim.structure import Modes
 from feedsim.structure.modes import write_modes
 from feedsim.tune.drive_program import DriveProgram, Errors, circles_of, partner_of, stops_of
 from feedsim.tune.drive_result import ERROR_FLOOR, WORSE, Case, Limits, Margins, Point, Tuned, decibels
+from feedsim.tune.effects import Effect, effects_of
 from feedsim.tune.knobs import Knobs, matched
 from feedsim.tune.search import Rank, least
 
 Progress = Callable[[str, int, int], None]
 
 FREQUENCY_FACTORS = (1.0, 0.9, 1.1)  # factors on the frequencies of elastic modes
-FRICTION_FACTORS = (1.2, 0.8)  # factors on the friction, with which the result is judged besides
 # Moves as distance [m] and feed [m/s], circles as radius [m] and feed [m/s]: to search on, to choose on, to judge on.
 _MM, _MPM = 1e-3, 1 / 60
 SEARCHED = (((1 * _MM, 2 * _MPM), (10 * _MM, 5 * _MPM), (100 * _MM, 10 * _MPM)),
@@ -304,7 +304,10 @@ class _Search:
         cases: dict[str, Callable[[Machine], Machine]] = {"as the machine file has it": lambda own: own}
         if len(self.judges) > len(self.poses):
             cases |= {_percent("modes", f): partial(self.with_modes, factor=f) for f in FREQUENCY_FACTORS[1:]}
-        cases |= {_percent("friction", f): partial(_with_friction, axis=self.axis, factor=f) for f in FRICTION_FACTORS}
+        cases |= {
+            effect.words: partial(_effect_on, effect=effect, axis=self.axis)
+            for effect, _ in effects_of(self.scenario.machine, [self.axis])
+        }
         for k, (name, change) in enumerate(cases.items()):
             self.progress("judging", k, len(cases))
             before = program.errors(change(self.scenario.machine), fmus=self.fmus)
@@ -388,8 +391,5 @@ def _percent(what: str, factor: float) -> str:
     return f"{what} {abs(100 * (factor - 1)):.0f} % {'higher' if factor > 1 else 'lower'}"
 
 
-def _with_friction(machine: Machine, axis: str, factor: float) -> Machine:
-    friction = machine.shipped_friction(axis, "a changed friction")
-    scaled = {name: factor * getattr(friction, name) for name in ("F_C", "F_S", "F_log")}
-    own = machine.axes[axis].model_copy(update={"friction": friction.model_copy(update=scaled)})
-    return machine.model_copy(update={"axes": {**machine.axes, axis: own}})
+def _effect_on(machine: Machine, effect: Effect, axis: str) -> Machine:
+    return effect.on(machine, [axis]) or machine

@@ -26,7 +26,7 @@ from feedsim.nc import Program, plan
 from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.model import Recording
 from feedsim.trace import Trace
-from feedsim.tune.circles import BEGIN, END, REST, SWEEP, Pair, turn_of
+from feedsim.tune.circles import REST, RUN_IN_ANGLE, Pair, run_in, sweep_of, turn_of
 from feedsim.tune.closed_forms import axis_lag
 
 BAND = 1e-6  # [m] within which an axis has settled
@@ -125,7 +125,8 @@ class DriveProgram:
                 motions += [Move(to=start, feed=approach), Dwell(duration=REST)]
                 turning.append(len(motions))
                 motions.append(Arc(
-                    plane=(axis, partner), feed=each.feed, centre_by={axis: -each.radius, partner: 0.0}, angle=SWEEP,
+                    plane=(axis, partner), feed=each.feed, centre_by={axis: -each.radius, partner: 0.0},
+                    angle=sweep_of(each, machine),
                 ))  # fmt: skip
             else:
                 motions += [Move(to={axis: centre[0]}, feed=approach), Dwell(duration=REST)]
@@ -149,11 +150,12 @@ class DriveProgram:
         for index, each, (own_centre, other) in zip(turning, circles, centres, strict=True):
             segment = program.segments[index]
             if partner:
-                turns.append(turn_of(program, (axis, partner), (own_centre, other), segment.start, segment.end))
+                begin = run_in(each, machine)
+                turns.append(turn_of(program, (axis, partner), (own_centre, other), segment.start, segment.end, begin))
             else:  # behind the fading a full period, which begins a sixth of it later
                 period = 2 * math.pi * each.radius / each.feed
-                turns.append((segment.start + (1 + BEGIN / (2 * math.pi)) * period,
-                              segment.start + (1 + END / (2 * math.pi)) * period))  # fmt: skip
+                turns.append((segment.start + (1 + RUN_IN_ANGLE / (2 * math.pi)) * period,
+                              segment.start + (2 + RUN_IN_ANGLE / (2 * math.pi)) * period))  # fmt: skip
         return cls(own, program, axis, partner, tuple(stops), tuple(circles), tuple(spans), tuple(turns),
                    tuple(centres), interval)  # fmt: skip
 

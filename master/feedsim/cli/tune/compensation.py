@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, Command, Option, names, out, settings
+from feedsim.cli.options import FIGURES, FMUS, QUIET_OPTION, UNCERTAIN, Command, Option, names, out, settings
 from feedsim.cli.terminal import finish, watching
 
 DESCRIPTION = """Find the values of a friction compensation: a pulse on the speed setpoint, constant or with a
@@ -30,6 +30,7 @@ def compensation(options: Namespace) -> None:
             kind=options.kind,
             axes=options.axes,
             objective=options.objective,
+            uncertain=options.uncertain,
             set=options.overrides,
             fmus=options.fmus,
             out=directory,
@@ -49,6 +50,7 @@ COMPENSATION = Command(
                default="pulse_characteristic"),
         Option("--axes", "NAMES", "axes of the plane that are compensated (default: both)", type=names),
         Option("--objective", "NAME", "what is minimised: ratio, worst or largest (default: ratio)", default="ratio"),
+        UNCERTAIN,
         out("tune_<name of the file>"), FIGURES, settings(), FMUS, QUIET_OPTION,
     ),
     DESCRIPTION,

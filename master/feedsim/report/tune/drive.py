@@ -13,6 +13,7 @@ import numpy as np
 from feedsim.analysis import Figure
 from feedsim.arguments import spelt
 from feedsim.findings import Note, Wrong
+from feedsim.replay.machine_files import drive_file
 from feedsim.report import sections
 from feedsim.report.chart import Axis, Chart, Curve, Level, Mark, Panel
 from feedsim.report.content import (
@@ -34,7 +35,7 @@ from feedsim.report.picture import Picture
 from feedsim.report.provenance import figures_part, input_files, inputs_part, machine_part, software
 from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, ALLOWED, BEFORE, MUTED, RESIDUAL_COLOUR
-from feedsim.report.tune.drive_files import SETTINGS, SHEET, drive_file, names_for, rows
+from feedsim.report.tune.drive_files import SETTINGS, SHEET, names_for, rows
 from feedsim.tune.drive import NOISE, TORQUE
 from feedsim.tune.drive_result import WORSE, Case, Margins, Point, Tuned, decibels
 

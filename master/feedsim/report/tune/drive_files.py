@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from feedsim.control import Name, names_of
+from feedsim.replay.machine_files import drive_file, drive_text
 from feedsim.report.control import asked
-from feedsim.scenario import Drive
 from feedsim.tune.changed import Changed
 from feedsim.tune.drive_result import Tuned
 from feedsim.units import convert
@@ -35,32 +35,13 @@ def drives(tuned: Tuned) -> dict[str, str]:
     A machine file or --set takes them.
     """
     same = "; its values stay as they were" if tuned.kept else ""
-    head = f"# Drive of axis {{}} of {tuned.scenario.machine.name}, written by feedsim tune drive{same}.\n"
+    head = f"Drive of axis {{}} of {tuned.scenario.machine.name}, written by feedsim tune drive{same}."
     return {
-        drive_file(axis): head.format(axis) + _drive_text(tuned.machine.shipped_drive(axis, "a file"))
+        drive_file(axis): drive_text(
+            tuned.machine.shipped_drive(axis, "a file"), {}, "", [head.format(axis)], exact=True
+        )
         for axis in dict.fromkeys([tuned.axis, *(change.axis for change in tuned.changes)])
     }
-
-
-def drive_file(axis: str) -> str:
-    """Name of the file with the drive of an axis."""
-    return f"drive_{axis}.yaml"
-
-
-def _drive_text(drive: Drive) -> str:
-    """All values of a drive, with the digits that give them back exactly."""
-    table = parameters("controller")
-    groups: dict[str, list[str]] = {}
-    for name, value in drive.parameters().items():
-        group, _, key = name.rpartition(".")
-        if name.endswith(".type"):
-            groups.setdefault(group, []).append(f"{key}: {getattr(drive, group).type}")
-        elif isinstance(value, bool | str) or name not in table:
-            groups.setdefault(group, []).append(f"{key}: {str(value).lower()}")
-        else:
-            groups.setdefault(group, []).append(f"{key}: {value!r} {table[name].unit}".removesuffix(" 1").rstrip())
-    own = groups.pop("", [])
-    return "\n".join([*own, *(f"{group}: {{{', '.join(entries)}}}" for group, entries in groups.items())]) + "\n"
 
 
 def sheet(tuned: Tuned, control: str = "") -> str:

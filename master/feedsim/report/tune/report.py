@@ -21,7 +21,9 @@ from feedsim.report.results import REPORT, SUMMARY, check_place
 from feedsim.report.style import AFTER, BEFORE
 from feedsim.tune.circles import Pair
 from feedsim.tune.compensation import Judged
-from feedsim.tune.compensators import amplitude
+from feedsim.tune.compensators import NEVER_WORSE, amplitude
+from feedsim.tune.effects import WITHOUT_PLAY
+from feedsim.uncertainty import interval, share_of
 from feedsim.units import convert
 from feedsim.variables import parameters
 
@@ -59,11 +61,18 @@ def figures_of(judged: Judged) -> dict[str, Figure]:
         "held_out.median": Figure(100 * float(np.median(found)), "%", f"median {words}"),
         "held_out.worst": Figure(100 * float(found.min()), "%", f"least {words}"),
     }
-    for change, (before, after) in judged.changed.items():
+    for effect, (before, after) in judged.changed.items():
         own = judged.reduction(before, after)
-        name, much = f"friction{'+' if change > 0 else '-'}", f"with the friction changed by {100 * change:+.0f} %"
-        figures[f"{name}.median"] = Figure(100 * float(np.median(own)), "%", f"median {words}, {much}")
-        figures[f"{name}.worst"] = Figure(100 * float(own.min()), "%", f"least {words}, {much}")
+        figures[f"{effect.name}.median"] = Figure(
+            100 * float(np.median(own)), "%", f"median {words}, with {effect.words}"
+        )
+        figures[f"{effect.name}.worst"] = Figure(100 * float(own.min()), "%", f"least {words}, with {effect.words}")
+    for name, (low, high) in drawn_intervals(judged).items():
+        for end, value in (("from", low), ("to", high)):
+            figures[f"held_out.{name}_{end}"] = Figure(
+                value, "%", f"{'lower' if end == 'from' else 'upper'} end of the interval of held_out.{name}, "
+                f"{100 * share_of(len(judged.drawn)):.0f} % of draws of the machine",  # type: ignore[arg-type]
+            )  # fmt: skip
     for axis, k in zip(judged.axes, judged.columns, strict=True):
         for name, errors in (("before", judged.held_before), ("after", judged.held_after)):
             figures[f"{axis}.largest_{name}"] = Figure(
@@ -73,6 +82,15 @@ def figures_of(judged: Judged) -> dict[str, Figure]:
     return figures
 
 
+def drawn_intervals(judged: Judged) -> dict[str, tuple[float, float]]:
+    """Intervals [%] of the median and of the least reduction over draws of the machine; empty without."""
+    if judged.drawn is None:
+        return {}
+    each = [100 * judged.reduction(before, after) for before, after in judged.drawn]
+    found = {"median": np.array([np.median(one) for one in each]), "worst": np.array([one.min() for one in each])}
+    return {name: tuple(map(float, interval(values))) for name, values in found.items()}  # type: ignore[misc]
+
+
 def findings(judged: Judged) -> list[str]:
     """What is to be known before the values are typed."""
     worse = [
@@ -80,6 +98,16 @@ def findings(judged: Judged) -> list[str]:
         for axis, pair, before, after in judged.worse
     ]
     found: list[str] = [Wrong(f"worse with compensation than without: {', '.join(worse)}")] if worse else []
+    figures = figures_of(judged)
+    for effect, (before, after) in judged.changed.items():
+        if (judged.reduction(before, after) < 1 - NEVER_WORSE).any():
+            most = -figures[f"{effect.name}.worst"].value
+            found.append(f"with {effect.words} a circle gets worse than without compensation, by {most:.0f} %")
+    if judged.drawn is not None:
+        worst = 100 * np.array([judged.reduction(*each).min() for each in judged.drawn])
+        bad = int((worst < 100 * (1 - NEVER_WORSE)).sum())
+        if bad:
+            found.append(f"in {bad} of {len(worst)} draws of the machine a circle gets worse than without compensation")
     if judged.found.kind == "model":
         found.append(Note("the compensation has the friction of the machine itself; a real one is never known so well"))
     else:
@@ -94,8 +122,19 @@ def answers(judged: Judged) -> list[str]:
     return [
         f"{where}: {WORDS[judged.found.kind]} of {', '.join(judged.axes)} takes off {figures['held_out.median']} of "
         f"the error at the reversals (median of {len(judged.held)} other circles), at least "
-        f"{figures['held_out.worst']}."
+        f"{figures['held_out.worst']}.",
+        *_drawn_answer(judged),
     ]
+
+
+def _drawn_answer(judged: Judged) -> list[str]:
+    """What the intervals of identified values make of it."""
+    found = drawn_intervals(judged)
+    if not found or judged.drawn is None:
+        return []
+    median, worst = ("{:.0f} to {:.0f} %".format(*found[name]) for name in ("median", "worst"))
+    share = f"{100 * share_of(len(judged.drawn)):.0f} %, {len(judged.drawn)} draws"
+    return [f"With what identification leaves open: median {median}, least {worst} ({share})."]
 
 
 def rows(judged: Judged) -> Iterator[tuple[str, str, Name | None, Any, Any]]:
@@ -174,6 +213,7 @@ def report_of(judged: Judged) -> Report:
         main=[
             *pictures_of(judged),
             _values(judged),
+            _effects(judged, figures),
             _errors("Circles not used for tuning", judged.held, judged.held_before, judged.held_after, judged),
             _errors("Circles tuned on", judged.tuned, judged.tuned_before, judged.tuned_after, judged),
             sections.figures_section(figures),
@@ -192,6 +232,26 @@ def _values(judged: Judged) -> Section | None:
         return None
     heads = ("Axis", "Number", "Name in the control", "Old", "New", "Unit", "Unit confirmed", "Parameter")
     return Section("Values to type", [Table("lllrrlll", heads, lines), Paragraph(LIMITS_UNKNOWN + ".", "muted")])
+
+
+def _effects(judged: Judged, figures: Mapping[str, Figure]) -> Section:
+    """What the same values do where the machine is another one."""
+    lines: list[tuple[Text, ...]] = [("as the machine file has it", *_both(figures, "held_out"))]
+    lines += [(effect.words, *_both(figures, effect.name)) for effect in judged.changed]
+    for name, (low, high) in drawn_intervals(judged).items():
+        if name == "median":
+            worst = drawn_intervals(judged)["worst"]
+            lines.append(
+                ("draws of identified values", *(minus(f"{a:.0f} to {b:.0f}") for a, b in ((low, high), worst)))
+            )
+    note = f"The same values on a changed machine. The sizes are usual ones, not measured ones. {WITHOUT_PLAY}"
+    heads = ("Machine", "Median reduction [%]", "Least reduction [%]")
+    return Section("With other effects of the machine", [Table("lrr", heads, lines, note)], "effects")
+
+
+def _both(figures: Mapping[str, Figure], name: str) -> tuple[str, str]:
+    median, worst = (figures[f"{name}.{key}"].value for key in ("median", "worst"))
+    return minus(f"{median:.0f}"), minus(f"{worst:.0f}")
 
 
 def _errors(title: str, pairs: Sequence[Pair], before: Any, after: Any, judged: Judged) -> Section:
@@ -253,6 +313,7 @@ def summary(judged: Judged, names: Sequence[str]) -> Mapping[str, Any]:
         "values": {axis: dict(values) for axis, values in judged.found.values.items()},
         "runs": judged.found.runs,
         "figures": figures_part(figures_of(judged)),
+        **({"uncertain": {"draws": len(judged.drawn)}} if judged.drawn is not None else {}),
         "circles": {
             name: [
                 {"radius": pair.radius, "feed": pair.feed, "before": list(before), "after": list(after)}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import yaml
 
-CIRCLE = Path(__file__).resolve().parents[2] / "scenarios" / "xz_circle.yaml"
+CIRCLE = Path(__file__).resolve().parents[1] / "scenarios" / "xz_circle.yaml"
 VALUES = {
     "sigma_0": (300.0, "N.m/rad"), "sigma_1": (0.8, "N.m.s/rad"), "sigma_2": (0.006, "N.m.s/rad"),
     "F_C": (1.6, "N.m"), "F_S": (2.1, "N.m"), "v_s": (0.6, "rad/s"), "W": (0.04, "rad"), "gamma": (0.35, ""),

@@ -1,0 +1,102 @@
+"""What a real axis has besides, or becomes: changes of a machine under which a tuned setting is judged, too.
+
+A tuned value is good for the machine file that it was tuned on. Here is what the same value leaves when friction is
+another one, when part of it acts at the guide, when the motor cogs, when there is play. All sizes are usual ones, no
+measured ones; an axis that has an effect in its machine file keeps its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from feedsim.scenario import Drive, Friction, Machine
+from feedsim.scenario.machine import Guide
+from feedsim.tune.compensators import compensated
+
+STRENGTH = 0.2  # of the friction, either way
+GUIDE = 0.5  # share of the friction at the guide
+COGGING = 0.1  # of the Coulomb friction
+ORDER = 10.0  # of the cogging per turn, where the number of pole pairs is not known
+PLAY = 2e-6  # [m]
+# Wear takes preload away and widens the engaging zone; warm grease is half as viscous.
+WORN = {"F_C": 0.7, "F_S": 0.7, "F_log": 0.7, "sigma_0": 0.7, "W": 2.0}
+WARM = {"F_log": 0.5, "sigma_2": 0.5}
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A change of axes. name: of figures; words: behind "with"; of: the machine with it on an axis, or None
+    where that cannot have it."""
+
+    name: str
+    words: str
+    of: Callable[[Machine, str], Machine | None]
+
+    def on(self, machine: Machine, axes: Sequence[str]) -> Machine | None:
+        """The machine with the effect on those of the axes that can have it; None where none can."""
+        changed = machine
+        for axis in axes:
+            changed = self.of(changed, axis) or changed
+        return None if changed is machine else changed
+
+
+def effects_of(machine: Machine, axes: Sequence[str]) -> Iterator[tuple[Effect, Machine]]:
+    """Every effect that one of the axes can have, and the machine with it."""
+    for effect in EFFECTS:
+        changed = effect.on(machine, axes)
+        if changed is not None:
+            yield effect, changed
+
+
+def _with(machine: Machine, axis: str, **changes: object) -> Machine:
+    return machine.model_copy(update={"axes": {**machine.axes, axis: machine.axes[axis].model_copy(update=changes)}})
+
+
+def _friction(factors: Mapping[str, float]) -> Callable[[Machine, str], Machine | None]:
+    def of(machine: Machine, axis: str) -> Machine | None:
+        friction = machine.axes[axis].friction
+        if not isinstance(friction, Friction):
+            return None
+        values = {name: factor * float(getattr(friction, name)) for name, factor in factors.items()}
+        return _with(machine, axis, friction=friction.model_copy(update=values))
+
+    return of
+
+
+def _guide(machine: Machine, axis: str) -> Machine | None:
+    own = machine.axes[axis]
+    if own.guide is not None or not isinstance(own.friction, Friction):
+        return None
+    return _with(machine, axis, guide=Guide.model_validate({"share": GUIDE}))
+
+
+def _cogging(machine: Machine, axis: str) -> Machine | None:
+    drive, friction = machine.axes[axis].drive, machine.axes[axis].friction
+    if not isinstance(drive, Drive) or not isinstance(friction, Friction) or getattr(drive, "cogging_1", None):
+        return None
+    order = 2.0 * drive.p if drive.p else ORDER
+    return compensated(machine, axis, "cogging_1", {"order": order, "amplitude": COGGING * friction.F_C})
+
+
+def _play(machine: Machine, axis: str) -> Machine | None:
+    """Play without dynamics fits axes that are measured at the motor."""
+    own = machine.axes[axis]
+    if own.play or not isinstance(own.drive, Drive) or not own.drive.indirect:
+        return None
+    return _with(machine, axis, play=PLAY)
+
+
+_LEVEL = ("F_C", "F_S", "F_log")
+EFFECTS = (
+    Effect("friction+", f"the friction {100 * STRENGTH:.0f} % higher", _friction(dict.fromkeys(_LEVEL, 1 + STRENGTH))),
+    Effect("friction-", f"the friction {100 * STRENGTH:.0f} % lower", _friction(dict.fromkeys(_LEVEL, 1 - STRENGTH))),
+    Effect("worn", "worn axes: friction and sigma_0 30 % lower, W doubled", _friction(WORN)),
+    Effect("warm", "warm grease: F_log and sigma_2 halved", _friction(WARM)),
+    Effect("guide", f"{100 * GUIDE:.0f} % of the friction at the guide", _guide),
+    Effect("cogging", f"cogging of {100 * COGGING:.0f} % of F_C, twice per pole pair", _cogging),
+    Effect("play", f"play of {1e6 * PLAY:.0f} um", _play),
+)
+WITHOUT_PLAY = (
+    "Play is tried on axes that are measured at the motor; measured directly it needs a model of the contact."
+)

@@ -73,7 +73,7 @@ CAUSES = (
           feeds=FAST),
     Cause("cogging of X, 0.4 N.m, six per turn", tuple(
         f"machine.axes.X.drive.cogging_1.{each}" for each in ("order=6", "amplitude=0.4 N.m")
-    ), feeds=FAST),
+    ), "cogging X"),
     Cause("60 % of the friction of X at its guide", ("machine.axes.X.guide.share=60 %",), "peaks X", feeds=FAST),
 )  # fmt: skip
 
@@ -119,10 +119,16 @@ def diagnosis(cause: Cause, feed: float, radius: float) -> tuple[Diagnosis, list
 
 def words(found: Diagnosis, cause: Cause) -> str:
     """The causes that a report names, the first first; friction's peaks, which this machine always has, and the mean
-    radius only where they are asked for. Of unlike amplitudes what the response of the axes makes of them."""
+    radius only where they are asked for; cogging that was put in also where it is a small part of G. Of unlike
+    amplitudes what the response of the axes makes of them."""
     named = []
-    asked = [term for term in found.terms if term.key == "radius" and cause.term == "radius" and term.shows]
-    for term in [*worth_telling(found), *asked]:
+    names = {cause.term} & {"radius", "cogging X"}
+    told = worth_telling(found)
+    asked = [
+        term for term in found.terms
+        if f"{term.key} {term.axis}".strip() in names and term.shows and term not in told
+    ]  # fmt: skip
+    for term in [*told, *asked]:
         if term.key == "offset" or (term.key == "peaks" and not cause.term.startswith("peaks")):
             continue
         factor, unit = FIGURE_UNITS[term.unit]

@@ -102,3 +102,20 @@ def test_path_lag_is_told_from_what_friction_makes_of_the_radius(driven: Driven)
         figures = driven(*overrides)[0]
         assert figures["XZ.radius_lag"].value < -5
         assert figures["XZ.radius_change"].value - friction == pytest.approx(figures["XZ.radius_lag"].value, abs=0.05)
+
+
+def test_cogging_is_named_with_its_order_and_torque(driven: Driven) -> None:
+    figures, found = driven(
+        "motions.0.radius=60 mm", "machine.axes.X.drive.cogging_1.order=6",
+        "machine.axes.X.drive.cogging_1.amplitude=0.4 N.m",
+    )  # fmt: skip
+    (term,) = (each for each in found.terms if each.key == "cogging")
+    assert (term.axis, term.order) == ("X", 6)
+    assert abs(term.value - 0.4) < term.half < 0.02
+    assert figures["XZ.cogging_X_6"].value == term.value
+    assert "cogging of X, 6 per turn" in [analysis.circle.name(each) for each in found.terms]
+    assert not found.vibrations  # it is no vibration
+    clean = driven("motions.0.radius=60 mm")[1]
+    assert not [each for each in clean.terms if each.key == "cogging"]
+    for axis in "XZ":  # the peaks are those of the machine without it
+        assert found[f"peaks {axis}"].value == pytest.approx(clean[f"peaks {axis}"].value, rel=0.01)

@@ -6,7 +6,7 @@ Definitions: docs/figures.md. Here recorded turns meet feedsim.analysis.circle, 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,10 @@ from feedsim.trace import Trace
 MIN_PEAK_TURN_SAMPLES = 180
 # A glitch by its old definition is misleading where it differs from the peak by this share of it, and this much [m].
 MISLEADING, LEAST_MISLEADING = 0.2, 1e-6
-FIGURE_UNITS = {"s": (1e3, "ms"), "m": (1e6, "um"), "1": (1e6, "um/m"), "rad": (1e6, "um/m")}
+FIGURE_UNITS = {"s": (1e3, "ms"), "m": (1e6, "um"), "1": (1e6, "um/m"), "rad": (1e6, "um/m"), "N.m": (1.0, "N.m")}
 FIGURE_ORDER = (
-    "peaks", "servo", "squareness", "squareness_or_servo", "scale", "lost_motion", "pitch", "straightness", "third",
-    "drift", "centres", "radius", "offset", "rest",
+    "peaks", "servo", "squareness", "squareness_or_servo", "scale", "lost_motion", "pitch", "cogging", "straightness",
+    "third", "drift", "centres", "radius", "offset", "rest",
 )  # fmt: skip
 ANGLES = 720  # at which two directions are compared: every half degree
 
@@ -36,12 +36,14 @@ def diagnosed(
     drag: Mapping[str, NDArray[np.complex128]] | None = None,
     columns: tuple[str, str] | None = None,
     recorded: bool = False,
+    response: Callable[[str, Array], NDArray[np.complex128]] | None = None,
 ) -> Diagnosis | None:
     """Turns of one circle taken apart; None where they have too few samples for that.
 
     pitch: axis -> [m]. gain: axis -> x_a/x_s at the circle's frequency [1]. drag: axis -> x_a over a torque at the
     motor at the odd multiples of that frequency [m/(N.m)]. columns: of the positions; default: those of the scales.
-    recorded: they are looked at as those of an instrument are.
+    recorded: they are looked at as those of an instrument are. response: of an axis at frequencies (F,) [Hz], x_a over
+    a torque on the rotor (F,) [m/(N.m)].
     """
     turn = turns[0]
     paths = []
@@ -52,7 +54,8 @@ def diagnosed(
         phase = (measured.time - measured.time[0]) * (2 * math.pi / (each.end - each.begin))
         paths.append(TurnedPath(measured.angle, measured.deviation, each.sense, phase))
     speed = 2 * math.pi * turn.radius / (turn.end - turn.begin)
-    return diagnose(CircleUnderTest(turn.axes, turn.radius, speed, pitch, gain or {}, drag or {}, recorded), paths)
+    circle = CircleUnderTest(turn.axes, turn.radius, speed, pitch, gain or {}, drag or {}, recorded, response)
+    return diagnose(circle, paths)
 
 
 def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
@@ -70,15 +73,18 @@ def cause_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
         "lost_motion": "lost motion: step where {axis} reverses",
         "peaks": "reversal peak where {axis} reverses, the largest one over the fitted rest",
         "pitch": "amplitude of the error of {axis} that repeats with its pitch",
+        "cogging": "amplitude of the torque of {axis} that comes {order} times in a turn of its motor",
         "straightness": "straightness of second order of the guide of {axis}, at the edge of the circle",
         "third": f"straightness of third order at the edge of the circle, that of {first} less that of {second}",
         "drift": "way of the centre in a turn",
         "centres": "distance of the centres of both directions",
         "rest": "what no cause explains, from peak to valley",
     }  # fmt: skip
-    for term in sorted(diagnosis.terms, key=lambda each: (FIGURE_ORDER.index(each.key), each.axis)):
+    for term in sorted(diagnosis.terms, key=lambda each: (FIGURE_ORDER.index(each.key), each.axis, each.order)):
         factor, unit = FIGURE_UNITS[term.unit]
-        found[figure_name(term)] = Figure(factor * term.value, unit, meanings[term.key].format(axis=term.axis))
+        found[figure_name(term)] = Figure(
+            factor * term.value, unit, meanings[term.key].format(axis=term.axis, order=term.order)
+        )
     if diagnosis.lag is not None:
         meaning = "part of the mean radius deviation that path lag makes, by the response of the position loops"
         found["radius_lag"] = Figure(1e6 * diagnosis.lag, "um", meaning)
@@ -100,7 +106,8 @@ def figure_name(term: Term) -> str:
     """Name of a term's figure, without the plane's."""
     names = {"servo": "servo_mismatch", "scale": "scale_mismatch", "peaks": "peak", "radius": "radius_change"}
     names |= {"third": "straightness_third", "drift": "centre_drift", "centres": "centres_apart"}
-    return f"{names.get(term.key, term.key)}{'_' if term.axis else ''}{term.axis}"
+    order = f"_{term.order}" if term.order else ""
+    return f"{names.get(term.key, term.key)}{'_' if term.axis else ''}{term.axis}{order}"
 
 
 def misleading(diagnosis: Diagnosis, glitches: Mapping[str, Figure]) -> list[str]:

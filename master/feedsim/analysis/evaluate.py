@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -109,7 +109,7 @@ class CircleTask:
         """
         last: tuple[Trace, Diagnosis | None] | None = self.__dict__.get("_last")
         if last is None or last[0] is not trace:
-            last = trace, diagnosed(trace, self.turns, self.pitch, self.gain, self.drag)
+            last = trace, diagnosed(trace, self.turns, self.pitch, self.gain, self.drag, response=self.response)
             self.__dict__["_last"] = last
         return last[1]
 
@@ -146,6 +146,18 @@ class CircleTask:
             }
         except InputError:
             return {}
+
+    @property
+    def response(self) -> Callable[[str, NDArray[np.float64]], NDArray[np.complex128]] | None:
+        """x_a over a torque on the rotor, of an axis at frequencies (F,) [Hz]: (F,) [m/(N.m)]; None as gain."""
+        return self._of_torque if self.drag else None
+
+    def _of_torque(self, axis: str, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        system = LinearSystem(self.machine, plant_modes(self.machine)[0])
+        s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
+        per_setpoint, _ = system.drives[system.axes.index(axis)].torque(s)
+        added = system.closing({axis: "position"}).transfer(frequency, f"{axis}.x_a", f"{axis}.M_add")
+        return np.asarray(added / per_setpoint)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from feedsim.analysis.circle.cogging import MAX_WAVES, Wave, settled, strongest, without
 from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
 from feedsim.analysis.circle.model import Fit, fit
 from feedsim.analysis.circle.setup import Offset
@@ -35,15 +36,16 @@ class Term:
     """One cause.
 
     Attributes:
-        key: "offset", "radius", "scale", "squareness", "servo", "squareness_or_servo", "lost_motion", "peaks", "pitch"
-            or "rest"; of records besides "straightness" (of second order), "third" (straightness of third order, that
-            of the first axis less that of the second), "drift" and "centres" (of both directions).
+        key: "offset", "radius", "scale", "squareness", "servo", "squareness_or_servo", "lost_motion", "peaks", "pitch",
+            "cogging" or "rest"; of records besides "straightness" (of second order), "third" (straightness of third
+            order, that of the first axis less that of the second), "drift" and "centres" (of both directions).
         axis: the one it belongs to; "" where to the pair.
         value: in ``unit`` (SI); scale, servo: what the first axis travels further, answers later than the second.
         half: half of its interval of 95 %; NaN where it has none.
         size: difference of the largest and the smallest radial deviation that it makes alone [m].
         share: of G: what it contributes where the deviation is largest, less where it is smallest, over G [1].
         gain: by how much G falls without it [m]; below 0 where it rises.
+        order: of "cogging", waves in a turn of the motor; else 0.
     """
 
     key: str
@@ -54,6 +56,7 @@ class Term:
     size: float
     share: float
     gain: float = 0.0
+    order: int = 0
 
     @property
     def shows(self) -> bool:
@@ -143,9 +146,14 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
     centred: the centre is that of the measurement's set-up and no error of the machine; G is then about the fitted one.
     """
     whole, paths = paths, [path.thinned() for path in paths]
-    found = fit(circle, paths)
+    found, waves = _fitted(circle, paths)
+    circle = replace(circle, response=None)  # a result is data
     curves = _curves(found, paths, circle)
     total = [path.deviation for path in paths]
+    for wave in waves:
+        curves[f"cogging {wave.axis} {wave.order}"] = [wave.curve(circle, each.angle, each.sense) for each in paths]
+    orders = {f"cogging {wave.axis} {wave.order}": wave for wave in waves}
+    whole, paths = without(circle, whole, waves), without(circle, paths, waves)
     if centred:
         offset = curves.pop("offset ")
         total = [e - part for e, part in zip(total, offset, strict=True)]
@@ -157,11 +165,17 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
     terms = []
     for name, part in parts.items():
         key, _, axis = name.partition(" ")
-        value, half, unit = _value(circle, found, peaks, key, axis)
+        order = 0
+        if name in orders:
+            axis, order = orders[name].axis, orders[name].order
+            value, half, unit = orders[name].amplitude, orders[name].half, "N.m"
+        else:
+            value, half, unit = _value(circle, found, peaks, key, axis)
         if key == "rest":
             value = float(np.ptp(part))
         share = float(part[high] - part[low]) / G if G > 0 else 0.0
-        terms.append(Term(key, axis, value, half, unit, float(np.ptp(part)), share, G - float(np.ptp(e - part))))
+        gain = G - float(np.ptp(e - part))
+        terms.append(Term(key, axis, value, half, unit, float(np.ptp(part)), share, gain, order))
     if centred:
         value, half, unit = _value(circle, found, peaks, "offset", "")
         terms.append(Term("offset", "", value, half, unit, 2 * value, 0.0))
@@ -194,6 +208,16 @@ def diagnose(circle: CircleUnderTest, paths: Sequence[TurnedPath], *, centred: b
             (path.angle, path.deviation - residual) for path, residual in zip(paths, found.residual, strict=True)
         ),
     )
+
+
+def _fitted(circle: CircleUnderTest, paths: Sequence[TurnedPath]) -> tuple[Fit, list[Wave]]:
+    """The model fitted to the paths without waves of the motors' torque, and these waves."""
+    found, waves = fit(circle, paths), list[Wave]()
+    while len(waves) < MAX_WAVES and (wave := strongest(circle, found)) is not None:
+        waves.append(wave)
+        found = fit(circle, without(circle, paths, waves))
+        waves = settled(circle, found, waves)
+    return found, waves
 
 
 def _lag(circle: CircleUnderTest) -> float | None:

@@ -6,7 +6,7 @@ model.py has the equations. Start reading at undo(), which takes known displacem
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,7 +27,7 @@ class CircleUnderTest:
     """What is known of the circle: axes of its plane (first, second), radius [m], path speed [m/s]; the pitch of an
     axis [m] where an error that repeats with it is looked for; where the drive of an axis is known, its response x_a
     over x_s at the circle's frequency [1], and x_a over a torque at the motor at the odd multiples of it, from the
-    first on [m/(N.m)].
+    first on [m/(N.m)]; or over a torque on the rotor as a function of axis and frequencies (F,) [Hz].
 
     recorded: an instrument at the tool has measured it. Then guides may be bent, the centre may move while turns are
     driven, and the angles may be off by a constant (setup.py)."""
@@ -39,6 +39,7 @@ class CircleUnderTest:
     gain: Mapping[str, complex] = field(default_factory=dict)
     drag: Mapping[str, NDArray[np.complex128]] = field(default_factory=dict)
     recorded: bool = False
+    response: Callable[[str, Array], NDArray[np.complex128]] | None = None
 
 
 # Displacements for 1 m of a term that follow from time and turn alone: name -> number of the axis, (N,) [m].

@@ -91,6 +91,7 @@ class Fit:
         wound: lost motion that friction at rest may make by itself, of "lost_0" and "lost_1" [m].
         unsure: what a term may be off by as the loops' response is not known better [m].
         offset: of the written angles; None where they are those of the machine's own scales.
+        tails: of every path, the columns of which ``tail`` is the sum (N, T).
     """
 
     names: tuple[str, ...]
@@ -110,6 +111,7 @@ class Fit:
     wound: Mapping[str, float]
     unsure: float = 0.0
     offset: Offset | None = None
+    tails: tuple[Array, ...] = ()
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
@@ -260,7 +262,7 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
                 else fading_tails(undone, paths, what_is_left(residual, which, since, window, usual), window)
             )
         fitted = (np.column_stack([matrix, tails.columns]) if len(tails.spread) else matrix)[kept]
-        blocks = _blocks(undone)[kept] if len(tails.spread) else np.empty(0)
+        blocks = blocks_of([each.angle for each in undone])[kept] if len(tails.spread) else np.empty(0)
         robust = robust_fit(fitted, deviation[kept], tails.spread, blocks)
         step = robust.values[: len(names)]
         values |= {name: values.get(name, 0.0) + float(d) for name, d in zip(names, step, strict=True)}
@@ -270,7 +272,7 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
     tail = tails.columns @ robust.values[len(names) :]
     rounded = rounding([path.deviation for path in paths], np.split(residual - tail, ends), robust.noise)[kept]
     covariance, quantile = covariance_of(
-        fitted, (residual - tail)[kept], robust, tails.spread, _blocks(undone)[kept], rounded
+        fitted, (residual - tail)[kept], robust, tails.spread, blocks_of([each.angle for each in undone])[kept], rounded
     )
     return Fit(
         names=names,
@@ -293,6 +295,7 @@ def _fit(circle: CircleUnderTest, paths: Sequence[TurnedPath], out: Left, shape:
             if len(circle.drag) == 2
         },
         unsure=_unsure(circle, tail[kept], residual[~kept], window),
+        tails=tuple(np.split(tails.columns, ends)),
     )
 
 
@@ -306,11 +309,9 @@ def _unsure(circle: CircleUnderTest, tail: Array, peaks: Array, window: float) -
     return float(np.abs(peaks).max(initial=0.0)) * math.exp(-passed / SETTLES)
 
 
-def _blocks(undone: Sequence[Undone]) -> Array:
-    """Which block of BLOCK_ANGLE each sample of all paths is in (N,)."""
-    return np.concatenate(
-        [1000 * k + np.floor(each.angle / math.radians(BLOCK_ANGLE)) for k, each in enumerate(undone)]
-    )
+def blocks_of(angles: Sequence[Array]) -> Array:
+    """Which block of BLOCK_ANGLE each sample of all paths is in (N,), by their angles [rad]."""
+    return np.concatenate([1000 * k + np.floor(angle / math.radians(BLOCK_ANGLE)) for k, angle in enumerate(angles)])
 
 
 def _windows(undone: Undone, sense: int, out: Left) -> tuple[NDArray[np.int64], Array]:

@@ -96,6 +96,11 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
             return _peaks(diagnosis, term)
         case "pitch":
             return f"{axis} errs by {_um(amount)} (amplitude) with every pitch of its drive: screw, or motor encoder"
+        case "cogging":
+            return (
+                f"the torque of {axis} swings by {_digits(amount)} N.m (amplitude), {term.order} times in a turn of "
+                "the motor: cogging, or torque that repeats with the screw; cogging compensation takes it away"
+            )
         case "straightness":
             other = second if axis == first else first
             return (
@@ -229,6 +234,7 @@ def name(term: Term) -> str:
         "lost_motion": f"lost motion of {term.axis}", "pitch": f"pitch error of {term.axis}",
         "peaks": f"reversal peaks of {term.axis}", "rest": "rest",
         "straightness": f"straightness of {term.axis}", "third": "straightness of third order",
+        "cogging": f"cogging of {term.axis}, {term.order} per turn",
         "drift": "drift of the centre", "centres": "distance of the centres",
     }  # fmt: skip
     return names[term.key]

@@ -1,0 +1,210 @@
+"""Torque that repeats with the turn of a motor, cogging above all, in what a fitted circle leaves.
+
+A torque A sin(k phi + psi), phi the angle of the motor, is along a circle a torque over the time of a turn, as phi
+follows the position of the axis. Its harmonics move the axis by the response of the loops to a torque at the motor.
+Speed and resonances are in that response, so the amplitude comes out in N.m. Looked for between the reversals, beside
+all terms of the model. Start reading at strongest().
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedsim.analysis.circle.geometry import CircleUnderTest, TurnedPath
+from feedsim.analysis.circle.model import Fit, blocks_of
+from feedsim.analysis.figures import Array
+from feedsim.estimation.covariance import Covariance
+from feedsim.estimation.interval import student
+
+# Orders that are tried: one wave a turn is an error of the pitch; of a torque at more than this frequency [Hz] at the
+# path speed an axis shows little.
+MOTOR_ORDERS, MAX_TORQUE_FREQUENCY = (2, 48), 150.0
+# What a circle leaves is looked into from this standard deviation on [m]. A wave is one if it explains so much of the
+# variance, and so much of that share beside any of the next ones: cogging of 0.2 to 0.4 N.m explains
+# 70 to 99 %, what circles of machines without leave is explained to 9 % at most.
+MIN_REMAINDER, MIN_EXPLAINED_SHARE, MIN_KEPT_SHARE, RIVAL_COUNT = 30e-9, 0.3, 0.5, 4
+MAX_WAVES = 4  # waves of a circle
+WAVE_POINTS = 8192  # of a turn; the finest wave has some 1500 periods
+SCREENED_SAMPLES = 2000  # samples of all paths for the search among the orders
+# The axis follows a small torque by the linear response to this share of it: friction changes with the speed.
+RESPONSE_UNCERTAINTY = 0.03
+FINE_GRID_FREQUENCY = 30.0  # up to this frequency [Hz] the response is taken at more points
+FINE_GRID_POINTS, GRID_POINTS = 100, 160
+
+# x_a over a torque at the motor (F,) [m/(N.m)], of an axis at frequencies (F,) [Hz].
+Response = Callable[[str, Array], NDArray[np.complex128]]
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """A torque of ``order`` waves in a turn of the motor of ``axis``.
+
+    Attributes:
+        parts: of the cosine and the sine of the angle that follows from the position [N.m].
+        half: half of the interval of the amplitude [N.m].
+        moved: what 1 N.m of each part moves the axis by over the time of a turn towards the second axis
+            (2, WAVE_POINTS) [m].
+    """
+
+    axis: str
+    order: int
+    parts: tuple[float, float]
+    half: float
+    moved: Array
+
+    @property
+    def amplitude(self) -> float:
+        """[N.m]"""
+        return math.hypot(*self.parts)
+
+    def displacements(self, circle: CircleUnderTest, angle: Array, sense: int) -> Array:
+        """Of the axis for 1 N.m of each part, at angles (N,) [rad] of a turn of ``sense``: (N, 2) [m]."""
+        time = np.linspace(0, 2 * math.pi, WAVE_POINTS, endpoint=False)
+        # The first axis goes the same way in both senses; the second one goes back, and so does the sine.
+        back = (1.0, float(sense)) if self.axis == circle.axes[1] else (1.0, 1.0)
+        turned = sense * angle % (2 * math.pi)
+        return np.column_stack(
+            [
+                way * np.interp(turned, time, each, period=2 * math.pi)
+                for way, each in zip(back, self.moved, strict=True)
+            ]
+        )
+
+    def columns(self, circle: CircleUnderTest, angle: Array, sense: int) -> Array:
+        """Radial deviation for 1 N.m of each part (N, 2) [m]."""
+        along = (np.cos, np.sin)[circle.axes.index(self.axis)](angle)
+        return np.asarray(along[:, None] * self.displacements(circle, angle, sense))
+
+    def curve(self, circle: CircleUnderTest, angle: Array, sense: int) -> Array:
+        """Radial deviation (N,) [m]."""
+        return np.asarray(self.columns(circle, angle, sense) @ np.array(self.parts))
+
+
+def without(circle: CircleUnderTest, paths: Sequence[TurnedPath], waves: Sequence[Wave]) -> list[TurnedPath]:
+    """Paths with the waves taken off the positions of their axes."""
+    found = []
+    for path in paths:
+        p = (circle.radius + path.deviation) * np.array([np.cos(path.angle), np.sin(path.angle)])
+        for wave in waves:
+            own = wave.displacements(circle, path.angle, path.sense) @ np.array(wave.parts)
+            p[circle.axes.index(wave.axis)] -= own
+        angle, deviation = np.arctan2(p[1], p[0]), np.hypot(p[0], p[1]) - circle.radius
+        found.append(replace(path, angle=angle, deviation=deviation) if waves else path)
+    return found
+
+
+def strongest(circle: CircleUnderTest, found: Fit) -> Wave | None:
+    """The wave that explains most of what ``found`` leaves between the reversals; None where none stands out."""
+    rest = _Rest(found, few=True)
+    if circle.response is None or rest.deviation < MIN_REMAINDER:
+        return None
+    tried = sorted(
+        ((rest.explained(each, circle), each) for axis in circle.axes for each in _waves(circle, axis)),
+        key=lambda pair: -pair[0],
+    )
+    if not tried or tried[0][0] < MIN_EXPLAINED_SHARE:
+        return None
+    best = tried[0][1]
+    if any(
+        rest.explained(best, circle, beside=other) < MIN_KEPT_SHARE * tried[0][0] for _, other in tried[1:RIVAL_COUNT]
+    ):
+        return None
+    return settled(circle, found, [best])[0]
+
+
+def settled(circle: CircleUnderTest, found: Fit, waves: Sequence[Wave]) -> list[Wave]:
+    """Waves with what ``found`` leaves of them, and their intervals."""
+    rest = _Rest(found)
+    matrix = np.hstack([rest.outside(rest.columns(wave, circle)) for wave in waves])
+    change = np.linalg.lstsq(matrix, rest.left, rcond=None)[0]
+    off = rest.left - matrix @ change
+    covariance = Covariance.of(matrix.T @ matrix)
+    free = max(int(rest.block.max()) + 1 - len(found.names) - len(change), 2)
+    blockwise = covariance.of_blocks(matrix, off, rest.block, free)
+    single = covariance.of_samples(matrix, off)
+    scale = np.sqrt(np.maximum(np.diag(single) / np.maximum(np.diag(blockwise), 1e-300), 1.0))
+    spread = scale[:, None] * blockwise * scale
+    result = []
+    for k, wave in enumerate(waves):
+        own = slice(2 * k, 2 * k + 2)
+        parts = np.array(wave.parts) + change[own]
+        along = parts / max(float(np.hypot(*parts)), 1e-300)
+        known = student(free) * math.sqrt(max(float(along @ spread[own, own] @ along), 0.0))
+        half = math.hypot(known, RESPONSE_UNCERTAINTY * float(np.hypot(*parts)))
+        result.append(replace(wave, parts=(float(parts[0]), float(parts[1])), half=half))
+    return result
+
+
+def _waves(circle: CircleUnderTest, axis: str) -> Iterator[Wave]:
+    """All orders that are tried of an axis, without size."""
+    assert circle.response is not None
+    i, pitch = circle.axes.index(axis), circle.pitch.get(axis, 0.0)
+    if pitch <= 0:
+        return
+    first = circle.speed / circle.radius / (2 * math.pi)
+    top = min(MOTOR_ORDERS[1], int(MAX_TORQUE_FREQUENCY * pitch / circle.speed))
+    # A wave that is fastest at the path speed has no harmonics far above that.
+    highest = min(int(1.15 * top * 2 * math.pi * circle.radius / pitch) + 20, WAVE_POINTS // 2 - 1)
+    fine, coarse = max(FINE_GRID_FREQUENCY, 2 * first), max(highest * first, FINE_GRID_FREQUENCY + 1)
+    grid = np.unique(
+        np.r_[np.geomspace(first, fine, FINE_GRID_POINTS), np.linspace(FINE_GRID_FREQUENCY, coarse, GRID_POINTS)]
+    )
+    grid = grid[grid >= first]
+    response, at = circle.response(axis, grid), first * np.arange(1, highest + 1)
+    T = np.interp(at, grid, response.real) + 1j * np.interp(at, grid, response.imag)
+    time = np.linspace(0, 2 * math.pi, WAVE_POINTS, endpoint=False)
+    x = circle.radius * (np.cos, np.sin)[i](time)
+    for order in range(MOTOR_ORDERS[0], top + 1):
+        moved = []
+        for wave in (np.cos, np.sin):
+            torque = np.fft.rfft(wave(2 * math.pi * order / pitch * x))
+            torque[0], torque[highest + 1 :] = 0, 0  # what stands still the integrators take
+            torque[1 : highest + 1] *= T
+            moved.append(np.fft.irfft(torque, WAVE_POINTS))
+        yield Wave(axis, order, (0.0, 0.0), math.inf, np.array(moved))
+
+
+class _Rest:
+    """What a fit leaves between the reversals, of all samples or of a few, and what is no term of it, nor a tail."""
+
+    def __init__(self, found: Fit, *, few: bool = False) -> None:
+        step = max(1, sum(len(each) for each in found.angle) // SCREENED_SAMPLES) if few else 1
+        rows = [np.flatnonzero(which < 0)[::step] for which in found.reversal]
+        self._angle = [angle[own] for angle, own in zip(found.angle, rows, strict=True)]
+        self._senses = found.senses
+        terms = np.concatenate([
+            np.column_stack([*(part[name][own] for name in found.names), tails[own]])
+            for part, tails, own in zip(found.columns, found.tails, rows, strict=True)
+        ])  # fmt: skip
+        self._terms = np.linalg.qr(terms / np.maximum(np.linalg.norm(terms, axis=0), 1e-300))[0]
+        left = np.concatenate([
+            (residual - tail)[own]
+            for residual, tail, own in zip(found.residual, found.tail, rows, strict=True)
+        ])  # fmt: skip
+        self.deviation = float(np.std(left))
+        self.left = self.outside(left)
+        self.block = np.unique(blocks_of(self._angle), return_inverse=True)[1]
+
+    def outside(self, values: Array) -> Array:
+        """(N, ...) without what terms of the model explain of it."""
+        return np.asarray(values - self._terms @ (self._terms.T @ values))
+
+    def columns(self, wave: Wave, circle: CircleUnderTest) -> Array:
+        """(N, 2) of the samples [m/(N.m)]."""
+        parts = zip(self._angle, self._senses, strict=True)
+        return np.concatenate([wave.columns(circle, angle, sense) for angle, sense in parts])
+
+    def explained(self, wave: Wave, circle: CircleUnderTest, beside: Wave | None = None) -> float:
+        """Share of the variance [1]; beside another wave, what it explains of it that the other does not."""
+        others = [] if beside is None else [self.outside(self.columns(beside, circle))]
+        columns = np.hstack([*others, self.outside(self.columns(wave, circle))])
+        return (self._unexplained(others[0]) if others else 1.0) - self._unexplained(columns)
+
+    def _unexplained(self, columns: Array) -> float:
+        off = self.left - columns @ np.linalg.lstsq(columns, self.left, rcond=None)[0]
+        return float(off @ off) / max(float(self.left @ self.left), 1e-300)

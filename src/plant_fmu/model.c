@@ -140,27 +140,23 @@ static void plant_by_direction(const Plant *plant, const double *of_axes, double
     }
 }
 
-/* What play and geometry add at the tool, whose displacements are tool[directions]. */
-static void plant_add_errors(const Plant *plant, const double *ways, double *tool) {
+/* What play and geometry add at the tool, added[directions]. */
+static void plant_errors(const Plant *plant, const double *ways, double *added) {
     double s[TOOL_DIRECTIONS], play[TOOL_DIRECTIONS], error[TOOL_DIRECTIONS];
     plant_by_direction(plant, ways, s);
     plant_by_direction(plant, ways + plant->axes, play);
     geometry_errors(&plant->geometry, s, error);
     for (size_t d = 0; d < TOOL_DIRECTIONS; d++) {
-        tool[d] += play[d] + error[d];
+        added[d] = play[d] + error[d];
     }
 }
 
-/* Whether the tool's displacements with them are numbers, of q and of the ways that end a step: a cube of a way is soon
- * none. */
-static bool plant_errors_are_numbers(Plant *plant, const Modal *modal, const double *q, const double *ways) {
-    double *tool = plant->y + plant->axes, probe = 0;
-    if (!plant_measure_tool(plant, modal, q, plant->y)) {
-        return false;
-    }
-    plant_add_errors(plant, ways, tool);
+/* Whether they are numbers at the ways that end a step: a cube of a way is soon none. */
+static bool plant_errors_are_numbers(const Plant *plant, const double *ways) {
+    double added[TOOL_DIRECTIONS], probe = 0;
+    plant_errors(plant, ways, added);
     for (size_t d = 0; d < TOOL_DIRECTIONS; d++) {
-        probe += number_probe(tool[d]);
+        probe += number_probe(added[d]);
     }
     return !isnan(probe);
 }
@@ -169,7 +165,11 @@ static void plant_show_tool(Unit *unit, Plant *plant, double *y) {
     Scalars *v = unit_scalars(unit);
     double *tool = y + plant->axes;
     if (plant->errors) {
-        plant_add_errors(plant, plant_ways(plant, plant_state(unit)), tool);
+        double added[TOOL_DIRECTIONS];
+        plant_errors(plant, plant_ways(plant, plant_state(unit)), added);
+        for (size_t d = 0; d < TOOL_DIRECTIONS; d++) {
+            tool[d] += added[d];
+        }
     }
     v->tool_x_X = tool[0];
     v->tool_x_Y = tool[1];
@@ -479,10 +479,9 @@ static bool plant_step(Unit *unit, double t, double h) {
     if (plant->errors) {
         double *ways = plant_ways(plant, end);
         plant_play(unit, plant, plant_ways(plant, state), ways);
-        if (!plant_errors_are_numbers(plant, &plant->modal[plant_head(unit)->cell], q_end, ways)) {
+        if (!plant_errors_are_numbers(plant, ways)) {
             return unit_fail(unit, "an output would be no finite number at the end of the step");
         }
-        plant_measure_tool(plant, &plant->modal[plant_head(unit)->cell], q_end, plant->y);
     }
     if (plant->guided) {
         if (plant->cells > 1) {

@@ -1,6 +1,6 @@
 """What docs/style.md asks of a page, checked: short sentences, lines that an editor shows, no words of the list there.
 
-    python docs/site/prose.py docs/theory.md     # prints what is wrong, with its line
+    python docs/site/prose.py docs/theory.md     # prints what is wrong, with its line; words of each page and of all
 
 Start reading at faults(). Code, tables, headings, pictures and comments are no prose.
 """
@@ -111,11 +111,14 @@ def lengths(text: str) -> list[int]:
 
 
 if __name__ == "__main__":
-    wrong = 0
+    wrong, every = 0, list[int]()
     for name in sys.argv[1:]:
         page = Path(name).read_text(encoding="utf-8")
+        every += lengths(page)
         listed = faults(page, own=Path(name).resolve() == STYLE)
         wrong += len(listed)
         print(*(f"{name}:{fault}" for fault in listed), sep="\n", end="\n" if listed else "")
         print(f"{name}: {sum(lengths(page))} words, median {median(lengths(page) or [0]):.0f}, {len(listed)} to mend")
+    if len(sys.argv) > 2:
+        print(f"together: {sum(every)} words, longest {max(every, default=0)}, median {median(every or [0]):.0f}")
     sys.exit(bool(wrong))

@@ -17,7 +17,7 @@ from agreement_helpers import assert_numbers_agree
 from command_helpers import feedsim
 from feedsim.linear.candidates import Candidates
 from feedsim.linear.judgement import judge
-from feedsim.scenario import Machine, load, load_machine
+from feedsim.scenario import Drive, Machine, load, load_machine
 from feedsim.structure import Modes, checked_modes
 from feedsim.tune.changed import changed_values
 from feedsim.tune.circles import Pair
@@ -402,3 +402,23 @@ def test_bad_input(words: tuple[str, ...], message: str, fmus: Path, tmp_path: P
     assert done.returncode == 2
     assert message in done.stderr
     assert not (tmp_path / "r").exists()
+
+
+def test_without_modes_the_gain_at_resonances_stays() -> None:
+    """The gain K_p |1 + 1/(j omega T_n)| above the crossover: no candidate has 1 dB more than the present drive."""
+    machine = load(Z).machine
+    J = checked_modes(machine).J_tot("Z")
+    present = machine.axes["Z"].drive.model_copy(update={"T_n": 0.02})
+    knobs = Knobs(present, machine.cycles, J, elastic=False)
+    assert not [knob.name for knob in knobs.all if knob.name.startswith(("filter", "new"))]
+    random = np.random.default_rng(3)
+    omega = np.geomspace(present.K_p / J, 1e4, 50)
+
+    def gain(drive: Drive) -> np.ndarray:
+        return drive.K_p * np.abs(1 + 1 / (1j * omega * drive.T_n))  # type: ignore[operator]
+
+    drives = [knobs.drive_at(random.uniform(size=len(knobs.all))) for _ in range(200)]
+    rise = np.array([20 * np.log10(gain(each) / gain(present)) for each in drives])
+    assert rise.max() < 1.0 + 1e-3  # values are rounded as they are typed
+    assert min(each.T_n for each in drives) < 0.9 * present.T_n  # type: ignore[type-var]
+    assert all(getattr(each, name) == getattr(present, name) for each in drives for name in ("filter_1", "filter_2"))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import csv
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
+from feedsim import cosim
 from feedsim.errors import InputError
 from feedsim.scenario import Friction, load
 from feedsim.uncertainty import cloud_of, interval, share_of
@@ -82,3 +85,37 @@ def test_intervals_hold_their_share_whatever_the_distribution() -> None:
     assert share_of(19) == 0.9
     low, high = interval(np.arange(1.0, 40.0))
     assert (float(low), float(high)) == pytest.approx((1.0, 39.0), rel=1e-12)
+
+
+def test_a_drawn_inertia_moves_as_a_plant_with_that_inertia(tmp_path: Path, fmus: Path) -> None:
+    """Torques divided by the inertia against a table of modes that has it: the same motion."""
+    folder = tmp_path / "machine"
+    shutil.copytree(CIRCLE.parent / "machines" / "sinumerik_840d", folder)
+    file = folder / "friction_X.yaml"
+    content = yaml.safe_load(file.read_text())
+    content["identified"] = {"axis": "X", "inertia": {"interval": ["0.05 kg.m2", "0.09 kg.m2"]}}
+    file.write_text(yaml.safe_dump(content))
+    scenario = tmp_path / "move.yaml"
+    scenario.write_text(
+        "name: Move\nmachine: machine\nmotions:\n  - {kind: dwell, duration: 0.05 s}\n"
+        "  - {kind: move, by: {X: 5 mm}, feed: 3 m/min}\n  - {kind: dwell, duration: 0.2 s}\n"
+    )
+    plan = load(scenario)
+    (drawn,) = cloud_of(plan.machine).draws(1)
+    before, after = plan.machine.axes["X"], drawn.axes["X"]
+    ratio = before.drive.K_p / after.drive.K_p  # of the inertia
+    assert abs(ratio - 1) > 0.02
+    plain = cosim.run(plan, fmus=fmus).trace["X.x_a"]
+    by_torque = cosim.run(plan.model_copy(update={"machine": drawn}), fmus=fmus).trace["X.x_a"]
+
+    with (folder / "modes.csv").open(newline="") as text:
+        heads, *rows = list(csv.reader(text))
+    of_X = [k for k, head in enumerate(heads) if head in ("n_X", "x_X", "tcp_X")]
+    for row in rows:
+        for k in of_X:
+            row[k] = repr(float(row[k]) / ratio**0.5)
+    with (folder / "modes.csv").open("w", newline="") as text:
+        csv.writer(text, lineterminator="\n").writerows([heads, *rows])
+    by_inertia = cosim.run(load(scenario), fmus=fmus).trace["X.x_a"]
+    assert np.abs(by_torque - by_inertia).max() < 1e-10
+    assert np.abs(by_torque - plain).max() > 1e-8  # and it makes a difference

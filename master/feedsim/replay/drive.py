@@ -27,10 +27,18 @@ from feedsim.errors import InputError
 from feedsim.identify.parameters import EXCESS
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms, setpoint_delay, speed_setpoint
 from feedsim.identify.record import Record
-from feedsim.identify.result import Estimate
+from feedsim.identify.result import Correlation, Estimate
 from feedsim.replay.closed_loop import AxisRecord, Replay
 from feedsim.replay.elastic import ElasticMode
-from feedsim.replay.estimates import elastic_modes, estimates_of, one_phase, one_way, refuse_poor, with_undecided
+from feedsim.replay.estimates import (
+    correlation_of,
+    elastic_modes,
+    estimates_of,
+    one_phase,
+    one_way,
+    refuse_poor,
+    with_undecided,
+)
 from feedsim.replay.parameters import TABLE
 from feedsim.replay.selection import (
     BLOCKS,
@@ -72,7 +80,7 @@ class DriveFound:
             machine's (logarithm of the likelihood).
         runs: of the units.
         modes: elastic ones. modes_predicted: number of modes -> rms of the position [m] of every quarter of the motion,
-            by a fit to the other three.
+            by a fit to the other three. correlation: of the estimates that have an interval.
     """
 
     axis: str
@@ -89,6 +97,7 @@ class DriveFound:
     runs: int
     modes: tuple[ElasticMode, ...] = ()
     modes_predicted: Mapping[int, float] = field(default_factory=dict)
+    correlation: Correlation | None = None
 
 
 def identify_drive(
@@ -198,6 +207,9 @@ def identify_drive(
         each.axis, estimates, taps, speed, problem.machine_of(found.values), parts, chosen,
         rms(found.position), rms(found.torque) if each.record.driven else nan, predicted, likelier, problem.runs,
         elastic_modes(problem, found, unseen), elastic,
+        correlation_of(
+            problem, found, unseen, taps if exact_delay else None, speed if exact_gain else None, estimates
+        ),
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from feedsim.estimation.covariance import Covariance, correlation_length, stretc
 from feedsim.estimation.interval import NORMAL_95, half_width, student
 from feedsim.identify.parameters import EXCESS, estimate, inner_to_outer
 from feedsim.identify.position_loop import SpeedSetpoint, Taps, rms
-from feedsim.identify.result import Estimate
+from feedsim.identify.result import Correlation, Estimate
 from feedsim.replay.closed_loop import AxisRecord
 from feedsim.replay.elastic import KEYS, ElasticMode, modes_of
 from feedsim.replay.tuning import Problem, Tuned
@@ -103,6 +103,40 @@ def estimates_of(
     if known:
         result["J"] = replace(estimate("J", values["J"]), status="given", reason="of the machine's modes")
     return {name: result[name] for name in ESTIMATE_ORDER if name in result}
+
+
+def correlation_of(
+    problem: Problem,
+    found: Tuned,
+    unseen: tuple[float, float],
+    taps: Taps | None,
+    speed: SpeedSetpoint | None,
+    estimates: Mapping[str, Estimate],
+) -> Correlation:
+    """Correlations of the estimates that have an interval, by the fit that they are from. Arguments as estimates_of().
+
+    What a regression over the record gives is independent of the fit: K_v, and the sum of T_dyn and T_sym.
+    """
+    values = problem.start | dict(found.values)
+    covariance = _covariance(problem, found, unseen)
+    names = [name for name, each in estimates.items() if each.sigma > 0]
+    rows, further = np.zeros((len(names), len(found.names))), np.zeros(len(names))
+    for row, name in enumerate(names):
+        if name == "T_n":
+            slopes = {"K_p": 1 / values["K_i"], "K_i": -values["K_p"] / values["K_i"] ** 2}
+            rows[row] = [slopes.get(each, 0.0) for each in found.names]
+        elif name == "F_S":
+            rows[row] = inner_to_outer(found.names, ["F_S"])[0]
+        elif name == "K_v" and speed is not None:
+            further[row] = 1.0
+        elif name == "T_dyn" and taps is not None:
+            rows[row] = [-1.0 if each == "T_sym" else 0.0 for each in found.names]
+            further[row] = taps.sigma**2
+        else:
+            rows[row] = [float(each == name) for each in found.names]
+    matrix = rows @ covariance @ rows.T + np.diag(further)
+    scale = np.sqrt(np.diag(matrix))
+    return Correlation(tuple(names), np.asarray(matrix / np.outer(scale, scale)))
 
 
 def one_way(each: AxisRecord, estimates: Mapping[str, Estimate], only: str) -> dict[str, Estimate]:

@@ -115,12 +115,12 @@ def identify_drives(
         drive, friction = one.machine.shipped_drive(axis, "a drive file"), friction_of(one, axis)
         if begin is None:
             files[drive_file(axis)] = drive_text(drive, one.estimates, OF_MACHINE, head)
-            files[friction_file(axis)] = friction_axis_text(axis, friction, one.estimates, head)
+            files[friction_file(axis)] = friction_axis_text(axis, friction, one.estimates, head, one.correlation)
         else:
             values = friction | {"J": one.estimates["J"].value, "M_0": one.machine.axes[axis].M_0}
             rigid[axis] = replace(
                 rigid_axis(each, begin.starts[0]), drive=drive, values=values, estimates=one.estimates, head=head,
-                modes=one.modes,
+                modes=one.modes, correlation=one.correlation,
             )  # fmt: skip
     if rigid:
         files = machine_files(name, note, rigid, interval, cycle, control)

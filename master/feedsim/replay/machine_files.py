@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, pi, sqrt
+from typing import Any
 
 from pydantic.fields import FieldInfo
 
 from feedsim.fields import Quantity
 from feedsim.identify.friction_file import DIGITS, Line, friction_text, interval_text
-from feedsim.identify.result import Estimate
+from feedsim.identify.result import Correlation, Estimate
 from feedsim.replay.elastic import ElasticMode
 from feedsim.scenario import Drive, Filter, Friction
 from feedsim.scenario.parameter_group import ParameterGroup
@@ -47,6 +48,7 @@ class RigidAxis:
     estimates: Mapping[str, Estimate]
     head: Sequence[str] = ()
     modes: Sequence[ElasticMode] = ()
+    correlation: Correlation | None = None
 
 
 def control_cycle(interval: float) -> float:
@@ -61,7 +63,7 @@ def machine_files(
     files = {"machine.yaml": _machine(name, note, axes, interval, position_cycle, control), "modes.csv": _modes(axes)}
     for axis, each in axes.items():
         files[drive_file(axis)] = drive_text(each.drive, each.estimates, ASSUMED, each.head)
-        files[friction_file(axis)] = friction_axis_text(axis, each.values, each.estimates, each.head)
+        files[friction_file(axis)] = friction_axis_text(axis, each.values, each.estimates, each.head, each.correlation)
     return files
 
 
@@ -166,15 +168,42 @@ def _shown(value: float | int | bool | str, info: FieldInfo, exact: bool) -> str
 
 
 def friction_axis_text(
-    axis: str, values: Mapping[str, float], estimates: Mapping[str, Estimate], head: Sequence[str] = ()
-) -> str:
-    """Text of a friction file: what was found with its interval."""
+    axis: str, values: Mapping[str, float], estimates: Mapping[str, Estimate], head: Sequence[str] = (),
+    correlation: Correlation | None = None,
+) -> str:  # fmt: skip
+    """Text of a friction file: what was found with its interval.
+
+    Its group `identified` has intervals and correlations of drive, inertia and friction, which one fit has found.
+    """
     lines = {
         name: Line(values[name], _remark(estimates.get(name)).removeprefix("  # "))
         for name in Friction.model_fields
         if name in values
     }
-    return friction_text(lines, {}, head, name=friction_file(axis))
+    identified = _identified(axis, estimates, correlation) if correlation is not None else {}
+    return friction_text(lines, identified, head, name=friction_file(axis))
+
+
+def _identified(axis: str, estimates: Mapping[str, Estimate], correlation: Correlation) -> dict[str, Any]:
+    """The group `identified`, as that of friction.yaml; values of the drive by names such as "drive.K_p"."""
+    beside = {"M_0": "constant_load", "J": "inertia"}
+
+    def named(name: str) -> str:
+        return name if name in Friction.model_fields or name in (*beside, "delay") else f"drive.{name}"
+
+    known = {name: each for name, each in estimates.items() if name in correlation.names}
+    ends = {
+        name: [float(f"{end:.8g}") if each.unit == "1" else f"{end:.8g} {each.unit}" for end in each.interval]
+        for name, each in known.items()
+    }
+    parts = {name: {"status": each.status, "interval": ends[name]} for name, each in known.items()}
+    matrix = [[round(float(value), 4) for value in row] for row in correlation.matrix]
+    return {
+        "axis": axis,
+        **{key: parts[name] for name, key in beside.items() if name in parts},
+        "parameters": {named(name): part for name, part in parts.items() if name not in (*beside, "delay")},
+        "correlation": {"names": [named(name) for name in correlation.names], "matrix": matrix},
+    }
 
 
 def _remark(found: Estimate | None) -> str:

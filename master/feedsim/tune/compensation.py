@@ -14,7 +14,7 @@ from feedsim.cosim.friction_law import FrictionLaw
 from feedsim.errors import InputError
 from feedsim.scenario import Machine, Scenario
 from feedsim.tune.circles import Circles, Pair, practical, size, tuned_on
-from feedsim.tune.compensators import NEVER_WORSE, Found, Progress, PulseGrid, instant, pulse, table
+from feedsim.tune.compensators import NEVER_WORSE, Found, Progress, PulseGrid, instant, pulse, table, together
 from feedsim.tune.effects import Effect, effects_of
 from feedsim.uncertainty import Cloud
 
@@ -143,7 +143,10 @@ def _found(
         }
         for axis in axes
     }
-    return Found(kind, values, len(machines) * int(np.prod(grid.errors.shape[:2])))
+    values, runs = together(
+        on, machines, values, objective, before=size(grid.errors[0, 0]), fmus=fmus, progress=progress
+    )
+    return Found(kind, values, runs + len(machines) * int(np.prod(grid.errors.shape[:2])))
 
 
 def _feedforward(circles: Circles, machine: Machine, axes: Sequence[str]) -> TorqueFeedforward:

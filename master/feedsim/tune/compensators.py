@@ -37,6 +37,7 @@ WEIGHT = 4.0  # exponent of the mean of ratios: large ones count more
 # Speeds of the table's points [m/s]: from standstill, where friction turns round, to fast circles.
 SPEEDS = tuple(speed / 60000 for speed in (0.0, 10.0, 30.0, 90.0, 250.0, 700.0, 2000.0, 6000.0))
 DISTANCE = 1e-6  # [m] the longest that the control allows
+PULSE_STEPS = (0.15, 0.08)  # of amplitudes and time constants, by which pulses of both axes are changed
 TORQUE_STEPS = (0.5, 0.25, 0.12)  # of the friction F_C, by which torques are changed
 
 
@@ -210,6 +211,42 @@ def pulse(
         values |= {"adaptation": True, "amplitude_min": scale * float(x[2])}
         values |= {f"acceleration_{i}": float(np.exp(edge)) for i, edge in enumerate(x[3:6], start=1)}
     return values
+
+
+def together(
+    circles: Circles, machines: Sequence[Machine], values: Mapping[str, Mapping[str, float | bool]], objective: str, *,
+    before: Array, fmus: Path | None, progress: Progress,
+) -> tuple[dict[str, dict[str, float | bool]], int]:  # fmt: skip
+    """Pulses of several axes, changed step by step where all axes together get better, and the runs that it took.
+
+    On the grid all axes have one time constant. On small fast circles the pulse of an axis lasts into the reversal of
+    the other one, so that pulses of different time constants disturb one another. Only runs with both show that.
+
+    before: (machines x pairs, axes) errors [m] without compensation.
+    """
+    columns = [circles.plane.index(axis) for axis in values]
+    best = {axis: dict(each) for axis, each in values.items()}
+
+    def cost(at: Mapping[str, Mapping[str, float | bool]]) -> float:
+        errors = size(_over(circles, machines, fmus, "friction_pulse", at))[:, columns]
+        return float(score((errors / before[:, columns]).T, errors.T, objective).mean())
+
+    least, runs = cost(best), 1
+    free = [
+        (axis, name) for axis, each in best.items() for name in ("amplitude", "amplitude_min", "time") if name in each
+    ]
+    total = 2 * len(PULSE_STEPS) * len(free)
+    for step in PULSE_STEPS:
+        for axis, name in free:
+            for factor in (1 + step, 1 / (1 + step)):
+                progress("both axes", runs, total)
+                runs += 1
+                tried = {**best, axis: {**best[axis], name: factor * best[axis][name]}}
+                if (found := cost(tried)) < least:
+                    best, least = tried, found
+                    break
+    progress("both axes", total, total)
+    return best, len(machines) * runs
 
 
 def instant(machine: Machine, axis: str) -> float:

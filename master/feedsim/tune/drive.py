@@ -117,7 +117,7 @@ class _Search:
                 for factor in FREQUENCY_FACTORS if not own.rigid.all() else FREQUENCY_FACTORS[:1]:
                     what = name if factor == 1 else f"{name}, {_percent('modes', factor)}"
                     judges[what] = Candidates(machine, _scaled(modes, factor), axis)
-            knobs = Knobs(machine.shipped_drive(axis, "tuning"), machine.cycles, own.J_tot(axis))
+            knobs = Knobs(machine.shipped_drive(axis, "tuning"), machine.cycles, own.J_tot(axis), not own.rigid.all())
             search = cls(
                 scenario, axis, partner, limits, fmus, progress, evaluations, knobs, judges,
                 ("pose of the machine file", *poses), scaled, (), (),

@@ -4,6 +4,11 @@ Free: K_p, T_n, K_v, omega_0, fit = K_p/(J omega_0/(2 D)), which is 1 where the 
 does with its P part alone; T_sym against the lag of the speed loop; frequency and dampings of the current setpoint
 filters. A drive without a part lacks its parameters; switches stay as they are. Of a drive without filters one band
 stop is free, which may turn out to be off.
+
+Of a machine without elastic modes K_p stays at most as it is, and so do the filters. Above its crossover a speed loop
+has the gain K_p times filters times structure. A real structure resonates there, and the present drive is known to bear
+that: its loop gain is below 1 at every resonance. With K_p no larger, a resonance that nobody has measured keeps its
+margin. T_n may fall as far as the gain of the speed controller at the crossover K_p/J rises by UNMEASURED.
 """
 
 from __future__ import annotations
@@ -31,6 +36,7 @@ SYMMETRY = 0.25  # of the larger of neutral and present T_sym, either side
 NOTCH = {"f": (0.6, 1.7), "D_num": (0.3, 4.0), "D_den": (0.3, 2.0)}
 LEAST_DAMPING, MOST_DAMPING = 0.02, 1.5
 NEW_NOTCH = (0.05, 0.8)  # its frequency, in shares of half the sampling rate
+UNMEASURED = 1.0  # [dB] by which the gain at resonances may rise that nobody has measured
 SHALLOW = 0.9  # D_num/D_den above which a new band stop is left off
 
 
@@ -61,11 +67,12 @@ class Knob:
 
 @dataclass(frozen=True, eq=False)
 class Knobs:
-    """The free parameters of a drive. J: inertia that a slow torque accelerates [kg.m2]."""
+    """The free parameters of a drive. J: inertia that a slow torque accelerates [kg.m2]. elastic: modes are known."""
 
     drive: Drive
     cycles: Cycles
     J: float
+    elastic: bool = True
 
     @cached_property
     def all(self) -> tuple[Knob, ...]:
@@ -80,6 +87,8 @@ class Knobs:
             off, width = self._off(d), SYMMETRY * max(self._neutral(d), d.T_sym)
             if width > 0:
                 found.append(Knob("off", min(-width, 1.1 * off), max(width, 1.1 * off), log=False))
+        if not self.elastic:
+            return tuple(found)
         highest = 0.5 / self.cycles.T_c
         for name in self._filters:
             each = getattr(d, name)
@@ -116,7 +125,7 @@ class Knobs:
         if "fit" in at:
             K_p, omega_0 = (float(new.get(name, getattr(d, name))) for name in ("K_p", "omega_0"))  # type: ignore[arg-type]
             new["D"] = typed("D", self.J * omega_0 / (2 * K_p) * at["fit"])
-        for name in self._filters:
+        for name in self._filters if self.elastic else ():
             own = {part: typed(f"filter_1.{part}", at[f"{name}.{part}"]) for part in NOTCH if f"{name}.{part}" in at}
             new[name] = getattr(d, name).model_copy(update=own)
         if "new.f" in at and at["new.depth"] < SHALLOW:
@@ -137,7 +146,18 @@ class Knobs:
         low, high = RANGES[name]
         value = float(getattr(self.drive, name))
         least = min(MIN_RESET_TIME, value) if name == "T_n" else 0.0
+        if not self.elastic:
+            high = 1.0 if name == "K_p" else high
+            least = max(least, self._least_T_n()) if name == "T_n" else least
         return Knob(name, max(low * value, least), high * value)
+
+    def _least_T_n(self) -> float:
+        """T_n [s] at which |1 + 1/(j omega T_n)| at omega = K_p/J is UNMEASURED above the present one."""
+        d = self.drive
+        assert d.T_n is not None
+        omega = d.K_p / self.J
+        square = 1 + 1 / (omega * d.T_n) ** 2
+        return 1 / (omega * math.sqrt(10 ** (UNMEASURED / 10) * square - 1))
 
     def _values(self, d: Drive) -> dict[str, float]:
         found = {name: float(getattr(d, name)) for name in RANGES if getattr(d, name)}

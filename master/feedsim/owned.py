@@ -105,7 +105,7 @@ def _taken(directory: Path, name: str, until: float) -> list[_Lock]:
             if told and f" on {platform.node()} since " not in told:
                 lock.close()
                 raise OutputError(
-                    f"{directory}: another process writes its results there, as {lock.path} tells: {told}. If it is "
+                    f"{directory}: another process writes its results there, as {lock.path} says: {told}. If it is "
                     "not at work any more, remove that file; or take another directory"
                 )
             unique = hashlib.sha256(os.path.realpath(lock.path).encode("utf-8", "surrogateescape")).hexdigest()[:32]

@@ -54,8 +54,8 @@ def test_radius_and_feed_of_the_header(lines: list[str], tmp_path: Path, capsys:
     assert code == 0, said
     assert found["circle"]["radius"]["value"] == pytest.approx(RADIUS, rel=1e-8)
     assert found["circle"]["speed"]["value"] == pytest.approx(SPEED, rel=1e-8)
-    assert "ccw.csv: the radius is 150 mm, as its header tells" in said
-    assert "cw.csv: the feed is 1000 mm/min, as its header tells" in said
+    assert "ccw.csv: the radius is 150 mm, as its header says" in said
+    assert "cw.csv: the feed is 1000 mm/min, as its header says" in said
     assert found["findings"] == []
 
 
@@ -64,14 +64,14 @@ def test_options_go_ahead_of_the_header(tmp_path: Path, capsys: pytest.CaptureFi
     code, said, found = diagnosed(tmp_path, capsys, "--radius", "151 mm", "--feed", "990 mm/min", ccw=lines)
     assert code == 0
     assert found["circle"]["radius"]["value"] == pytest.approx(0.151)
-    assert "as its header tells" not in said
+    assert "as its header says" not in said
 
 
 def test_headers_of_two_circles_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = ["Radius: 150 mm", "Feed: 1000 mm/min"]
     code, said, _ = diagnosed(tmp_path, capsys, one=[*lines, *table(1)], two=["Radius: 100 mm", *table(-1)])
     assert code == 2
-    assert "two.csv: its header tells a radius of 100 mm, that of " in said
+    assert "two.csv: its header gives a radius of 100 mm, that of " in said
 
 
 def test_a_value_without_a_unit_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

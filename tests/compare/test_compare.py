@@ -192,7 +192,7 @@ def test_units() -> None:
     result = Series(k, {"n": k * 60 / (2 * np.pi), "x": k * 1e3, "f": k}, {"n": "U/min", "x": "mm"})
     found = compare(result, reference, EXACT)
     assert found.same, found.line
-    assert any("f: the result tells no unit; taken as SI" in note for note in found.notes)
+    assert any("f: the result gives no unit; taken as SI" in note for note in found.notes)
     wrong = Series(result.time, result.columns, {"n": "mm", "x": "mm"})
     found = compare(wrong, reference, EXACT)
     assert (found.verdict, found.exit_code) == ("unusable", 2)
@@ -205,7 +205,7 @@ def test_units() -> None:
     assert compare(bare, reference, EXACT, Options(only=["x"], units={"x": "mm"})).same
     found = compare(bare, Series(k, {"x": 1000.2 * k}), Tolerances.parse(["600 mm"]))
     assert found.variables[0].allowed == 0.6
-    assert any("neither side tells a unit" in note for note in found.notes)
+    assert any("neither side gives a unit" in note for note in found.notes)
 
 
 def test_flags_hold_their_values() -> None:

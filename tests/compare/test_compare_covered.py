@@ -165,11 +165,11 @@ def test_units_told_by_the_header_and_by_an_option() -> None:
         (Options(units={"*.x_a": "mm"}), "result"),
         (Options(reference_units={"Z.x_a": "mm"}), "reference"),
     ):
-        with pytest.raises(InputError, match=f"{whose}'s unit given for 'Z.x_a': mm, but its header tells m"):
+        with pytest.raises(InputError, match=f"{whose}'s unit given for 'Z.x_a': mm, but its header gives m"):
             compare(reference, reference, None, options)
     found = compare(reference, reference, None, Options(units={"Z.x_a": "m"}))
     assert found.same
-    assert any(note == "Z.x_a: the result's header tells m already" for note in found.notes)
+    assert any(note == "Z.x_a: the result's header gives m already" for note in found.notes)
     # where nothing is compared, nothing contradicts
     assert compare(reference, reference, None, Options(units={"Z.x_a": "mm"}, only=["Z.M_a"])).same
     bare = Series(reference.time, reference.columns)

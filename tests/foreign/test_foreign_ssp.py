@@ -74,7 +74,7 @@ def test_a_plain_file_whose_drive_is_not_ours(acme_ssp: Path, tmp_path: Path) ->
     assert {"X.x_a", "X.M_a", "X.M_fr"} <= set(names)
     assert "X.n_s" not in other.trace
     assert all(np.array_equal(one.trace[name], other.trace[name]) for name in names)
-    assert "no drive tells its control cycle; it is 0.001 s, the step size that the file advises" in warnings_of(plain)
+    assert "no drive gives its control cycle; it is 0.001 s, the step size that the file advises" in warnings_of(plain)
 
 
 def test_parameters_count_as_the_file_has_them(acme_ssp: Path, tmp_path: Path) -> None:

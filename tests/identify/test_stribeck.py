@@ -139,7 +139,7 @@ def test_a_level_that_does_not_vary_leaves_the_asymmetry_at_zero() -> None:
     p = {**TRUE, "F_S": 1.6, "F_log": 0.0, "M_0": 0.3}
     found = stribeck.stationary(made(p=p, noise=1e-4, seed=1))
     assert found.estimates["asymmetry"].status == "undetermined"
-    assert "does not tell it from the constant load" in found.estimates["asymmetry"].reason
+    assert "does not separate it from the constant load" in found.estimates["asymmetry"].reason
     assert found.estimates["M_0"].value == pytest.approx(0.3, abs=1e-3)
 
 

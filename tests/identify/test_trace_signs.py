@@ -56,8 +56,8 @@ def test_a_stop_that_was_cut_out_is_no_fault(tmp_path: Path) -> None:
         (2 * pi, r"\(6\.283: radians taken for turns in the speed, or turns for radians in the position\)"),
         (60, r"\(60: per minute taken for per second in the speed\)"),
         (1 / 60, r"\(0\.01667: per second taken for per minute in the speed\)"),
-        (-1, r"-1 times.*likely the sign of one of both is wrong: sign: -1"),
-        (-1000, r"likely the sign of one of both and a unit \(1000: mm"),
+        (-1, r"-1 times.*likely the sign of one of the two is wrong: sign: -1"),
+        (-1000, r"likely the sign of one of the two and a unit \(1000: mm"),
         (2, r"2 times.*\(allowed: 0\.67 to 1\.5\); check units, pitch and gear of both"),
     ],
 )

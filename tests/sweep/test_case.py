@@ -60,7 +60,7 @@ def test_a_study_that_has_changed_is_not_made_anew(done: tuple[Path, Table], sho
     record = json.loads((folder / "study.json").read_text())
     del record["place"]
     (folder / "study.json").write_text(json.dumps(record))
-    with pytest.raises(InputError, match="does not tell where its study file is"):
+    with pytest.raises(InputError, match="does not say where its study file is"):
         scenario_of(chosen)
 
 

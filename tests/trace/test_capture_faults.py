@@ -67,13 +67,13 @@ def test_the_cause_stands_where_the_pitch_is_asked_for(
     signals = noisy()
     said = refused(written(tmp_path, signals | change(signals)))
     assert "its pitch is needed" in said
-    assert f"The record itself does not tell it: {cause}" in said
+    assert f"The record itself does not give it: {cause}" in said
 
 
 def test_a_signal_that_is_not_there(tmp_path: Path) -> None:
     signals = noisy()
     del signals["POWER"]
-    assert "does not tell it: the file has no POWER of it" in refused(written(tmp_path, signals))
+    assert "does not give it: the file has no POWER of it" in refused(written(tmp_path, signals))
 
 
 @pytest.mark.parametrize("signal", ["TORQUE", "POWER", "ENC_POS"])

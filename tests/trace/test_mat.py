@@ -146,9 +146,9 @@ NESTED = NUMBERS
     ("content", "words"),
     [
         (HEAD + matrix(b"x", NUMBERS)[:-9], "ends within variable 1"),
-        (HEAD + matrix(b"x", NUMBERS, size=(4, 2)), "'x' holds 4 values; its size (4, 2) tells 8"),
+        (HEAD + matrix(b"x", NUMBERS, size=(4, 2)), "'x' holds 4 values; its size (4, 2) gives 8"),
         (HEAD + matrix(b"x", NUMBERS, size=(-4, -1)), "has the size [-4, -1]"),
-        (HEAD + matrix(b"x", NUMBERS, size=(2**31 - 1,) * 3), "tells 99035"),
+        (HEAD + matrix(b"x", NUMBERS, size=(2**31 - 1,) * 3), "gives 99035"),
         (HEAD + matrix(b"x", NUMBERS, of_class=99), "'x' is of the unknown class 99"),
         (HEAD + matrix(b"x", element(77, b"\0" * 32)), "'x' is data of type 77"),
         (HEAD + matrix(b"x", b"", 2, (1, 1)), "ends within the fields of 'x'"),

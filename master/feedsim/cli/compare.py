@@ -84,7 +84,7 @@ def compare(options: Namespace) -> int:
 def _side(side: str, whose: str) -> tuple[Option, ...]:
     """What can be said of the columns of either side."""
     return (
-        Option(f"--{whose}unit", "PATTERN=UNIT", f"unit of the {side}'s columns whose header tells none", many=True),
+        Option(f"--{whose}unit", "PATTERN=UNIT", f"unit of the {side}'s columns whose header gives none", many=True),
         Option(f"--{whose}time", "NAME[:UNIT]", f"time column of the {side}"),
         Option(f"--{whose}columns", "MAPPING.yaml", f"mapping, where the {side} is a drive's record", type=Path),
     )
@@ -127,7 +127,7 @@ COMMAND = Command(
             Option("--shift", "TIME", "added to the result's time, such as '0.5 ms', or 'estimate'", default="0 s"),
             Option("--max-shift", "TIME", "largest estimated shift (default: 50 ms)", default="50 ms"),
             Option("--cover", "SHARE",
-                   "least share of the result's rows that must be compared, such as '90 %%' (default: any, and told)",
+                   "least share of the result's rows that must be compared, such as '90 %%' (default: any; reported)",
                    default="0 %"),
             Option("--max-gap", "TIME", "longest step between rows of the result (default: any)"),
             Option("--at", "",

@@ -60,7 +60,7 @@ COMMAND = Command(
         Option("traces", "TRACE", "CSV or MAT file (docs/traces.md)", type=Path, nargs="+"),
         Option("--axis", "NAME", "axis that is identified (default: the only one)"),
         Option("--machine", "MACHINE-or-SCENARIO",
-               "gives pitch, torque constant and inertia of the axis, and values for what the traces do not tell",
+               "gives pitch, torque constant and inertia of the axis, and values for what the traces do not determine",
                type=Path),
         Option("--columns", "MAPPING.yaml", "which columns of the traces are what (docs/traces.md)", type=Path),
         out("identify_<axis>, in small letters"), FIGURES,

@@ -116,7 +116,8 @@ IDENTIFY_DRIVE = Command(
     (
         _RECORD, _AXES,
         Option("--machine", "MACHINE-or-SCENARIO",
-               "whose structure and friction are known (default: rigid axes, with what the record tells)", type=Path),
+               "whose structure and friction are known (default: rigid axes, and what the record determines)",
+               type=Path),
         _COLUMNS, _WINDOW,
         Option("--position-cycle", "VALUE",
                "cycle of the position loop of rigid axes, e.g. '2 ms' (default: the control cycle, as where the "

@@ -81,7 +81,7 @@ def write_ssp(options: Namespace) -> None:
 TRUST = """An FMU is a program, and so is an SSP, which holds some: to run it is to run its libraries with your rights.
 The shipped libraries are known by their bytes, wherever they lie. `feedsim run` names every other one on standard
 error, with its place in the archive and its SHA-256, before it executes it. `feedsim validate` executes none of them:
-it judges what the archives say of themselves, and tells what it has not checked. No text in an archive makes feedsim
+it judges what the archives say of themselves, and says what it has not checked. No text in an archive makes feedsim
 read a file outside of it."""
 
 PAGE = Option(

@@ -152,7 +152,7 @@ COMMAND = Command(
         Option("--runs", "N", "in place of the study's sampling.runs", type=int),
         Option("--format", "", "of the table (default: csv)", choices=("csv", "parquet"), default="csv"),
         Option("--restart", "", "begin anew; discards the runs that DIR has"),
-        Option("--dry-run", "", "tell what would be done and how long it takes"),
+        Option("--dry-run", "", "say what would be done and how long it takes"),
         Option("--row", "RUN", "print the command that makes this one run by itself", type=int),
         QUIET_OPTION, FMUS, settings(),
     ),

@@ -207,7 +207,7 @@ def _variable(
         reason = f"its tolerance: {error}{_fitting(over.reference, tolerances, name)}"
         return Variable(name, "unusable", source, unit, reason=reason), remarks
     if tolerance.unit and not unit and not theirs:
-        remarks.append("neither side tells a unit; both are taken as SI for the tolerance")
+        remarks.append("neither side gives a unit; both are taken as SI for the tolerance")
     reach = tolerance.time or 0.0
     low, high = bounds(time, values, at, reach, slack=over.slack, hold=bool(hold))
     if between is not None:

@@ -87,7 +87,7 @@ def missing(name: str, result: Sequence[str]) -> str:
 
 
 def with_units(series: Series, given: Mapping[str, str]) -> Series:
-    """With the units that are given for columns whose header tells none. given: pattern -> unit."""
+    """With the units that are given for columns whose header gives none. given: pattern -> unit."""
     if not given:
         return series
     return replace(series, units={name: unit or _given(name, given) for name, unit in series.units.items()})
@@ -99,7 +99,7 @@ def _given(name: str, given: Mapping[str, str]) -> str:
 
 
 def units_told(headers: Mapping[str, str], names: Iterable[str], given: Mapping[str, str], whose: str) -> list[str]:
-    """Which compared columns are given the unit that their header tells already; one that it does not: InputError.
+    """Which compared columns are given the unit that their header gives already; one that it does not: InputError.
 
     headers: name -> unit as the file has it. given: pattern -> unit.
     """
@@ -114,11 +114,11 @@ def units_told(headers: Mapping[str, str], names: Iterable[str], given: Mapping[
             scale = 0.0
         if scale != 1.0:
             raise InputError(
-                f"{whose}'s unit given for {name!r}: {unit}, but its header tells {header}; a unit is given to columns "
+                f"{whose}'s unit given for {name!r}: {unit}, but its header gives {header}; a unit is given to columns "
                 "without one, and a header that is wrong must be put right"
             )
         twice.setdefault(unit, []).append(name)
-    return [f"{few(those, LISTED)}: the {whose}'s header tells {unit} already" for unit, those in twice.items()]
+    return [f"{few(those, LISTED)}: the {whose}'s header gives {unit} already" for unit, those in twice.items()]
 
 
 def factor(result: str, reference: str) -> tuple[float, str]:
@@ -133,9 +133,9 @@ def factor(result: str, reference: str) -> tuple[float, str]:
         return conversion(result, reference), ""
     if not result:
         scale = 1 / units.unit(spelled(reference)).factor
-        return float(scale), f"the result tells no unit; taken as SI (the reference's is {reference})"
+        return float(scale), f"the result gives no unit; taken as SI (the reference's is {reference})"
     to_si = float(units.unit(spelled(result)).factor)
-    return to_si, f"the reference tells no unit; taken as SI (the result's is {result})"
+    return to_si, f"the reference gives no unit; taken as SI (the result's is {result})"
 
 
 def conversion(given: str, wanted: str) -> float:

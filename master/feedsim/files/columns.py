@@ -118,7 +118,7 @@ class Signal(Model):
 
     column: StrictStr = Field(min_length=1, description="Name in the header without the unit, or variable of the file")
     unit: UnitText | None = Field(
-        default=None, description="Unit of the column, where the header does not tell it; increments for plain counts"
+        default=None, description="Unit of the column, where the header does not give it; increments for plain counts"
     )
     factor: Factor | None = Field(
         default=None, description="What the values are multiplied with, for example 35.15 N/V"
@@ -140,7 +140,7 @@ class Clock(Model):
     """The time: a column, or the interval of a trace without one."""
 
     column: StrictStr | None = Field(default=None, min_length=1, description="Name of the time's column")
-    unit: UnitText | None = Field(default=None, description="Unit of the column, where the header does not tell it")
+    unit: UnitText | None = Field(default=None, description="Unit of the column, where the header does not give it")
     factor: Factor | None = Field(default=None, description="What a counter of cycles is multiplied with: 2 ms")
     interval: Annotated[float, Quantity("s", above=0, example="2 ms")] | None = Field(
         default=None, description="Time between rows, where the trace has no column of time"
@@ -234,11 +234,11 @@ def contradictions(columns: Columns) -> Iterator[tuple[Place, str]]:
         yield ("time",), "'factor' needs the 'column' that it belongs to"
     given = [role for role in DRIVING if columns.signal(role) is not None]
     for role in given[1:]:
-        yield (role,), f"stands beside {given[0]}; one of both is enough, and they could contradict one another"
+        yield (role,), f"stands beside {given[0]}; one of the two is enough, and they could contradict one another"
     if columns.position is None and columns.speed is None:
         yield (), "missing: position or speed, for example position: {column: x, unit: mm}"
     if columns.mass is not None and columns.inertia is not None:
-        yield ("mass",), "stands beside inertia; give one of both"
+        yield ("mass",), "stands beside inertia; give one of the two"
     if columns.torque_constant is not None and columns.current is None and given:
         yield ("torque_constant",), f"is of no use: the trace's {given[0]} is taken, not a current"
     for role in DIMENSIONS:

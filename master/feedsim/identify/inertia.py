@@ -81,7 +81,7 @@ def inertia(records: Sequence[Record]) -> Inertia:
         if rows < MIN_INERTIA_ROWS:
             raise InputError(
                 f"{', '.join(record.name for record in records)}: the axis does not move for {length:g} s in one "
-                "direction often enough to tell its inertia; give the inertia, or record moves that accelerate"
+                "direction often enough to determine its inertia; give the inertia, or record moves that accelerate"
             )
         acceleration = np.concatenate([stretch.columns[:, 0] for stretch in stretches])
         noise = max(stretch.noise for stretch in stretches)
@@ -167,7 +167,7 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     torque = np.concatenate([stretch.torque for stretch in stretches])
     if np.ptp(columns[:, 2]) == 0:
         names.remove("M_0")
-        held["M_0"] = "motion in one direction only does not tell it from friction"
+        held["M_0"] = "motion in one direction only does not separate it from friction"
         said.append("motion in one direction only: the constant load is taken for friction")
     chosen = [RIGID_AXIS_NAMES.index(name) for name in names]
     scale = np.linalg.norm(columns[:, chosen], axis=0)
@@ -175,7 +175,7 @@ def _solve(stretches: Sequence[_Stretch], length: float) -> Inertia:
     strength = np.linalg.svd(scaled, compute_uv=False)
     if scale[0] == 0 or strength[-1] < 1e-6 * strength[0]:
         raise InputError(
-            "the records tell no inertia: the axis neither accelerates nor changes its speed in them; give the "
+            "the records determine no inertia: the axis neither accelerates nor changes its speed in them; give the "
             "inertia, or record moves that accelerate"
         )
     values = np.linalg.solve(scaled.T @ scaled, scaled.T @ torque)

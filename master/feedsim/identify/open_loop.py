@@ -104,7 +104,7 @@ def balanced(
     if not free:
         return refused("neither F_C nor M_0 is free")
     if len(free) > 1 and len(directions) < 2:
-        return refused("motion in one direction only does not tell load from friction")
+        return refused("motion in one direction only does not separate load from friction")
 
     drifting = [axis.change for axis in axes] if "M_0" in free else []
     values |= dict.fromkeys((axis.change for axis in axes), 0.0)

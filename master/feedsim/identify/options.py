@@ -131,7 +131,7 @@ class Asked:
             which = ", ".join(f"{axis} ({file})" for axis, file in named.items())
             raise InputError(f"the traces are of several axes: {which}; --axis names one, and its traces are needed")
         if not named:
-            raise InputError("the traces do not tell which axis they are of; give --axis, for example --axis Z")
+            raise InputError("the traces do not say which axis they are of; give --axis, for example --axis Z")
         return next(iter(named))
 
     def _given_inertia(self, I_P: float, sources: Sequence[Provenance]) -> Estimate | None:

@@ -175,7 +175,9 @@ def _known(
 ) -> _Known:
     values = {**NO_EFFECT, "J": 0.0, "delay": delay if delay is not None else 0.0}
     held: dict[str, tuple[Status, str]] = {
-        name: ("held", "usual value, records of friction hardly tell it") for name in DEFAULT_SHAPES if name not in free
+        name: ("held", "usual value, records of friction hardly determine it")
+        for name in DEFAULT_SHAPES
+        if name not in free
     }
     priors: list[Prior] = []
     drift: Prior | None = None
@@ -211,9 +213,9 @@ def _known(
     if delay is not None:
         held["delay"] = "given", ""
     elif (turns := reversals(fine)) < LEAST_REVERSALS:
-        held["delay"] = "undetermined", f"{turns} reversal{'s'[: turns != 1]} only, {LEAST_REVERSALS} tell it"
+        held["delay"] = "undetermined", f"{turns} reversal{'s'[: turns != 1]} only, {LEAST_REVERSALS} determine it"
     values |= hold
-    held |= {name: ("held", "no stage tells it") if name in FIXED else ("given", "") for name in hold}
+    held |= {name: ("held", "no stage determines it") if name in FIXED else ("given", "") for name in hold}
     values |= sliding(fine, values, unknown - set(hold))
     if prior is None:
         values["F_S"] = max(hold.get("F_S", values["F_C"]), values["F_C"])
@@ -288,7 +290,7 @@ def _without(
     values = {**found.values, **judged.held}
     left = [name for name in base if name not in judged.held]
     if not left:
-        raise InputError(f"stage 2: these records tell no parameter at all; last {judged.name}: {judged.reason}")
+        raise InputError(f"stage 2: these records determine no parameter at all; last {judged.name}: {judged.reason}")
     without = search.solve(values, found.states, left, tolerance=FINAL, limit=40)
     known.leave_open(judged.held, found, without)
     return without, left
@@ -357,7 +359,7 @@ def _left_with(known: _Known, base: list[str]) -> dict[str, tuple[Status, str]]:
     missing = [name for name in CURVE if any(name in names for names in known.open)]
     if not missing:
         return {}
-    reason = f"sines alone leave {', '.join(missing)} open, for which it stands; strokes at constant speed tell it"
+    reason = f"sines alone leave {', '.join(missing)} open, for which it stands; strokes at constant speed determine it"
     left = [name for name in CURVE if name in base]
     base[:] = [name for name in base if name not in left]
     return {name: ("undetermined", reason) for name in left}
@@ -411,8 +413,8 @@ def _speeds(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float |
     top = max(float(np.max(np.abs(model.moved(0.0)[1]))) for model in fine)
     shown = f"{top:.3g} rad/s" if I_P is None else f"{60e3 * top * I_P:.3g} mm/min"
     return (
-        f"the records of sines tell the friction up to {shown}, their highest speed: above it is extrapolated and not "
-        "to be relied on; strokes at constant speed tell the curve",
+        f"the records of sines determine the friction up to {shown}, their highest speed: above it is extrapolated and "
+        "not to be relied on; strokes at constant speed determine the curve",
     )
 
 

@@ -195,7 +195,7 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
             )
         if chosen.pitch is not None and abs(chosen.pitch - own.pitch) > PITCH_MISMATCH * own.pitch:
             warnings.append(
-                f"{recording.path}: the record tells a pitch of {1e3 * chosen.pitch:.4g} mm; axis {chosen.axis} of "
+                f"{recording.path}: the record gives a pitch of {1e3 * chosen.pitch:.4g} mm; axis {chosen.axis} of "
                 f"machine {machine.name} has {1e3 * own.pitch:.9g} mm, which counts"
             )
         pitch, constant = own.pitch if pitch is None else pitch, K_t if constant is None else constant
@@ -222,7 +222,7 @@ def _drive(recording: Recording, chosen: Chosen, mapping: Columns | None, machin
 
 
 def _why(chosen: Chosen) -> str:
-    return f". The record itself does not tell it: {chosen.why}" if chosen.why else ""
+    return f". The record itself does not give it: {chosen.why}" if chosen.why else ""
 
 
 def _which(chosen: Chosen, machine: Machine | None) -> str:

@@ -213,7 +213,7 @@ class Identification:
         correlation: of all estimated together.
         seconds: wall time per step ("reading", "inertia", "plateaus", "stage 1", "stage 2", "open loop").
         rigid: the simple model beside it, by inverse dynamics of all records: J, sigma_2, F_C, M_0; empty where the
-            records tell no inertia.
+            records determine no inertia.
         balance: F_C and M_0 from the position in open loop; None where that was not asked for.
         prior: False where both stages are of the same records: then stage 1 did not enter the estimates, and its
             warnings are not among these.

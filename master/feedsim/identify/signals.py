@@ -177,7 +177,7 @@ def _of_capture(recording: Recording, axis: str) -> tuple[Recording, list[str]]:
     if found.pitch is None:
         return recording.of_axis(found), [
             *doubts,
-            f"{where}: POWER does not tell the pitch, nor whether TORQUE and CURRENT count in the position's "
+            f"{where}: POWER does not give the pitch, nor whether TORQUE and CURRENT count in the position's "
             f"direction: they are taken to. {found.why[:1].upper()}{found.why[1:]}",
         ]
     if found.rotary:

@@ -59,12 +59,12 @@ def _speed(where: str, records: Sequence[Record]) -> Iterator[str]:
     if wrong and abs(a) >= SCALE_CORRELATION * np.sqrt(b * c):
         raise InputError(f"{said} (allowed: {1 / WRONG_SLOPE:.2g} to {WRONG_SLOPE:g}); {_likely(ratio)}")
     if abs(ratio - 1) > SLOPE:
-        yield f"{said}; sign, unit, pitch or gear of one of both is not right"
+        yield f"{said}; the sign, unit, pitch or gear of one of the two is wrong"
 
 
 def _likely(ratio: float) -> str:
     """The error of sign and unit that makes the speed `ratio` times too large."""
-    turned = ["the sign of one of both"] if ratio < 0 else []
+    turned = ["the sign of one of the two"] if ratio < 0 else []
     size = abs(ratio)
     if abs(size - 1) <= SLOPE:
         return f"likely {turned[0]} is wrong: sign: -1 in the mapping"

@@ -109,7 +109,7 @@ class _Run:
             second = self._dynamic(first)
         if first is None and second is None:
             raise InputError(
-                "the records tell no friction: " + "; ".join(self.reasons[stage] for stage in sorted(self.reasons))
+                "the records determine no friction: " + "; ".join(self.reasons[stage] for stage in sorted(self.reasons))
             )
         with self._timed("open loop"):
             estimates: Mapping[str, Estimate] = self._merged(first, second, J)
@@ -190,7 +190,7 @@ class _Run:
             self.reasons[1] = "no stretches at constant speed"
             self.advice.append(
                 "no stretch at constant speed was found: strokes at 8 or more speeds from 10 mm/min up, in both "
-                "directions, tell the Stribeck curve"
+                "directions, determine the Stribeck curve"
             )
             return None
         self.progress("stage 1: Stribeck curve", 0, 1)
@@ -212,7 +212,7 @@ class _Run:
             self.reasons[2] = "no reversals"
             self.advice.append(
                 "the axis reverses nowhere in the records: sines of 5 um at 10 Hz, 20 um at 5 Hz, 100 um at 2 Hz and "
-                "200 um at 1 Hz tell the pre-sliding"
+                "200 um at 1 Hz determine the pre-sliding"
             )
         if not chosen:
             return None
@@ -244,7 +244,7 @@ class _Run:
             return None
 
     def _rigid(self, records: Sequence[Record]) -> Inertia | None:
-        """Inverse dynamics; None where the records tell no inertia."""
+        """Inverse dynamics; None where the records determine no inertia."""
         self.progress("inertia", 0, 1)
         try:
             found = inertia(records)

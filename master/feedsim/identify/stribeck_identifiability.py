@@ -82,24 +82,24 @@ def too_few(points: Points, free: Sequence[str]) -> dict[str, str]:
         reason = f"the torque does not fall with speed at any of {count} speed(s): no Stribeck effect shows"
         found |= {name: reason for name in (EXCESS, "v_s", "beta") if name in free}
     wanted = [name for name in ranks if name in free and name not in found]
-    few = f"{count} speed(s) do not tell {len(wanted)} parameters of the curve"
+    few = f"{count} speed(s) do not determine {len(wanted)} parameters of the curve"
     found |= {name: few for name in wanted[count:]}
     wanted = wanted[:count]
     load = [name for name in ("M_0", "asymmetry") if name in free and points.both]
     if "asymmetry" in load and (count < 2 or len(wanted) + len(load) > len(points.speed)):
         load.remove("asymmetry")
         found["asymmetry"] = (
-            f"{len(points.speed)} plateau(s) at {count} speed(s) do not tell it from the constant load M_0"
+            f"{len(points.speed)} plateau(s) at {count} speed(s) do not separate it from the constant load M_0"
         )
     room = max(len(points.speed) - len(load), 1)
-    return found | {name: f"{len(points.speed)} plateaus do not tell more" for name in wanted[room:]}
+    return found | {name: f"{len(points.speed)} plateaus do not determine more" for name in wanted[room:]}
 
 
 def unseparated(points: Points) -> dict[str, str]:
     """M_0 and asymmetry where one direction is missing."""
     if points.both:
         return {}
-    return {name: "plateaus in one direction only do not tell it from friction" for name in ("M_0", "asymmetry")}
+    return {name: "plateaus in one direction only do not separate it from friction" for name in ("M_0", "asymmetry")}
 
 
 def unanswered(points: Points, found: Fit, values: dict[str, float]) -> dict[str, str]:
@@ -119,18 +119,19 @@ def unanswered(points: Points, found: Fit, values: dict[str, float]) -> dict[str
     reach = level(values, points.speeds)
     if "F_log" in free and found.sigma["F_log"] > float(np.mean(reach)):
         return {
-            "F_log": f"speeds from {points.speeds[0]:.3g} to {points.speeds[-1]:.3g} rad/s do not tell it from sigma_2"
+            "F_log": f"speeds from {points.speeds[0]:.3g} to {points.speeds[-1]:.3g} rad/s do not separate it from "
+            "sigma_2"
         }
     if "asymmetry" in free:
         if np.ptp(reach) < VARIED * np.mean(reach):
             return {
                 "asymmetry": f"the level of friction varies by {100 * np.ptp(reach) / np.mean(reach):.1f} % over the "
-                "speeds only: that does not tell it from the constant load M_0"
+                "speeds only: that does not separate it from the constant load M_0"
             }
         if found.sigma["asymmetry"] > 0.1:
             return {
                 "asymmetry": f"it would be known to {found.sigma['asymmetry']:.2g} only: the level of friction varies "
-                "too little over the speeds to tell it from the constant load M_0"
+                "too little over the speeds to separate it from the constant load M_0"
             }
     return {name: "the torque at these speeds does not depend on it" for name in found.silent}
 
@@ -174,8 +175,9 @@ def warnings(points: Points, found: Fit, matrix: Array, names: Sequence[str], I_
             # M_0 and asymmetry go together by their definition; whether they are told apart is looked at on its own.
             if abs(matrix[row, column]) > LIKE and pair != {"M_0", "asymmetry"}:
                 said.append(
-                    f"{names[column]} and {first} are correlated by {matrix[row, column]:+.3f}: the data tell their "
-                    "combination, not each of them; the curve is not worse for it. Add speeds, or hold one of them"
+                    f"{names[column]} and {first} are correlated by {matrix[row, column]:+.3f}: the data determine "
+                    "their combination, not each of them; the curve is not worse for it. Add speeds, or "
+                    "hold one of them"
                 )
     return said
 

@@ -52,7 +52,7 @@ def write_ssp(
     b'PK'
     """
     if out is not None and not is_ssp(Path(out)):
-        raise InputError(f"{spelt('out')} {out}: an SSP file ends in .ssp; simulators tell it by that")
+        raise InputError(f"{spelt('out')} {out}: an SSP file ends in .ssp; simulators recognise it by that")
     file = Path(scenario)
     if is_ssp(file):
         raise InputError(f"{file}: is an SSP file already; a scenario is expected")

@@ -24,7 +24,7 @@ def exchange_stability(scenario: Scenario, modes: Modes) -> list[str]:
     if unknown:
         warnings.append(
             f"axis {', '.join(unknown)}: how steeply another maker's friction rises with the speed is not known: "
-            f"nothing tells ahead whether scheme {scheme.name} is stable with it, the energy residual of the run does"
+            f"nothing shows ahead whether scheme {scheme.name} is stable with it, the energy residual of the run does"
         )
     for name, axis in scenario.machine.axes.items():
         friction = axis.friction
@@ -45,7 +45,7 @@ def energy(run: Run, loops: Sequence[Loop]) -> list[str]:
     coupling = run.scenario.coupling
     step = run.scenario.machine.cycles.T_c / coupling.substeps
     if any(loop.growing for loop in loops):
-        why = "that is a consequence of the unstable control loop, and tells nothing of the coupling"
+        why = "that is a consequence of the unstable control loop, and says nothing of the coupling"
     else:
         why = (
             "it is unstable or too coarse, and the result is not to be trusted; try coupling.substeps above "

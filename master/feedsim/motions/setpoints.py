@@ -26,7 +26,7 @@ class Column(Model):
     """A column of a CSV file; in short just its name."""
 
     column: StrictStr = Field(min_length=1, description="Name in the header, without the unit")
-    unit: StrictStr | None = Field(default=None, description="Unit of the values, where the header does not tell it")
+    unit: StrictStr | None = Field(default=None, description="Unit of the values, where the header does not give it")
 
     @model_validator(mode="before")
     @classmethod

@@ -89,7 +89,7 @@ class LoadCourse(Model):
     motor_torque: Column | None = Field(
         default=None,
         description="Column of the motor torque that was recorded with it: the drive's work in the run is held against "
-        "that, and tells a load of wrong sign or size",
+        "that, and shows a load of wrong sign or size",
     )
     table: Table | None = None
     noise: Noise | None = None

@@ -103,7 +103,7 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Opened]:
             told = (*_late(structure, path), *_jumps(scenario, program, path), *warnings)
             if guessed:
                 cycle = units.show(T_c, "s")
-                told += (f"{path.name}: no drive tells its control cycle; it is {cycle}, {guessed}",)
+                told += (f"{path.name}: no drive gives its control cycle; it is {cycle}, {guessed}",)
             yield Opened(scenario, program, path, folder, told, _sources(structure, parts, folder))
 
 
@@ -216,7 +216,7 @@ def _with_motions(
             kept = setpoints.segments(planned, program)
             return scenario, Program(program.time, program.x_s, program.n_ffw, kept), tuple(warnings)
         warnings.append(
-            f"{path.name}: its setpoints are not those of the motions that it tells: they run as recorded ones, and "
+            f"{path.name}: its setpoints are not those of the motions that it names: they run as recorded ones, and "
             "what was to be evaluated is not"
         )
     scenario = _load(rebuilt.scenario_data(parts, own, path.stem, folder, motions=False), folder, path, overrides)

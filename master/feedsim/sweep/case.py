@@ -73,7 +73,7 @@ def scenario_of(chosen: Case) -> tuple[Scenario, Path]:
         record = record_of(chosen.folder)
         parts, place = dict(record["parts"]), dict(record["place"])
     except (ValueError, KeyError, TypeError):
-        raise InputError(f"{chosen.folder / RECORD}: does not tell where its study file is; {again}") from None
+        raise InputError(f"{chosen.folder / RECORD}: does not say where its study file is; {again}") from None
     study = load_study(chosen.folder / place["file"], place["overrides"], runs=place["runs"])
     planned = design(study)
     fmus = fmus_directory() if place["fmus"] is None else chosen.folder / place["fmus"]

@@ -143,7 +143,7 @@ def fault(address: str, answer: Any, here: Mapping[str, str] | None = None) -> s
     if isinstance(answer, ModuleNotFoundError):
         return f"worker {address}: has no feedsim {here['feedsim']} ({answer}); install the same version there"
     if not isinstance(answer, Mapping):
-        return f"worker {address}: does not tell its version of feedsim: {answer}"
+        return f"worker {address}: does not say its version of feedsim: {answer}"
     if answer["feedsim"] != here["feedsim"]:
         return (
             f"worker {address}: has feedsim {answer['feedsim']}, here is {here['feedsim']}; a study needs the same "

@@ -2,7 +2,7 @@
 
 A file holds a header with the list of signals, and a payload of messages: rows of all signals ("HFData"), and events
 such as NC blocks ("HFBlockEvent"). A counter of cycles is the clock of both. Signals are called NAME|n,
-n being the control's number of the axis. The header tells neither units nor directions nor pitches. Units are those
+n being the control's number of the axis. The header gives neither units nor directions nor pitches. Units are those
 that the signals have on such controls, held against the data; pitch and direction: capture_axes.py. Rows are read one
 by one (json_stream.py), so that a file takes the memory of its numbers, and no more than MOST_NUMBERS of them.
 """

@@ -332,7 +332,7 @@ def decimal_mark(columns: Sequence[Sequence[str]], lines: Sequence[int], where: 
         number = unclear[1]
         raise InputError(
             f"{where}:{unclear[0]}: {number!r} may mean {number.replace(',', '.')} or {number.replace(',', '')}, and "
-            "no other number in the file tells which; write it with a decimal point"
+            "no other number in the file shows which; write it with a decimal point"
         )
     return "," if comma else "."
 

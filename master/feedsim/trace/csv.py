@@ -30,7 +30,7 @@ def read_csv(
 
     columns    names (without unit) to read; default all but the time. Others may hold anything.
     time       name of the time column; default "time" or "t" in any case, else a first column whose unit is a time
-    time_unit  unit of the time where the header does not tell it; default s
+    time_unit  unit of the time where the header does not give it; default s
 
     Units of columns stay as written; the time is converted to s. Raises InputError with file and line.
 

@@ -105,7 +105,7 @@ class _Reader:
         if kind >> 16:  # up to four bytes in the tag itself
             kind, size, start, end = kind & 0xFFFF, kind >> 16, at + 4, at + 8
             if size > 4:
-                raise _Fault(f"{what} tells {size} bytes where there are 4")
+                raise _Fault(f"{what} gives {size} bytes where there are 4")
         else:
             end = start + size + (-size % 8 if kind != _COMPRESSED else 0)
         if start + size > len(view):
@@ -180,7 +180,7 @@ class _Reader:
         for _ in range(1 + is_complex):
             values, at = self._numbers(data, at, where)
             if len(values) != math.prod(shape):
-                raise _Fault(f"{where} holds {len(values)} values; its size {shape} tells {math.prod(shape)}")
+                raise _Fault(f"{where} holds {len(values)} values; its size {shape} gives {math.prod(shape)}")
             with np.errstate(all="ignore"):
                 parts.append(values.astype(dtype.newbyteorder("="), copy=False))
         found = parts[0] + 1j * parts[1] if is_complex else parts[0]

@@ -158,7 +158,7 @@ def _grouped(
     for names, words in (
         (held, "has another sampling time: its values are kept until its next one"),
         (unknown, "is in a unit that is not known"),
-        (scaled, "has a scale factor; the file does not tell whether its values are scaled"),
+        (scaled, "has a scale factor; the file does not say whether its values are scaled"),
     ):
         notes += [f"{path}: {few(names, 4)} {words}"] if names else []
     return Signals(columns, units, tuple(notes))

@@ -209,7 +209,7 @@ def read_response_xml(path: Path) -> FrequencyResponse:
         for each in root.iter("PrimaryFreqRespSigNodeData")
     ]  # fmt: skip
     if not pairs:
-        raise InputError(f"{path}: {root.tag} does not tell which signal is input and which is output")
+        raise InputError(f"{path}: {root.tag} does not say which signal is input and which is output")
     frequency: Array | None = None
     columns: dict[str, Complexes] = {}
     coherence: dict[str, Array] = {}

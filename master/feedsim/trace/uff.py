@@ -113,7 +113,7 @@ def _frequencies(path: Path, name: str, function: Mapping[str, Any]) -> Floats:
     x = np.asarray(function["x"], dtype=np.float64)
     data, count = np.asarray(function["data"]), int(function["num_pts"])
     if not len(x) == len(data) == count or not count:
-        raise InputError(f"{path}: function {name!r} has {len(data)} values; its header tells {count}")
+        raise InputError(f"{path}: function {name!r} has {len(data)} values; its header gives {count}")
     if not (np.all(np.isfinite(x)) and np.all(np.isfinite(data))):
         raise InputError(f"{path}: function {name!r} holds a value that is not finite")
     return x * _hertz(path, name, str(function.get("abscissa_axis_units_lab") or "").strip())

@@ -92,11 +92,11 @@ class Told:
         for what, value in found.items():
             if self._given[what] is not None:
                 continue
-            self.notes.append(f"{file}: the {what} is {_shown(what, value)}, as its header tells")
+            self.notes.append(f"{file}: the {what} is {_shown(what, value)}, as its header says")
             first, other = self._ahead.setdefault(what, (file, value))
             if abs(other / value - 1) > 1e-9:
                 raise InputError(
-                    f"{file}: its header tells a {what} of {_shown(what, value)}, that of {first} one of "
+                    f"{file}: its header gives a {what} of {_shown(what, value)}, that of {first} one of "
                     f"{_shown(what, other)}; give files of one circle"
                 )
 

@@ -126,7 +126,7 @@ def read_circle(
             f"{files[0]}: has no column of time, and the feed is not known: give it, for example --feed '1000 mm/min'"
         )
     if own is not None and headers.feed is not None and abs(own / headers.feed - 1) > OFF_FEED:
-        doubts.append(f"{files[0]}: its header tells another feed than its time, {own * 6e4:.5g} mm/min, which counts")
+        doubts.append(f"{files[0]}: its header gives another feed than its time, {own * 6e4:.5g} mm/min, which counts")
     notes, doubts = [*headers.notes, *notes], [*headers.doubts, *doubts]
     if radius is None:
         doubts += unusual_radius(nominal) or (unusual_feed(own) if own is not None and feed is None else [])

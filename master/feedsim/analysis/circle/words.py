@@ -209,7 +209,7 @@ def swinging(diagnosis: Diagnosis) -> str:
         f"{each.axis or 'the radius'} {_um(each.amplitude)} (amplitude) at {each.frequency:.3g} Hz"
         for each in diagnosis.vibrations
     ]
-    alone = "; a file of angle and radius does not tell the axis" if not diagnosis.vibrations[0].axis else ""
+    alone = "; a file of angle and radius does not name the axis" if not diagnosis.vibrations[0].axis else ""
     return f"Between the reversals swings {', '.join(told)}{alone}."
 
 

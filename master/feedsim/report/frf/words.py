@@ -69,7 +69,7 @@ def _loops(responses: Responses) -> Iterator[tuple[str, Margins]]:
 
 
 def _trust(responses: Responses) -> str:
-    known = "Closed form of the sampled loops without friction and limits (a warning tells which loop is worse at rest)"
+    known = "Closed form of the sampled loops without friction and limits (a warning says which loop is worse at rest)"
     if responses.campaign is not None:
         return f"{known}; how near the units come to it, measured, is said under Measured against closed form."
     if responses.result.unstable_poles:

@@ -167,7 +167,7 @@ def correlation_picture(axis: str, correlation: Correlation) -> Picture | None:
         return None
     caption = (
         "Blue: two parameters err in the same direction, vermillion: in opposite ones. Close to ±1 (bold from "
-        f"{STRONG:g}) the data tell a combination of both rather than each; the curve can be sure all "
+        f"{STRONG:g}) the data determine a combination of both rather than each; the curve can be sure all "
         "the same. Empty: not known."
     )
     matrix = np.array(correlation.matrix, dtype=float)

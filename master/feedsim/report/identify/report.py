@@ -82,7 +82,7 @@ def report_of(identified: Identified, pictures: Sequence[Picture]) -> Report:
         ),
         main=[
             _use(found),
-            Section("What further moves would tell", [_bullets(found.advice)]) if found.advice else None,
+            Section("What further moves would determine", [_bullets(found.advice)]) if found.advice else None,
             *pictures,
             _parameters(found),
             _stage_1(found),
@@ -110,11 +110,11 @@ def answers(found: Identification) -> list[str]:
     open_ones = [name for name, each in found.estimates.items() if each.status == "undetermined"]
     if open_ones:
         lines.append(
-            f"The records do not tell {', '.join(open_ones)}"
+            f"The records do not determine {', '.join(open_ones)}"
             + ("; which moves would is said below." if found.advice else ".")
         )
     elif found.dynamic is None:
-        lines.append("Plateaus tell the curve alone: stiffness and damping of the bristles need sines.")
+        lines.append("Plateaus determine the curve alone: stiffness and damping of the bristles need sines.")
     return lines
 
 

@@ -282,7 +282,7 @@ def answers(report: DriveReport) -> list[str]:
         lines.append(
             f"{each.axis}: the position of the record is met to {own['position_rms']} rms ({own['share_of_lag']} of "
             f"the lag){torque}; of motion that a fit has not seen, to {1e6 * one.predicted[0]:.3g} um. The record "
-            f"tells {', '.join(told) or 'no parameter'}."
+            f"determines {', '.join(told) or 'no parameter'}."
         )
     lines.append("Replay another record on it before trusting it with other motion.")
     return lines

@@ -54,9 +54,9 @@ SHARE_NOTE = (
     "joint changes do, nor a minimum in the middle; Sobol indices (method: sensitivity) do."
 )
 FAILURES_NOTE = (
-    "Messages that differ in numbers only are one. Where: parameters whose values tell these runs from those that are "
-    "done by more than chance (5 %, corrected for the number of tests), with the range that the runs lie in and how "
-    "many of all runs there failed so; empty where no parameter does, or too few runs are done."
+    "Messages that differ in numbers only are one. Where: parameters whose values separate these runs from those that "
+    "are done by more than chance (5 %, corrected for the number of tests), with the range that the runs lie in and "
+    "how many of all runs there failed so; empty where no parameter does, or too few runs are done."
 )
 # What the record of a study holds of how it was made, and in words.
 RECORDED = {
@@ -282,7 +282,7 @@ def _statistics(account: Account) -> Section | None:
         "grid": "On a grid the numbers describe the grid, no probability.",
         "sensitivity": "Here and in the pictures these are the runs of the samples A and B, which are independent; the "
         "others serve the Sobol indices.",
-    }.get(account.study.sampling.method, "They are worth what the distributions of the parameters are worth.")
+    }.get(account.study.sampling.method, "They are as good as the distributions of the parameters.")
     if not grid:
         told += (
             " In brackets the 95 % interval of a quantile, between two of the sorted values; none where the runs are "

@@ -61,7 +61,7 @@ def _for_the_study(kind: Kind, count: int | None, grid: bool, whole: bool) -> li
     if whole and kind != "uniform":
         return [(("distribution",), "of whole numbers only uniform")]
     if not grid:
-        return [(("count",), "only in a grid; elsewhere sampling.runs tells how many")] if count else []
+        return [(("count",), "only in a grid; elsewhere sampling.runs says how many")] if count else []
     if kind not in ("uniform", "loguniform"):
         return [(("distribution",), "in a grid: uniform (even steps) or loguniform (even ratios), or values: [...]")]
     if count is None and not whole:

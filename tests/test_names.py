@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import tokenize
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -136,6 +137,19 @@ def test_a_name_has_no_more_than_two_meanings() -> None:
         for name in constants(ast.parse(file.read_text(encoding="utf-8"))):
             rooms[name].add(file.relative_to(PACKAGE).parts[0])
     assert {name: sorted(of) for name, of in rooms.items() if len(of) > 2 and name not in DECLARED} == {}
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PACKAGE)))
+def test_comments_say_shown_given_or_determined(file: Path) -> None:
+    """What "tells" may mean any of these."""
+    with tokenize.open(file) as lines:
+        found = [
+            (token.start[0], token.string)
+            for token in tokenize.generate_tokens(lines.readline)
+            if (token.type == tokenize.COMMENT or token.string.startswith('"""'))
+            and re.search(r"\b(?:told|tells?)\b", token.string)
+        ]
+    assert found == []
 
 
 def test_a_private_word_is_found() -> None:

@@ -1,4 +1,4 @@
-"""Exception types, and how their messages tell many names and the one that was meant.
+"""Exception types, and how their messages list many names and the one that was meant.
 
 Messages say what is wrong, where (file:line if there is one), the actual value, what is allowed.
 """

@@ -50,7 +50,7 @@ class Reading:
 
 
 def _without_examples(schema: dict[str, Any]) -> None:
-    """Schemas tell what docstrings say; their examples are for a Python prompt."""
+    """Schemas say what docstrings say; their examples are for a Python prompt."""
     if told := schema.get("description"):
         schema["description"] = told.partition("\n\n>>> ")[0]
 
@@ -64,7 +64,7 @@ class Model(BaseModel):
     )
 
     IN_FOLDER: ClassVar[str] = ""  # name of the file, where its folder may be named in its place
-    TOLD_BY: ClassVar[str | None] = None  # the key that tells it from another model that may stand at its place
+    TOLD_BY: ClassVar[str | None] = None  # the key that separates it from another model that may stand at its place
 
 
 def fault(message: str, beside: tuple[str, ...] = ()) -> PydanticCustomError:

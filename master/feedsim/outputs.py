@@ -66,7 +66,7 @@ def check_file(
 
 
 def begins_with(*marks: bytes) -> Callable[[Path], bool]:
-    """What tells files that hold one of the marks near their beginning."""
+    """What shows files that hold one of the marks near their beginning."""
 
     def one(path: Path) -> bool:
         try:
@@ -80,7 +80,7 @@ def begins_with(*marks: bytes) -> Callable[[Path], bool]:
 
 
 def archive_with(member: str, mark: bytes) -> Callable[[Path], bool]:
-    """What tells archives whose `member` holds the mark."""
+    """What shows archives whose `member` holds the mark."""
 
     def one(path: Path) -> bool:
         try:
@@ -93,7 +93,7 @@ def archive_with(member: str, mark: bytes) -> Callable[[Path], bool]:
 
 
 def unchanged(content: bytes) -> Callable[[Path], bool]:
-    """What tells a file that holds these bytes already: writing them again loses nothing."""
+    """What shows a file that holds these bytes already: writing them again loses nothing."""
 
     def one(path: Path) -> bool:
         try:

@@ -2,7 +2,7 @@
 
 May use: errors. Start reading at claimed().
 
-A lock of the system on an open file tells whether its owner lives: it goes with the process, whatever has ended that.
+A lock of the system on an open file shows whether its owner lives: it goes with the process, whatever has ended that.
 So nothing that a killed process has left keeps others waiting, and the next start removes it.
 """
 
@@ -36,7 +36,7 @@ _OWNED_NAME = re.compile(rf"{PREFIX}[{_NAME_LETTERS}]{{{_LENGTH}}}")
 LOCK = ".feedsim.lock"  # in a folder that belongs to a process
 WRITING = 2.0  # s for which processes that are just being ended may still write into a folder that is removed
 YOUNG = 60.0  # s within which a folder without a lock may be one that is just being made
-_HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what a lock that another has is told by
+_HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what a lock that another has is known by
 _FAR = 1 << 30  # where Windows locks: there a locked byte cannot be read
 _LOOK = 0.02  # s between two looks at a lock that is waited for
 _BETWEEN = 1e-4  # s between two attempts at what others may remove at the same moment
@@ -51,7 +51,7 @@ def claimed(directory: Path, lock: str = LOCK, wait: float = 0.0) -> Iterator[No
     What is made is removed with the block if nothing is in it then. Blocks of one thread may stand in one another.
 
     Args:
-        lock: name of the file that tells it.
+        lock: name of the file that shows it.
         wait: for others to end [s].
 
     Raises:
@@ -285,7 +285,7 @@ def _remove(folder: Path, held: list[int], owner: int) -> None:
 
 
 def _emptied(folder: Path) -> bool:
-    """Remove what is in a folder, but for what tells whose it is: a folder that is half removed still has an owner."""
+    """Remove what is in a folder, but for what shows whose it is: a folder that is half removed still has an owner."""
     left = [path for path in folder.iterdir() if path.name != LOCK] if folder.is_dir() else []
     for path in left:
         if path.is_dir() and not path.is_symlink():

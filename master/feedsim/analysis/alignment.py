@@ -1,6 +1,6 @@
 """Results and records laid over each other: in time, about their stops, and by the angle of circles.
 
-What axes were told, x_s, has the same course in all that made the same motion, whatever the axes did with it. By it
+What axes were given, x_s, has the same course in all that made the same motion, whatever the axes did with it. By it
 sources are shifted; positions serve where a file has no setpoints, which takes out a lag that all axes share.
 """
 
@@ -26,7 +26,7 @@ from feedsim.trace import Trace, as_series
 SAME_MOTION = 0.02
 # A record of a circle is about the programmed centre where that of its positions lies closer than this [m].
 SAME_CENTRE = 1e-3
-# An axis is told to move faster than this [m/s], and further [m]: splines through setpoints ring by less.
+# An axis counts as moving faster than this [m/s], and further [m]: splines through setpoints ring by less.
 MOVING_SPEED, MOVING_DISTANCE = 10e-6, 1e-6
 MOST_TOLD = 4  # signals in a message
 WORDS = {"x_s": "position setpoints x_s", "x_a": "positions x_a, which takes out what all axes lag"}

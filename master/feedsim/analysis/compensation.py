@@ -310,7 +310,7 @@ def _dip(measured: Contour, axis: str) -> float:
 
 
 def lags_of(scenario: Scenario, axes: Sequence[str]) -> dict[str, Lag]:
-    """Axis -> lags of its drive. Raises InputError where the parameters of a drive do not tell them."""
+    """Axis -> lags of its drive. Raises InputError where the parameters of a drive do not determine them."""
     lags: dict[str, Lag] = {}
     problems = []
     for axis in axes:

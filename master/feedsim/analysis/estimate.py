@@ -7,7 +7,7 @@ S_ab = sum of A B* over blocks of the record (A, B: their discrete Fourier trans
     H1       H = S_yu / S_uu     right where u is free of noise and feedback; in a loop, noise pulls it to -1/control
     coherence of a with b: gamma^2 = |S_ab|^2 / (S_aa S_bb)
 
-Where u is r itself, both are the same. The coherence told with a joint estimate is the lower one of (y, r) and (u, r):
+Where u is r itself, both are the same. The coherence given with a joint estimate is the lower one of (y, r) and (u, r):
 a response is known only where the excitation reaches both ends of it.
 
 Periodic excitation: blocks are whole periods, the excited lines alone are evaluated, nothing leaks. Noise averages out
@@ -80,7 +80,7 @@ def periodic(
         lines: (K,) excited harmonics of the period, ascending.
 
     A trace's linear drift, such as the travel at an offset speed, is taken out: the change from the first period to the
-    last tells it exactly. It needs two periods.
+    last determines it exactly. It needs two periods.
 
     Raises:
         InputError: a column is missing, a trace holds no whole number of periods, lines beyond half the sampling rate,

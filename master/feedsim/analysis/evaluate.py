@@ -103,7 +103,7 @@ class CircleTask:
         return found | (cause_figures(diagnosis) if diagnosis is not None else {})
 
     def diagnosis(self, trace: Trace) -> Diagnosis | None:
-        """Why the circle is not round; None where it has too few samples to tell.
+        """Why the circle is not round; None where it has too few samples to say.
 
         Found once for the same trace: figures and causes of a run both rest on it.
         """

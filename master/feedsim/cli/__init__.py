@@ -135,7 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from feedsim.extras import ask, missing
     from feedsim.outputs import replacing
 
-    # Where no home folder can be written to, matplotlib tells at length that its cache is a temporary one.
+    # Where no home folder can be written to, matplotlib writes at length that its cache is a temporary one.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     _end_cleanly_on_signals()
     try:

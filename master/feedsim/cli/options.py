@@ -160,7 +160,7 @@ def settings(example: str = "machine.axes.Z.friction.F_C='1.8 N.m'") -> Option:
 
 @contextmanager
 def given(option: str, text: str) -> Iterator[None]:
-    """Have a fault that the block finds tell which option it is of: "--delay 3 kg: ..."."""
+    """Have a fault that the block finds say which option it is of: "--delay 3 kg: ..."."""
     try:
         yield
     except InputError as error:

@@ -38,7 +38,7 @@ class Progress:
         self._bar.update(done - self._bar.n)
 
     def of(self, what: str) -> Any:
-        """The same for those who tell how much is done, and not of what."""
+        """The same for those who report how much is done, and not of what."""
         return lambda done, total: self(what, done, total)
 
 

@@ -1,7 +1,7 @@
 """What a reference still holds of the time between its rows, where it has been thinned.
 
 Beside `case.csv` lies `case.bounds.csv`, beside `case_ref.csv` it or `case_ref.bounds.csv`, with the same instants. Of
-a variable v its columns `v.below` and `v.above` tell how far v lies below and above the straight line from the row
+a variable v its columns `v.below` and `v.above` show how far v lies below and above the straight line from the row
 before to this one, at most.
 """
 

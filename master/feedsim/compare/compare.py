@@ -49,7 +49,7 @@ def compare(
 
     Columns that the reference lacks are ignored; those that the result lacks are missing, which is different; so is a
     result that begins later or ends earlier than the reference by more than a step. What differs or cannot be compared
-    is told in what is returned. between: bounds of the reference between its rows (`feedsim.compare.between`).
+    is reported in what is returned. between: bounds of the reference between its rows (`feedsim.compare.between`).
     InputError: the options themselves are wrong for these columns, or the bounds are of another reference.
     """
     tolerances, options = tolerances or Tolerances(), options or Options()

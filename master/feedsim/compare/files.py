@@ -54,7 +54,7 @@ def compare_files(
 ) -> Comparison:
     """Read and compare two files, the reference with the bounds beside it.
 
-    What cannot be read or compared is told in what is returned.
+    What cannot be read or compared is reported in what is returned.
     """
     read: list[Series] = []
     for path, what in ((result, "result"), (reference, "reference")):
@@ -80,7 +80,7 @@ def compare_series(
     between: Series | None = None,
     names: tuple[str, str],
 ) -> Comparison:
-    """compare(), with options that are wrong told in what is returned."""
+    """compare(), with options that are wrong reported in what is returned."""
     try:
         return compare(result, reference, tolerances, options, between=between, names=names)
     except InputError as error:
@@ -102,7 +102,7 @@ def beside(reference: Path) -> Path | None:
 def tolerances_of(reference: Path, file: Path | None, texts: Sequence[str]) -> Tolerances:
     """Of a tolerance file (default: the one beside the reference), then of texts as behind --tol. InputError.
 
-    They may serve several references: a pattern that matches nothing is told in Comparison.unused.
+    They may serve several references: a pattern that matches nothing is reported in Comparison.unused.
     """
     path = file or beside(reference)
     written = Tolerances.of_file(load_tolerances(path)) if path is not None else Tolerances()

@@ -25,7 +25,7 @@ MISTAKEN = ("m", "mm", "um", "in", "rad", "deg", "rev", "rad/s", "rpm", "deg/s",
             "m/min", "in/min", "N", "kN", "N.m", "N.cm", "mN.m", "A", "mA", "percent", "1")  # fmt: skip
 LIKE_A_UNIT = 1e-3  # relative; a factor is called a unit when it is that near
 ROWS_SEARCHED = 2000  # rows of a result that its digits and its shift are looked for in,
-VARIABLES_SEARCHED = 6  # and variables, the worst, that tell a shift
+VARIABLES_SEARCHED = 6  # and variables, the worst, that show a shift
 MIN_GUESS_ROWS = 3  # rows that a guess rests on
 # Largest shift that is looked for: so many steps, or that long, but no more than a tenth of the compared time.
 MAX_SHIFT_STEPS, MAX_SHIFT_TIME, MAX_SHIFT_SHARE = 200, 0.05, 0.1

@@ -22,7 +22,7 @@ class Options:
 
     columns          (result's name, reference's name); `*` in both: ("plant.*", "*")
     only, ignore     patterns of reference's names that are compared, and that are not
-    units            pattern -> unit of result's columns whose header does not tell it; reference_units likewise
+    units            pattern -> unit of result's columns whose header does not give it; reference_units likewise
     hold             patterns of columns that hold their values between rows
     start, end       [s] of the reference's time; None: all of it
     shift            added to the result's time [s]

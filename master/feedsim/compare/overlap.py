@@ -27,7 +27,7 @@ class Overlap:
     """The instants at which a result is looked at, and what there is to say about the two times.
 
     start, end: compared time [s]; at: (M,) instants; rows: which rows of the result they are, None where the result is
-    interpolated; inside: its rows within the compared time. bounded: the reference tells what all that is compared may
+    interpolated; inside: its rows within the compared time. bounded: the reference shows what all that is compared may
     be between its rows. problem: why nothing can be compared; uncovered: what of the reference the result does not
     cover.
     """
@@ -104,7 +104,7 @@ class Overlap:
     def rows_of(self, name: str, hold: bool, bounded: bool) -> tuple[Array, Array]:
         """(K,) instants and values of a column of the result: those looked at, and its rows between that are none.
 
-        bounded: the reference tells what the column may be between its rows, so that all rows are looked at.
+        bounded: the reference shows what the column may be between its rows, so that all rows are looked at.
         """
         whole = self.result[name]
         if self.rows is not None or (bounded and self.options.at == "auto"):
@@ -115,7 +115,7 @@ class Overlap:
             values = along(self.theirs, whole, self.at)
         broken = self._inside(self.theirs, self.start, self.end)
         broken = broken[~np.isfinite(whole[broken])]
-        # Those at an instant that tells it already do not count twice.
+        # Those at an instant that shows it already do not count twice.
         told = np.r_[self.at[~np.isfinite(values)], inf]
         behind = told[np.searchsorted(told, self.theirs[broken] - self.slack, side="left")]
         broken = broken[behind > self.theirs[broken] + self.slack]

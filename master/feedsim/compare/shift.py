@@ -26,7 +26,7 @@ CANDIDATES = 8
 
 @dataclass(frozen=True)
 class Shift:
-    """What is added to the result's time [s], the columns that tell it, and those that do not, with the reason."""
+    """What is added to the result's time [s], the columns that show it, and those that do not, with the reason."""
 
     seconds: float
     used: tuple[str, ...]

@@ -213,7 +213,7 @@ def library(directory: Path, identifier: str, present: Collection[str], where: s
         present: folders under binaries/ that the archive has.
 
     Raises:
-        InputError: there is none for this platform; tells which there are.
+        InputError: there is none for this platform; names which there are.
     """
     suffix = _SUFFIXES.get(platform.system().lower(), ".so")
     for folder in folders():

@@ -103,7 +103,7 @@ def measure(
         offset_speed: motor speed [rad/s] at which the axis moves during the measurement; in the middle of the
             excitation it passes its pose, or comes as near to it as its travel allows. None: it stands. A moving axis,
             and one that carries a load, get a second to become steady before the excitation starts.
-        periods: recorded; two at least where the axis moves, so that its travel can be told from its response.
+        periods: recorded; two at least where the axis moves, so that its travel can be separated from its response.
         settle: periods of excitation ahead of those.
         fmus: folder of the archives; default :func:`fmus_directory`.
         progress: called now and then with (cycles done, cycles in all).
@@ -112,7 +112,7 @@ def measure(
 
     Raises:
         InputError: an argument that does not fit the machine, the travel is too short, a drive met a limit, so that the
-            response is not the linear one; the message tells the amplitude and the limit.
+            response is not the linear one; the message gives the amplitude and the limit.
         SimulationError: a unit failed.
     """
     fmus = fmus or fmus_directory()

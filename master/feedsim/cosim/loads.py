@@ -25,7 +25,7 @@ from feedsim.scenario import Machine, Scenario
 from feedsim.scenario.loads import LoadCourse, MotorLoad, Noise, ToolLoad
 from feedsim.trace import read_signals
 
-# A load acts where it is more than this share of its largest value; and does work that tells something where that is
+# A load acts where it is more than this share of its largest value; and does work that shows something where that is
 # more than this share of the motor's, as much as the friction of a good model is off by.
 ACTS, TELLS = 0.1, 0.05
 LOAD_TAKEN_UP = 1.0  # s; position and speed controller together settle in some tenths of it

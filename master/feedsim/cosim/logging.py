@@ -130,7 +130,7 @@ def ideal_axes(scenario: Scenario) -> tuple[str, ...]:
 def full_rate_columns(scenario: Scenario) -> tuple[str, ...]:
     """What must be recorded at the control cycle for a scenario's log; none without one.
 
-    The setpoints tell when an axis moves.
+    The setpoints show when an axis moves.
     """
     if scenario.logging is None:
         return ()

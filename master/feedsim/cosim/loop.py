@@ -1,4 +1,4 @@
-"""The cycle loop of a run: control cycles, what the units are told ahead of each, and what is written down.
+"""The cycle loop of a run: control cycles, what the units are given ahead of each, and what is written down.
 
 Executed natively where the library is at hand (:mod:`~feedsim.cosim.exchange`), else in Python, with the same result.
 """
@@ -48,7 +48,7 @@ class Loop:
         """
         Args:
             native: the library that executes it; None: Python does.
-            buffered: what is told of every stretch of cycles ahead of it.
+            buffered: what is given of every stretch of cycles ahead of it.
         """
         operations = [*before, *cycle.operations(), *after]
         T_c = cycle.cycle

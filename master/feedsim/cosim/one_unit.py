@@ -58,7 +58,7 @@ def pack_whole(
 
 
 def pack_tables(base: Path, out: Path, machine: Machine) -> None:
-    """Pack the machine's axes and modes alone, for a run that tells the unit all else; errors as `pack_whole`."""
+    """Pack the machine's axes and modes alone, for a run that gives the unit all else; errors as `pack_whole`."""
     from feedsim_packager import whole_machine
 
     pose = {axis: machine.pose[axis] for axis in machine.axes}

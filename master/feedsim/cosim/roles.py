@@ -42,12 +42,12 @@ class RoleUnit:
 
     @property
     def takes_slopes(self) -> bool:
-        """Whether it can be told how fast its inputs change."""
+        """Whether it can be given how fast its inputs change."""
         return bool(self.archive.description.coSimulation.canInterpolateInputs)
 
     @property
     def gives_slopes(self) -> bool:
-        """Whether it tells how fast its outputs change."""
+        """Whether it shows how fast its outputs change."""
         return int(self.archive.description.coSimulation.maxOutputDerivativeOrder) > 0
 
     @property

@@ -1,4 +1,4 @@
-"""One control cycle of the coupled system: who steps when, and what each unit is told of its inputs within the step.
+"""One control cycle of the coupled system: who steps when, and what each unit is given of its inputs within the step.
 
 It is written down here, once, as a list of operations, and executed elsewhere (feedsim.cosim.operations).
 

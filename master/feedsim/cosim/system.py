@@ -38,7 +38,7 @@ class Control:
 class Contact:
     """The friction of an axis with its ports.
 
-    speed_end: n_fr at the end of the exchange step, for a unit that cannot be told how fast it changes within.
+    speed_end: n_fr at the end of the exchange step, for a unit that cannot be given how fast it changes within.
     """
 
     role: RoleUnit
@@ -60,7 +60,7 @@ class System(Closing):
     M_a                     motor torque at the start of the exchange step
     M_fr, M_fr_slope        friction torque at the start of the exchange step and the slope of the last one
     n_start, n_end          speed at the friction contact at the ends of the exchange step
-    n, n_slope              what the friction units are told of it
+    n, n_slope              what the friction units are given of it
     measured                x_a and n_a of every axis at the end of the exchange step
     ======================= ==============================================================================
     """
@@ -217,7 +217,7 @@ class System(Closing):
 
     @property
     def instances(self) -> Mapping[str, Unit]:
-        """What there is to be initialised and to be told of, by its name."""
+        """What there is to be initialised and to be given of, by its name."""
         return self.units
 
     @property

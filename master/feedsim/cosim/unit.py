@@ -298,7 +298,7 @@ def exchanging(operation: str, names: Sequence[str]) -> str:
 
 
 # Another maker's unit leaves it to the importer's logger to print numbers into its messages, as in C. FMPy's library
-# does, and hands over to a logger that is the same for all units: which unit it is tells the environment.
+# does, and hands over to a logger that is the same for all units: which unit it is says the environment.
 _UNITS: weakref.WeakValueDictionary[int, Unit] = weakref.WeakValueDictionary()
 
 

@@ -87,7 +87,7 @@ class Store:
         self._lock = threading.Lock()
         self.loading = threading.Lock()  # FMPy changes the working folder while it loads a library
         self._contents: dict[str, Content] = {}  # those used last stand last
-        self._digests: dict[tuple[int, ...], str] = {}  # by what tells a file from others and from its later states
+        self._digests: dict[tuple[int, ...], str] = {}  # by what separates a file from others and from its later states
         self._ends = False
 
     def take(self, path: Path, allowance: untrusted.Allowance, unpack: Callable[[IO[bytes], Content], None]) -> Content:
@@ -136,7 +136,7 @@ class Store:
             return
         self._ends = True
         atexit.register(self.clear)  # Windows does not remove a library that is loaded
-        # Workers that multiprocessing forks end without what atexit and weakref have been told.
+        # Workers that multiprocessing forks end without what atexit and weakref were given.
         processes = sys.modules.get("multiprocessing.process")
         if processes is not None and processes.parent_process() is not None:
             from multiprocessing.util import Finalize

@@ -54,8 +54,8 @@ def entries(package: zipfile.ZipFile, where: str) -> dict[str, zipfile.ZipInfo]:
 
     Raises:
         InputError: lists entries that do not belong into one: names that lead out of it, occur twice, are none that
-            every system has, cannot be on a disk together (one that does not tell upper from lower case, nor the ways
-            to write an accent) or are too long; links; what is encrypted or packed by an unusual method.
+            every system has, cannot be on a disk together (one that does not separate upper from lower case, nor the
+            ways to write an accent) or are too long; links; what is encrypted or packed by an unusual method.
     """
     if (count := len(package.infolist())) > MOST_ENTRIES:
         raise InputError(f"{where}: cannot be trusted: it has {count} entries; allowed: up to {MOST_ENTRIES}")
@@ -116,7 +116,7 @@ def _part_fault(part: str) -> str | None:
 
 
 def _folded(name: str) -> str:
-    """A name as disks compare it that do not tell upper from lower case, nor the ways to write an accent."""
+    """A name as disks compare it that do not separate upper from lower case, nor the ways to write an accent."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 

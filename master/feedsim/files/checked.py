@@ -1,4 +1,4 @@
-"""A file -> the model it is read as: the files that it names are fetched, every problem is told with its line."""
+"""A file -> the model it is read as: the files that it names are fetched, every problem is reported with its line."""
 
 from __future__ import annotations
 

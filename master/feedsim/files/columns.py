@@ -251,7 +251,7 @@ def _of_signal(role: str, signal: Signal | Clock | None) -> Iterator[tuple[Place
         return
     factor = "1" if signal.factor is None else signal.factor.unit
     if signal.unit is None:
-        return  # the trace's header may tell it
+        return  # the trace's header may give it
     try:
         given = resulting(signal.unit, factor)
         target = target_of(role, given)

@@ -53,7 +53,7 @@ def resolve(annotation: Any, data: Any) -> Any:
                 if all(map(kind_of, options)):
                     kind = data.get("kind") if isinstance(data, dict) else None
                     options = [option for option in options if kind_of(option) == kind]
-                elif all(is_group(resolve(part, None)) for part in options):  # a key tells them apart
+                elif all(is_group(resolve(part, None)) for part in options):  # a key separates them
                     given = data if isinstance(data, dict) else {}
                     options = [
                         part for part in options if getattr(resolve(part, None), "TOLD_BY", None) in given

@@ -1,6 +1,6 @@
 """Which moves are missing for which parameter, in words.
 
-Which moves tell what (the reasoning behind the recommended sets):
+Which moves determine what (the reasoning behind the recommended sets):
 
 - sigma_0 acts right after every reversal; any move of a few micrometres shows it.
 - W and gamma act while the drive train engages anew after a reversal: the travel must cover a good part of W for W,
@@ -49,7 +49,7 @@ def advice(
 
     Args:
         deflection: F_S/sigma_0 [rad].
-        I_P: lead [m/rad]; without it amplitudes are told at the motor.
+        I_P: lead [m/rad]; without it amplitudes are given at the motor.
     """
     reversing = [s for s in stretches if s.kind == "sine"]
     sentences = []
@@ -96,7 +96,7 @@ def advice(
 
 
 def _wanted(estimate: Estimate) -> str:
-    """How much a parameter asks for moves that show it; empty: not at all, it is told well or not sought."""
+    """How much a parameter asks for moves that show it; empty: not at all, it is determined well or not sought."""
     if estimate.status in ("held", "given"):
         return ""
     if estimate.status == "undetermined" or not np.isfinite(estimate.sigma):

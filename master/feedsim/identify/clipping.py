@@ -1,4 +1,5 @@
-"""Torque that was recorded as no more than a limit, where the axis needed more: rows that tell nothing of friction.
+"""Torque that was recorded as no more than a limit, where the axis needed more: rows that determine nothing of
+friction.
 
 A range of the recording, or of what the drive hands out, cuts the torque off. Its rows then heap at one value. So they
 do where an axis accelerates evenly, or where the drive itself has no more to give: such rows are right. The difference
@@ -21,7 +22,7 @@ from feedsim.identify.record import Array, Record, runs
 
 MEAN = 5  # rows of the mean that takes noise, added behind the limit, off the heap
 CLIPPING_SIGMAS = 4.0  # standard deviations that pass for noise
-MIN_HEAP_ROWS = 5  # rows of a heap that tell whether it is one
+MIN_HEAP_ROWS = 5  # rows of a heap that determine whether it is one
 CLIPPED_EXCESS = 0.05  # of the limit: what inertia and friction must need beyond it; the simple friction is not better
 MOST_SHOWN = 3  # stretches of time that the message names
 
@@ -43,7 +44,7 @@ class _Heap:
 def without_clipped(records: Sequence[Record], J: float | None = None) -> tuple[tuple[Record, ...], tuple[str, ...]]:
     """The records with the rows marked at which their torque is cut off, and a sentence for each such record.
 
-    J: inertia [kg.m2] for records whose other rows tell none.
+    J: inertia [kg.m2] for records whose other rows determine none.
     """
     heaps = [tuple(_heap(record, side) for side in (1.0, -1.0)) for record in records]
     trial = [

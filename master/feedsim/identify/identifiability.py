@@ -1,4 +1,4 @@
-"""Which parameters the records of stage 2 do not tell: judged by what they hold, by bound and by value."""
+"""Which parameters the records of stage 2 do not determine: judged by what they hold, by bound and by value."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class Verdict:
 
 
 def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = ()) -> Verdict | None:
-    """The one parameter, or set that belongs together, that most deserves to be held; None: all are told.
+    """The one parameter, or set that belongs together, that most deserves to be held; None: all are determined.
 
-    kept: what is free whatever its bound, because a prior tells it.
+    kept: what is free whatever its bound, because a prior determines it.
     """
     values = solution.values
     found: list[tuple[float, Verdict]] = []
     for name in free:
-        # Those without a scale of their own are told with any bound, large or small.
+        # Those without a scale of their own are determined with any bound, large or small.
         lenient = name in kept or name in ANY_VALUE
         key = inner(name)
         if lenient and np.isfinite(solution.sigma(key)) and key not in solution.fit.at_bound:
@@ -62,7 +62,7 @@ def verdict(solution: Solution, free: Collection[str], kept: Collection[str] = (
 
 
 def _judge(solution: Solution, name: str) -> tuple[float, Verdict] | None:
-    """How vague a parameter is and the verdict on it; None: it is told well enough."""
+    """How vague a parameter is and the verdict on it; None: it is determined well enough."""
     key = inner(name)
     value = solution.fit[key]
     sigma = solution.sigma(key)
@@ -116,9 +116,9 @@ def no_delay(models: Sequence[RecordTorque], solution: Solution, free: Collectio
 
 LEAST_EXPLAINED = 0.01  # of the torque's rms: interpolation, ripple and held commands are not modelled to better
 MIN_TURNOVER_ROWS = (
-    5.0  # of the log from a reversal until the bristles have turned over, to tell damping or engaging zone
+    5.0  # of the log from a reversal until the bristles have turned over, to determine damping or engaging zone
 )
-LEAST_REVERSALS = 4  # to tell the delay of the torque: at each it could also be the bristles'
+LEAST_REVERSALS = 4  # to determine the delay of the torque: at each it could also be the bristles'
 FAST = 0.05  # of the top speed: what a direction of motion must reach to count
 
 

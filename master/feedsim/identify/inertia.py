@@ -117,7 +117,7 @@ def _stretches(record: Record, length: float, slow: float) -> list[_Stretch]:
         ways.append((white(record.speed) * float(np.linalg.norm(first)), record.speed, kernel, first))
     if record.angle is not None:
         ways.append((white(record.angle) * float(np.linalg.norm(second)), record.angle, first, second))
-    # The one that tells the acceleration with less noise.
+    # The one that determines the acceleration with less noise.
     noise, signal, to_speed, to_acceleration = min(ways, key=lambda way: way[0])
     speed = smooth_speed(record)
     moving = np.abs(speed) > slow
@@ -150,7 +150,7 @@ def _apply(weights: Array, signal: Array, step: int) -> Array:
 
 
 def smooth_speed(record: Record) -> Array:
-    """(N,) speed, averaged over a short time, to tell rest and reversals."""
+    """(N,) speed, averaged over a short time, to determine rest and reversals."""
     half = max(ceil(SMOOTH / record.interval / 2), 1)
     if record.speed is not None:
         spread = np.pad(record.speed, half, mode="edge")

@@ -1,7 +1,8 @@
 """Magnitudes that no feed axis has: where a unit of time, length or torque is taken for another.
 
 The limits lie beyond what machine tools, robots and precision stages have, and nearer to that than the factor of 1000
-by which mm and m, or ms and s, are confused. What no magnitude tells (a factor of 2.5 in a length) stays untold.
+by which mm and m, or ms and s, are confused. What no magnitude determines (a factor of 2.5 in a length) stays
+unnoticed.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ F_S moves by as much as F_C, and all else is held. The step refuses itself where
 
 A load is never quite constant: an amplifier's offset moves as it warms, grease leaves the rail. A change by 1 % of the
 friction over the record takes the position as far away as all else. With M_0, which is that in the middle of the
-record, goes its rate dM_0/dt, one for each record. The residual of the torque tells the rate, too, by a regression on
-time; as the two criteria weigh the record differently, the interval holds both. Where the intervals of all rates
+record, goes its rate dM_0/dt, one for each record. The residual of the torque determines the rate, too, by a regression
+on time; as the two criteria weigh the record differently, the interval holds both. Where the intervals of all rates
 include 0, the records determine no drift: F_C and M_0 are then estimated with a constant load.
 """
 
@@ -51,7 +51,7 @@ TORQUE_GROWS = 0.1  # of the torque residual's rms: what the position may cost
 EXPLICIT_STEP_SHARE = (
     0.25  # of the quickest time of bristles and inertia: the longest step of the free axis, which goes explicitly
 )
-MOST_STEPS = 32  # per interval: beyond that the bristles are too stiff to be told by this record
+MOST_STEPS = 32  # per interval: beyond that the bristles are too stiff to be determined by this record
 START_FIT = 0.01, 9  # [s], rows, whichever is more: what the cubic for the first speed goes through
 OUTLIER = 5.0  # standard deviations from that cubic that no sample of it may lie off
 BLOCKS, DRAWS = 10, 24  # stretches of a record whose torque residual may be turned, and how often they are drawn
@@ -344,7 +344,7 @@ def _model(record: Record, law: FrictionLaw) -> RecordTorque | None:
 
 
 def _unfit(record: Record, model: RecordTorque | None, values: Mapping[str, float]) -> str:
-    """Why a record tells nothing in open loop."""
+    """Why a record determines nothing in open loop."""
     duration = record.interval * (len(record) - 1)
     if record.angle is None:
         return "no position"

@@ -29,7 +29,7 @@ class Options:
         modes: of the machine whose J_tot is given: what its structure takes beyond J dn/dt is known then.
         delay: of the torque channel [s]; None: estimated.
         hold: name -> SI value that a parameter keeps. free: names that are estimated although they are usually held.
-        fallback: name -> SI value, for what the records do not tell: the friction of the machine so far.
+        fallback: name -> SI value, for what the records do not determine: the friction of the machine so far.
         stages: 1 stationary friction, 2 pre-sliding.
         seed: of the random starts.
 
@@ -69,7 +69,7 @@ class Asked:
     """What someone says of an axis, ahead of its traces.
 
     Attributes:
-        axis: its name; None: the only one that the traces tell.
+        axis: its name; None: the only one that the traces determine.
         inertia: seen at the motor [kg.m2]; mass: the same at the slide [kg], and in words; None: not said.
         delay: of the torque channel [s]; None: not said.
         estimated: "inertia", "delay", or both: to be estimated, whatever mapping and machine say.
@@ -89,7 +89,7 @@ class Asked:
     def with_traces(self, sources: Sequence[Provenance], machine: Machine | None = None) -> Options:
         """What is known when the traces are read: this, else what their mapping says, else the machine.
 
-        Raises InputError: the traces are of several axes or pitches, or tell none; else as :class:`Options`.
+        Raises InputError: the traces are of several axes or pitches, or determine none; else as :class:`Options`.
         """
         axis = self._axis(sources)
         pitches = {source.pitch: source.file for source in sources if source.pitch is not None}
@@ -118,7 +118,7 @@ class Asked:
             delay=of_mapping if self.delay is None else self.delay,
             hold=self.hold,
             free=self.free,
-            # The friction that the machine file has: for parameters that the traces do not tell.
+            # The friction that the machine file has: for parameters that the traces do not determine.
             fallback={name: float(value) for name, value in friction.parameters().items()} if friction else {},
             stages=self.stages,
         )

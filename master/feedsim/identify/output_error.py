@@ -52,8 +52,8 @@ FINAL = 1e-9  # tolerance of cost and step for the result
 MIN_GAIN_PER_PARAMETER = (
     12.0  # least fall of the sum of squares (of unit variance) per parameter more: significant beyond 99.9 %
 )
-# In the order in which they are tried where no stage 1 tells them: what friction is first, refinements last. Asymmetry
-# comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
+# In the order in which they are tried where no stage 1 determines them: what friction is first, refinements last.
+# Asymmetry comes after what makes friction depend on speed: with a friction that does not, it is a constant load.
 REFINEMENTS = (
     ("sigma_1",),
     ("F_log", "asymmetry"),
@@ -67,14 +67,14 @@ REFINEMENTS = (
 # Where all speeds are far above the usual v_log the logarithm is a constant to them, and what friction gains with speed
 # falls to sigma_2 alone. It then bends at a BEND-th of the typical speed.
 FAR_ABOVE, BEND = 10.0, 3.0
-OPEN_RISE = 1.2  # F_S over F_C to begin with, where stage 1 does not tell it
+OPEN_RISE = 1.2  # F_S over F_C to begin with, where stage 1 does not determine it
 CURVE = ("F_C", "F_S", "v_s", "F_log", "sigma_2")  # friction over speed, of which each stands for a missing other
-LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant load to be told apart
+LEAST_SHARE = 0.1  # of the time in either direction, for direction and constant load to be separated
 
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """What is known before the fit: start values, which parameters the prior tells, which are held or given.
+    """What is known before the fit: start values, which parameters the prior determines, which are held or given.
 
     drift: the part of stage 1's covariance that the prior has not; None: no stage 1.
     open: names that are held though the records do not rule out other values -> the variance that the rest (inner
@@ -117,12 +117,12 @@ def dynamic(
     Args:
         records: of one axis. The plateaus that `prior` was made of are left out of them: they would count twice.
         law: the friction law.
-        prior: result of stage 1; None: everything from these records, as far as they tell it.
+        prior: result of stage 1; None: everything from these records, as far as they determine it.
         J: inertia [kg.m2]; with a standard deviation it is refined, without it is held; None: estimated.
         delay: of the torque channel [s]; None: estimated.
         hold: name -> value that is not touched. free: what is usually held but is to be estimated (beta, v_log).
         I_P: lead [m/rad], for advice in micrometres.
-        progress: is told what is done and the share of the work that lies behind.
+        progress: is called with what is done and the share of the work that lies behind.
 
     Raises InputError: nothing moves in the records.
     """
@@ -154,7 +154,7 @@ def dynamic(
     found = search.solve(found.values, found.states, base, tolerance=FINAL, limit=40)
     found, base = _told(search, found, base, known, held)
     honest = uncertainty(search, found, known.open.values(), known.drift)
-    # The delay first: without it damping is told that both together leave open.
+    # The delay first: without it damping is determined that both together leave open.
     while (judged := no_delay(fine, honest.solution, base) or verdict(honest.solution, base, known.told)) is not None:
         found, base = _without(search, found, base, judged, known, held)
         honest = uncertainty(search, found, known.open.values(), known.drift)
@@ -186,7 +186,7 @@ def _known(
         values |= {name: estimate.value for name, estimate in prior.estimates.items() if name in PARAMETER_KINDS}
         unknown = {"J"}
         for name, estimate in prior.estimates.items():
-            # What stage 1 cannot tell is free here: held, it would bend what hangs on it.
+            # What stage 1 cannot determine is free here: held, it would bend what hangs on it.
             if estimate.status not in ("estimated", "undetermined") and name in PARAMETER_KINDS and name not in free:
                 held[name] = estimate.status, estimate.reason or "as in stage 1"
             elif estimate.status == "undetermined" and name == "F_S" and name not in hold:
@@ -195,7 +195,7 @@ def _known(
         places = [prior.correlation.names.index(name) for name in names]
         if names:
             at = np.array([values[name] for name in names])
-            # Drift would leave the sines to bend what plateaus tell: it is in the intervals, not in the weights.
+            # Drift would leave the sines to bend what plateaus determine: it is in the intervals, not in the weights.
             weighed, drifts = prior.covariance - prior.drift, prior.drift
             priors.append(Prior(names, at, np.asarray(weighed[np.ix_(places, places)])))
             drift = with_excess(Prior(names, np.zeros(len(names)), np.asarray(drifts[np.ix_(places, places)])))
@@ -231,7 +231,7 @@ def _known(
 
 
 def _both_directions(fine: Sequence[RecordTorque]) -> bool:
-    # A slow way back counts as well as a fast one there: it is friction that both tell apart from the load.
+    # A slow way back counts as well as a fast one there: it is friction that both separate from the load.
     fast = _sliding(fine, REST_SPEED_SHARE)
     return LEAST_SHARE < float(np.mean(fast > 0)) < 1 - LEAST_SHARE
 
@@ -272,7 +272,7 @@ def _weights(fine: Sequence[RecordTorque], found: Solution, before: Sequence[Arr
 def _told(
     search: Search, found: Solution, base: list[str], known: _Known, held: dict[str, tuple[Status, str]]
 ) -> tuple[Solution, list[str]]:
-    """Without what the data do not tell, one after the other."""
+    """Without what the data do not determine, one after the other."""
     while (judged := verdict(found, base, known.told)) is not None:
         found, base = _without(search, found, base, judged, known, held)
     return found, base
@@ -305,7 +305,7 @@ def _refined(
     known: _Known,
     held: dict[str, tuple[Status, str]],
 ) -> tuple[Solution, list[str]]:
-    """With a group of parameters more, if the data ask for them and tell them."""
+    """With a group of parameters more, if the data ask for them and determine them."""
     added = [name for name in group if name not in known.held and name not in base]
     if not added or len(added) < len(group):
         return found, base
@@ -355,7 +355,7 @@ def _refined(
 
 def _left_with(known: _Known, base: list[str]) -> dict[str, tuple[Status, str]]:
     """Friction over speed where sines alone leave a part of it open: that part is in all others, which are taken out of
-    what is told. Their values stay, as together they are what the sines show."""
+    what is determined. Their values stay, as together they are what the sines show."""
     missing = [name for name in CURVE if any(name in names for names in known.open)]
     if not missing:
         return {}
@@ -407,7 +407,7 @@ def _result(
 
 
 def _speeds(fine: Sequence[RecordTorque], prior: Stationary | None, I_P: float | None) -> tuple[str, ...]:
-    """A warning where sines alone tell the friction over speed."""
+    """A warning where sines alone determine the friction over speed."""
     if prior is not None or not has_sines(fine):
         return ()
     top = max(float(np.max(np.abs(model.moved(0.0)[1]))) for model in fine)

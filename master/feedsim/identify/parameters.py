@@ -1,4 +1,4 @@
-"""The friction law as identification knows it: parameters, who tells them, ranges of the search, curve over speed.
+"""The friction law as identification knows it: parameters, who determines them, ranges of the search, curve over speed.
 
 Unit, range, meaning and start value are those of the friction unit's table. A parameter of it that no stage names here
 is held at its start value, and nothing else in this room needs to know it.
@@ -22,16 +22,18 @@ from feedsim.scenario import Friction
 
 _TABLE = variables.parameters("friction")
 FRICTION_NAMES = tuple(_TABLE)
-# What reversals tell (stage 2), and what plateaus of constant speed tell (stage 1), in the order in which it is shown.
+# What reversals determine (stage 2), and what plateaus of constant speed determine (stage 1), in the order in which it
+# is shown.
 PRE_SLIDING = ("sigma_0", "sigma_1", "W", "gamma")
 CONSTANT_SPEED = ("F_C", "F_S", "v_s", "beta", "F_log", "v_log", "sigma_2", "asymmetry", "M_0")
 RIGID_AXIS_NAMES = ("J", "sigma_2", "F_C", "M_0")  # of a rigid axis with Coulomb and viscous friction
-# Held at the unit's start values unless they are freed: no record of friction alone tells them well.
+# Held at the unit's start values unless they are freed: no record of friction alone determines them well.
 DEFAULT_SHAPES: Mapping[str, float] = {name: float(_TABLE[name].start) for name in ("beta", "v_log")}
 STATIONARY = tuple(
     name for name in CONSTANT_SPEED if name not in DEFAULT_SHAPES
 )  # all of stage 1 that stage 2 takes over
-FIXED = tuple(name for name in FRICTION_NAMES if name not in (*PRE_SLIDING, *CONSTANT_SPEED))  # no stage tells them
+# no stage determines them
+FIXED = tuple(name for name in FRICTION_NAMES if name not in (*PRE_SLIDING, *CONSTANT_SPEED))
 # Where a parameter has no effect: what machine files mean that do not give it; v_s where F_S is F_C.
 NO_EFFECT: Mapping[str, float] = {
     **{"sigma_1": 0.0, "sigma_2": 0.0, "M_0": 0.0, "v_s": float(_TABLE["v_s"].start)},
@@ -122,21 +124,22 @@ def inner_to_outer(moved: Sequence[str], wanted: Sequence[str]) -> Array:
 
 Range = Mapping[str, Any]  # lower, upper, scale, scatter, log of a fit.Parameter
 
-# Stage 1, within what is physical: beyond these bounds plateaus tell nothing, and the solver goes astray.
+# Stage 1, within what is physical: beyond these bounds plateaus determine nothing, and the solver goes astray.
 V_S = 20.0, 2.0  # below the lowest speed, above the highest: a Stribeck effect that is over before, or no end of it
 V_LOG = 1e-2, 1e2  # likewise: a logarithm all along, or a straight line
 BETA = 0.2, 4.0  # flatter, the peak has no end within decades of speed; steeper, it is a step
 ASYMMETRY = -0.5, 0.5  # beyond, it plays the constant load's part
 MOST_TORQUE = 2.0  # of the largest measured: no part of the friction, and no load, is more
 LEAST_F_C = 1e-3  # of the largest torque: what is reported is relative to it
-# What may be there though no plateau tells it, of the friction: standard deviations of values that pass for usual. A
-# Stribeck effect that no plateau shows is over by the lowest speed, which is UNSEEN_SPEED_RATIO times v_s at least.
+# What may be there though no plateau determines it, of the friction: standard deviations of values that pass for usual.
+# A Stribeck effect that no plateau shows is over by the lowest speed, which is UNSEEN_SPEED_RATIO times v_s at least.
 PRIOR_DEVIATIONS: Mapping[str, float] = {EXCESS: 0.3, "F_log": 0.3, "sigma_2": 0.3, "asymmetry": 0.05, "M_0": 2.0}
 UNSEEN_SPEED_RATIO = 2.0
 
 
 def hidden(name: str, friction: float, fast: float) -> float:
-    """Standard deviation that a parameter may have which no plateau tells: friction [N.m], highest speed [rad/s]."""
+    """Standard deviation that a parameter may have which no plateau determines: friction [N.m], highest speed
+    [rad/s]."""
     return PRIOR_DEVIATIONS[name] * (1.0 if name == "asymmetry" else friction / fast if name == "sigma_2" else friction)
 
 

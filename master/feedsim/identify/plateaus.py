@@ -28,7 +28,7 @@ TAPER = 0.05  # the weights of the mean rise and fall over it; two periods of th
 MIN_PLATEAU_TIME = 0.1  # time that must be left
 MOST_DROPPED = 0.6  # of a stretch, looking for where its torque has settled
 PLATEAU_SIGMAS = 4.0  # standard deviations that pass for noise
-QUIETER = 1.5  # times less noise in the speed that the angle tells, for the recorded speed to be passed over
+QUIETER = 1.5  # times less noise in the speed that the angle determines, for the recorded speed to be passed over
 LONGER = (1, 4, 16)  # times the block, one after the other as far as noise asks for it
 BLOCK_NOISE_SHARE = (
     0.2  # share of a speed that the noise of a block may have (PLATEAU_SIGMAS of its standard deviations)
@@ -64,7 +64,7 @@ def plateaus(record: Record, J: float) -> tuple[Plateau, ...]:
 
 class _Motion:
     """Travel and speed over blocks, from the speed where it was recorded, else from the angle. Where both were, and the
-    angle tells a much quieter speed, from the angle.
+    angle determines a much quieter speed, from the angle.
 
     travel: (N,) [rad]. blocks: (N,) mean speed over a block about each row [rad/s]. direct: from the speed.
     """
@@ -90,7 +90,7 @@ class _Motion:
         self.scatter = white(self.signal)
 
     def _noise(self, signal: Array, direct: bool) -> float:
-        """Of a block's mean speed, told from one signal or the other."""
+        """Of a block's mean speed, separated from one signal or the other."""
         return white(signal) * (1 / sqrt(self.rows) if direct else sqrt(2) / (self.rows * self.interval))
 
     def noise(self, rows: int) -> float:

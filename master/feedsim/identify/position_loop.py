@@ -29,7 +29,7 @@ MAX_TAPS = 6  # samples that an interpolation runs over
 # noise, and may grow by a share.
 BY_CHANCE = 3.84
 DIGITS, GROWS = 1e-5, 0.05
-LEAST_TRAVEL = 1e-3  # rad: a motor that turns less does not tell a delay
+LEAST_TRAVEL = 1e-3  # rad: a motor that turns less does not determine a delay
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ def speed_setpoint(records: Sequence[Record]) -> SpeedSetpoint:
     moved = _usable(records, ("setpoint", "angle", "speed_setpoint"))
     with_forward = all(record.feedforward is not None for record in moved)
     targets = [np.asarray(record.speed_setpoint, dtype=np.float64) for record in moved]
-    # K_v x_s and K_v x are columns of their own, so that K_v is told by the measured position alone.
+    # K_v x_s and K_v x are columns of their own, so that K_v is determined by the measured position alone.
     others = [
         [-np.asarray(record.angle), np.ones(len(record)), *([np.asarray(record.feedforward)] if with_forward else [])]
         for record in moved
@@ -138,8 +138,8 @@ def _window(
 ) -> tuple[Taps, Array, Array]:
     """The narrowest window of samples of the setpoint that explains the targets, and what goes with it.
 
-    others: further columns of each record. gain: which of them tells the sum of the weights (negative of the measured
-    angle's); None: it is 1.
+    others: further columns of each record. gain: which of them determines the sum of the weights (negative of the
+    measured angle's); None: it is 1.
 
     Returns the taps, the coefficients of `others`, and the covariance of taps and others together.
     """

@@ -26,7 +26,7 @@ from feedsim.trace import Recording, read_recording
 TYPED_TOLERANCE = 1e-9
 # Share of the residual that may be left for a column to be advised as a load: less than that is chance.
 SMALLER = 0.98
-PITCH_MISMATCH = 0.02  # relative; what a pitch that a record tells may be off the machine's without a word
+PITCH_MISMATCH = 0.02  # relative; what a pitch that a record determines may be off the machine's without a word
 # Names of columns that hold a known load; "workload" or "payload" are not.
 LOAD_NAME = re.compile(
     r"(?<![a-z])load|pulse|disturbance|(?<![a-z])external[ _.-]*force|(?<![a-z])ext[ _.-]+force", re.IGNORECASE
@@ -40,7 +40,7 @@ class Provenance:
     Attributes:
         file, sha256: the trace.
         mapping: mapping file; None where columns were found by their names.
-        axis: "" where nothing tells it.
+        axis: "" where nothing determines it.
         name, note: of the mapping.
         columns: role -> column used (position, speed, torque, current, force, load, setpoint, time).
         pitch: [m]; torque_constant: [N.m/A]; None where not needed and not given.
@@ -253,7 +253,7 @@ def _unread_load(
             torque = _motor_side({"load": load}, {"load": values}, drive)["load"]
             left = [_residual(records, [side * torque[rows] for rows in pieces]) for side in (0.0, 1.0, -1.0)]
         except InputError:
-            continue  # no signal of this trace, no force, or nothing moves that would tell
+            continue  # no signal of this trace, no force, or nothing moves that would determine
         best = min(left[1:])
         if best > SMALLER * left[0]:
             continue
@@ -316,7 +316,7 @@ def _provenance(
 
 
 def distinct(files: Sequence[Path]) -> tuple[str, ...]:
-    """The file names, with as many folders ahead as it takes to tell them apart. InputError: a file stands twice."""
+    """The file names, with as many folders ahead as it takes to separate them. InputError: a file stands twice."""
     whole = [file.resolve().parts for file in files]
     names = []
     for parts in whole:
@@ -330,7 +330,7 @@ def distinct(files: Sequence[Path]) -> tuple[str, ...]:
 
 
 def named_apart(recorded: Sequence[Recorded]) -> tuple[Record, ...]:
-    """The records of all files, under names that tell the files apart."""
+    """The records of all files, under names that separate the files."""
     names = distinct([each.provenance.file for each in recorded])
     return tuple(
         replace(record, name=name + record.name.removeprefix(each.provenance.file.name))

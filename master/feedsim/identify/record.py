@@ -104,7 +104,7 @@ class Record:
 GAP_RATIO = 1.75
 # More gaps than that, and than that share of all steps, are no gaps but uneven time: a clock of too few digits.
 MOST_GAPS, SHARE_OF_GAPS = 10, 0.05
-# Rows between gaps that make a stretch: fewer tell neither a motion nor whether they are even.
+# Rows between gaps that make a stretch: fewer determine neither a motion nor whether they are even.
 MIN_ROWS_BETWEEN_GAPS = 8
 
 

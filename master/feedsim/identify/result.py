@@ -22,7 +22,7 @@ class Estimate:
     Attributes:
         value: SI, in `unit`.
         sigma: standard deviation; nan where it was held, given or could not be determined.
-        status: estimated; held at a usual value; given by the user; undetermined: the data do not tell.
+        status: estimated; held at a usual value; given by the user; undetermined: the data do not determine.
         reason: why it is held or undetermined.
     """
 

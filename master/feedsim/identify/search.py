@@ -156,7 +156,8 @@ def sliding(models: Sequence[RecordTorque], values: Mapping[str, float], unknown
     acceleration = np.concatenate([row[2] for row in rows])
     torque = np.concatenate([model.measured - row[3] for model, row in zip(models, rows, strict=True)])
     fast = np.abs(speed) > SLIDING * np.max(np.abs(speed))
-    if np.ptp(np.sign(speed[fast])) == 0:  # fast in one direction only: what is slow in the other one tells the load
+    # fast in one direction only: what is slow in the other one determines the load
+    if np.ptp(np.sign(speed[fast])) == 0:
         fast = np.abs(speed) > REST_SPEED_SHARE * np.max(np.abs(speed))
     shapes = {"J": acceleration, "sigma_2": speed, "F_C": np.sign(speed), "M_0": np.ones_like(speed)}
     names = [name for name in shapes if name in unknown]

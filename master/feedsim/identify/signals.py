@@ -46,8 +46,8 @@ class Channel:
 
 @dataclass(frozen=True)
 class Chosen:
-    """Columns to use; of the time either the column or the interval [s]. pitch: [m], as the recording tells it; why: it
-    tells none, "" where nothing would tell it."""
+    """Columns to use; of the time either the column or the interval [s]. pitch: [m], as the recording determines it;
+    why: it determines none, "" where nothing would determine it."""
 
     axis: str
     channels: Mapping[str, Channel]
@@ -62,11 +62,12 @@ def choose(
 ) -> Chosen:
     """Columns of an axis.
 
-    axis: "" where it is not known; then feedsim's own names tell it if there is one only. axes: of the machine.
+    axis: "" where it is not known; then feedsim's own names determine it if there is one only. axes: of the machine.
     driven: torque, current or force is needed.
 
-    Raises InputError: a column that the mapping names is not there; names that do not tell which column is meant, or
-    none that is known (with what there is, and the line of a mapping to write); a unit missing or of a wrong dimension.
+    Raises InputError: a column that the mapping names is not there; names that do not determine which column is meant,
+    or none that is known (with what there is, and the line of a mapping to write); a unit missing or of a wrong
+    dimension.
     """
     if mapping is not None:
         return _mapped(recording, mapping, axis, driven)
@@ -102,7 +103,7 @@ def _time(recording: Recording, mapping: Columns) -> Signal | None:
     if clock.interval is not None:
         return None
     if clock.column is not None:
-        # What is not told is s, as everywhere in traces; but a counter is nothing before its factor.
+        # What has no unit is s, as everywhere in traces; but a counter is nothing before its factor.
         unit = clock.unit or (None if clock.factor or recording.units.get(clock.column) else "s")
         return Signal(column=clock.column, unit=unit, factor=clock.factor)
     found = _named_time(recording, mapping.axis or "")

@@ -42,7 +42,7 @@ SPAN = 10e-3  # [s] that the speed is averaged over where only a position was re
 def checked(path: Path, records: Sequence[Record], axis: str = "") -> Iterator[str]:
     """What is worth a warning. Raises InputError where a sign or a unit is wrong beyond doubt.
 
-    axis: its name; empty where nothing tells it.
+    axis: its name; empty where nothing determines it.
     """
     where = f"{path}, axis {axis}" if axis else f"{path}"
     yield from _speed(where, records)

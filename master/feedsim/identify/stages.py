@@ -60,8 +60,8 @@ def identify(
 
     law: the friction model. Stage 1 takes every stretch at constant speed; stage 2 takes the records with sines or,
     where there are none, all whose axis reverses. Stage 1 enters stage 2 as a prior, unless both are of the same
-    records. Either may be absent; what it would tell is then held, with the reason. Of records of general motion F_C
-    and M_0 are then taken from the position in open loop (open_loop.py).
+    records. Either may be absent; what it would determine is then held, with the reason. Of records of general motion
+    F_C and M_0 are then taken from the position in open loop (open_loop.py).
 
     Raises InputError: no records, neither plateaus nor reversals, or a fit that cannot be made.
     """
@@ -114,7 +114,7 @@ class _Run:
         with self._timed("open loop"):
             estimates: Mapping[str, Estimate] = self._merged(first, second, J)
             balance = None
-            if second is not None and not (first is not None and self.prior):  # the curve is told by its plateaus
+            if second is not None and not (first is not None and self.prior):  # the curve is determined by its plateaus
                 self.progress("open loop", 0, 1)
                 balance = balanced(transitions(self.records), self.law, estimates, hold=options.hold)
                 estimates = balance.estimates
@@ -124,7 +124,7 @@ class _Run:
         prior = self.prior or second is None
         # Doubts of a stage 1 that the estimates do not rest on would be doubts about nothing.
         if first is not None and prior:
-            # Nor is what stage 1 could not tell, but stage 2 does.
+            # Nor is what stage 1 could not determine, but stage 2 does.
             told = [f"{name} is not estimated" for name, each in estimates.items() if each.status == "estimated"]
             self.warnings += [text for text in first.warnings if not text.startswith(tuple(told))]
         self.warnings += second.warnings if second is not None else ()
@@ -217,7 +217,7 @@ class _Run:
         if not chosen:
             return None
         # Nothing counts twice: plateaus that a prior is made of are left out of the motion. But where a few speeds
-        # among it tell no curve, the motion as a whole tells more than they and the rest apart.
+        # among it determine no curve, the motion as a whole determines more than they and the rest apart.
         names = {record.name for record in chosen}
         others = [record for record in self.records if record.name not in names]
         if first is not None and any(plateau.record in names for plateau in first.plateaus):
@@ -309,7 +309,7 @@ class _Run:
         return {name: found[name] for name in RESULT_ORDER if name in found}
 
     def _absent(self, name: str, found: Mapping[str, Estimate]) -> Estimate:
-        """A parameter that no stage tells."""
+        """A parameter that no stage determines."""
         options, reason = self.options, self.reasons.get(2 if name in PRE_SLIDING else 1, "")
 
         def held(value: float, why: str) -> Estimate:
@@ -357,13 +357,14 @@ def transitions(records: Sequence[Record]) -> tuple[Record, ...]:
         return sines
     ways = {id(record): _directions(record, found[id(record)]) for record in records}
     reversing = tuple(r for r in records if len(ways[id(r)]) > 1)
-    # Strokes of one direction each, of which one file is up and the other down, tell both together.
+    # Strokes of one direction each, of which one file is up and the other down, determine both together.
     both = len(set().union(*ways.values())) > 1
     return reversing or tuple(r for r in records if both and ways[id(r)])
 
 
 def merged_correlation(first: Stationary | None, second: Dynamic | None) -> Correlation:
-    """Of all that was estimated; nan between a parameter that stage 1 alone tells and one that stage 2 alone does."""
+    """Of all that was estimated; nan between a parameter that stage 1 alone determines and one that stage 2 alone
+    does."""
     stages = [stage.correlation for stage in (second, first) if stage is not None]
     names = tuple(dict.fromkeys(name for each in stages for name in each.names))
     matrix = np.full((len(names), len(names)), nan)
@@ -379,7 +380,7 @@ def merged_correlation(first: Stationary | None, second: Dynamic | None) -> Corr
 def _parts(record: Record) -> tuple[Part, ...]:
     try:
         return parts(record, motion(record))
-    except InputError:  # too short to tell a motion from noise
+    except InputError:  # too short to separate a motion from noise
         return ()
 
 

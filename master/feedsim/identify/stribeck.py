@@ -62,10 +62,10 @@ def stationary(
         free: names of `hold` and `DEFAULT_SHAPES` that are estimated nevertheless.
         seed: of the further starts. I_P: lead [m/rad], for advice in mm/min.
 
-    What the plateaus cannot tell is held with a reason and a warning (F_S = F_C, v_s, F_log = 0, sigma_2 = 0,
+    What the plateaus cannot determine is held with a reason and a warning (F_S = F_C, v_s, F_log = 0, sigma_2 = 0,
     asymmetry = 0, M_0 = 0). Plateaus that scatter about the curve by more than their own noise explains (friction that
     depends on position, temperature) get a share of their torque added to their standard deviation, as large as makes
-    the residuals plausible (R. Paule, J. Mandel, J. Res. NBS 87, 1982): the confidence intervals tell it then.
+    the residuals plausible (R. Paule, J. Mandel, J. Res. NBS 87, 1982): the confidence intervals determine it then.
 
     Raises InputError: no plateau; a name that is none; a value held outside its physical range, or F_S below F_C.
     """
@@ -177,9 +177,9 @@ class _Problem:
     def marginal(self, found: Fit, reasons: Mapping[str, str], extra: float) -> tuple[Array, Array]:
         """Covariance (P, P) of what was found, and its part by warming, which changes viscous friction.
 
-        What is held because the plateaus do not tell it is not known: it adds what the rest would move by if it had
-        another usual value, as far as the plateaus allow that one, and what it moves by if it has the value that suits
-        them best. So does the course of viscous friction over time.
+        What is held because the plateaus do not determine it is not known: it adds what the rest would move by if it
+        had another usual value, as far as the plateaus allow that one, and what it moves by if it has the value that
+        suits them best. So does the course of viscous friction over time.
         """
         without, moved = self._hidden(found, reasons, extra, 0.0)
         within, warmed = self._hidden(found, reasons, extra, drift.WARMS)

@@ -1,4 +1,4 @@
-"""What plateaus cannot tell: parameters that are held for it, and warnings with their reason."""
+"""What plateaus cannot determine: parameters that are held for it, and warnings with their reason."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SLOW_ENOUGH = 50e-3 / 60  # m/s: a lowest speed above leaves the Stribeck range 
 V_S_WARNED = 0.3
 FALL_SIGMAS = 2.0  # standard deviations that a fall of torque over speed must have
 LIKE = 0.99  # correlation above which two parameters are one
-VARIED = 0.05  # range of the level over its mean that tells an asymmetry from a constant load
+VARIED = 0.05  # range of the level over its mean that separates an asymmetry from a constant load
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def falls(points: Points) -> bool:
 
 
 def too_few(points: Points, free: Sequence[str]) -> dict[str, str]:
-    """Curve parameters among `free` that so few speeds do not tell, name -> reason: more than there are speeds."""
+    """Curve parameters among `free` that so few speeds do not determine, name -> reason: more than there are speeds."""
     count = len(points.speeds)
     found: dict[str, str] = {}
     ranks = ["F_C", EXCESS, "sigma_2", "F_log", "v_s", "v_log", "beta"]
@@ -172,7 +172,7 @@ def warnings(points: Points, found: Fit, matrix: Array, names: Sequence[str], I_
     for row, first in enumerate(names):
         for column in range(row):
             pair = {first, names[column]}
-            # M_0 and asymmetry go together by their definition; whether they are told apart is looked at on its own.
+            # M_0 and asymmetry go together by their definition; whether they are separated is looked at on its own.
             if abs(matrix[row, column]) > LIKE and pair != {"M_0", "asymmetry"}:
                 said.append(
                     f"{names[column]} and {first} are correlated by {matrix[row, column]:+.3f}: the data determine "

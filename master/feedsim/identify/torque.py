@@ -40,8 +40,8 @@ class RecordTorque:
 
     What z and c were when the record began is not known (an axis at rest keeps any of them). They are parameters of
     their own, as shares of what is possible: `z` of F_S/sigma_0, within -1 and 1, `c` of W, within -1/2 and 1/2. How
-    much they matter, and for how long, the sensitivities then tell by themselves: after travelling W in one direction
-    nothing is left of them.
+    much they matter, and for how long, the sensitivities then determine by themselves: after travelling W in one
+    direction nothing is left of them.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""How far what was found can be relied on: what the scatter of the torque does not tell of it."""
+"""How far what was found can be relied on: what the scatter of the torque does not determine of it."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from feedsim.identify.torque import RecordTorque
 # samples, modes of the structure). Without it the quietest move of a record without noise would count for all.
 MODEL_ACCURACY = 1e-3
 DRAWS = 8  # their mean square is known to within a half, their root to a quarter: an order of magnitude is wanted
-BY_CHANCE = 3.84  # variances that one stretch pulls by chance, 95 % (chi^2): a few stretches that agree tell no more
-# Of a row's interval: to better than that no cubic between rows tells when something happened. A delay that is too
+# variances that one stretch pulls by chance, 95 % (chi^2): a few stretches that agree determine no more
+BY_CHANCE = 3.84
+# Of a row's interval: to better than that no cubic between rows determines when something happened. A delay that is too
 # short by it passes for damping, sigma_0 times as large.
 INSTANT = 0.01
 SMOOTHER = 1.5  # times lower a cut-off: what it takes off more is about what the first one did
@@ -30,7 +31,7 @@ MOTION_NOISE_RATIO = 2.0  # times the deviation by the torque's noise that the m
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """A solution with all in its covariance that the scatter of the torque does not tell.
+    """A solution with all in its covariance that the scatter of the torque does not determine.
 
     torque: its standard deviations by that scatter alone; motion: by errors of the recorded motion; at_odds: factors by
     which stretches and prior contradict each other; all by inner name.
@@ -46,8 +47,8 @@ def uncertainty(
     search: Search, found: Solution, left_open: Collection[Mapping[str, float]], drift: Prior | None = None
 ) -> Uncertainty:
     """Stretches that contradict each other or stage 1; errors of the recorded motion; what may have drifted in stage 1;
-    what the rest would be with a parameter free that the records leave open, which is held here; and what rows tell at
-    best.
+    what the rest would be with a parameter free that the records leave open, which is held here; and what rows
+    determine at best.
 
     left_open: per such parameter, inner name -> variance with it free. drift: the part of stage 1's covariance that is
     not in the search's prior.
@@ -70,7 +71,7 @@ def uncertainty(
 
 
 def _least(models: Sequence[RecordTorque], values: Mapping[str, float]) -> dict[str, float]:
-    """Variances that no records tell a parameter better than, by inner name."""
+    """Variances that no records determine a parameter better than, by inner name."""
     apart = INSTANT * max(model.record.interval for model in models)
     least = {"delay": apart, "sigma_1": apart * values["sigma_0"]}
     return {name: sigma**2 for name, sigma in least.items()}
@@ -96,12 +97,12 @@ def _matters(honest: Uncertainty, name: str) -> bool:
 
 
 def limits(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
-    """What of the records, other than the noise of the torque, limits what is told: a warning each."""
+    """What of the records, other than the noise of the torque, limits what is determined: a warning each."""
     return (*_rough(honest, names, fine), *_at_odds(honest, names))
 
 
 def _rough(honest: Uncertainty, names: Sequence[str], fine: Sequence[RecordTorque]) -> tuple[str, ...]:
-    """A warning where the recorded motion, not the torque, limits what is told."""
+    """A warning where the recorded motion, not the torque, limits what is determined."""
     told = [name for name in names if name in (*PRE_SLIDING, "delay") and _matters(honest, name)]
     rough = [name for name in told if np.hypot(1, honest.motion[name] / honest.torque[name]) > MOTION_NOISE_RATIO]
     if not rough:
@@ -134,8 +135,8 @@ def motion_covariance(
     The fit takes the motion for exact and all scatter for the torque's. A position in steps of 1 um is not exact: the
     law answers to motion that was not there, the same way in every fit of the record, so that the residuals do not show
     it. The smoothed motion is therefore recorded once more, with the noise and in the steps that its samples have, and
-    the linearised fit tells how far the parameters move with that (parametric bootstrap). What smoothing takes off the
-    reversals, or the samples lack, is not in it: a motion smoothed by as much more tells how far that goes.
+    the linearised fit determines how far the parameters move with that (parametric bootstrap). What smoothing takes off
+    the reversals, or the samples lack, is not in it: a motion smoothed by as much more determines how far that goes.
 
     weights: those that the fit was made with.
     """

@@ -1,4 +1,4 @@
-"""A run with what it tells a user to doubt, and a scenario judged before its first step."""
+"""A run with what it shows a user to doubt, and a scenario judged before its first step."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def check(scenario: Scenario, program: Program, *, fmus: Path | None = None) -> 
 def _foreseen(
     scenario: Scenario, modes: Modes, program: Program, loops: Sequence[Loop], acting: Sequence[Acting]
 ) -> tuple[str, ...]:
-    """What the parameters and the loads alone tell a user to doubt, a sentence each."""
+    """What the parameters and the loads alone show a user to doubt, a sentence each."""
     return (
         *control(scenario.machine, loops, program), *exchange.exchange_stability(scenario, modes),
         *loads.unbalanced(scenario, acting), *loads.sizes(scenario.machine, program, acting),

@@ -137,7 +137,7 @@ def _judged_axes(
 def _judged(
     axis: str, kind: Kind, state: State, gain: float, L: Complexes, growing: int, closed: int, inner: int
 ) -> Loop:
-    """What the open-loop gain L (F,) along half the contour tells of a loop.
+    """What the open-loop gain L (F,) along half the contour shows of a loop.
 
     growing: solutions that grow with it closed; closed: with all loops closed; inner: in the loops below it alone.
     """

@@ -1,4 +1,4 @@
-"""What curves over frequency tell, independent of a grid: crossings, extremes, margins, bandwidths.
+"""What curves over frequency show, independent of a grid: crossings, extremes, margins, bandwidths.
 
 A grid finds brackets, which are narrowed together to the resolution of floating-point numbers. The grid's step is a
 share of the least damping ratio: a resonance is some 2 zeta wide on a logarithmic axis, an anti-resonance no less.

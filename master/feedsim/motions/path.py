@@ -64,7 +64,7 @@ class PathMotion(MotionKind):
 
     @property
     def at_feed(self) -> str:
-        """The programmed speed as reports tell it."""
+        """The programmed speed as reports show it."""
         return f"at {self.feed * 6e4:.6g} mm/min"
 
     def plan(self, start: Start) -> Course:

@@ -1,9 +1,9 @@
 """Periodic excitation on the grid of the control cycle: multisine and maximum-length sequence.
 
 A period is a whole number of position cycles, so that every loop of the drive sees a periodic signal and the discrete
-Fourier transform over a period has no leakage. The position controller samples with T_pos: of what it is told at f, it
-answers at the images abs(f + m/T_pos) as well. A response at f can only be told from the image of another line where no
-two excited lines are images of one another; the multisine here chooses its lines so (:func:`distinct_lines`).
+Fourier transform over a period has no leakage. The position controller samples with T_pos: of what it is given at f, it
+answers at the images abs(f + m/T_pos) as well. A response at f can only be separated from the image of another line
+where no two excited lines are images of one another; the multisine here chooses its lines so (:func:`distinct_lines`).
 
 Sources: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., Wiley 2012, chapters 4
 and 5 (random-phase multisines, binary sequences); E. Van der Ouderaa, J. Schoukens, J. Renneboog, Peak factor
@@ -166,7 +166,7 @@ def binary_sequence(
 
     Args:
         rms: RMS and peak of the signal, in the unit of the input.
-        band: lines within are told as excited [Hz]; the signal itself has lines beyond.
+        band: lines within are reported as excited [Hz]; the signal itself has lines beyond.
         stages: of the shift register, 3 to 20.
         hold: chip length in control cycles; the spectrum has its first zero at 1/(hold T_c).
         seed: of the sequence and of its start. Seeds that follow one another, up to as many as there are sequences of

@@ -257,6 +257,6 @@ class Replay:
 
 
 def per_row_of(interval: float, machine: Machine) -> int:
-    """Samples of a simulation per row of a record that a delay between the rows can be told from: up to four."""
+    """Samples of a simulation per row of a record that a delay between the rows can be separated from: up to four."""
     cycles = round(interval / machine.cycles.T_c)
     return max(each for each in (1, 2, 4) if cycles % each == 0)

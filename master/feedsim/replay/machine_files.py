@@ -21,13 +21,13 @@ from feedsim.scenario import Drive, Filter, Friction
 from feedsim.scenario.parameter_group import ParameterGroup
 
 TOOL_AXES = ("X", "Y", "Z")
-CONTROL = 125e-6  # [s] control cycle of a machine that tells none
+CONTROL = 125e-6  # [s] control cycle of a machine that determines none
 ASSUMED = "assumed: the record does not show it"
 
 
 def simple_drive(values: Mapping[str, float], torque: float) -> Drive:
-    """A drive with what a record tells, and without what it does not: no reference model, no filters, an ideal current
-    loop. values: K_v, k_ffw, T_dyn, T_sym, K_p, K_i = K_p/T_n. torque: limit [N.m]."""
+    """A drive with what a record determines, and without what it does not: no reference model, no filters, an ideal
+    current loop. values: K_v, k_ffw, T_dyn, T_sym, K_p, K_i = K_p/T_n. torque: limit [N.m]."""
     told = {name: values[name] for name in ("K_v", "k_ffw", "T_dyn", "T_sym", "K_p")}
     assumed = {"ramp_speed_setpoint": False, "reference_model": False, "ideal_current_loop": True, "K_t": 1.0}
     return Drive.model_validate({**told, "T_n": values["K_p"] / values["K_i"], "M_max": torque, **assumed})
@@ -37,7 +37,7 @@ def simple_drive(values: Mapping[str, float], torque: float) -> Drive:
 class RigidAxis:
     """An axis as it goes into the folder.
 
-    limits: as start.limits gives them. values: of the friction, J and M_0, SI; estimates: of what was told.
+    limits: as start.limits gives them. values: of the friction, J and M_0, SI; estimates: of what was determined.
     """
 
     pitch: float

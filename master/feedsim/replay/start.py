@@ -21,9 +21,9 @@ ZONE = 0.06  # [rad] width of an engaging zone
 RESERVE = 1.5  # what the machine may do beyond what the record shows
 # Shares of the mean torque that friction may have of it, where the record does not separate it from the constant load.
 FRICTION_SHARES = (0.05, 0.15, 0.4)
-LEAST_TRAVEL = 0.01  # rad: a motor that turns less tells no drive
+LEAST_TRAVEL = 0.01  # rad: a motor that turns less determines no drive
 SEPARATED = 0.5  # relative half width of F_C below which the rigid line separates friction from the constant load
-# A torque limit that is not known must not act: gentle moves tell nothing of the torque of rapid ones.
+# A torque limit that is not known must not act: gentle moves determine nothing of the torque of rapid ones.
 TORQUE_LIMIT_RATIO = 20.0
 
 
@@ -31,8 +31,8 @@ TORQUE_LIMIT_RATIO = 20.0
 class Begin:
     """Where fits of an axis begin.
 
-    starts: parameters of drive and friction, a fit each. one_way: what the record tells of constant load and friction
-    where it does not separate them, in words; empty where it does.
+    starts: parameters of drive and friction, a fit each. one_way: what the record determines of constant load and
+    friction where it does not separate them, in words; empty where it does.
     """
 
     starts: Sequence[Mapping[str, float]]

@@ -13,7 +13,7 @@ from feedsim.report.content import Section, Table, Text, code
 from feedsim.report.formatting import minus
 from feedsim.scenario import Machine
 
-# What the causes of a circle are set by, where no machine tells values.
+# What the causes of a circle are set by, where no machine shows values.
 OF_CIRCLES = (
     "drive.K_v", "drive.k_ffw", "drive.T_sym", "drive.T_dyn", "drive.backlash_compensation.value",
     "drive.friction_pulse.amplitude", "drive.friction_pulse.time",

@@ -19,7 +19,7 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 EXPONENT_BELOW = Decimal("1e-4")  # below which a number is written with a power of ten
 DISPLAY_UNITS = {"um": "µm", "1": "", "deg": "°"}
 NOT_DETERMINED = "not determined"
-SHORT = 10.0  # [ms] a delay, of which microseconds are told
+SHORT = 10.0  # [ms] a delay, of which microseconds are shown
 # SI unit -> (largest magnitude up to which the unit is taken, factor, unit), from small to large.
 _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "m": ((0.999e-3, 1e6, "um"), (10.0, 1e3, "mm")),

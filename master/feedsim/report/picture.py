@@ -63,7 +63,7 @@ class Picture:
         return replace(self, stem=f"{self.stem}-first", shows=Chart(first, self.chart.widths))
 
     def save(self, path: str | Path) -> Path:
-        """Write it as .png or .svg, which the name tells; returns the path. Raises InputError, OutputError."""
+        """Write it as .png or .svg, which the name shows; returns the path. Raises InputError, OutputError."""
         path = Path(path)
         kind = path.suffix.lower().removeprefix(".")
         if kind not in PICTURE_FORMATS:

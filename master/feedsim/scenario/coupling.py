@@ -27,7 +27,7 @@ class Scheme:
 
     @property
     def speed_ramp(self) -> bool:
-        """Whether friction is told the slope of its speed."""
+        """Whether friction is given the slope of its speed."""
         return self.speed in ("within", "extrapolated")
 
 

@@ -185,7 +185,7 @@ class Subject:
 
 
 def load_subject(path: str | Path, overrides: Sequence[str] = ()) -> Subject:
-    """Read a scenario file, a machine file, or a folder with a machine.yaml; which of them is told by its keys.
+    """Read a scenario file, a machine file, or a folder with a machine.yaml; which of them is known by its keys.
 
     `overrides` as for load(); for a machine, with or without "machine." ahead. Raises InputError like load().
     """

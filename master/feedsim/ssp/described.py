@@ -35,10 +35,10 @@ def text(scenario: Scenario) -> str:
     axes = {}
     for name, axis in machine["axes"].items():
         axes[name] = {key: axis[key] for key in own}
-        for role in ("drive", "friction"):  # of another maker's unit what is recorded, which no connection tells
+        for role in ("drive", "friction"):  # of another maker's unit what is recorded, which no connection shows
             kept = {key: axis[role][key] for key in ("identified", "outputs") if axis[role].get(key)}
             axes[name] |= {role: kept} if kept else {}
-    # The parameters of a shipped drive tell the others.
+    # The parameters of a shipped drive show the others.
     shipped = any(isinstance(axis.drive, Drive) for axis in scenario.machine.axes.values())
     told = ("interpolation",) if shipped else ("control", "position", "interpolation")
     whole["machine"] = {

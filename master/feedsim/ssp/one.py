@@ -1,4 +1,4 @@
-"""An SSP file of one component, the machine as one unit: written, and its parts told apart where it is read."""
+"""An SSP file of one component, the machine as one unit: written, and its parts separated where it is read."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Opened:
 
     Attributes:
         path: the SSP file.
-        program: the setpoints of the file's own table; its segments are the motions, where the annotation tells them.
+        program: the setpoints of the file's own table; its segments are the motions, where the annotation shows them.
         fmus: folder with the file's own archives.
         warnings: what a user should know, a sentence each.
         sources: place in that folder -> what the archive there is called in the file.

@@ -16,7 +16,7 @@ from feedsim.ssp.xml import append_units, read_units
 
 # The same name in every set of a file: ecos asks for the sets of one name, in whichever component they are.
 SET_NAME = "parameters"
-MOST_PROBLEMS = 20  # told at once
+MOST_PROBLEMS = 20  # reported at once
 _XML_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?INF|NaN")  # of XML Schema
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 

@@ -26,10 +26,10 @@ from feedsim.ssp.values import start_value
 
 FILTER_NAMES = {number: name for name, number in reversed(FILTER_TYPES.items())}
 MODES_RESOURCE, SETPOINTS_RESOURCE = "modes.csv", "setpoints.csv"  # beside the scenario's data
-# What the annotation may tell at its top.
+# What the annotation may show at its top.
 OWN_KEYS = ("name", "note", "machine", "motions", "coupling", "recording", "logging", "evaluate")
 MAX_ANNOTATION_DEPTH = 50  # levels of the annotation; a scenario has some 10
-MARGIN = 1e-3  # m, that an axis may travel beyond its setpoints where nobody tells how far
+MARGIN = 1e-3  # m, that an axis may travel beyond its setpoints where nobody shows how far
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def cycles(
     step: float | None,
     where: str,
 ) -> tuple[float, float, str]:
-    """T_c and T_pos [s], and where T_c comes from if no shipped drive tells it, else nothing.
+    """T_c and T_pos [s], and where T_c comes from if no shipped drive shows it, else nothing.
 
     Other drives have parameters of their own. The annotation knows then, or else the table is played once in a position
     cycle, and T_c is the step that the file advises, or a drive's archive.
@@ -284,7 +284,7 @@ def _shipped_drive(parts: Parts, control: str) -> dict[str, Any]:
 
 
 def _foreign(parts: Parts, component: str, role: Role, told: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A component that is no shipped unit. The wiring tells what is exchanged, the annotation what else is recorded."""
+    """A component that is no shipped unit. The wiring shows what is exchanged, the annotation what else is recorded."""
     archive, signals = parts.archives[component], parts.roles.foreign[component]
     recorded = {
         signal: name
@@ -315,7 +315,7 @@ def _group(parts: Parts, component: str, leave: tuple[str, ...] = ()) -> dict[st
 
 
 def _pitch(I_P: float, told: Any) -> str:
-    """A pitch whose lead is I_P [m/rad] to the last bit, if there is one; the one that was told, where it still is."""
+    """A pitch whose lead is I_P [m/rad] to the last bit, if there is one; the one that was shown, where it still is."""
     near = 2 * pi * I_P
     candidates = [near, nextafter(near, inf), nextafter(near, -inf)]
     if isinstance(told, str):
@@ -333,7 +333,7 @@ def _seen_pitch(table: Table, setpoint: str) -> float:
 
 
 def _limits(table: Table, setpoint: str, x_0: float) -> dict[str, Any]:
-    """Limits of an axis that nobody tells: those that its setpoints reach."""
+    """Limits of an axis that nobody shows: those that its setpoints reach."""
     x_s = np.append(table.x_s[setpoint], x_0)
     speed = np.abs(np.diff(x_s[:-1])) / table.cycle
     acceleration = np.abs(np.diff(x_s[:-1], 2)) / table.cycle**2

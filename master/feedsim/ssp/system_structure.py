@@ -63,7 +63,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Structure:
-    """A system. `step` [s] is for libcosim and OMSimulator, and for files whose drives tell no control cycle;
+    """A system. `step` [s] is for libcosim and OMSimulator, and for files whose drives show no control cycle;
     `scenario` is the content of the annotation of that name."""
 
     name: str

@@ -87,7 +87,7 @@ class SparseFactor:
         return np.asarray(scale * self._lu.solve(scale * right))
 
     def eigenvalues_below(self) -> int | None:
-        """How many eigenvalues of (K, M) lie below sigma; None where the factorisation does not tell.
+        """How many eigenvalues of (K, M) lie below sigma; None where the factorisation does not show.
 
         It does not where a pivot had to be taken off the diagonal, or where the pivots on it lost too many digits.
         """

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from feedsim.cache import digest
 
-# What tells a file from a later one of the same name.
+# What separates a file from a later one of the same name.
 State = tuple[int, int, int]
 # What solutions of a structure follow from besides its file: the rooms of structures, solved and described.
 CODE = (Path(__file__).parent, Path(__file__).parents[1] / "scenario" / "structure")

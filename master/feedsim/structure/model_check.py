@@ -1,7 +1,7 @@
 """Checks of a finite-element model before it is solved: whether it can be a machine, each fault with its own message.
 
 Cheap beside solving: products with the sparse matrices, no dense matrix, and factorisations of small parts only. What
-only the solution can tell stays with it: how many rigid modes there are, and negative stiffness too small to show here.
+only the solution can show stays with it: how many rigid modes there are, and negative stiffness too small to show here.
 """
 
 from __future__ import annotations

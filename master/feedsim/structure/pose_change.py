@@ -164,7 +164,7 @@ class ModesOverAxis:
 
 
 def over_axis(machine: Machine, axis: str, positions: Sequence[float]) -> ModesOverAxis | None:
-    """What :func:`pose_change` would find at ends of a motion (P,) [m]; None where no structure file tells of them."""
+    """What :func:`pose_change` would find at ends of a motion (P,) [m]; None where no structure file describes them."""
     if machine.structure is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""Rigid modes: told from elastic ones, counted against the axes, made exact and given a definite basis."""
+"""Rigid modes: separated from elastic ones, counted against the axes, made exact and given a definite basis."""
 
 from __future__ import annotations
 

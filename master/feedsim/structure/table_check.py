@@ -24,8 +24,8 @@ SAME_FREQUENCY = 1e-3
 def table_mismatch(machine: Machine) -> str | None:
     """A sentence where the table of modes is not that of the machine's pose by its structure; None where it is.
 
-    None as well where it cannot be told: no structure, matrices (of one pose, and costly to solve), or a structure that
-    is faulty, which who needs it will say.
+    None as well where it cannot be shown: no structure, matrices (of one pose, and costly to solve), or a structure
+    that is faulty, which who needs it will say.
     """
     if machine.structure is None:
         return None

@@ -2,7 +2,7 @@
 
 A batch takes about half a second: many short runs or one long one, so that handing over costs little; towards the end
 they get smaller, so that the workers end together. Tasks whose worker has died are run once more, one at a time, and at
-last with nothing else under way: the one that kills its worker is told from those that were in its company.
+last with nothing else under way: the one that kills its worker is separated from those that were in its company.
 """
 
 from __future__ import annotations

@@ -127,7 +127,7 @@ class Workplace:
         try:
             moved = {}
             for i, (name, content) in enumerate(files.items()):
-                # A folder for each, so that no two names collide, and the file's own name, which messages tell.
+                # A folder for each, so that no two names collide, and the file's own name, which messages show.
                 file = folder / "files" / f"{i}" / re.split(r"[/\\]", name)[-1]
                 file.parent.mkdir(parents=True)
                 file.write_bytes(content)
@@ -146,7 +146,7 @@ class Workplace:
         self._unpacked = re.compile(rf"{re.escape(str(Path(tempfile.gettempdir()) / PREFIX))}\w+[/\\]?")
 
     def run(self, task: Task) -> Outcome:
-        """Make a run. Whatever goes wrong is told in the outcome, but for MemoryError: the machine's fault."""
+        """Make a run. Whatever goes wrong is reported in the outcome, but for MemoryError: the machine's fault."""
         begun = time.perf_counter()
         try:
             figures, warnings = self._figures(task)

@@ -21,7 +21,7 @@ JOIN = 30.0  # s that a scheduler without workers has to get one
 _ONE_THREAD = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")}
 _QUIET = {
     "distributed.worker.profile.enabled": False,  # samples the stack 100 times a second
-    "distributed.admin.tick.limit": "1 h",  # does not tell that a run has held the interpreter
+    "distributed.admin.tick.limit": "1 h",  # does not say that a run has held the interpreter
     "distributed.admin.low-level-log-length": 100,  # what Dask notes of each batch, some 10 kB, would reach 1000
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
@@ -86,7 +86,7 @@ def local(workers: int) -> Iterator[Any]:
 def remote(address: str, say: Callable[[str], None] | None = None) -> Iterator[Any]:
     """A client of the scheduler at `address`, which has one worker at the least.
 
-    say: told when workers have to be waited for.
+    say: called when workers have to be waited for.
 
     Raises:
         InputError: no address, no scheduler answers there, or it has no workers.
@@ -121,7 +121,7 @@ def remote(address: str, say: Callable[[str], None] | None = None) -> Iterator[A
 
 
 def _check_address(address: str) -> None:
-    """Dask takes half a minute to find out that there is no port, and then tells of itself."""
+    """Dask takes half a minute to find out that there is no port, and then reports it."""
     found = re.fullmatch(r"(?:[a-z][a-z0-9+]*://)?(?:\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]]+):(\d+)/?", address)
     if found is None or not 0 < int(found[1]) < 1 << 16:
         raise InputError(f"{address!r} is no address of a scheduler; an address reads tcp://host:8786, with its port")
@@ -140,7 +140,7 @@ def _end(cluster: Any) -> None:
 
 @contextmanager
 def _muted() -> Iterator[None]:
-    """Dask tells at length of what the engine deals with itself: workers that die, connections that close."""
+    """Dask writes at length of what the engine deals with itself: workers that die, connections that close."""
     loggers = [logging.getLogger(name) for name in ("distributed", "tornado.application", "asyncio")]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

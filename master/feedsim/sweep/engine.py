@@ -65,7 +65,7 @@ def open_engine(
     Args:
         workers: processes on this machine; 0: runs are made in this process; default: one for each core it may use.
         scheduler: address of the Dask scheduler of a cluster, in place of local processes: "tcp://host:8786".
-        say: told in words when it takes longer: no worker is there yet.
+        say: called with words when it takes longer: no worker is there yet.
 
     Raises:
         InputError: the workers cannot be had, or have another version of feedsim.
@@ -168,7 +168,7 @@ class Crowd:
             flight.cancel()
 
     def refuse(self, worker: str, why: str) -> None:
-        """`worker`, an address, gets no more batches. The first one that cannot take part is told of, as a warning."""
+        """`worker`, an address, gets no more batches. The first one that cannot take part is reported as a warning."""
         if not self.refused:
             warning = f"{why}; it is left out, as others will be, and the study goes on without it"
             _log.warning(warning)

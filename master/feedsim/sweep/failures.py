@@ -1,4 +1,4 @@
-"""Failed runs by message, and the parameters whose values tell where they lie."""
+"""Failed runs by message, and the parameters whose values show where they lie."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ Rows = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Where:
-    """A parameter whose values tell failed runs from those that are done.
+    """A parameter whose values separate failed runs from those that are done.
 
     Attributes:
         parameter: its place in the design.
         values: of the failed runs: those that occur, where `by_level`; else the least and the greatest.
         failed, there: how many of the runs with these values, or between them, failed so, and how many there are.
-        medians: of the failed and of the done runs, where the range does not tell the tendency; else None.
+        medians: of the failed and of the done runs, where the range does not show the tendency; else None.
     """
 
     parameter: int
@@ -87,7 +87,7 @@ def levels(values: Array, *, worded: bool = False) -> Array:
 
 
 def _where(design: Design, runs: NDArray[np.int64], here: Rows, ok: Rows) -> tuple[Where, ...]:
-    """The parameters whose values tell the rows `here` from those that are `ok` by more than chance.
+    """The parameters whose values separate the rows `here` from those that are `ok` by more than chance.
 
     Other failures stay out: what they differ in would be laid at the door of these. Bonferroni's correction for the
     number of parameters and tests.

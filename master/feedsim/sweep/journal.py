@@ -50,7 +50,7 @@ class Journal(Closing):
 
         head: what the runs belong to; `head["parts"]` maps what can differ to its fingerprint. runs: of the study.
         restart: begin anew, whatever is there.
-        first: number of runs -> what tells the first so many of them from others, where the study with fewer runs
+        first: number of runs -> what shows the first so many of them from others, where the study with fewer runs
             consists of just those; its journal is then gone on with.
 
         Raises:
@@ -188,7 +188,7 @@ def _encoded(content: Mapping[str, Any]) -> bytes:
 
 
 def read(path: Path, runs: int) -> Iterator[Outcome]:
-    """What a journal's lines tell, without those that cannot be read."""
+    """What a journal's lines show, without those that cannot be read."""
     with path.open("rb") as file:
         file.readline()
         for line in file:

@@ -69,7 +69,7 @@ def run(
         restart: discard the runs that the folder has.
         format: of the table.
         command: that was given, for the record.
-        say: told in words when something takes longer.
+        say: called with words when something takes longer.
         discard: called when a restart has discarded the runs; takes away what else was made of them.
 
     The folder holds the journal (runs.jsonl), the table and study.json, which says what it comes from. An interrupt, a
@@ -136,7 +136,7 @@ def run(
                 bundle = Bundle.of(study, folder)
                 with open_engine(bundle, workers=workers, scheduler=scheduler, say=say) as engine:
                     made_by, where, processes = engine, engine.where, max(engine.workers, 1)
-                    note(None)  # also of a session that is killed the record tells
+                    note(None)  # also of a session that is killed the record shows
                     unchanged = [] if nominal else [Task(planned.runs, ())]
                     for outcome in engine.map(chain(planned.tasks(journal.missing()), unchanged)):
                         if outcome.run == planned.runs:
@@ -171,7 +171,7 @@ def _nominal(before: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _sessions(before: Mapping[str, Any], resumed: int) -> list[dict[str, Any]]:
-    """The sessions in which the `resumed` runs were made, as the record of the last one tells."""
+    """The sessions in which the `resumed` runs were made, as the record of the last one shows."""
     try:
         told = [dict(each) for each in before["sessions"]] if resumed else []
         for each in told:

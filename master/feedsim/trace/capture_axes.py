@@ -1,4 +1,4 @@
-"""What a capture tells of its axes by its own figures: pitch, direction, units, and why where it tells none.
+"""What a capture shows of its axes by its own figures: pitch, direction, units, and why where it shows none.
 
     POWER = TORQUE times the motor's speed,    motor's speed = 2 pi v / pitch
 
@@ -24,7 +24,7 @@ LEAST_PITCH = 0.9  # mm: below it the positions are in another unit, where the f
 OTHER_LENGTHS = {"in": 25.4, "m": 1000.0}  # unit -> mm
 DEGREES_PER_TURN = 360.0  # deg: what a rotary axis travels with a turn
 FITS = 0.1  # relative residual up to which POWER is TORQUE times a speed
-PITCH_TOLERANCE = 0.01  # relative; a pitch is told to that at best, as the channels are sampled at different instants
+PITCH_TOLERANCE = 0.01  # relative; a pitch is shown to that at best, as the channels are sampled at different instants
 NEAR_WITHOUT = 0.03  # the same where rows had to be left out, of which some beside are touched, too
 # N.m of TORQUE for an A of CURRENT that motors of feed axes with a screw have.
 TORQUE_CONSTANTS = (0.05, 5.0)
@@ -36,13 +36,13 @@ OUTLIER_SHARE = 0.02  # share of the rows that may stand out
 
 @dataclass(frozen=True)
 class CaptureAxis:
-    """What a capture tells of an axis.
+    """What a capture shows of an axis.
 
     Attributes:
         number: the control's, behind the bar of its signals. name: in the header, such as "Y1".
-        pitch: travel per motor turn in mm (deg of a rotary axis), positive; None where its motion does not tell.
-        sign: of TORQUE and CURRENT in the direction of the position; 0 where its motion does not tell.
-        rotary: its positions are degrees, as far as its motion tells.
+        pitch: travel per motor turn in mm (deg of a rotary axis), positive; None where its motion does not show.
+        sign: of TORQUE and CURRENT in the direction of the position; 0 where its motion does not show.
+        rotary: its positions are degrees, as far as its motion shows.
         length: unit of its positions. torque: unit of its TORQUE, "" where CURRENT contradicts N.m.
         doubts: what is the matter with its signals. why: the reason where there is no pitch.
     """

@@ -1,6 +1,6 @@
 """MAT files of version 4 to 7, read in Python alone: a damaged one is an error, whatever is damaged.
 
-Read are numbers, and structures of them; all else that a file may hold is told as what it is. Formats: "MAT-File
+Read are numbers, and structures of them; all else that a file may hold is reported as what it is. Formats: "MAT-File
 Format", The MathWorks (versions 4 and 5; 7 is 5 with variables that zlib has deflated).
 """
 

@@ -33,7 +33,7 @@ class Recording:
     Attributes:
         path: the file.
         names: its columns: of a CSV file without their units, of a MAT file its vectors, rows and columns alike.
-        units: column -> unit as the header has it; "" where it tells none, as always in MAT files.
+        units: column -> unit as the header has it; "" where it shows none, as always in MAT files.
         scalars: numbers that stand beside the columns (MAT).
         axes: of a capture, whose columns are called NAME|number of the axis; empty for other files.
         marks: what the control did, and when (capture).
@@ -103,7 +103,7 @@ class Recording:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Look into a CSV file, a MAT file (told by its ending .mat) or a control's capture (.json).
+    """Look into a CSV file, a MAT file (shown by its ending .mat) or a control's capture (.json).
 
     Raises InputError: what read_csv() and read_capture() refuse; a MAT file that is not there or is none, one of
     version 7.3, which is HDF5, or one without a vector of real numbers.
@@ -168,7 +168,7 @@ def convert(path: str | Path, columns: Sequence[tuple[str, str, str]], out: str 
     """Write columns of a recording as a CSV trace and return the trace.
 
     columns  (variable, new name, unit); the first must be the time (name "time", any unit of time). Values whose unit
-             the file tells are converted to that unit; others are taken to be in it. A variable inside a structure of
+             the file shows are converted to that unit; others are taken to be in it. A variable inside a structure of
              a MAT file is "structure.field". Empty: all columns, as the file calls them.
 
     Raises InputError: what read_recording() refuses, a variable that is missing (with those there are), no vector of

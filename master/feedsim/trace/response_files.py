@@ -115,7 +115,7 @@ def read_response_csv(path: str | Path, *, columns: Mapping[str, Sequence[str]] 
     """Read frequency responses.
 
     columns    response -> its columns of magnitude, phase and perhaps coherence, by name without unit; default: what
-               the names of the columns tell
+               the names of the columns show
 
     The frequency is called "frequency", "freq" or "f" in any case, else it is a first column whose unit is a frequency.
     Frequencies are converted to Hz (a first row of 0 Hz is left out), phases to rad, dB to values; the unit of
@@ -144,7 +144,7 @@ def read_response_csv(path: str | Path, *, columns: Mapping[str, Sequence[str]] 
 
 
 def _by_name(table: Table, at: int, file: str) -> dict[str, dict[str, int]]:
-    """Responses that the columns' names tell; columns of other names are left alone."""
+    """Responses that the columns' names show; columns of other names are left alone."""
     found: dict[str, dict[str, int]] = {}
     for i, column in enumerate(table.names):
         match = _COLUMN_NAME.fullmatch(column)

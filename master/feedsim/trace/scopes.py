@@ -20,7 +20,7 @@ from feedsim.files import regular
 from feedsim.files.spellings import known_unit, spelled
 from feedsim.trace.trace import Array
 
-SCOPE_BYTES = 65536  # bytes within which a file tells what it is
+SCOPE_BYTES = 65536  # bytes within which a file shows what it is
 # Rows of a TwinCAT header; they repeat their key ahead of every column of time.
 KEYS = frozenset({
     "Name", "SymbolName", "SymbolComment", "NetId", "NetID", "Port", "IndexGroup", "IndexOffset", "Data-Type",
@@ -38,7 +38,7 @@ MAX_PERIOD_DIGITS = 12  # digits of halscope's sampling period in ns: 1000 s
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Columns of one length, "time" [s] among them, their units ("" where none is told), what a reader should know."""
+    """Columns of one length, "time" [s] among them, their units ("" where none is shown), what a reader should know."""
 
     columns: Mapping[str, Array]
     units: Mapping[str, str]

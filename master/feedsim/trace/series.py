@@ -1,6 +1,6 @@
 """Results of any simulator: like traces, but time may stand still at events, and values may be missing.
 
-What `read_csv` refuses for good reason where numbers are calculated with, is read here and told: rows at one instant,
+What `read_csv` refuses for good reason where numbers are calculated with, is read here and shown: rows at one instant,
 empty cells, NaN and infinities, columns of text, array names such as `x[3]`, units in round brackets.
 """
 
@@ -72,7 +72,7 @@ def read_series(path: str | Path, *, time: str | None = None) -> Series:
     """Read the CSV file of any simulator; layout, separators and decimal marks as `read_csv`.
 
     time   name of the time column, or NAME:UNIT where there is no column of that whole name and the header does not
-           tell the unit (default s); default "time" or "t" in any case, else a first column whose unit is a time
+           show the unit (default s); default "time" or "t" in any case, else a first column whose unit is a time
 
     True and false are 1 and 0. Raises InputError with file and line: layout, time that runs back or is missing, a unit
     of the time that is not the header's.

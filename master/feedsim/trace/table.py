@@ -59,7 +59,7 @@ class Table:
         if self._values is not None:
             self._values[:, first:last] = block
         elif self._file is not None:
-            # Written, not mapped: a full disk is then an error that can be told, not the end of the process.
+            # Written, not mapped: a full disk is then an error that can be shown, not the end of the process.
             try:
                 for i, values in enumerate(block):
                     self._file.seek(8 * (i * self.rows + first))

@@ -1,6 +1,6 @@
 """Kinds of friction compensation, and how their values are found on a simulated machine.
 
-pulse, pulse_characteristic: amplitude and time constant enter a run once each, so that a grid of runs over both tells
+pulse, pulse_characteristic: amplitude and time constant enter a run once each, so that a grid of runs over both shows
 the error of every circle for any characteristic: peak and dip are close to straight lines in the amplitude. The search
 itself is on that grid, from many starts, and costs no runs. table: Gauss-Newton on the contour would need its samples;
 the torques are found by coordinate steps on the errors, for both axes in the same runs. model: nothing to find, the

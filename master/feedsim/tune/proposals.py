@@ -287,7 +287,7 @@ def _backlash(machine: Machine, term: Term) -> Iterator[Proposal]:
 
 
 def _unknown(diagnosis: Diagnosis, term: Term) -> Iterator[Proposal]:
-    """What a circle alone tells: directions, and amounts that need no machine."""
+    """What a circle alone shows: directions, and amounts that need no machine."""
     first, second = diagnosis.circle.axes
     if term.key == "servo":
         late, early = (first, second) if term.value > 0 else (second, first)

@@ -90,7 +90,7 @@ class Diagnosis:
     Attributes:
         circle, senses: what was tested, and in which senses.
         G: largest less smallest radial deviation of all turns [m].
-        terms: those that are told from zero first, by how much G falls without them, then by their size.
+        terms: those that are separated from zero first, by how much G falls without them, then by their size.
         peaks: of all reversals, in the order of the turns.
         vibrations: the strongest of each axis that stands out, of the radius where only that is known.
         lag: the part of the mean radius that the loops' response makes [m]; None where the drives are not known.
@@ -123,7 +123,7 @@ class Diagnosis:
     rest: tuple[tuple[Array, Array], ...]
 
     def __getitem__(self, key: str) -> Term:
-        """The term "servo", or "lost_motion X"; KeyError where the turns do not tell it."""
+        """The term "servo", or "lost_motion X"; KeyError where the turns do not determine it."""
         for term in self.terms:
             if key == f"{term.key} {term.axis}".strip():
                 return term
@@ -320,7 +320,7 @@ def _peaks(circle: CircleUnderTest, found: Fit, k: int, sense: int) -> list[Peak
         own = np.flatnonzero(found.reversal[k] == which)
         own = own[np.argsort(found.since[k][own])]
         # Between two samples nobody knows on which side of a step of lost motion one is; nor within the angle from the
-        # point that is told to the one that an ellipse makes of it, as instruments write the one or the other.
+        # point that is given to the one that an ellipse makes of it, as instruments write the one or the other.
         own = own[np.abs(found.since[k][own]) > 1.5 * per_sample + ellipse]
         if len(own) < 5 * wide:
             peaks.append(nothing)

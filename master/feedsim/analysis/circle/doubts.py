@@ -1,7 +1,7 @@
 """What is the matter with a recorded circle before anything is diagnosed in it: a wrong unit, radius or feed, samples
 that are missing, stand out alone, or come from a scale that is too coarse or at its end.
 
-A radius or feed that contradicts the record is refused; the rest is said, as somebody at the machine can tell best.
+A radius or feed that contradicts the record is refused; the rest is said, as somebody at the machine knows best.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ class Undone:
 
 
 def enough_pitches(circle: CircleUnderTest, axis: str) -> bool:
-    """Whether the circle is large enough to tell an error that repeats with the pitch of ``axis``."""
+    """Whether the circle is large enough to determine an error that repeats with the pitch of ``axis``."""
     return axis in circle.pitch and 2 * circle.radius >= PITCHES * circle.pitch[axis]
 
 
@@ -153,7 +153,7 @@ def displacements(
 def columns_of(
     circle: CircleUnderTest, undone: Undone, sense: int, both: bool, values: Mapping[str, float]
 ) -> dict[str, Array]:
-    """Radial deviation for 1 m of every term; ``both`` senses are there to tell a delay from an angle."""
+    """Radial deviation for 1 m of every term; ``both`` senses are there to separate a delay from an angle."""
     angle = undone.angle
     along = np.cos(angle), np.sin(angle)
     found = {"offset_0": along[0], "offset_1": along[1], "radius": np.ones_like(angle), "scale": np.cos(2 * angle)}

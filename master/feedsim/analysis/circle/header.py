@@ -48,7 +48,7 @@ def own_format(path: Path) -> None:
 
 
 def told_ahead(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
-    """Of "radius" [m] and "feed" [m/s] those that lines tell, and words of those that they do not tell clearly."""
+    """Of "radius" [m] and "feed" [m/s] those that lines give, and words of those that they do not give clearly."""
     found: dict[str, float] = {}
     notes: list[str] = []
     for line in lines:
@@ -77,7 +77,7 @@ def told_ahead(lines: Sequence[str]) -> tuple[dict[str, float], list[str]]:
 
 
 class Told:
-    """What the headers of several files tell of one circle. given: what is known without them; notes, doubts: words."""
+    """What the headers of several files give of one circle. given: what is known without them; notes, doubts: words."""
 
     def __init__(self, radius: float | None, feed: float | None) -> None:
         self._given = {"radius": radius, "feed": feed}

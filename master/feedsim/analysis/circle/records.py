@@ -37,7 +37,7 @@ WAYS = {
     -1: ("cw", "clockwise", "uhrzeigersinn", "horaire"),
 }
 RADII = ("radius", "r", "length", "ballbar length", "radius length", "rayon")
-LEAST_RADIUS = 1e-3  # [m]; where a name does not tell, what is never less is a radius and no deviation
+LEAST_RADIUS = 1e-3  # [m]; where a name does not say, what is never less is a radius and no deviation
 TIME_COLUMNS = ("time", "t", "zeit", "temps")
 # The angle has turned round where it goes back by this [rad]: less is noise at rest.
 TURNED_ROUND = math.radians(10)
@@ -47,7 +47,7 @@ CLOSED = 0.01
 RESTING = 0.05
 # Turns whose feeds differ by more than this share are of different circles: path lag and peaks grow with the feed.
 SAME_FEED = 0.02
-# A turn needs so many samples for its parts to be told apart.
+# A turn needs so many samples for its parts to be separated.
 MIN_TURN_SAMPLES = 180
 
 

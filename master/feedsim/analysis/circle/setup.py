@@ -3,11 +3,11 @@
 A guide that bends moves the other axis: by s (x/R)^2 in second order, which is s/4 (sin phi + sin 3 phi) in the radius,
 the first part of it a shift of the centre. In third order, by t ((x/R)^3 - (x/R)/2), which is t/8 sin 4 phi; the same
 of the other guide has the other sign, so one circle shows the difference of both alone. The sum is an angle between
-the axes: it is part of the squareness, and another radius tells it from that.
+the axes: it is part of the squareness, and another radius separates it from that.
 
 Angles that are off by a constant turn every term, which nothing shows but the places where the axes reverse. There the
 deviation has an edge, of lost motion or friction. Written angle minus place is a + s b, where s is the sense of the
-motion and b how far behind a reversal friction shows: both directions together tell a. Start reading at
+motion and b how far behind a reversal friction shows: both directions together determine a. Start reading at
 angle_offset().
 """
 

@@ -38,7 +38,7 @@ def answer(diagnosis: Diagnosis) -> str:
 
 
 def causes(diagnosis: Diagnosis) -> list[tuple[Term, str]]:
-    """Every term with its sentence, those that are told from zero first, by how much G falls without them."""
+    """Every term with its sentence, those that are separated from zero first, by how much G falls without them."""
     return [(term, sentence(diagnosis, term)) for term in diagnosis.terms]
 
 
@@ -124,7 +124,7 @@ def sentence(diagnosis: Diagnosis, term: Term) -> str:
 
 
 def further(diagnosis: Diagnosis) -> list[str]:
-    """What one cannot tell from these turns, and which circle would: radius, feed or direction."""
+    """What one cannot determine from these turns, and which circle would: radius, feed or direction."""
     circle = diagnosis.circle
     if diagnosis.angles is None:
         return []

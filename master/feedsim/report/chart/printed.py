@@ -197,7 +197,7 @@ def _band(axes: Axes, band: Band, across: Range, up: Range) -> None:
 
 
 def _shapes(chart: Chart) -> dict[str, str]:
-    """Large dots of several names are told apart without colours, too."""
+    """Large dots of several names are separated without colours, too."""
     panels = [part for part in chart.panels if isinstance(part, Panel)]
     names = dict.fromkeys(
         curve.name for panel in panels for curve in panel.curves if curve.dots and curve.width >= THICK

@@ -96,7 +96,7 @@ def ticks(axis: Axis, span: Range, most: float) -> Iterator[tuple[float, str]]:
 
 
 def _digits(at: float, step: float) -> int:
-    """As many as tell a tick from the next one."""
+    """As many as separate a tick from the next one."""
     return max(6, math.floor(math.log10(abs(at) or step)) - math.floor(math.log10(step) + 1e-9) + 1)
 
 

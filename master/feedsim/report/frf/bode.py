@@ -107,7 +107,7 @@ def bode_chart(
 ) -> Chart:
     """Magnitude and, unless it is left out, phase of all columns, and the coherence of what was measured.
 
-    told: what is marked, by the columns' titles. span: frequencies shown [Hz]; those of the curves by default. floor:
+    shown: what is marked, by the columns' titles. span: frequencies shown [Hz]; those of the curves by default. floor:
     lowest magnitude shown, in display units.
     """
     span = span or span_of(columns)

@@ -159,8 +159,8 @@ def _pictures(
 ) -> list[Picture]:
     """A picture per group of columns.
 
-    title: {} in it are the names of the columns. told: what is marked in a column, by its name and its first curve. of:
-    what the columns are.
+    title: {} in it are the names of the columns. shown: what is marked in a column, by its name and its first curve.
+    of: what the columns are.
     """
 
     def picture(part: Columns, name: str) -> Picture:

@@ -102,7 +102,7 @@ def _delivered(found: Identification, stage: Stationary) -> list[Curve]:
     a load that asymmetry stands for would look like a misfit.
     """
     values = {name: each.value for name, each in found.estimates.items()}
-    # A load that no stage tells is not in the set; it is taken off the curve in any case.
+    # A load that no stage shows is not in the set; it is taken off the curve in any case.
     values.setdefault("M_0", 0.0)
     first = stage.estimates.get("M_0")
     more = values["M_0"] - first.value if first is not None else 0.0

@@ -14,7 +14,7 @@ from feedsim.report.style import RECORDED, RESIDUAL_COLOUR, SIMULATED, Array
 from feedsim.trace import Mark
 
 SHOWN_UNITS = {"m": (1e6, "µm"), "rad/s": (TO_RPM, "rpm"), "N.m": (1.0, "N·m")}
-MOST_MARKS = 25  # lines in a picture that can still be told apart
+MOST_MARKS = 25  # lines in a picture that can still be separated
 MOST_NAMES, MAX_NAME_CHARACTERS = 9, 16  # names of them side by side in a panel, and their characters
 
 

@@ -1,4 +1,4 @@
-"""What the report on a study tells: parameters and figures in people's units, failures by message, sensitivities.
+"""What the report on a study shows: parameters and figures in people's units, failures by message, sensitivities.
 
 The measure of sensitivity is the one that the runs allow: Sobol indices, shares of a grid, or rank correlations.
 """
@@ -127,7 +127,7 @@ class Output(Column):
 
 
 class Account:
-    """A study with its table, ready to be told. record: how the runs were made, as study.json holds it."""
+    """A study with its table, ready to be shown. record: how the runs were made, as study.json holds it."""
 
     def __init__(self, table: Table, study: Study, design: Design, record: Mapping[str, Any] | None = None) -> None:
         self.table, self.study, self.design = table, study, design
@@ -246,7 +246,7 @@ class Account:
         return failures(self.table, self.design)
 
     def where(self, failure: Failure) -> str:
-        """Where runs that failed alike lie; empty where no parameter tells."""
+        """Where runs that failed alike lie; empty where no parameter shows."""
         return "; ".join(map(self._place, failure.where))
 
     def _place(self, where: Where) -> str:

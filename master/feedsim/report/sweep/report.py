@@ -35,8 +35,8 @@ METHODS = {
     "sensitivity": "samples for Sobol indices",
 }
 MOST_FAILURES = 50  # kinds
-MOST_ANSWERS = 4  # figures that are told first
-MIN_NAMED_SHARE = 0.05  # share of the scatter, from which a parameter is told to move a figure
+MOST_ANSWERS = 4  # figures that are shown first
+MIN_NAMED_SHARE = 0.05  # share of the scatter, from which a parameter is said to move a figure
 EDGE = 0.01  # share of a parameter's range, up to which a value lies at its end
 MOST_RUNS = 12  # numbers of a kind
 SOBOL_NOTE = (

@@ -17,7 +17,7 @@ NEEDS: dict[Kind, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "normal": (("mean", "deviation"), ("from", "to")),
     "lognormal": (("mean", "deviation"), ("from", "to")),
 }
-# Deviations from the mean beyond which nothing is left: doubles cannot tell the tail's probability any more.
+# Deviations from the mean beyond which nothing is left: doubles cannot represent the tail's probability any more.
 FARTHEST = 8.0
 
 Problem = tuple[Place, str]

@@ -189,8 +189,8 @@ def _sampling(
 
 
 def _pattern_faults(source: Source, entry: StudyFile, base: Base, parameters: Mapping[str, Parameter]) -> list[str]:
-    """What is wrong with the study's `figures`, told before the first run: patterns that no figure's name begins like.
-    No word where the beginnings of the names do not tell.
+    """What is wrong with the study's `figures`, reported before the first run: patterns that no figure's name begins
+    like. No word where the beginnings of the names do not show.
 
     parameters: those that could be read.
     """

@@ -1,4 +1,4 @@
-"""The entries of a study's `parameters`, read with what the scenario tells of their keys: dimension, allowed range."""
+"""The entries of a study's `parameters`, read with what the scenario shows of their keys: dimension, allowed range."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ class Reader:
         return Choice(" ".join(label.split()), number, text, meant)
 
     def _meant(self, keys: tuple[str, ...], value: Source, targets: list[Target]) -> Any:
-        """The plain value with the files that it names in it; faults are told with the lines of the study."""
+        """The plain value with the files that it names in it; faults are reported with the lines of the study."""
         draft = self.base.draft.copy() if keys == ("machine",) else self.base.settled.copy()
         draft.apply((key, value) for key in keys)
         if keys == ("machine",):
